@@ -1,0 +1,1 @@
+"""Spec -> array -> layout -> solid -> files + database."""

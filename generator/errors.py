@@ -1,0 +1,69 @@
+"""What can be wrong with what a person gave us.
+
+::
+
+    GeneratorError        exit code 2
+    ├── SpecError         the YAML file: one or more problems, each with its place
+    ├── ShapeError        a polyhedron or a file that holds one
+    ├── ArrayError        an encoding that cannot be built or does not identify
+    ├── AlphabetError     a symbol that cannot be embossed as asked
+    ├── LayoutError       a face that shows no place, or an array that is full
+    ├── SolidError        a part that cannot be made or did not pass its proof
+    └── DatabaseError     exit code 4: cannot be opened, newer, or holds another object
+
+Every error says what was given, what is allowed, and the way out (`fix`).
+"""
+
+from __future__ import annotations
+
+
+class GeneratorError(Exception):
+    """Base of all errors of `generator`.
+
+    Parameters
+    ----------
+    cause
+        What is wrong, with the value that was given and what is allowed.
+    fix
+        The way out, as an instruction ("set pitch to 5.7 mm or less").
+    place
+        Where: a file, `file:line:column`, or the name of a face.
+    """
+
+    exit_code = 2
+
+    def __init__(self, cause: str, *, fix: str = "", place: str = "") -> None:
+        super().__init__(cause)
+        self.cause = cause
+        self.fix = fix
+        self.place = place
+
+    def __str__(self) -> str:
+        head = f"{self.place}: {self.cause}" if self.place else self.cause
+        return f"{head}; {self.fix}" if self.fix else head
+
+
+class ShapeError(GeneratorError):
+    """A polyhedron is not closed, not planar, not oriented, or a file holds none."""
+
+
+class ArrayError(GeneratorError):
+    """An encoding that cannot be built, decoded, or does not identify its windows."""
+
+
+class AlphabetError(GeneratorError):
+    """A symbol that cannot be embossed as asked: an edge collapses, a gap closes."""
+
+
+class LayoutError(GeneratorError):
+    """A face on which no place can be identified, or an array without free cells."""
+
+
+class SolidError(GeneratorError):
+    """A part that cannot be made, or that did not pass its proof of closure."""
+
+
+class DatabaseError(GeneratorError):
+    """A database that cannot be opened, is newer than this tool, or refuses the object."""
+
+    exit_code = 4

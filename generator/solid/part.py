@@ -1,0 +1,49 @@
+"""The intermediate solid: vertices, planar facets with loops, and what stands on them.
+
+A part is a plain polyhedral body plus embossings. An embossing repeats a few symbol
+outlines (tiers) many times on one facet, so a part with 20,000 symbols stays as small
+as its list of centres; exporters instance each outline instead of repeating geometry.
+Part frame: mm, local origin, as the part lies on the printer's bed (z up).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.alphabet.outline import Tiers
+
+
+@dataclass(frozen=True, slots=True)
+class Facet:
+    """A planar polygon of the body, before its embossing is cut in."""
+
+    name: str
+    loops: tuple[tuple[int, ...], ...]  #: body vertices; outer counter-clockwise seen from outside
+
+
+@dataclass(frozen=True, slots=True)
+class Embossing:
+    """Symbols on one facet; tiers with falling z are engraved instead."""
+
+    facet: int  #: number of the facet in the part
+    face: int | None  #: face of the object, None for marks such as edge numbers
+    T_part_facet: NDArray[np.float64]  #: (4, 4); z outward, the facet lies in z = 0
+    rotation_rad: float  #: of the symbols' x axis in the facet frame
+    centres_mm: NDArray[np.float64]  #: (n, 2) facet frame
+    labels: NDArray[np.int64]  #: (n,) which outline of `tiers`
+    names: tuple[str, ...]  #: (n,) name of each symbol, "r12c34"
+    tiers: tuple[Tiers, ...]  #: one per label, in the symbol's own axes
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One printable body."""
+
+    name: str
+    vertices: NDArray[np.float64]  #: (V, 3) mm, part frame; the body alone
+    facets: tuple[Facet, ...]
+    embossings: tuple[Embossing, ...]
+    T_object_part: NDArray[np.float64]  #: (4, 4)
