@@ -1,1 +1,35 @@
-"""placeholder"""
+"""Pseudo-random arrays: which symbol stands in which cell, and what a window tells.
+
+Definition -> array -> labels. Thesis chapter 5. `profile` names ready choices, `array_from`
+takes an explicit encoding; both give a `SymbolArray` (`contract`).
+
+    factor, residue, torus        integers, GF(p)[x]/H, indices on a cycle
+    field, polynomial, notation   GF(q), polynomials over it and how they are written
+    primitive, size               polynomials on file, folds that decode
+    sequence                      PRBS, PRMVS
+    fold                          PRBA, PRMVA
+    product                       PRPA, PRMVPA
+    window                        minimum distance, unique windows
+    definition, profiles          arrays by plain values and by name
+"""
+
+from generator.array.contract import Labels, SymbolArray
+from generator.array.definition import array_from
+from generator.array.fold import FoldedArray
+from generator.array.product import ProductArray
+from generator.array.profiles import DEFAULT_PROFILE, PROFILES, Profile, enlarged, profile
+from generator.array.sequence import Sequence
+
+__all__ = [
+    "DEFAULT_PROFILE",
+    "PROFILES",
+    "FoldedArray",
+    "Labels",
+    "ProductArray",
+    "Profile",
+    "Sequence",
+    "SymbolArray",
+    "array_from",
+    "enlarged",
+    "profile",
+]

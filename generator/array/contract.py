@@ -59,6 +59,10 @@ class SymbolArray(Protocol):
         """Whether the cells together name their place: the rank test."""
         ...
 
+    def minimum_distance(self, rows: ArrayLike, columns: ArrayLike) -> int:
+        """Return in how many of these cells two places differ at least; 0 if some look alike."""
+        ...
+
     def definition(self) -> dict[str, Any]:
         """Return the plain values (JSON) from which `array_from` makes this array again."""
         ...

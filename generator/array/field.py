@@ -1,0 +1,197 @@
+"""GF(q) for every prime power q: labels and exact tables.
+
+Labels 0 ... q - 1 name the elements. Prime q: the integers modulo q. Extension q = p^m:
+0 is 0 and k >= 1 is A^(k - 1), A a root of a primitive polynomial over GF(p). For 4, 8, 9
+it is the thesis's (the relations under table 5.3); it is Conway's for these and all others
+up to 256, and beyond that the first primitive one by the value of its coefficients.
+
+    thesis    4: A^2+A+1     8: A^3+A+1     9: A^2+2A+2
+    others   16: A^4+A+1    25: A^2+4A+2   27: A^3+2A+1   and so on, `MINIMAL_POLYNOMIALS`
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import product
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from generator.array.factor import period_factors, prime_power
+from generator.array.residue import Residues
+from generator.errors import ArrayError
+
+Labels = NDArray[np.int64]
+
+LARGEST_FIELD = 1024  #: elements: tables of q^2 labels
+
+#: A's minimal polynomial over GF(p), coefficients from A^0 upwards.
+MINIMAL_POLYNOMIALS: dict[int, tuple[int, ...]] = {
+    4: (1, 1, 1),
+    8: (1, 1, 0, 1),
+    9: (2, 2, 1),
+    16: (1, 1, 0, 0, 1),
+    25: (2, 4, 1),
+    27: (1, 2, 0, 1),
+    32: (1, 0, 1, 0, 0, 1),
+    49: (3, 6, 1),
+    64: (1, 1, 0, 1, 1, 0, 1),
+    81: (2, 0, 0, 2, 1),
+    121: (2, 7, 1),
+    125: (3, 3, 0, 1),
+    128: (1, 1, 0, 0, 0, 0, 0, 1),
+    169: (2, 12, 1),
+    243: (1, 2, 0, 0, 0, 1),
+    256: (1, 0, 1, 1, 1, 0, 0, 0, 1),
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Field:
+    """GF(q) as tables over labels; all arrays are read-only."""
+
+    order: int  #: q
+    characteristic: int  #: p
+    degree: int  #: m, with q = p^m
+    minimal: tuple[int, ...]  #: A's minimal polynomial, from A^0; () for prime q
+    digits: Labels  #: (q, m) coefficients of each element in 1, A, ..., A^(m-1)
+    addition: Labels  #: (q, q)
+    multiplication: Labels  #: (q, q)
+    negative: Labels  #: (q,)
+    inverse: Labels  #: (q,); entry 0 is 0 and has no meaning
+    label_of_code: Labels  #: (q,) label of the element whose digits have the value sum d_i p^i
+
+    def add(self, a: ArrayLike, b: ArrayLike) -> Labels:
+        """Return a + b for labels, broadcast together."""
+        return np.asarray(self.addition[np.asarray(a), np.asarray(b)])
+
+    def subtract(self, a: ArrayLike, b: ArrayLike) -> Labels:
+        """Return a - b for labels, broadcast together."""
+        return np.asarray(self.addition[np.asarray(a), self.negative[np.asarray(b)]])
+
+    def multiply(self, a: ArrayLike, b: ArrayLike) -> Labels:
+        """Return a b for labels, broadcast together."""
+        return np.asarray(self.multiplication[np.asarray(a), np.asarray(b)])
+
+    def labels(self, digits: ArrayLike) -> Labels:
+        """Return the labels of elements given by their digits, (..., m)."""
+        weights = self.characteristic ** np.arange(self.degree)
+        return np.asarray(self.label_of_code[np.asarray(digits, dtype=np.int64) @ weights])
+
+    def matrix(self, label: int) -> Labels:
+        """Return the (m, m) matrix of multiplication: digits(b) @ matrix = digits(b label)."""
+        basis = self.labels(np.eye(self.degree, dtype=np.int64))
+        return np.asarray(self.digits[self.multiplication[basis, label]])
+
+    @property
+    def primitive_labels(self) -> tuple[int, ...]:
+        """Labels of the elements that generate the multiplicative group."""
+        primes = period_factors(self.order, 1)
+        return tuple(a for a in range(1, self.order) if _generates(self, a, tuple(primes)))
+
+
+def field_of_order(order: int, minimal: Sequence[int] | None = None) -> Field:
+    """Return GF(order), the same object for the same arguments.
+
+    Parameters
+    ----------
+    order
+        A prime power from 2 to 1024.
+    minimal
+        Minimal polynomial of A over GF(p), coefficients from A^0 to A^m = 1; the one of
+        `MINIMAL_POLYNOMIALS` by default. Not used for prime orders.
+
+    Raises
+    ------
+    ArrayError
+        If the order is no prime power or too large, or `minimal` is not primitive.
+
+    Examples
+    --------
+    >>> field_of_order(4).add(2, 3)  # A + A^2 = 1
+    array(1)
+    """
+    return _field(order, None if minimal is None else tuple(int(c) for c in minimal))
+
+
+@lru_cache(maxsize=64)
+def _field(order: int, minimal: tuple[int, ...] | None) -> Field:
+    prime, exponent = prime_power(order)
+    if order > LARGEST_FIELD:
+        raise ArrayError(
+            f"GF({order}) is too large: an alphabet has at most {LARGEST_FIELD} symbols",
+            fix=f"take a prime power up to {LARGEST_FIELD}",
+        )
+    if exponent == 1:
+        digits = np.arange(order)[:, None]
+        minimal = ()
+    else:
+        minimal = minimal or MINIMAL_POLYNOMIALS.get(order) or _first_primitive(prime, exponent)
+        digits = _powers_of_a(prime, exponent, minimal)
+    weights = prime ** np.arange(exponent)
+    label_of_code = np.empty(order, dtype=np.int64)
+    label_of_code[digits @ weights] = np.arange(order)
+    addition = np.zeros((order, order), dtype=np.int64)
+    for digit, weight in zip(digits.T, weights, strict=True):
+        addition += (digit[:, None] + digit) % prime * weight
+    addition = label_of_code[addition]
+    negative = label_of_code[-digits % prime @ weights]
+    if exponent == 1:
+        labels = np.arange(order)
+        multiplication = labels[:, None] * labels % order
+        inverse = np.array([pow(a, -1, order) if a else 0 for a in range(order)], dtype=np.int64)
+    else:
+        logarithms = np.arange(order - 1)
+        multiplication = np.zeros((order, order), dtype=np.int64)
+        multiplication[1:, 1:] = (logarithms[:, None] + logarithms) % (order - 1) + 1
+        inverse = np.zeros(order, dtype=np.int64)
+        inverse[1:] = -logarithms % (order - 1) + 1
+    tables = (digits, addition, multiplication, negative, inverse, label_of_code)
+    for table in tables:
+        table.setflags(write=False)
+    return Field(order, prime, exponent, minimal, *tables)
+
+
+def _powers_of_a(prime: int, exponent: int, minimal: tuple[int, ...]) -> Labels:
+    """Return (q, m) digits of 0, 1, A, A^2, ...; checks that A is primitive."""
+    if (
+        len(minimal) != exponent + 1
+        or minimal[-1] != 1
+        or not all(0 <= c < prime for c in minimal)
+        or not Residues(prime, minimal).is_primitive(period_factors(prime, exponent))
+    ):
+        order = prime**exponent
+        usual = MINIMAL_POLYNOMIALS.get(order)
+        raise ArrayError(
+            f"{list(minimal)} is not a primitive polynomial of degree {exponent} over "
+            f"GF({prime}), so it does not make GF({order})",
+            fix=f"take {list(usual)}" if usual else "leave the minimal polynomial out",
+        )
+    ring = Residues(prime, minimal)
+    digits = np.zeros((prime**exponent, exponent), dtype=np.int64)
+    power = ring.powers_of_x[0]
+    for label in range(1, prime**exponent):
+        digits[label] = power
+        power = ring.product(power, ring.powers_of_x[1])
+    return digits
+
+
+def _first_primitive(prime: int, exponent: int) -> tuple[int, ...]:
+    factors = period_factors(prime, exponent)
+    for high in product(range(prime), repeat=exponent):
+        candidate = (*reversed(high), 1)
+        if candidate[0] and Residues(prime, candidate).is_primitive(factors):
+            return candidate
+    raise AssertionError("every field has a primitive polynomial of every degree")
+
+
+def _generates(field: Field, label: int, primes: tuple[int, ...]) -> bool:
+    for prime in primes:
+        power = 1
+        for _ in range((field.order - 1) // prime):
+            power = int(field.multiplication[power, label])
+        if power == 1:
+            return False
+    return True

@@ -1,0 +1,233 @@
+"""PRBA and PRMVA: an m-sequence folded on the torus, A[t mod n1][t mod n2] = s[t].
+
+Any coprime n1 n2 = q^n - 1 serves (the thesis takes n1 = q^k1 - 1, n = k1 k2, figure 5.5).
+With e1 = 1 (mod n1), 0 (mod n2) and e2 the other way round, cell (r, c) has the index
+t = r e1 + c e2 and the field element beta^r gamma^c, beta = x^e1, gamma = x^e2: rows and
+columns are prepared apart, and a symbol is one inner product. Nothing is materialised.
+A set of visible cells names its place if the functionals of its cells have rank n.
+"""
+
+from __future__ import annotations
+
+from math import gcd
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from generator.array.contract import Labels
+from generator.array.notation import written
+from generator.array.residue import Digits, Powers, packed
+from generator.array.sequence import Sequence
+from generator.array.size import no_fold
+from generator.array.torus import on_torus
+from generator.array.window import minimum_distance
+from generator.errors import ArrayError
+
+_CHUNK = 1 << 14  # cells at a time where digits are not packed
+
+
+class FoldedArray:
+    """A folded m-sequence; an unfolded one (PRBS, PRMVS) has one row.
+
+    Parameters
+    ----------
+    sequence
+        The m-sequence, N terms.
+    rows, columns
+        Coprime, rows * columns = N.
+    window
+        Rows and columns of a window that must be unique; the smallest one by default.
+
+    Raises
+    ------
+    ArrayError
+        If the fold is not one, or the window is not unique; the error names one that is.
+    """
+
+    def __init__(
+        self,
+        sequence: Sequence,
+        rows: int,
+        columns: int,
+        window: tuple[int, int] | None = None,
+    ) -> None:
+        if rows < 1 or rows * columns != sequence.period or gcd(rows, columns) != 1:
+            raise no_fold(sequence.field.order, sequence.degree, rows, columns)
+        self.sequence = sequence
+        self._rows, self._columns = rows, columns
+        period = sequence.period
+        self.row_step = columns * pow(columns, -1, rows) % period  #: e1: index of cell (1, 0)
+        self.column_step = rows * pow(rows, -1, columns) % period  #: e2: index of cell (0, 1)
+        ring = sequence.ring
+        self._beta = Powers(ring, ring.power_of_x(self.row_step), rows)
+        self._gamma = Powers(ring, ring.power_of_x(self.column_step), columns)
+        self._window = self._smallest_window() if window is None else self._checked(window)
+
+    def __repr__(self) -> str:
+        return f"FoldedArray({self.sequence!r}, {self.rows}x{self.columns})"
+
+    @property
+    def rows(self) -> int:
+        """Number of rows, n1."""
+        return self._rows
+
+    @property
+    def columns(self) -> int:
+        """Number of columns, n2."""
+        return self._columns
+
+    @property
+    def order(self) -> int:
+        """Number of different symbols, q."""
+        return self.sequence.field.order
+
+    @property
+    def window(self) -> tuple[int, int]:
+        """Rows and columns of the window that is known to be unique."""
+        return self._window
+
+    @property
+    def full_rank(self) -> int:
+        """Rank at which cells name their place, n."""
+        return self.sequence.degree
+
+    @property
+    def family(self) -> str:
+        """One of prbs, prba, prmvs, prmva."""
+        return ("prb" if self.order == 2 else "prmv") + ("s" if self.rows == 1 else "a")
+
+    # --- cells -----------------------------------------------------------------------------
+
+    def symbols(self, rows: ArrayLike, columns: ArrayLike) -> Labels:
+        """Return the labels at cells (rows, columns), broadcast together, on the torus."""
+        field = self.sequence.field
+        r, in_row = _distinct(rows, self.rows)
+        c, in_column = _distinct(columns, self.columns)
+        maps = self.sequence.functionals(self._beta.at(r))  # (rows, m, D)
+        elements = self._gamma.at(c)  # (columns, D)
+        in_row, in_column = np.broadcast_arrays(in_row, in_column)
+        if field.characteristic == 2:
+            masks, words = packed(maps), packed(elements)[in_column]
+            codes = np.zeros(in_row.shape, dtype=np.int64)
+            for digit in range(field.degree):
+                ones = np.bitwise_count(masks[in_row, digit] & words)
+                codes |= (ones & np.uint8(1)).astype(np.int64) << digit
+            return np.asarray(field.label_of_code[codes])
+        return self._summed(maps, elements, in_row.ravel(), in_column.ravel()).reshape(in_row.shape)
+
+    def _summed(
+        self, maps: Digits, elements: Digits, in_row: NDArray[np.intp], in_column: NDArray[np.intp]
+    ) -> Labels:
+        labels = np.empty(in_row.size, dtype=np.int64)
+        for start in range(0, in_row.size, _CHUNK):
+            part = slice(start, start + _CHUNK)
+            sums = np.einsum("kmd,kd->km", maps[in_row[part]], elements[in_column[part]])
+            labels[part] = self.sequence.field.labels(self.sequence.ring.reduced(sums))
+        return labels
+
+    def index(self, row: int, column: int) -> int:
+        """Return the index t of a cell in the sequence."""
+        return (int(row) * self.row_step + int(column) * self.column_step) % self.sequence.period
+
+    def cell(self, index: int) -> tuple[int, int]:
+        """Return the cell (row, column) of index t: (t mod n1, t mod n2)."""
+        return int(index) % self.rows, int(index) % self.columns
+
+    def element(self, row: int, column: int) -> Digits:
+        """Return the field element x^t of a place as (D,) digits, see `Sequence.element`."""
+        return self.sequence.element(self.index(row, column))
+
+    # --- what visible cells tell --------------------------------------------------------------
+
+    def offsets(self, rows: ArrayLike, columns: ArrayLike) -> list[int]:
+        """Return the index of each cell relative to cell (0, 0), flat, as Python integers."""
+        r, c = np.broadcast_arrays(on_torus(rows, self.rows), on_torus(columns, self.columns))
+        return [
+            self.index(a, b) for a, b in zip(r.ravel().tolist(), c.ravel().tolist(), strict=True)
+        ]
+
+    def coefficients(self, rows: ArrayLike, columns: ArrayLike) -> Labels:
+        """Return (k, n) labels c with A[place + cell] = sum_j c_j s[t + j], t the place's index."""
+        return self.sequence.coefficients(self.offsets(rows, columns))
+
+    def functionals(self, rows: ArrayLike, columns: ArrayLike) -> Digits:
+        """Return (k, m, D) digits F with digits(A[place + cell]) = F @ element(place)."""
+        return self.sequence.functionals(self.sequence.element(self.offsets(rows, columns)))
+
+    def rank(self, rows: ArrayLike, columns: ArrayLike) -> int:
+        """Return the rank over GF(q) of a set of visible cells."""
+        offsets = self.offsets(rows, columns)
+        return self.sequence.rank(offset - offsets[0] for offset in offsets)
+
+    def identifies(self, rows: ArrayLike, columns: ArrayLike) -> bool:
+        """Whether the cells together name their place: rank n."""
+        return self.rank(rows, columns) == self.full_rank
+
+    def minimum_distance(self, rows: ArrayLike, columns: ArrayLike) -> int:
+        """Return the least number of these cells in which two places differ; 0: look alike."""
+        distinct = list(dict.fromkeys(self.offsets(rows, columns)))
+        return minimum_distance(self.sequence, distinct, [1] * len(distinct))
+
+    # --- the window --------------------------------------------------------------------------
+
+    def _unique(self, window: tuple[int, int]) -> bool:
+        return self._window_rank(window) == self.full_rank
+
+    def _window_rank(self, window: tuple[int, int]) -> int:
+        return self.rank(np.arange(window[0])[:, None], np.arange(window[1]))
+
+    def _smallest_window(self, at_least: tuple[int, int] = (1, 1)) -> tuple[int, int]:
+        """Fewest cells, at most four times as long as wide: a touch sees a compact patch.
+
+        Of these the most square one, the higher one of two.
+        """
+        for cells in range(self.full_rank, 4 * self.full_rank**2 + 2):
+            shapes = [(cells // b, b) for b in range(1, cells + 1) if cells % b == 0]
+            for a, b in sorted(shapes, key=lambda s: (abs(s[0] - s[1]), s[1])):
+                compact = max(a, b) <= 4 * min(a, b) or a == self.rows or b == self.columns
+                fits = at_least[0] <= a <= self.rows and at_least[1] <= b <= self.columns
+                if compact and fits and self._unique((a, b)):
+                    return a, b
+        return self.rows, self.columns
+
+    def _checked(self, window: tuple[int, int]) -> tuple[int, int]:
+        a, b = window
+        if not (1 <= a <= self.rows and 1 <= b <= self.columns):
+            raise ArrayError(
+                f"a {a}x{b} window does not lie in an array of {self.rows}x{self.columns} cells",
+                fix="take a window of at least 1x1 and at most the array",
+            )
+        rank = self._window_rank(window)
+        if rank < self.full_rank:
+            smallest, larger = self._smallest_window(), self._smallest_window(window)
+            name = written(self.sequence.field, self.sequence.polynomial)
+            raise ArrayError(
+                f"a {a}x{b} window of {name} on {self.rows}x{self.columns} has rank {rank} of "
+                f"{self.full_rank}, so it occurs more than once",
+                fix=f"take {smallest[0]}x{smallest[1]} or {larger[0]}x{larger[1]}",
+            )
+        return a, b
+
+    def definition(self) -> dict[str, Any]:
+        """Return the plain values (JSON) from which `array_from` makes this array again."""
+        found: dict[str, Any] = {"family": self.family, **sequence_definition(self.sequence)}
+        return found | {"rows": self.rows, "columns": self.columns, "window": list(self.window)}
+
+
+def sequence_definition(sequence: Sequence) -> dict[str, Any]:
+    """Return the plain values that make the sequence again."""
+    field = sequence.field
+    found: dict[str, Any] = {"order": field.order, "degree": sequence.degree}
+    if field.degree > 1:
+        found["field"] = list(field.minimal)
+    return found | {
+        "polynomial": list(sequence.polynomial),
+        "initial": list(sequence.initial),
+    }
+
+
+def _distinct(indices: ArrayLike, steps: int) -> tuple[NDArray[np.uint64], NDArray[np.intp]]:
+    on_cycle = on_torus(indices, steps)
+    distinct, place = np.unique(on_cycle.ravel(), return_inverse=True)
+    return distinct, place.reshape(on_cycle.shape)

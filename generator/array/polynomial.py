@@ -1,0 +1,148 @@
+"""Polynomials over GF(q): arithmetic modulo h, order, primitivity. Thesis 5.4.1.
+
+A polynomial is a sequence of labels, coefficient of x^0 first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from itertools import count
+
+import numpy as np
+
+from generator.array.factor import LARGEST_PERIOD, period_factors, prime_factors
+from generator.array.field import Field, Labels
+from generator.array.residue import Residues
+from generator.errors import ArrayError
+
+
+def product(field: Field, a: Sequence[int], b: Sequence[int]) -> tuple[int, ...]:
+    """Return the product of two polynomials."""
+    result = np.zeros(len(a) + len(b) - 1, dtype=np.int64)
+    left = np.asarray(a, dtype=np.int64)
+    for shift, coefficient in enumerate(b):
+        if coefficient:
+            part = result[shift : shift + len(a)]
+            part[:] = field.addition[part, field.multiplication[left, coefficient]]
+    return tuple(result.tolist())
+
+
+def remainder(field: Field, a: Sequence[int], h: Sequence[int]) -> tuple[int, ...]:
+    """Return a modulo the monic polynomial h of degree n, n coefficients."""
+    degree = len(h) - 1
+    modulus = np.asarray(h, dtype=np.int64)
+    result = np.zeros(max(len(a), degree), dtype=np.int64)
+    result[: len(a)] = a
+    for top in range(len(result) - 1, degree - 1, -1):
+        if result[top]:
+            part = result[top - degree : top + 1]
+            factor = field.negative[result[top]]
+            part[:] = field.addition[part, field.multiplication[factor, modulus]]
+    return tuple(result[:degree].tolist())
+
+
+def mulmod(field: Field, a: Sequence[int], b: Sequence[int], h: Sequence[int]) -> tuple[int, ...]:
+    """Return a b modulo the monic polynomial h."""
+    return remainder(field, product(field, a, b), h)
+
+
+def powmod(field: Field, a: Sequence[int], exponent: int, h: Sequence[int]) -> tuple[int, ...]:
+    """Return a^exponent modulo the monic polynomial h, exponent >= 0."""
+    result = remainder(field, (1,), h)
+    for bit in bin(exponent)[2:]:
+        result = mulmod(field, result, result, h)
+        if bit == "1":
+            result = mulmod(field, result, a, h)
+    return result
+
+
+def order(field: Field, h: Sequence[int]) -> int:
+    """Return the least t > 0 with x^t = 1 modulo h, the period of its recurrence.
+
+    h is monic with a constant term; it may be reducible. Slow for large degrees: meant for
+    looking at one polynomial, while `is_primitive` is quick.
+    """
+    checked = monic(field, h)
+    degree = len(checked) - 1
+    one = remainder(field, (1,), checked)
+    lifted = next(
+        field.characteristic**k for k in count() if field.characteristic**k >= degree
+    )  # an irreducible factor may be repeated up to `degree` times
+    primes = set(prime_factors(lifted))
+    bound: int = field.order**degree - 1
+    if powmod(field, (0, 1), bound, checked) != one:
+        bound = lifted
+        for k in range(1, degree + 1):
+            bound *= field.order**k - 1
+    for k in range(1, degree + 1):
+        primes.update(period_factors(field.order, k))
+    for prime in sorted(primes):
+        while bound % prime == 0 and powmod(field, (0, 1), bound // prime, checked) == one:
+            bound //= prime
+    return bound
+
+
+def norm(field: Field, h: Sequence[int]) -> tuple[int, ...]:
+    """Return the product of h and its conjugates: the polynomial over GF(p) of h's roots.
+
+    For a primitive h of degree n it is their minimal polynomial, degree n m, so that GF(q)[x]/h
+    and GF(p)[x]/norm are the same field with the same x.
+    """
+    result: tuple[int, ...] = (1,)
+    conjugate = tuple(h)
+    for _ in range(field.degree):
+        result = product(field, result, conjugate)
+        conjugate = tuple(_frobenius(field, label) for label in conjugate)
+    return tuple(int(digit) for digit in field.digits[list(result), 0])
+
+
+def _frobenius(field: Field, label: int) -> int:
+    if label == 0 or field.degree == 1:
+        return label
+    return (label - 1) * field.characteristic % (field.order - 1) + 1
+
+
+def is_primitive(field: Field, h: Sequence[int]) -> bool:
+    """Whether the monic polynomial h, of degree n, has the period q^n - 1.
+
+    h is primitive over GF(q) exactly if its norm is primitive over GF(p) (same roots).
+    """
+    if len(h) < 2 or h[-1] != 1 or h[0] == 0:
+        return False
+    factors = period_factors(field.order, len(h) - 1)
+    return Residues(field.characteristic, norm(field, h)).is_primitive(factors)
+
+
+def monic(field: Field, h: Iterable[int]) -> tuple[int, ...]:
+    """Return h as a tuple, checked: labels of the field, monic, degree >= 1, h(0) not 0."""
+    labels = tuple(h)
+    if not all(
+        isinstance(c, int | np.integer) and not isinstance(c, bool) and 0 <= c < field.order
+        for c in labels
+    ):
+        raise ArrayError(
+            f"polynomial {list(labels)}: coefficients over GF({field.order}) are the labels "
+            f"0 to {field.order - 1}",
+            fix="give the labels from x^0 upwards, or a text as 'x^2+x+A'",
+        )
+    if len(labels) < 2 or labels[-1] != 1 or labels[0] == 0:
+        raise ArrayError(
+            f"polynomial {list(labels)} cannot drive a shift register: it must have degree 1 or "
+            "more, the highest coefficient 1 and a constant term",
+            fix="list the coefficients from x^0 upwards, the last one being 1",
+        )
+    if field.order ** (len(labels) - 1) - 1 > LARGEST_PERIOD:
+        period_factors(field.order, len(labels) - 1)  # raises with the longest degree
+    return tuple(int(c) for c in labels)
+
+
+def companion_powers(field: Field, h: Sequence[int], number: int) -> Labels:
+    """Return x^0 ... x^(number-1) modulo h as (number, n) labels."""
+    degree = len(h) - 1
+    low = field.negative[np.asarray(h[:-1], dtype=np.int64)]
+    rows = np.zeros((number, degree), dtype=np.int64)
+    rows[0, 0] = 1
+    for k in range(1, number):
+        rows[k, 1:] = rows[k - 1, :-1]
+        rows[k] = field.addition[rows[k], field.multiplication[rows[k - 1, -1], low]]
+    return rows

@@ -1,0 +1,170 @@
+"""PRPA and PRMVPA: a symbol for each pair of terms of two m-sequences.
+
+A[r][c] = law(SR[r], SC[c]), SR down the rows, SC along the columns. Every injective law
+serves; a symbol then gives both factors, and the place is two indices found apart. The
+default law q_c SR + SC is the one of both figures: 5.7 (SX + 2 SY, X along the columns)
+and 5.11 (4 S(i) + label of S(j)). Thesis 5.3 and 5.5.
+
+Where the thesis is wrong as printed: figure 5.11's corner header is swapped, S(i) runs down
+the rows; figure 6.9 pairs two binary x^4+x+1 sequences with figure 5.7's law (both axes, no
+GF(4) sequence, no field product); a window needs max(k1, k2) symbols, one in every row and
+every column, not p + q - 1; and the law must be injective, commutative or not.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from generator.array.contract import Labels
+from generator.array.fold import sequence_definition
+from generator.array.sequence import Sequence
+from generator.array.torus import on_torus
+from generator.array.window import minimum_distance
+from generator.errors import ArrayError
+
+
+class ProductArray:
+    """A product array of two m-sequences.
+
+    Parameters
+    ----------
+    row_sequence, column_sequence
+        SR, one term for each row, and SC, one term for each column.
+    window
+        Rows and columns of the window; the two degrees (the smallest one) by default.
+    law
+        (q_r, q_c) labels of the symbols, each of 0 ... q_r q_c - 1 once;
+        law[a][b] = q_c a + b by default.
+    """
+
+    def __init__(
+        self,
+        row_sequence: Sequence,
+        column_sequence: Sequence,
+        window: tuple[int, int] | None = None,
+        law: ArrayLike | None = None,
+    ) -> None:
+        self.row_sequence = row_sequence
+        self.column_sequence = column_sequence
+        self.law = self._checked_law(law)
+        places = np.argsort(self.law.ravel())
+        q = column_sequence.field.order
+        #: (order, 2) labels of SR and SC for each symbol
+        self.factors: Labels = np.stack([places // q, places % q], axis=1).astype(np.int64)
+        least = (row_sequence.degree, column_sequence.degree)
+        self._window = least if window is None else window
+        a, b = self._window
+        if not (least[0] <= a <= self.rows and least[1] <= b <= self.columns):
+            raise ArrayError(
+                f"a {a}x{b} window of a {self.rows}x{self.columns} product array does not show "
+                f"{least[0]} rows and {least[1]} columns, the degrees of its two sequences",
+                fix=f"take {least[0]}x{least[1]} or larger, within the array",
+            )
+
+    def __repr__(self) -> str:
+        return f"ProductArray({self.row_sequence!r}, {self.column_sequence!r})"
+
+    @property
+    def rows(self) -> int:
+        """Number of rows: the period of SR."""
+        return self.row_sequence.period
+
+    @property
+    def columns(self) -> int:
+        """Number of columns: the period of SC."""
+        return self.column_sequence.period
+
+    @property
+    def order(self) -> int:
+        """Number of different symbols, q_r q_c."""
+        return self.row_sequence.field.order * self.column_sequence.field.order
+
+    @property
+    def window(self) -> tuple[int, int]:
+        """Rows and columns of the window that is known to be unique."""
+        return self._window
+
+    @property
+    def full_rank(self) -> int:
+        """Sum of the two degrees: both factors determined."""
+        return self.row_sequence.degree + self.column_sequence.degree
+
+    @property
+    def family(self) -> str:
+        """Return prpa for two binary sequences, prmvpa otherwise."""
+        binary = self.row_sequence.field.order == self.column_sequence.field.order == 2
+        return "prpa" if binary else "prmvpa"
+
+    def symbols(self, rows: ArrayLike, columns: ArrayLike) -> Labels:
+        """Return the labels at cells (rows, columns), broadcast together, on the torus."""
+        return np.asarray(
+            self.law[self.row_sequence.symbols(rows), self.column_sequence.symbols(columns)]
+        )
+
+    def rank(self, rows: ArrayLike, columns: ArrayLike) -> int:
+        """Return rank of the visible rows over SR plus rank of the visible columns over SC.
+
+        Each is at most its degree, so the sum is full only if both are.
+        """
+        r, c = self._cells(rows, columns)
+        if not r:
+            return 0
+        in_rows = self.row_sequence.rank(row - r[0] for row in r)
+        return in_rows + self.column_sequence.rank(column - c[0] for column in c)
+
+    def identifies(self, rows: ArrayLike, columns: ArrayLike) -> bool:
+        """Whether the cells together name their place: both factors determined."""
+        return self.rank(rows, columns) == self.full_rank
+
+    def minimum_distance(self, rows: ArrayLike, columns: ArrayLike) -> int:
+        """Return the least number of these cells in which two places differ; 0: look alike.
+
+        A row of cells changes as a whole, so d = min(b d_row, a d_column) for an a x b window.
+        """
+        r, c = self._cells(rows, columns)
+        pairs = set(zip(r, c, strict=True))
+        in_row = Counter(row for row, _ in pairs)
+        in_column = Counter(column for _, column in pairs)
+        return min(
+            minimum_distance(sequence, list(count), list(count.values()))
+            for sequence, count in (
+                (self.row_sequence, dict(sorted(in_row.items()))),
+                (self.column_sequence, dict(sorted(in_column.items()))),
+            )
+        )
+
+    def _cells(self, rows: ArrayLike, columns: ArrayLike) -> tuple[list[int], list[int]]:
+        r, c = np.broadcast_arrays(on_torus(rows, self.rows), on_torus(columns, self.columns))
+        return r.ravel().tolist(), c.ravel().tolist()
+
+    def _checked_law(self, law: ArrayLike | None) -> Labels:
+        shape = (self.row_sequence.field.order, self.column_sequence.field.order)
+        every = np.arange(shape[0] * shape[1])
+        if law is None:
+            return every.reshape(shape)
+        given = np.asarray(law)
+        if given.shape != shape or not np.array_equal(np.sort(given.ravel()), every):
+            raise ArrayError(
+                f"the product law must be a table of {shape[0]}x{shape[1]} labels with each of "
+                f"0 to {every.size - 1} once (injective)",
+                fix="leave law: out for the thesis's, or correct the table",
+            )
+        return given.astype(np.int64)
+
+    def definition(self) -> dict[str, Any]:
+        """Return the plain values (JSON) from which `array_from` makes this array again."""
+        return {
+            "family": self.family,
+            "factors": {
+                "rows": sequence_definition(self.row_sequence),
+                "columns": sequence_definition(self.column_sequence),
+            },
+            "law": self.law.tolist(),
+            "rows": self.rows,
+            "columns": self.columns,
+            "window": list(self.window),
+        }

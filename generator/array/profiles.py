@@ -1,0 +1,161 @@
+"""Ready choices of array, window, alphabet and pitch, by name.
+
+`one-touch` is the default: its 3x2 window lies under one 25 mm touch. Windows are rows x
+columns. Where the measured figures come from: design, and the thesis's experiments (6.17 to
+6.19 for `thesis`, figure 5.11 for `product`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
+
+from generator.array.definition import array_from
+from generator.array.fold import FoldedArray
+from generator.array.product import ProductArray
+from generator.array.size import nearest_sizes
+from generator.errors import ArrayError
+
+DEFAULT_PROFILE = "one-touch"
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """One ready choice."""
+
+    name: str
+    encoding: Mapping[str, Any]  #: what `array_from` takes; read-only
+    window: tuple[int, int]  #: rows, columns
+    alphabet: str  #: name of the alphabet
+    pitch_mm: float  #: distance of neighbouring symbols
+    purpose: str
+
+    def array(self) -> FoldedArray | ProductArray:
+        """Return the array of this profile."""
+        return array_from(self.encoding)
+
+
+def _profile(
+    name: str,
+    encoding: dict[str, Any],
+    window: tuple[int, int],
+    alphabet: str,
+    pitch_mm: float,
+    purpose: str,
+) -> Profile:
+    whole = MappingProxyType(encoding | {"window": list(window)})
+    return Profile(name, whole, window, alphabet, pitch_mm, purpose)
+
+
+def _gf4(degree: int, polynomial: str, rows: int, columns: int) -> dict[str, Any]:
+    size = {"rows": rows, "columns": columns}
+    return {"family": "prmva", "order": 4, "degree": degree, "polynomial": polynomial} | size
+
+
+PROFILES: Mapping[str, Profile] = MappingProxyType(
+    {
+        profile.name: profile
+        for profile in (
+            _profile(
+                "one-touch",
+                _gf4(6, "x^6+x^2+x+A", 63, 65),
+                (3, 2),
+                "dense-4",
+                7.0,
+                "one 25 mm touch is enough",
+            ),
+            _profile(
+                "thesis",
+                {"family": "prba", "polynomial": "0x1099", "rows": 63, "columns": 65},
+                (6, 2),
+                "thesis-2",
+                12.0,
+                "the thesis's own experiment, its three published windows",
+            ),
+            _profile(
+                "product",
+                {
+                    "family": "prmvpa",
+                    "factors": {
+                        "rows": {"order": 2, "polynomial": "x^4+x+1"},
+                        "columns": {"order": 4, "polynomial": "x^2+x+A"},
+                    },
+                },
+                (4, 2),
+                "dense-8",
+                12.0,
+                "the thesis's product array (figure 5.11), indices found apart",
+            ),
+            _profile(
+                "large",
+                _gf4(8, "x^8+x^3+x+A", 255, 257),
+                (4, 2),
+                "dense-4",
+                7.0,
+                "hundreds of objects",
+            ),
+            _profile(
+                "fine",
+                _gf4(8, "x^8+x^3+x+A", 255, 257),
+                (4, 2),
+                "dense-4",
+                4.5,
+                "resin printing, small faces",
+            ),
+        )
+    }
+)
+
+
+def profile(name: str = DEFAULT_PROFILE) -> Profile:
+    """Return the profile called `name`; raises `ArrayError` that lists the known ones."""
+    try:
+        return PROFILES[name]
+    except KeyError:
+        raise ArrayError(
+            f"unknown profile '{name}'", fix=f"choose one of {', '.join(PROFILES)}"
+        ) from None
+
+
+def enlarged(smaller: Profile) -> Profile:
+    """Return the profile on the next larger fold of the same field: `large` "and up".
+
+    255x257, 511x513, 1023x1025, 4095x4097, ... over GF(4); the window is the smallest one.
+
+    Raises `ArrayError` for a product array, or if no larger one decodes.
+    """
+    array = smaller.array()
+    if isinstance(array, ProductArray) or array.rows == 1:
+        raise ArrayError(
+            f"profile '{smaller.name}' is not a folded array, so it has no next size",
+            fix="take profile large",
+        )
+    size = _next_size(array.order, array.full_rank)
+    if size is None:
+        raise ArrayError(
+            f"no array over GF({array.order}) is larger than {array.rows}x{array.columns}",
+            fix="start another database",
+        )
+    degree, (rows, columns) = size
+    larger = array_from(
+        {
+            "family": array.family,
+            "order": array.order,
+            "degree": degree,
+            "rows": rows,
+            "columns": columns,
+        }
+    )
+    encoding = MappingProxyType(larger.definition())
+    return replace(smaller, encoding=encoding, window=larger.window)
+
+
+def _next_size(order: int, degree: int) -> tuple[int, tuple[int, int]] | None:
+    """Return the next degree and fold that is no long strip."""
+    while above := [size for size in nearest_sizes(order, degree) if size[0] > degree]:
+        degree, (rows, columns) = above[0]
+        if columns <= 2 * rows:
+            return degree, (rows, columns)
+    return None

@@ -1,0 +1,223 @@
+"""PRBS and PRMVS: the m-sequence of a primitive polynomial, at any index.
+
+s[t+n] = -(h_0 s[t] + ... + h_(n-1) s[t+n-1]) over GF(q), period N = q^n - 1. Because
+s[t] = L(x^t) for a linear functional L on GF(q)[x]/h, any term costs O(log t), none is
+stored, and s[t + d] is a fixed linear combination of the state (s[t], ..., s[t+n-1]): the
+coefficients of x^d modulo h. Thesis 5.1 and 5.4.2, table 5.1, table 5.3.
+
+As printed, figure 5.10 says length 1024 and holds one digit too many in line 11: the
+sequence of x^5+x+A has 4^5 - 1 = 1023 terms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from functools import cached_property
+from itertools import islice
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from generator.array.factor import (
+    LARGEST_PRIME_FACTOR,
+    degrees_that_decode,
+    period_factors,
+)
+from generator.array.field import Field, Labels
+from generator.array.notation import written
+from generator.array.polynomial import companion_powers, monic, norm
+from generator.array.residue import Digits, Powers, Residues, binary_rank, packed, rank_modulo
+from generator.array.torus import on_torus
+from generator.errors import ArrayError
+
+_REMEMBERED = 1 << 16  # offsets whose functionals are kept
+
+
+class Sequence:
+    """A pseudo-random multi-valued sequence (PRMVS; PRBS over GF(2)).
+
+    Parameters
+    ----------
+    field
+        GF(q).
+    polynomial
+        (n + 1,) labels of the primitive polynomial h, from x^0 to x^n = 1.
+    initial
+        (n,) labels s[0] ... s[n-1], not all zero; 0 ... 0 1 by default (appendix 4).
+
+    Raises
+    ------
+    ArrayError
+        If the polynomial is not primitive, the start is zero, the sequence is longer than
+        2^64 - 1, or its length has a prime factor beyond 2^40, so that no index could be
+        recovered from a window (the error names the nearest degrees).
+
+    Examples
+    --------
+    >>> from generator.array.field import field_of_order
+    >>> Sequence(field_of_order(4), (2, 1, 1)).symbols(range(6))
+    array([0, 1, 1, 3, 1, 0])
+    """
+
+    def __init__(
+        self, field: Field, polynomial: Iterable[int], initial: Iterable[int] | None = None
+    ) -> None:
+        self.field = field
+        self.polynomial = monic(field, polynomial)
+        self.degree = len(self.polynomial) - 1  #: n
+        self.period: int = field.order**self.degree - 1  #: N
+        self.factors = period_factors(field.order, self.degree)  #: {prime: exponent} of N
+        self._refuse_undecodable()
+        self.ring = Residues(field.characteristic, norm(field, self.polynomial))
+        if not self.ring.is_primitive(self.factors):
+            raise ArrayError(
+                f"{written(field, self.polynomial)} is not primitive over GF({field.order}): its "
+                f"sequence repeats before {self.period} terms",
+                fix="take one on file (generator.array.primitive.primitive_polynomial("
+                f"{field.order}, {self.degree})) or leave polynomial: out",
+            )
+        start = (*[0] * (self.degree - 1), 1) if initial is None else tuple(initial)
+        self.initial = self._checked_state(start)
+        self.powers = Powers(self.ring, self.ring.powers_of_x[1], self.period)
+        terms = list(islice(self.forward(), 2 * self.ring.degree))
+        windows = np.lib.stride_tricks.sliding_window_view(
+            field.digits[terms], self.ring.degree, axis=0
+        )[: self.ring.degree]
+        self._hankel = windows.reshape(self.ring.degree, -1).astype(np.float64)
+        self._remembered: dict[int, list[int]] = {}
+
+    def __repr__(self) -> str:
+        return f"Sequence(GF({self.field.order}), {written(self.field, self.polynomial)})"
+
+    def _refuse_undecodable(self) -> None:
+        largest = max(self.factors, default=1)
+        if largest > LARGEST_PRIME_FACTOR:
+            order = self.field.order
+            near = degrees_that_decode(order, self.degree)
+            sizes = " or ".join(f"{n} ({order**n - 1} terms)" for n in near)
+            raise ArrayError(
+                f"degree {self.degree} over GF({order}) cannot be decoded: {self.period} has the "
+                f"prime factor {largest}, and the discrete logarithm is limited to 2^40",
+                fix=f"take degree {sizes}, the nearest that decode",
+            )
+
+    def _checked_state(self, state: Iterable[int]) -> tuple[int, ...]:
+        labels = tuple(int(label) for label in state)
+        if (
+            len(labels) != self.degree
+            or not any(labels)
+            or not all(0 <= label < self.field.order for label in labels)
+        ):
+            raise ArrayError(
+                f"state {list(labels)} does not start a sequence of degree {self.degree} over "
+                f"GF({self.field.order})",
+                fix=f"give {self.degree} labels from 0 to {self.field.order - 1}, not all 0",
+            )
+        return labels
+
+    # --- terms -----------------------------------------------------------------------------
+
+    def symbols(self, indices: ArrayLike) -> Labels:
+        """Return s[t] for indices of any shape and size, taken modulo the period."""
+        t = on_torus(indices, self.period)
+        distinct, place = np.unique(t.ravel(), return_inverse=True)
+        digits = self.ring.reduced(self.powers.at(distinct) @ self._first_digits)
+        return np.asarray(self.field.labels(digits)[place.reshape(t.shape)])
+
+    def __getitem__(self, index: int) -> int:
+        return int(self.symbols(index))
+
+    def state(self, index: int) -> tuple[int, ...]:
+        """Return the n labels s[t] ... s[t+n-1]: the window at t."""
+        return tuple(self.symbols([index + k for k in range(self.degree)]).tolist())
+
+    def forward(self, state: Iterable[int] | None = None) -> Iterator[int]:
+        """Yield the terms from `state` (s[0] ... by default) on, by the direct feedback."""
+        field = self.field
+        scale = field.multiplication[field.negative[list(self.polynomial[:-1])]].tolist()
+        taps = [(k, scale[k]) for k, label in enumerate(self.polynomial[:-1]) if label]
+        return self._shifted(state, taps)
+
+    def reverse(self, state: Iterable[int] | None = None) -> Iterator[int]:
+        """Yield s[t-1], s[t-2], ... before `state` (s[t] ...), by the reverse feedback."""
+        field = self.field
+        register = self.initial if state is None else self._checked_state(state)
+        over = field.negative[field.inverse[self.polynomial[0]]]
+        scale = field.multiplication[field.multiplication[list(self.polynomial[1:]), over]].tolist()
+        taps = [
+            (self.degree - 1 - k, scale[k]) for k, label in enumerate(self.polynomial[1:]) if label
+        ]
+        return islice(self._shifted(register[::-1], taps), self.degree, None)
+
+    def _shifted(
+        self, state: Iterable[int] | None, taps: list[tuple[int, list[int]]]
+    ) -> Iterator[int]:
+        register = list(self.initial if state is None else self._checked_state(state))
+        sums = self.field.addition.tolist()
+        while True:
+            yield register[0]
+            label = 0
+            for place, scaled in taps:
+                label = sums[label][scaled[register[place]]]
+            register = [*register[1:], label]
+
+    # --- linear functionals, for the rank test and for the decoder -----------------------------
+
+    @cached_property
+    def _first_digits(self) -> Digits:
+        return self._hankel.reshape(self.ring.degree, self.field.degree, -1)[:, :, 0]
+
+    @cached_property
+    def _to_labels(self) -> Digits:
+        """(D, n m): digits in x^j modulo norm(h) to digits over GF(q)[x]/h."""
+        rows = companion_powers(self.field, self.polynomial, self.ring.degree)
+        return self.field.digits[rows].reshape(self.ring.degree, -1).astype(np.float64)
+
+    def element(self, indices: ArrayLike) -> Digits:
+        """Return x^t in GF(p)[x]/norm(h), (..., D) digits: the field element of a place."""
+        t = on_torus(indices, self.period)
+        return self.powers.at(t.ravel()).reshape(*t.shape, self.ring.degree)
+
+    def coefficients(self, offsets: ArrayLike) -> Labels:
+        """Return c with s[t + offset] = sum_j c_j s[t + j] for all t: (..., n) labels.
+
+        c is x^offset modulo h over GF(q), also the field element of index `offset`.
+        """
+        elements = self.element(offsets)
+        digits = self.ring.reduced(elements @ self._to_labels)
+        return self.field.labels(
+            digits.reshape(*elements.shape[:-1], self.degree, self.field.degree)
+        )
+
+    def functionals(self, elements: Digits) -> Digits:
+        """Return F with digits(s[t + d]) = F @ element(t), for elements x^d: (..., m, D).
+
+        Digits are those of `Field.digits`; all of it modulo p.
+        """
+        flat = self.ring.reduced(elements @ self._hankel)
+        return flat.reshape(*elements.shape[:-1], self.field.degree, self.ring.degree)
+
+    def rank(self, offsets: Iterable[int]) -> int:
+        """Return the rank over GF(q) of the terms s[t + offset]; n names the index t.
+
+        The functionals span a GF(q) space, so their rank over GF(p) is m times it.
+        """
+        distinct = list(dict.fromkeys(int(offset) % self.period for offset in offsets))
+        if not distinct:
+            return 0
+        if self.field.characteristic == 2:
+            return binary_rank(self._words(distinct), self.ring.degree) // self.field.degree
+        rows = self.functionals(self.element(distinct)).reshape(-1, self.ring.degree)
+        return rank_modulo(rows, self.field.characteristic) // self.field.degree
+
+    def _words(self, offsets: list[int]) -> list[int]:
+        """Rows of the functionals as integers; layout asks for the same offsets many times."""
+        known = self._remembered
+        missing = [offset for offset in offsets if offset not in known]
+        if len(known) + len(missing) > _REMEMBERED:
+            self._remembered = known = {}
+            missing = offsets
+        if missing:
+            maps = packed(self.functionals(self.element(missing))).tolist()
+            known.update(zip(missing, maps, strict=True))
+        return [word for offset in offsets for word in known[offset]]

@@ -1,0 +1,299 @@
+"""The thesis's arrays against golden.json, read from the printed figures and appendices.
+
+Not here: figure 5.8 (its content is not in the text, nothing to compare with); table 5.2 and
+the milestones of figure 5.10 (code conversions: the decoder's).
+"""
+
+import hashlib
+import json
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from generator.array import array_from, profile
+from generator.array.field import field_of_order
+from generator.array.polynomial import is_primitive, order, powmod
+from generator.array.primitive import known_polynomials, primitive_polynomial
+from generator.array.product import ProductArray
+from generator.array.sequence import Sequence
+from generator.array.window import windows_are_unique
+
+FIXTURES = Path(__file__).parents[2] / "fixtures"
+GOLDEN = json.loads((FIXTURES / "golden.json").read_text())
+MEASURED = json.loads((FIXTURES / "array_profiles.json").read_text())
+THESIS = GOLDEN["prba_63x65"]
+
+
+def whole(array):
+    return array.symbols(np.arange(array.rows)[:, None], np.arange(array.columns))
+
+
+def distance(array, a, b):
+    return array.minimum_distance(np.arange(a)[:, None], np.arange(b))
+
+
+@pytest.mark.parametrize("entry", GOLDEN["table_5_1"], ids=lambda e: f"n={e['n']}")
+def test_table_5_1(entry):
+    n, direct, reverse = entry["n"], entry["direct_taps"], entry["reverse_taps"]
+    sequence = Sequence(field_of_order(2), primitive_polynomial(2, n, "table 5.1"))
+    assert list(sequence.polynomial) == entry["poly"]
+    s = list(islice(sequence.forward(), sequence.period + 2 * n))
+    for t in range(n + 1, len(s)):  # R(k) holds s[t - k], R(0) = s[t]
+        assert s[t] == sum(s[t - k] for k in direct) % 2
+        assert s[t - n - 1] == sum(s[t - k] for k in reverse) % 2
+    register = s[n : 2 * n]
+    assert list(islice(sequence.reverse(register), n)) == s[n - 1 :: -1][:n]
+
+
+@pytest.mark.parametrize("entry", GOLDEN["table_5_3"], ids=lambda e: f"q={e['q']},n={e['n']}")
+def test_table_5_3(entry):
+    q, n = entry["q"], entry["n"]
+    field = field_of_order(q)
+    h = primitive_polynomial(q, n, "table 5.3")
+    assert list(h) == entry["poly"]
+    assert is_primitive(field, h) == entry["primitive"]
+    assert order(field, h) == entry["period"]
+
+
+def test_table_5_3_is_complete_and_its_fields_hold():
+    printed = {(p.order, p.degree) for p in known_polynomials() if p.source == "table 5.3"}
+    assert printed == {(e["q"], e["n"]) for e in GOLDEN["table_5_3"]}
+    assert GOLDEN["table_5_3_field_relations_ok"] == {"4": True, "8": True, "9": True}
+    # A^k = digits, highest power of A first, as printed under the table
+    relations = {
+        4: {2: "11", 3: "01"},
+        8: {3: "011", 4: "110", 5: "111", 6: "101", 7: "001"},
+        9: {2: "11", 3: "21", 4: "02", 5: "20", 6: "22", 7: "12", 8: "01"},
+    }
+    for q, powers in relations.items():
+        field = field_of_order(q)
+        for power, digits in powers.items():
+            label = 1 + power % (q - 1)
+            assert "".join(map(str, field.digits[label][::-1])) == digits
+
+
+@pytest.mark.parametrize("entry", GOLDEN["appendix4_q2"], ids=lambda e: f"n={e['n']}")
+def test_appendix_4_binary(entry):
+    sequence = Sequence(field_of_order(2), primitive_polynomial(2, entry["n"], "appendix 4"))
+    assert list(sequence.polynomial) == entry["poly"]
+    assert list(sequence.initial) == entry["init"]
+    s = sequence.symbols(range(200))
+    for t in range(entry["n"], 200):
+        assert s[t] == sum(s[t - lag] for lag in entry["lags"]) % 2
+
+
+@pytest.mark.parametrize("entry", GOLDEN["appendix4_q3"], ids=lambda e: f"n={e['n']}")
+def test_appendix_4_ternary(entry):
+    sequence = Sequence(field_of_order(3), primitive_polynomial(3, entry["n"]))
+    s = sequence.symbols(range(200))
+    for t in range(entry["n"], 200):
+        assert s[t] == sum(c * s[t - int(lag)] for lag, c in entry["lag_coef"].items()) % 3
+
+
+@pytest.mark.parametrize("entry", GOLDEN["appendix4_q4"], ids=lambda e: f"n={e['n']}")
+def test_appendix_4_quaternary(entry):
+    field = field_of_order(4)
+    sequence = Sequence(field, primitive_polynomial(4, entry["n"]))
+    assert list(sequence.polynomial) == entry["poly"]
+    s = sequence.symbols(range(200))
+    for t in range(entry["n"], 200):
+        total = 0
+        for lag, label in entry["lags_coef_labels"].items():
+            total = field.add(total, field.multiply(label, s[t - int(lag)]))
+        assert s[t] == total
+
+
+def test_appendix_4_lengths_that_are_misprinted():
+    # printed: 16393 for GF(2) n = 14, 13682 for GF(3) n = 9
+    assert Sequence(field_of_order(2), primitive_polynomial(2, 14)).period == 16383
+    assert Sequence(field_of_order(3), primitive_polynomial(3, 9)).period == 19682
+    # printed: (2 prma) % 4 for GF(4) n = 1, which gives 1, 2, 0
+    assert Sequence(field_of_order(4), (2, 1)).symbols(range(3)).tolist() == [1, 2, 3]
+
+
+def test_fifteen_terms_over_gf4():
+    entry = GOLDEN["prmvs15_gf4"]
+    array = array_from(
+        {"family": "prmvs", "order": 4, "polynomial": entry["poly"], "initial": entry["init"]}
+    )
+    assert whole(array).tolist() == [entry["sequence"]]
+    assert (array.rows, array.columns, array.window) == (1, 15, (1, 2))
+    assert windows_are_unique(array, (1, 2))
+
+
+def test_figure_5_10():
+    entry = GOLDEN["fig_5_10"]
+    sequence = Sequence(field_of_order(4), entry["poly"], entry["init"])
+    assert sequence.period == entry["true_length"] == 1023
+    digits = "".join(map(str, sequence.symbols(range(1023))))
+    assert digits == entry["sequence"]
+    assert hashlib.sha256(digits.encode()).hexdigest() == entry["sha256_digits"]
+
+
+def test_figure_5_7():
+    field = field_of_order(2)
+    array = ProductArray(Sequence(field, (1, 1, 1)), Sequence(field, (1, 1, 1)))
+    for pair, symbol in GOLDEN["fig_5_7_law"]["table"].items():
+        sx, sy = (int(part[-1]) for part in pair.split(","))
+        assert array.law[sy, sx] == symbol  # Y down the rows, X along the columns
+        assert array.factors[symbol].tolist() == [sy, sx]
+
+
+def test_figure_5_11():
+    entry = GOLDEN["fig_5_11"]
+    array = profile("product").array()
+    assert array.row_sequence.symbols(range(15)).tolist() == entry["rows_sequence"]["s"]
+    assert array.column_sequence.symbols(range(15)).tolist() == entry["cols_sequence"]["s"]
+    grid = whole(array)
+    assert grid.tolist() == entry["array"]
+    shown = np.array(entry["window"])
+    torus = np.pad(grid, ((0, 3), (0, 1)), mode="wrap")
+    found = [
+        [i, j] for i in range(15) for j in range(15) if (torus[i : i + 4, j : j + 2] == shown).all()
+    ]
+    assert found == entry["window_decodes_to"]
+
+
+def test_figure_6_9():
+    entry = GOLDEN["fig_6_9"]
+    array = array_from(
+        {"family": "prpa", "factors": {"rows": {"degree": 4}, "columns": {"degree": 4}}}
+    )
+    assert array.row_sequence.symbols(range(15)).tolist() == entry["row_sequence_SY"]
+    assert array.column_sequence.symbols(range(15)).tolist() == entry["col_sequence_SX"]
+    assert whole(array).tolist() == entry["array"]
+    assert windows_are_unique(array, (4, 4))
+    assert array.rows * array.columns == entry["unique_4x4_windows"]
+    assert not windows_are_unique(array, (4, 3))
+
+
+def test_product_window_needs_one_symbol_in_every_row_and_column():
+    """GOLDEN["min_symbols_note"]: max(k1, k2) symbols, not k1 + k2 - 1."""
+    array = profile("product").array()
+    assert array.identifies([0, 1, 2, 3], [0, 1, 0, 1])
+    assert not array.identifies([0, 1, 2], [0, 1, 0])
+    assert not array.identifies([0, 1, 2, 3], [0, 0, 0, 0])
+
+
+def test_recognition_figures_6_17_to_6_19():
+    array = profile("thesis").array()
+    assert array.window == (6, 2)
+    for entry in THESIS["golden_windows"]:
+        row, column = entry["row"], entry["col"]
+        assert (entry["Y_PRBA"], entry["X_PRBA"]) == (row, column)
+        seen = array.symbols(row + np.arange(6)[:, None], column + np.arange(2))
+        assert ["".join(map(str, line)) for line in seen] == entry["window"]
+        assert array.index(row, column) == entry["t"]
+        assert array.cell(entry["t"]) == (row, column)
+
+
+def test_the_whole_63x65_array():
+    array = profile("thesis").array()
+    grid = whole(array)
+    assert list(array.sequence.polynomial) == THESIS["poly"]
+    assert list(array.sequence.initial) == THESIS["init"]
+    assert "".join(map(str, grid[0])) == THESIS["row0"]
+    assert (
+        hashlib.sha256("".join(map(str, grid.ravel())).encode()).hexdigest()
+        == (THESIS["sha256_rowmajor"])
+    )
+    s = array.sequence.symbols(range(4095))
+    assert all(s[t] == s[t - 5] ^ s[t - 8] ^ s[t - 9] ^ s[t - 12] for t in range(12, 4095))
+
+
+def test_appendix_5_remainder_is_no_window():
+    entry = GOLDEN["appendix5_example"]
+    field, h = field_of_order(2), tuple(entry["h"])
+    sequence = Sequence(field, h, entry["sequence"][:3])
+    assert sequence.symbols(range(7)).tolist() == entry["sequence"]
+    r = entry["r_low_to_high"]
+    assert list(powmod(field, (0, 1), entry["exponent_of_r"], h)) == r
+    assert list(sequence.state(entry["thesis_i"])) == r  # the same tuple as a window: index 2
+    # the linear map between the two: element -> window
+    element = sequence.element(2)
+    window = sequence.functionals(sequence.element([0, 1, 2]))[:, 0] @ element % 2
+    assert window.tolist() == r
+
+
+@pytest.mark.parametrize(
+    ("definition", "measured"),
+    [
+        ({"family": "prba", "polynomial": 0x1099}, MEASURED["prba_63x65"]["dmin_thesis"]),
+        ({"family": "prba", "polynomial": 0x1655}, MEASURED["prba_63x65"]["dmin_0x1655"]),
+        ({"family": "prmva", "order": 4, "degree": 6}, MEASURED["prmva_gf4_63x65"]["dmin"]),
+        (
+            {"family": "prmva", "order": 4, "degree": 6, "rows": 45, "columns": 91},
+            MEASURED["prmva_gf4_45x91"]["dmin"],
+        ),
+    ],
+    ids=["0x1099", "0x1655", "gf4-63x65", "gf4-45x91"],
+)
+def test_minimum_distances(definition, measured):
+    array = array_from(definition)
+    for shape, expected in measured.items():
+        a, b = map(int, shape.split("x"))
+        if isinstance(expected, str):  # "rank 8, not unique"
+            rank = array.rank(np.arange(a)[:, None], np.arange(b))
+            assert rank == int(expected.split()[1].rstrip(","))
+            assert distance(array, a, b) == 0
+            assert not windows_are_unique(array, (a, b))
+        else:
+            assert distance(array, a, b) == expected
+            assert windows_are_unique(array, (a, b))
+
+
+def test_product_distances():
+    array = array_from(
+        {"family": "prpa", "factors": {"rows": {"degree": 4}, "columns": {"degree": 4}}}
+    )
+    assert (distance(array, 4, 4), distance(array, 5, 5)) == (4, 5)
+    gf4 = {"order": 4, "degree": 2}
+    array = array_from({"family": "prmvpa", "factors": {"rows": gf4, "columns": gf4}})
+    assert array.order == 16
+    assert distance(array, 4, 4) == 12
+
+
+@pytest.mark.parametrize(
+    ("q", "n", "rows", "columns", "windows"),
+    [
+        (2, 12, 63, 65, ["6x2", "2x6", "3x4"]),  # 0x1f11
+        (4, 6, 45, 91, ["1x6", "2x3", "3x2", "6x1"]),
+        (3, 8, 41, 160, ["2x4", "4x2"]),
+        (9, 4, 41, 160, ["2x2"]),
+        (9, 6, 560, 949, ["3x2"]),
+        (8, 4, 63, 65, ["2x2"]),
+        (8, 6, 511, 513, ["3x2"]),
+    ],
+)
+def test_general_folds_have_tight_windows(q, n, rows, columns, windows):
+    polynomial = primitive_polynomial(q, n, "three windows" if q == 2 else None)
+    definition = {"family": "prmva", "order": q, "polynomial": list(polynomial)}
+    array = array_from(definition | {"rows": rows, "columns": columns})
+    for name in windows:
+        a, b = map(int, name.split("x"))
+        assert a * b == n == array.full_rank
+        assert array.identifies(np.arange(a)[:, None], np.arange(b))
+        if rows * columns < 10_000:
+            assert windows_are_unique(array, (a, b))
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "window", "alphabet", "pitch_mm", "distance_of_window"),
+    [
+        ("thesis", (63, 65, 2), (6, 2), "thesis-2", 12.0, 1),
+        ("product", (15, 15, 8), (4, 2), "dense-8", 8.0, 2),
+        ("one-touch", (63, 65, 4), (3, 2), "dense-4", 7.0, 1),
+        ("large", (255, 257, 4), (4, 2), "dense-4", 7.0, 1),
+        ("fine", (255, 257, 4), (4, 2), "dense-4", 4.5, 1),
+    ],
+)
+def test_profiles(name, size, window, alphabet, pitch_mm, distance_of_window):
+    chosen = profile(name)
+    array = chosen.array()
+    assert (array.rows, array.columns, array.order) == size
+    assert chosen.window == array.window == window
+    assert (chosen.alphabet, chosen.pitch_mm) == (alphabet, pitch_mm)
+    assert windows_are_unique(array, window)
+    assert distance(array, *window) == distance_of_window

@@ -1,0 +1,152 @@
+"""Laws that hold for every array: unique windows, the rank test, the torus, random access."""
+
+import json
+from itertools import islice
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from generator.array import FoldedArray, ProductArray, Sequence, array_from
+from generator.array.factor import decodes
+from generator.array.field import field_of_order
+from generator.array.notation import parsed, written
+from generator.array.polynomial import is_primitive, mulmod, norm, powmod
+from generator.array.primitive import known_polynomials
+from generator.array.size import folds
+from generator.array.window import windows_are_unique
+
+ON_FILE = known_polynomials()
+SMALL = [p for p in ON_FILE if p.degree > 1 and p.order**p.degree <= 7000 and p.order <= 27]
+FOLDING = [p for p in SMALL if folds(p.order, p.degree)]
+MEDIUM = [p for p in ON_FILE if p.order**p.degree <= 2**64]
+
+small, folding, medium = map(st.sampled_from, (SMALL, FOLDING, MEDIUM))
+quick = settings(max_examples=60, deadline=None)
+
+
+def sequence_of(entry):
+    return Sequence(field_of_order(entry.order), entry.labels)
+
+
+def decodable(entry):
+    return decodes(entry.order, entry.degree)
+
+
+@quick
+@given(folding, st.data())
+def test_rank_test_says_exactly_which_cells_identify(entry, data):
+    """Any set of visible cells: full rank if and only if no two places look alike."""
+    fold = data.draw(st.sampled_from(folds(entry.order, entry.degree)))
+    array = FoldedArray(sequence_of(entry), *data.draw(st.permutations(fold)))
+    k = data.draw(st.integers(1, entry.degree + 3))
+    cell = st.tuples(st.integers(0, 7), st.integers(0, 7))
+    cells = np.array(data.draw(st.lists(cell, min_size=k, max_size=k, unique=True)))
+    rows, columns = np.unique(cells % (array.rows, array.columns), axis=0).T
+    places = np.arange(array.rows)[:, None, None], np.arange(array.columns)[:, None]
+    seen = array.symbols(places[0] + rows, places[1] + columns).reshape(-1, rows.size)
+    unique = len(np.unique(seen, axis=0)) == len(seen)
+    assert array.identifies(rows, columns) == unique
+    distance = array.minimum_distance(rows, columns)
+    assert (distance > 0) == unique
+    if unique:  # linear: the same from every place, but for the zero word that no place shows
+        some = data.draw(st.integers(0, len(seen) - 2))
+        others = [np.sort(np.count_nonzero(seen != seen[k], axis=1))[1] for k in (some, some + 1)]
+        assert min(others) == distance
+    assert windows_are_unique(array, array.window)
+
+
+@quick
+@given(small, small, st.data())
+def test_product_identifies_when_both_factors_are_determined(a, b, data):
+    array = ProductArray(sequence_of(a), sequence_of(b))
+    if array.rows * array.columns > 40_000:
+        return
+    k = data.draw(st.integers(1, max(a.degree, b.degree) + 2))
+    cell = st.tuples(st.integers(0, 5), st.integers(0, 5))
+    cells = np.array(data.draw(st.lists(cell, min_size=k, max_size=k, unique=True)))
+    rows, columns = cells.T
+    places = np.arange(array.rows)[:, None, None], np.arange(array.columns)[:, None]
+    seen = array.symbols(places[0] + rows, places[1] + columns).reshape(-1, k)
+    unique = len(np.unique(seen, axis=0)) == len(seen)
+    assert array.identifies(rows, columns) == unique
+    distance = array.minimum_distance(rows, columns)
+    assert (distance > 0) == unique
+    if unique:
+        assert min(np.count_nonzero(seen[1:] != seen[0], axis=1)) >= distance
+
+
+@quick
+@given(medium.filter(decodable), st.integers(-(2**70), 2**70))
+def test_random_access_obeys_the_recurrence_in_both_directions(entry, t):
+    sequence = sequence_of(entry)
+    n = entry.degree
+    around = sequence.symbols([t + k for k in range(-n, 2 * n)]).tolist()
+    state = around[n : 2 * n]
+    assert list(sequence.state(t)) == state
+    assert list(islice(sequence.forward(state), 2 * n)) == around[n:]
+    assert list(islice(sequence.reverse(state), n)) == around[:n][::-1]
+    assert sequence[t] == sequence[t + sequence.period]
+    field = sequence.field
+    total = 0
+    for h, s in zip(sequence.polynomial, around, strict=False):
+        total = int(field.add(total, field.multiply(h, s)))
+    assert total == 0
+
+
+@quick
+@given(folding, st.integers(-(2**66), 2**66), st.integers(-(2**66), 2**66))
+def test_fold_is_the_sequence_on_a_torus(entry, row, column):
+    array = FoldedArray(sequence_of(entry), *folds(entry.order, entry.degree)[0])
+    t = array.index(row, column)
+    assert array.cell(t) == (row % array.rows, column % array.columns)
+    assert int(array.symbols(row, column)) == array.sequence[t]
+
+
+@quick
+@given(st.sampled_from([2, 3, 4, 5, 8, 9, 16]), st.data())
+def test_arithmetic_modulo_h_over_gf_q_and_over_its_prime_field_agree(q, data):
+    field = field_of_order(q)
+    n = data.draw(st.integers(1, 5))
+    label = st.integers(0, q - 1)
+    h = (
+        data.draw(st.integers(1, q - 1)),
+        *data.draw(st.lists(label, min_size=n - 1, max_size=n - 1)),
+        1,
+    )
+    a, b = (data.draw(st.lists(label, min_size=n, max_size=n)) for _ in "ab")
+    e = data.draw(st.integers(0, q**n))
+    assert mulmod(field, a, b, h) == mulmod(field, b, a, h)
+    assert mulmod(field, powmod(field, a, e, h), a, h) == powmod(field, a, e + 1, h)
+    conjugates = norm(field, h)
+    assert len(conjugates) == n * field.degree + 1
+    prime_field = field_of_order(field.characteristic)
+    if is_primitive(field, h):
+        assert is_primitive(prime_field, conjugates)
+        assert powmod(field, (0, 1), q**n - 1, h) == powmod(field, (0, 1), 0, h)
+    assert parsed(field, written(field, h)) == h
+
+
+@quick
+@given(folding, st.data())
+def test_definition_round_trip(entry, data):
+    fold = data.draw(st.sampled_from(folds(entry.order, entry.degree)))
+    initial = data.draw(
+        st.lists(st.integers(0, entry.order - 1), min_size=entry.degree, max_size=entry.degree)
+    )
+    if not any(initial):
+        initial[0] = 1
+    array = array_from(
+        {
+            "family": "prmva",
+            "order": entry.order,
+            "polynomial": list(entry.labels),
+            "initial": initial,
+            "rows": fold[0],
+            "columns": fold[1],
+        }
+    )
+    again = array_from(json.loads(json.dumps(array.definition())))
+    assert again.definition() == array.definition()
+    cells = np.arange(12)[:, None], np.arange(12)
+    assert np.array_equal(again.symbols(*cells), array.symbols(*cells))

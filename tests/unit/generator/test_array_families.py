@@ -1,0 +1,418 @@
+"""Sequences, folds and products: sizes, random access, errors with their way out, costs."""
+
+import doctest
+import importlib
+import json
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from generator.array import (
+    PROFILES,
+    FoldedArray,
+    ProductArray,
+    Sequence,
+    array_from,
+    enlarged,
+    profile,
+)
+from generator.array.field import field_of_order
+from generator.array.primitive import primitive_polynomial
+from generator.array.size import folds, usual_fold
+from generator.array.window import (
+    echelon,
+    least_weight_by_dual,
+    minimum_distance,
+    null_space,
+    terms,
+    windows_are_unique,
+)
+from generator.errors import ArrayError
+
+
+def block(a, b):
+    return np.arange(a)[:, None], np.arange(b)
+
+
+def test_most_square_folds():
+    binary = {8: (15, 17), 10: (31, 33), 12: (63, 65), 14: (127, 129), 16: (255, 257),
+              18: (511, 513), 20: (1023, 1025), 24: (4095, 4097)}  # fmt: skip
+    assert {n: usual_fold(2, n) for n in binary} == binary
+    quaternary = {4: (15, 17), 6: (63, 65), 8: (255, 257), 10: (1023, 1025), 12: (4095, 4097)}
+    assert {n: usual_fold(4, n) for n in quaternary} == quaternary
+    octal = {2: (7, 9), 4: (63, 65), 6: (511, 513), 8: (4095, 4097)}
+    assert {n: usual_fold(8, n) for n in octal} == octal
+    assert [usual_fold(3, n) for n in (6, 9, 12)] == [(8, 91), (26, 757), (80, 6643)]
+    assert [usual_fold(9, n) for n in (3, 6)] == [(8, 91), (80, 6643)]
+    assert usual_fold(2, 13) is None
+    assert folds(2, 6) == [(7, 9)]
+
+
+@pytest.mark.parametrize(
+    ("q", "n"), [(2, 64), (4, 32), (3, 40), (9, 20), (16, 16), (5, 27), (7, 22)]
+)
+def test_random_access_on_the_largest_arrays(q, n):
+    sequence = Sequence(field_of_order(q), primitive_polynomial(q, n))
+    array = FoldedArray(sequence, *usual_fold(q, n))
+    rng = np.random.default_rng(q)
+    r = [int(x) for x in rng.integers(0, 2**63, 6)]
+    c = [int(x) * 3 + 7 for x in rng.integers(0, 2**63, 6)]  # beyond 2^64
+    expected = [sequence[array.index(a, b)] for a, b in zip(r, c, strict=True)]
+    assert array.symbols(r, c).tolist() == expected
+    # the recurrence around a far index, by the feedback itself
+    t = int(rng.integers(0, 2**63))
+    state = sequence.state(t)
+    forward = sequence.forward(state)
+    assert [next(forward) for _ in range(3 * n)] == sequence.symbols(
+        [t + k for k in range(3 * n)]
+    ).tolist()
+    reverse = sequence.reverse(state)
+    assert [next(reverse) for _ in range(2 * n)] == sequence.symbols(
+        [t - 1 - k for k in range(2 * n)]
+    ).tolist()
+
+
+def test_two_to_the_64_sequence_has_indices_beyond_int64():
+    array = array_from({"family": "prbs", "degree": 64})
+    n = array.columns
+    assert (array.rows, n, array.window, array.family) == (1, 2**64 - 1, (1, 64), "prbs")
+    last = array.symbols(0, np.array([n - 1, 2**64 - 3], dtype=object))
+    assert last.tolist() == array.symbols(5, [-1, -2]).tolist()
+    assert array.symbols(0, [0, -1, 2**64 - 2]).tolist()[1:] == [last[0], last[0]]
+    assert array.symbols(0, np.array([2**64 - 2], dtype=np.uint64)).tolist() == [last[0]]
+
+
+def test_shapes_and_kinds_of_indices():
+    array = profile().array()
+    assert array.symbols(3, 4).shape == ()
+    assert array.symbols([], []).shape == (0,)
+    assert array.symbols(np.zeros((5, 1), int), np.zeros((1, 0), int)).shape == (5, 0)
+    assert array.symbols([[1], [2]], [1, 2, 3]).shape == (2, 3)
+    assert array.symbols(-1, -1) == array.symbols(62, 64) == array.symbols(62 + 63, 64 - 650)
+    assert array.symbols(np.int8(-1), np.uint8(64)) == array.symbols(62, 64)
+    for wrong in (1.0, [0.5], True, "a", [None], np.array([1.0]), [2**64, 0.5]):
+        with pytest.raises(ArrayError, match="pair of integers"):
+            array.symbols(wrong, 0)
+    assert array.symbols([1, 2], 3).dtype == np.int64
+
+
+def test_table_and_direct_access_agree():
+    one, other = profile().array(), profile().array()
+    grid = one.symbols(*block(63, 65))  # keeps every power of both axes
+    for row, column in ((0, 0), (62, 64), (17, 40)):
+        assert other.symbols(row, column) == grid[row, column]
+    assert np.array_equal(one.symbols(*block(70, 70))[63:, 65:], grid[:7, :5])
+
+
+def test_functionals_of_cells():
+    for definition in (
+        {"family": "prba", "degree": 12},
+        {"family": "prmva", "order": 4, "degree": 6},
+        {"family": "prmva", "order": 9, "degree": 3},
+        {"family": "prmva", "order": 5, "degree": 6},
+    ):
+        array = array_from(definition)
+        sequence, field = array.sequence, array.sequence.field
+        rows, columns = np.array([0, 1, 2, -1, 5]), np.array([0, 0, 3, 2, -7])
+        place = (5, 7)
+        seen = array.symbols(place[0] + rows, place[1] + columns)
+        t = array.index(*place)
+        by_state = np.zeros(5, dtype=np.int64)
+        state = sequence.state(t)
+        for j, label in enumerate(state):
+            by_state = field.add(
+                by_state, field.multiply(array.coefficients(rows, columns)[:, j], label)
+            )
+        assert np.array_equal(by_state, seen)
+        by_element = array.functionals(rows, columns) @ array.element(*place)
+        assert np.array_equal(field.labels(by_element % field.characteristic), seen)
+        assert array.cell(t) == place
+        # element and coefficients are the same field element, x^t
+        assert np.array_equal(sequence.coefficients(t), sequence.coefficients(t + sequence.period))
+
+
+def test_rank_depends_on_differences_only():
+    array = profile("thesis").array()
+    assert array.rank([], []) == 0
+    assert array.rank(0, 0) == 1
+    assert array.rank([0, 0, 63], [0, 65, 0]) == 1  # one cell, three times
+    r, c = block(4, 4)
+    assert array.rank(r, c) == array.rank(r + 60, c - 3) == 10
+    assert not array.identifies(r, c)
+    assert array.identifies(*block(6, 2))
+    assert not array.identifies(*block(2, 6))  # of 0x1099: 6x2 means six rows
+
+
+def test_one_touch_window_is_three_rows_by_two_columns():
+    array = profile("one-touch").array()
+    assert array.identifies(*block(3, 2))
+    ranks = {shape: array.rank(*block(*shape)) for shape in ((3, 2), (2, 3), (6, 1), (1, 6))}
+    assert ranks[3, 2] == 6
+    for shape, rank in ranks.items():
+        assert windows_are_unique(array, shape) == (rank == 6)
+
+
+def test_fold_that_is_none():
+    with pytest.raises(ArrayError, match=r"63x64 is no size.*take 63x65 or 23x89"):
+        array_from({"family": "prba", "rows": 63, "columns": 64})
+    sequence = Sequence(field_of_order(2), primitive_polynomial(2, 12))
+    with pytest.raises(ArrayError, match="take 63x65, 45x91"):
+        FoldedArray(sequence, 105, 39)  # 3 divides both
+    with pytest.raises(ArrayError, match=r"do not fold.*degree 12 \(63x65\) or degree 14.*prbs"):
+        array_from({"family": "prba", "degree": 13})
+    assert array_from({"family": "prba", "degree": 12, "rows": 65, "columns": 63}).rows == 65
+    assert array_from({"family": "prba", "degree": 12, "rows": 45}).columns == 91
+    assert array_from({"family": "prba", "degree": 12, "columns": 91}).rows == 45
+
+
+@pytest.mark.parametrize(
+    ("order", "degree", "cause", "fix"),
+    [
+        (2, 61, r"prime factor 2305843009213693951.*2\^40", r"degree 60 \(\d+x\d+\) or degree 62"),
+        (2, 59, "prime factor 3203431780337", r"degree 58 .* or degree 60"),
+        (2, 49, "prime factor 4432676798593", "degree 48 .* or degree 50"),
+        (7, 19, "prime factor", "degree 18 .* or degree 20"),
+    ],
+)
+def test_sizes_that_cannot_be_decoded_are_refused(order, degree, cause, fix):
+    for family in ("prmva", "prmvs"):
+        with pytest.raises(ArrayError) as caught:
+            array_from({"family": family, "order": order, "degree": degree})
+        caught.match(cause)
+        caught.match("take degree")
+        if family == "prmva":
+            caught.match(fix)
+    factors = {"rows": {"order": order, "degree": degree}, "columns": {"degree": 3}}
+    with pytest.raises(ArrayError, match="prime factor"):
+        array_from({"family": "prmvpa", "factors": factors})
+
+
+def test_window_that_is_not_unique():
+    with pytest.raises(ArrayError) as caught:
+        array_from({"family": "prba", "polynomial": "0x1099", "window": [4, 4]})
+    assert str(caught.value) == (
+        "a 4x4 window of 0x1099 on 63x65 has rank 10 of 12, so it occurs more than once; "
+        "take 6x2 or 5x4"
+    )
+    array_from({"family": "prba", "polynomial": "0x1099", "window": [5, 4]})
+    for window in ([0, 3], [64, 2], [3, 66]):
+        with pytest.raises(ArrayError, match="does not lie in an array of 63x65"):
+            array_from({"family": "prba", "degree": 12, "window": window})
+    with pytest.raises(ArrayError, match="take 4x2 or larger"):
+        array_from(dict(profile("product").encoding) | {"window": [3, 2]})
+
+
+@pytest.mark.parametrize(
+    ("definition", "message"),
+    [
+        ({}, "family None is none.*prbs, prba"),
+        ({"family": "anoto"}, "family 'anoto'"),
+        ({"family": "prba", "order": 4, "degree": 6}, "binary.*take family prmva"),
+        ({"family": "prmva", "degree": 6}, "needs the order"),
+        ({"family": "prmva", "order": 4}, "no size.*give degree"),
+        ({"family": "prmva", "order": 6, "degree": 2}, "prime power"),
+        ({"family": "prba", "degree": 12, "taps": [1]}, "knows no taps; use family, order"),
+        ({"family": "prba", "degree": "12"}, "degree: '12' is no positive integer"),
+        ({"family": "prba", "degree": True}, "degree: True is no positive integer"),
+        ({"family": "prba", "degree": 0}, "degree: 0"),
+        ({"family": "prba", "degree": 65}, "take a degree from 1 to 64"),
+        ({"family": "prba", "degree": 11, "polynomial": "0x1099"}, "set degree: 12"),
+        ({"family": "prba", "polynomial": "0x1fff"}, "0x1fff is not primitive"),
+        ({"family": "prba", "polynomial": 1.5}, "is not understood"),
+        ({"family": "prba", "polynomial": [1, 2, 0, 0, 1]}, "labels 0 to 1"),
+        ({"family": "prba", "degree": 12, "initial": [0] * 12}, "not all 0"),
+        ({"family": "prba", "degree": 12, "initial": [1]}, "give 12 labels"),
+        ({"family": "prba", "degree": 12, "initial": "1"}, "no list of labels"),
+        ({"family": "prba", "degree": 12, "window": 3}, "window: 3"),
+        ({"family": "prba", "degree": 12, "window": [3]}, r"window: \[3\]"),
+        ({"family": "prbs", "degree": 12, "rows": 63}, "prbs has one row, not 63; take prba"),
+        ({"family": "prmva", "order": 4, "degree": 6, "field": [1, 0, 1]}, "not a primitive"),
+        ({"family": "prmva", "order": 4, "degree": 6, "field": "x"}, "no minimal polynomial"),
+        ({"family": "prmva", "order": 32, "degree": 9}, "is on file"),
+        ({"family": "prpa"}, "factors: does not give them"),
+        ({"family": "prpa", "factors": {"rows": {}, "columns": 3}}, "rows: has no degree"),
+        ({"family": "prpa", "factors": {"rows": {"degree": 4}, "columns": 3}}, "is no sequence"),
+        ({"family": "prpa", "factors": {"rows": {"degree": 4, "window": 2}, "columns": {}}},
+         "factors: rows knows no window"),
+        ({"family": "prpa", "factors": {"rows": {"degree": 4, "order": 4}, "columns": {}}},
+         "binary"),
+        ({"family": "prpa", "degree": 4}, "prpa knows no degree"),
+    ],
+)  # fmt: skip
+def test_definitions_that_make_no_array(definition, message):
+    with pytest.raises(ArrayError, match=message) as caught:
+        array_from(definition)
+    assert caught.value.fix
+
+
+def test_product_law_and_sizes():
+    factors = {"rows": {"degree": 4}, "columns": {"degree": 6}}
+    array = array_from({"family": "prpa", "factors": factors, "law": [[0, 2], [1, 3]]})
+    assert (array.rows, array.columns, array.order, array.window) == (15, 63, 4, (4, 6))
+    rows, columns = array.row_sequence, array.column_sequence
+    assert np.array_equal(
+        array.symbols(*block(15, 63)),
+        rows.symbols(block(15, 1)[0]) + 2 * columns.symbols(range(63)),
+    )
+    assert windows_are_unique(array, (4, 6))
+    for law in ([[0, 1], [1, 2]], [[0, 1, 2, 3]], [0, 1, 2, 3]):
+        with pytest.raises(ArrayError, match="injective"):
+            array_from({"family": "prpa", "factors": factors, "law": law})
+    with pytest.raises(ArrayError, match="rows: 16 is not the period of its sequence, 15"):
+        array_from({"family": "prpa", "factors": factors, "rows": 16})
+    assert array.rank([], []) == 0
+    assert array.minimum_distance([0], [0]) == 0
+
+
+def test_large_product_array_is_never_materialised():
+    factors = {"rows": {"degree": 64}, "columns": {"order": 3, "degree": 40}}
+    array = array_from({"family": "prmvpa", "factors": factors})
+    assert isinstance(array, ProductArray)
+    seen = array.symbols(2**63 + np.arange(64, dtype=object)[:, None], np.arange(64) + 10**18)
+    assert seen.shape == (64, 64)
+    pair = array.factors[seen]
+    assert np.array_equal(pair[:, 0, 0], array.row_sequence.state(2**63))
+    assert array.identifies(*block(64, 40))
+    assert not array.identifies(*block(64, 39))
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_definitions_round_trip(name):
+    array = profile(name).array()
+    definition = json.loads(json.dumps(array.definition()))
+    again = array_from(definition)
+    assert again.definition() == definition
+    assert type(again) is type(array)
+    assert np.array_equal(again.symbols(*block(9, 9)), array.symbols(*block(9, 9)))
+
+
+def test_definition_keeps_start_and_field():
+    given = {"family": "prmva", "order": 16, "degree": 2, "field": [1, 0, 0, 1, 1]}
+    polynomial = (2, 1, 1)
+    field = field_of_order(16, (1, 0, 0, 1, 1))
+    for candidate in ((c, b, 1) for b in range(1, 16) for c in range(2, 16)):
+        try:
+            Sequence(field, candidate)
+        except ArrayError:
+            continue
+        polynomial = candidate
+        break
+    array = array_from(given | {"polynomial": list(polynomial), "initial": [7, 3]})
+    again = array_from(array.definition())
+    assert again.definition()["field"] == [1, 0, 0, 1, 1]
+    assert array.sequence.symbols([0, 1]).tolist() == [7, 3]
+    assert np.array_equal(again.symbols(*block(15, 17)), array.symbols(*block(15, 17)))
+    assert windows_are_unique(array, array.window)
+
+
+def test_profiles_by_name():
+    assert profile() is PROFILES["one-touch"]
+    with pytest.raises(ArrayError, match="unknown profile 'huge'; choose one of one-touch, thesis"):
+        profile("huge")
+    with pytest.raises(TypeError):
+        profile().encoding["order"] = 2
+
+
+def test_large_and_up():
+    large = enlarged(profile("large"))
+    assert (large.name, large.pitch_mm, large.alphabet) == ("large", 7.0, "dense-4")
+    array = large.array()
+    assert (array.rows, array.columns) == (511, 513)
+    assert array.window == large.window
+    assert array.identifies(*block(*large.window))
+    degree = 9
+    while degree < 32:
+        large = enlarged(large)
+        assert large.array().full_rank > degree
+        degree = large.array().full_rank
+    with pytest.raises(ArrayError, match=r"no array over GF\(4\) is larger"):
+        enlarged(large)
+    with pytest.raises(ArrayError, match="not a folded array"):
+        enlarged(profile("product"))
+
+
+def test_distance_by_dual_equals_distance_by_listing():
+    for q, n, cells in ((2, 8, 17), (3, 4, 9), (4, 4, 8), (5, 3, 7), (9, 2, 4)):
+        sequence = Sequence(field_of_order(q), primitive_polynomial(q, n))
+        offsets = [(7 * k * k + k) % sequence.period for k in range(cells)]
+        offsets = list(dict.fromkeys(offsets))
+        listed = minimum_distance(sequence, offsets, [1] * len(offsets))
+        if sequence.rank(offsets) == n:
+            assert least_weight_by_dual(sequence.field, sequence.coefficients(offsets)) == listed
+            assert listed >= 1
+
+
+def test_distance_on_large_arrays():
+    array = array_from({"family": "prba", "degree": 24})  # 4095x4097, window 12x2
+    assert array.minimum_distance(*block(12, 2)) == 1
+    assert array.minimum_distance(*block(3, 3)) == 0
+    d = array.minimum_distance(*block(6, 6))
+    assert d >= 1
+    with pytest.raises(ArrayError, match=r"out of reach: exact up to 1048576 places"):
+        array.minimum_distance(*block(9, 9))
+    with pytest.raises(ArrayError, match="too many to compare"):
+        windows_are_unique(array, (12, 2))
+
+
+def test_echelon_and_null_space():
+    field = field_of_order(9)
+    rng = np.random.default_rng(9)
+    matrix = rng.integers(0, 9, (4, 7))
+    matrix[3] = field.add(field.multiply(matrix[0], 5), matrix[1])
+    rows, pivots = echelon(field, matrix)
+    assert len(rows) == len(pivots) == 3
+    basis = null_space(field, matrix)
+    assert basis.shape == (4, 7)
+    for word in basis:
+        for row in matrix:
+            total = 0
+            for a, b in zip(row, word, strict=True):
+                total = int(field.add(total, field.multiply(a, b)))
+            assert total == 0
+
+
+def test_terms_equal_the_recurrence():
+    for q, n in ((2, 10), (4, 5), (9, 3)):
+        sequence = Sequence(field_of_order(q), primitive_polynomial(q, n))
+        forward = sequence.forward()
+        assert terms(sequence, sequence.period).tolist() == [
+            next(forward) for _ in range(sequence.period)
+        ]
+
+
+def test_a_face_costs_what_it_shows():
+    def best_of_five(work):
+        times = []
+        for _ in range(5):
+            start = time.perf_counter()
+            work()
+            times.append(time.perf_counter() - start)
+        return min(times)
+
+    rows = 10 * np.arange(6)[:, None, None] + np.arange(8)[:, None]
+    columns = 9 * np.arange(6)[:, None, None] + np.arange(8)
+    assert best_of_five(lambda: profile().array().symbols(rows, columns)) < 0.02  # target 5 ms
+    huge = {"family": "prba", "degree": 64}
+    face = 2**31 + np.arange(64)[:, None], 2**30 + np.arange(64)
+    assert best_of_five(lambda: array_from(huge).symbols(*face)) < 0.2
+
+
+@pytest.mark.parametrize("module", ["field", "primitive", "sequence", "definition"])
+def test_examples_in_docstrings_run(module):
+    result = doctest.testmod(importlib.import_module(f"generator.array.{module}"))
+    assert result.attempted
+    assert not result.failed
+
+
+def test_import_is_light():
+    script = (
+        "import sys, generator.array; "
+        "heavy = {'scipy','shapely','trimesh','pydantic','sqlalchemy','yaml','typer','rich',"
+        "'manifold3d','PIL','matplotlib','OCP','importlib.resources'} & set(sys.modules); "
+        "print(sorted(heavy))"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "[]"

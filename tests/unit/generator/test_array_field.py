@@ -1,0 +1,249 @@
+"""GF(q) tables, factors, polynomials and the ones on file."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from generator.array import factor, notation, polynomial, primitive
+from generator.array.field import MINIMAL_POLYNOMIALS, field_of_order
+from generator.array.residue import Powers, Residues, packed, rank_modulo
+from generator.errors import ArrayError
+
+ORDERS = [2, 3, 4, 5, 7, 8, 9, 11, 13, 16, 25, 27, 32, 49, 64, 81, 121, 125, 128, 169, 243, 256]
+
+
+@pytest.mark.parametrize("q", [2, 3, 4, 5, 7, 8, 9, 11, 16, 25, 27, 49])
+def test_field_axioms_exhaustively(q):
+    field = field_of_order(q)
+    add, mul = field.addition, field.multiplication
+    a = np.arange(q)
+    assert np.array_equal(add[0], a)
+    assert np.array_equal(mul[1], a)
+    assert not mul[0].any()
+    assert np.array_equal(add, add.T)
+    assert np.array_equal(mul, mul.T)
+    x, y, z = a[:, None, None], a[:, None], a
+    assert np.array_equal(add[add[x, y], z], add[x, add[y, z]])
+    assert np.array_equal(mul[mul[x, y], z], mul[x, mul[y, z]])
+    assert np.array_equal(mul[x, add[y, z]], add[mul[x, y], mul[x, z]])
+    assert not add[a, field.negative].any()
+    assert (mul[a[1:], field.inverse[1:]] == 1).all()
+    assert not field.subtract(a, a).any()
+
+
+@pytest.mark.parametrize("q", ORDERS)
+def test_labels_are_integers_or_powers_of_a(q):
+    field = field_of_order(q)
+    if field.degree == 1:
+        assert field.add(q - 1, 1) == 0
+        assert field.multiply(2 % q, q - 1) == (q - 2) % q
+    else:
+        power = 1
+        for label in range(1, q):
+            assert power == label
+            power = int(field.multiply(power, 2))
+        assert power == 1
+    assert np.array_equal(field.labels(field.digits), np.arange(q))
+    assert field_of_order(q) is field
+
+
+@pytest.mark.parametrize("q", sorted(MINIMAL_POLYNOMIALS))
+def test_minimal_polynomials_are_conways(q):
+    """The definition: first in Conway's order, primitive, and compatible with each subfield."""
+    p, m = factor.prime_power(q)
+
+    def compatible(candidate):
+        ring = Residues(p, candidate)
+        if not ring.is_primitive(factor.period_factors(p, m)):
+            return False
+        for d in range(1, m):
+            if m % d == 0:
+                root = ring.power_of_x((q - 1) // (p**d - 1))
+                value, power = np.zeros(m), ring.powers_of_x[0]
+                for coefficient in smaller(d):
+                    value = (value + coefficient * power) % p
+                    power = ring.product(power, root)
+                if value.any():
+                    return False
+        return True
+
+    def smaller(d):
+        if d > 1:
+            return MINIMAL_POLYNOMIALS[p**d]
+        generator = next(g for g in range(1, p) if p == 2 or multiplicative_order(g, p) == p - 1)
+        return (-generator % p, 1)
+
+    for signed in itertools.product(range(p), repeat=m):  # c_k = (-1)^(m-k) signed_k
+        candidate = (*((-1) ** (m - k) * signed[m - 1 - k] % p for k in range(m)), 1)
+        if candidate[0] and compatible(candidate):
+            assert candidate == MINIMAL_POLYNOMIALS[q]
+            return
+    pytest.fail("no candidate")
+
+
+def multiplicative_order(a, p):
+    return next(k for k in range(1, p) if pow(a, k, p) == 1)
+
+
+def test_other_minimal_polynomial_and_large_fields():
+    field = field_of_order(16, (1, 0, 0, 1, 1))
+    assert field.add(1, field.multiply(2, field.multiply(2, 2))) == 5  # A^4 = A^3 + 1
+    assert field_of_order(343).order == 343
+    with pytest.raises(ArrayError, match=r"not a primitive polynomial of degree 4.*take \[1, 1, 0"):
+        field_of_order(16, (1, 1, 1, 1, 1))
+    with pytest.raises(ArrayError, match="prime power; take one of 4, 5, 7, 8"):
+        field_of_order(6)
+    with pytest.raises(ArrayError, match="up to 1024"):
+        field_of_order(2048)
+    for wrong in (1, 0, -3):
+        with pytest.raises(ArrayError, match="no field has"):
+            field_of_order(wrong)
+
+
+def test_prime_factors():
+    assert factor.prime_factors(1) == {}
+    for number in range(1, 3000):
+        found = factor.prime_factors(number)
+        assert math.prod(p**e for p, e in found.items()) == number
+        assert all(all(p % d for d in range(2, math.isqrt(p) + 1)) for p in found)
+    assert factor.prime_factors(1009 * 1013) == {1009: 1, 1013: 1}
+    assert factor.prime_factors(1000003**2) == {1000003: 2}
+    assert factor.prime_factors(1000003**3) == {1000003: 3}
+    assert factor.prime_factors(4294967291 * 4294967279) == {4294967279: 1, 4294967291: 1}
+    assert factor.is_prime(2**61 - 1)
+    assert not factor.is_prime(3215031751)  # passes for the bases 2, 3, 5, 7
+    assert factor.period_factors(2, 64) == {3: 1, 5: 1, 17: 1, 257: 1, 641: 1, 65537: 1, 6700417: 1}
+    assert factor.period_factors(4, 32) == factor.period_factors(2, 64)
+    assert factor.period_factors(2, 61) == {2**61 - 1: 1}
+
+
+@pytest.mark.parametrize("q", [2, 3, 4, 5, 7, 8, 9, 16, 25, 27])
+def test_period_factors_multiply_to_the_period(q):
+    n = 1
+    while q**n <= 2**64:
+        found = factor.period_factors(q, n)
+        assert math.prod(p**e for p, e in found.items()) == q**n - 1
+        assert all(map(factor.is_prime, found))
+        n += 1
+    with pytest.raises(ArrayError, match=rf"take a degree from 1 to {n - 1}"):
+        factor.period_factors(q, n)
+
+
+def test_every_polynomial_on_file_is_primitive():
+    entries = primitive.known_polynomials()
+    degrees = {q: {p.degree for p in entries if p.order == q} for q in ORDERS}
+    assert degrees[2] == set(range(2, 65))
+    assert degrees[4] == set(range(1, 33))
+    assert degrees[8] == set(range(1, 22))
+    for q in (3, 5, 7, 9, 11, 13, 16, 25, 27):
+        assert degrees[q] == {n for n in range(1, 65) if q**n <= 2**64}
+    for entry in entries:
+        field = field_of_order(entry.order)
+        assert len(entry.labels) == entry.degree + 1, entry
+        assert polynomial.is_primitive(field, entry.labels), entry
+    sources = {"appendix 4", "table 5.1", "table 5.3", "robust", "three windows", "search"}
+    assert {entry.source for entry in entries} == sources
+
+
+@pytest.mark.parametrize(("q", "n"), [(2, 17), (2, 40), (3, 11), (4, 12), (5, 6), (9, 1), (16, 2)])
+def test_search_repeats_what_is_on_file(q, n):
+    assert primitive.search_primitive(q, n) == primitive.primitive_polynomial(q, n)
+
+
+def test_primitive_polynomial_that_is_not_on_file():
+    with pytest.raises(ArrayError, match=r"degrees 1 to 8.*search_primitive\(32, 9\)"):
+        primitive.primitive_polynomial(32, 9)
+    with pytest.raises(ArrayError, match="none is for this field"):
+        primitive.primitive_polynomial(121, 2)
+    with pytest.raises(ArrayError, match=r"from table 5\.1 is on file; on file: degrees 4 to 10"):
+        primitive.primitive_polynomial(2, 12, "table 5.1")
+
+
+@pytest.mark.parametrize("q", [2, 3, 4, 5, 8, 9])
+def test_order_and_primitivity_agree_with_counting(q):
+    field = field_of_order(q)
+    n = 4 if q == 2 else 2
+    primitive_ones = 0
+    for low in itertools.product(range(q), repeat=n):
+        if low[0] == 0:
+            continue
+        h = (*low, 1)
+        power, t = polynomial.remainder(field, (0, 1), h), 1
+        one = polynomial.remainder(field, (1,), h)
+        while power != one:
+            power, t = polynomial.mulmod(field, power, (0, 1), h), t + 1
+        assert polynomial.order(field, h) == t
+        assert polynomial.is_primitive(field, h) == (t == q**n - 1)
+        primitive_ones += t == q**n - 1
+    totient = sum(math.gcd(k, q**n - 1) == 1 for k in range(1, q**n))
+    assert primitive_ones == totient // n
+
+
+def test_orders_of_reducible_and_unsuitable_polynomials():
+    binary = field_of_order(2)
+    assert polynomial.order(binary, (1, 0, 1)) == 2  # (x + 1)^2
+    assert polynomial.order(binary, (1, 1, 1, 1, 1)) == 5
+    assert polynomial.order(binary, (1, 0, 0, 0, 0, 1)) == 5
+    assert not polynomial.is_primitive(binary, (0, 1, 1))
+    for wrong in ((0, 1, 1), (1,), (1, 1, 2), (1, 1.5, 1), (1, 1, 0)):
+        with pytest.raises(ArrayError):
+            polynomial.monic(binary, wrong)
+    with pytest.raises(ArrayError, match="at most 2\\^64 - 1"):
+        polynomial.monic(binary, [1] * 66)
+
+
+@pytest.mark.parametrize(
+    ("q", "text", "labels"),
+    [
+        (2, "0x1099", (1, 0, 0, 1, 1, 0, 0, 1, 0, 0, 0, 0, 1)),
+        (2, "x^4 + x + 1", (1, 1, 0, 0, 1)),
+        (3, "x^3+2x+1", (1, 2, 0, 1)),
+        (4, "x^10+x^3+A(x^2+x+1)", (2, 2, 2, 1, 0, 0, 0, 0, 0, 0, 1)),
+        (4, "x^4+x^2+A*x+A^2", (3, 2, 1, 0, 1)),
+        (9, "x^2+2x+A^9", (2, 5, 1)),  # 2 = A^4, A^9 = A
+        (4, "x+x+x^2+A", (2, 0, 1)),
+    ],
+)
+def test_written_polynomials(q, text, labels):
+    field = field_of_order(q)
+    assert notation.parsed(field, text) == labels
+    assert notation.parsed(field, notation.written(field, labels)) == labels
+
+
+@pytest.mark.parametrize(
+    ("q", "text"),
+    [(2, ""), (2, "x^2+y"), (2, "x^2+A"), (3, "x^2+3"), (4, "0x13"), (4, "A(x+(1))"), (2, "x^99"),
+     (2, "x^^2"), (4, "x^2-A")],
+)  # fmt: skip
+def test_polynomials_that_are_not_understood(q, text):
+    with pytest.raises(ArrayError):
+        notation.parsed(field_of_order(q), text)
+
+
+@pytest.mark.parametrize(("p", "modulus"), [(2, (1, 1, 0, 0, 1)), (3, (2, 1, 1)), (5, (3, 1))])
+def test_powers_are_repeated_products(p, modulus):
+    ring = Residues(p, modulus)
+    period = p**ring.degree - 1
+    base = ring.power_of_x(2)
+    powers = Powers(ring, base, period)
+    expected = [ring.powers_of_x[0]]
+    for _ in range(period - 1):
+        expected.append(ring.product(expected[-1], base))
+    assert np.array_equal(powers.at(np.array([period - 1], dtype=np.uint64))[0], expected[-1])
+    assert np.array_equal(powers.at(np.arange(period, dtype=np.uint64)), expected)
+    assert powers.at(np.zeros(0, dtype=np.uint64)).shape == (0, ring.degree)
+    assert np.array_equal(ring.power(base, 5), expected[5 % period])
+    assert np.array_equal(expected[1] @ ring.multiplication(base) % p, ring.power(base, 2))
+
+
+def test_rank_and_packing():
+    rows = np.array([[1, 2, 0], [2, 4, 0], [0, 1, 1]])
+    assert rank_modulo(rows.astype(float), 5) == 2
+    assert rank_modulo(rows.astype(float), 2) == 2
+    assert rank_modulo(np.zeros((2, 3)), 3) == 0
+    bits = np.zeros((2, 64))
+    bits[0, [0, 63]] = 1
+    assert packed(bits).tolist() == [2**63 + 1, 0]
+    assert packed(np.ones((1, 3))).tolist() == [7]
