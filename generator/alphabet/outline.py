@@ -1,13 +1,37 @@
-"""Glyph outlines: (placeholder types; the owner completes this module)."""
+"""Glyph outlines: stroke graphs widened by an octagonal nib, with draft and chamfer.
+
+Glyph + style -> Tiers: outlines at rising heights, mm, in the symbol's own axes. The top
+of a stroke keeps its width; draft widens the foot, a chamfer of 45 degrees narrows the
+top. From tier to tier every edge moves along its own normal and every corner with it, so
+each side of a symbol is one exactly planar quadrilateral.
+Thesis 6.1, 6.2 (the embossed symbols).
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-Ring = NDArray[np.float64]  # (k, 2) mm in the symbol's axes, outer counter-clockwise, holes clockwise
+from generator.alphabet.known import Alphabet
+from generator.alphabet.nib import Lines, covered, moved
+from generator.alphabet.rings import crossing, edges_kept, signed_area
+from generator.alphabet.strokes import Glyph
+from generator.errors import AlphabetError
+
+Ring = NDArray[
+    np.float64
+]  #: (k, 2) mm in the symbol's axes, outer counter-clockwise, holes clockwise
+
+#: An edge shorter than this share of the stroke is refused as collapsed.
+SHORTEST_EDGE = 0.01
+#: A smaller chamfer cannot be seen, and its sides would be slivers.
+LEAST_CHAMFER_MM = 0.01
+#: Free margin around the footprint, as a share of the pitch, for triangulation.
+FOOT_MARGIN = 0.005
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,15 +40,239 @@ class SymbolStyle:
 
     pitch_mm: float = 7.0
     height_mm: float = 1.0
-    stroke_mm: float = 1.4  #: width of the stroke at the top
+    stroke_mm: float = 1.4  #: width of the stroke at the top, before the chamfer
     draft_rad: float = 0.17453292519943295  #: slope of the sides from the vertical
-    chamfer_mm: float = 0.0  #: of the top edge; 0 for none
+    chamfer_mm: float = 0.0  #: of the top edge, at 45 degrees; 0 for none
+
+    @property
+    def draft_mm(self) -> float:
+        """How far the foot reaches beyond the top, before the chamfer, on every side."""
+        return self.height_mm * math.tan(self.draft_rad)
 
 
 @dataclass(frozen=True, slots=True)
 class Tiers:
-    """A symbol as outlines at rising (emboss) or falling (engrave) heights; same ring count and
-    vertex count on every tier, so that neighbouring tiers join by planar quadrilaterals."""
+    """A symbol as outlines at rising (emboss) or falling (engrave) heights.
 
-    z_mm: tuple[float, ...]  #: first 0.0 in the face
+    Every tier has the same number of rings, and ring k the same number of corners on every
+    tier; edge i of ring k (corner i to i + 1) has one direction on all tiers, so
+    neighbouring tiers join by planar quadrilaterals. With a, b the corners on one tier and
+    c, d those after it, the loop (a_i, a_i+1, b_i+1, b_i) has its normal out of the
+    material in both cases: beside an embossed stroke, or into the void of an engraved one.
+    The facet in z = 0 is cut by the first tier's rings reversed; inside each hole ring of
+    the first tier it goes on (an island of the facet). The last tier's rings, as they are,
+    bound the top (or the floor), whose normal is +z in both cases.
+    """
+
+    z_mm: tuple[float, ...]  #: first 0.0 in the face; strictly rising or strictly falling
     rings: tuple[tuple[Ring, ...], ...]  #: [tier][ring]; ring 0 outer, others holes
+
+
+@lru_cache(maxsize=64)
+def outlines(alphabet: Alphabet, style: SymbolStyle) -> tuple[Tiers, ...]:
+    """Return the tiers of all symbols of an alphabet, in the order of their labels.
+
+    Raises
+    ------
+    AlphabetError
+        See `outline`; the message names the alphabet.
+    """
+    return tuple(
+        outline(glyph, alphabet.reach * style.pitch_mm, style, place=f"alphabet {alphabet.name}")
+        for glyph in alphabet.glyphs
+    )
+
+
+def outline(glyph: Glyph, unit_mm: float, style: SymbolStyle, *, place: str = "") -> Tiers:
+    """Return the tiers of one embossed glyph.
+
+    Parameters
+    ----------
+    glyph
+        Strokes on integer nodes.
+    unit_mm
+        Distance of two neighbouring nodes, mm.
+    style
+        Stroke, height, draft and chamfer; the pitch is not used.
+    place
+        Named in errors.
+
+    Returns
+    -------
+    Tiers
+        Two tiers, or three with a chamfer.
+
+    Raises
+    ------
+    AlphabetError
+        If a number is out of range, an edge collapses, or strokes meet at the foot that
+        stand apart at the top. The message gives a draft or chamfer that works.
+    """
+    _check_numbers(style, place)
+    lines = _stroke_lines(glyph, unit_mm, style.stroke_mm, place)
+    steps = _steps(style)
+    if _regular(lines, [d for _, d in steps], style.stroke_mm):
+        rings = tuple(tuple(_frozen(moved(ring, d)) for ring in lines) for _, d in steps)
+        return Tiers(tuple(z for z, _ in steps), rings)
+    raise _collapse(glyph, unit_mm, style, place)
+
+
+@lru_cache(maxsize=256)
+def engraved(glyph: Glyph, unit_mm: float, stroke_mm: float, depth_mm: float) -> Tiers:
+    """Return the tiers of a glyph cut into a facet as a groove with 45 degree walls.
+
+    The stroke has its width at the surface and loses twice the depth at the floor, so the
+    groove prints without support also where it faces the bed.
+
+    Raises
+    ------
+    AlphabetError
+        If the floor of the groove collapses.
+    """
+    lines = _stroke_lines(glyph, unit_mm, stroke_mm, "edge number")
+    if not _regular(lines, [0.0, -depth_mm], stroke_mm):
+        raise AlphabetError(
+            f"'{glyph.name}' collapses: stroke {stroke_mm:g} mm, depth {depth_mm:g} mm",
+            fix=f"engrave less than {0.45 * stroke_mm:.2g} mm deep, or use larger figures",
+        )
+    rings = tuple(tuple(_frozen(moved(ring, d)) for ring in lines) for d in (0.0, -depth_mm))
+    return Tiers((0.0, -depth_mm), rings)
+
+
+def foot_half_mm(tiers: Tiers) -> float:
+    """Half side of the smallest square about the symbol's centre that holds its foot, mm."""
+    return max(float(np.abs(ring).max()) for ring in tiers.rings[0])
+
+
+def footprint_half_mm(alphabet: Alphabet, style: SymbolStyle) -> float:
+    """Half side of a square about the symbol's centre that holds every foot.
+
+    Axis-parallel in the symbol's axes, mm, with a margin of 0.005 pitch; less than half
+    the pitch.
+
+    Raises
+    ------
+    AlphabetError
+        If neighbouring symbols would touch, or see `outline`.
+    """
+    half = max(foot_half_mm(tiers) for tiers in outlines(alphabet, style))
+    half += FOOT_MARGIN * style.pitch_mm
+    if half < style.pitch_mm / 2:
+        return half
+    solid = style.stroke_mm / 2 + style.draft_mm
+    free = 0.5 - alphabet.reach - FOOT_MARGIN
+    fix = f"set pitch to {math.ceil(solid / free * 100) / 100 + 0.01:g} mm or more"
+    if free * style.pitch_mm > style.draft_mm:
+        widest = 2 * (free * style.pitch_mm - style.draft_mm)
+        fix += f", or stroke to {(math.floor(widest * 100) - 1) / 100:g} mm or less"
+    raise AlphabetError(
+        f"symbols with a foot of {2 * half:.3g} mm touch at a pitch of {style.pitch_mm:g} mm",
+        fix=fix,
+        place=f"alphabet {alphabet.name}",
+    )
+
+
+def _steps(style: SymbolStyle) -> list[tuple[float, float]]:
+    """Return the height of every tier and how far it lies outside the stroke, mm."""
+    slope = math.tan(style.draft_rad)
+    h, c = style.height_mm, style.chamfer_mm
+    if c > 0:
+        return [(0.0, h * slope), (h - c, c * slope), (h, c * slope - c)]
+    return [(0.0, h * slope), (h, 0.0)]
+
+
+def _check_numbers(style: SymbolStyle, place: str) -> None:
+    """Refuse sizes that are no symbol at all."""
+    for name, value in (
+        ("pitch", style.pitch_mm),
+        ("height", style.height_mm),
+        ("stroke", style.stroke_mm),
+    ):
+        if not (math.isfinite(value) and value > 0):
+            raise AlphabetError(
+                f"{name} {value:g} mm", fix=f"set {name} to more than 0 mm", place=place
+            )
+    if not 0 <= style.draft_rad <= math.radians(60):
+        raise AlphabetError(
+            f"draft {math.degrees(style.draft_rad):g} degrees",
+            fix="set draft between 0 and 60 degrees, 10 prints well",
+            place=place,
+        )
+    most = 0.9 * style.height_mm
+    if style.chamfer_mm and not LEAST_CHAMFER_MM <= style.chamfer_mm <= most:
+        raise AlphabetError(
+            f"chamfer {style.chamfer_mm:g} mm on symbols {style.height_mm:g} mm high",
+            fix=f"set chamfer to 0, or between {LEAST_CHAMFER_MM:g} and {most:.2g} mm",
+            place=place,
+        )
+
+
+def _stroke_lines(glyph: Glyph, unit_mm: float, stroke_mm: float, place: str) -> list[Lines]:
+    """Return the outline's lines, outer ring first, starting at its lowest left corner."""
+    rings = covered(np.array(glyph.strokes, dtype=np.float64) * unit_mm, stroke_mm)
+    begun = []
+    for ring in rings:
+        corners = moved(ring, 0.0)
+        order = np.lexsort(np.round(corners / stroke_mm, 6).T[::-1])
+        first = int(order[0])
+        area = signed_area(corners)
+        key = (area < 0, *np.round(corners[first] / stroke_mm, 6))
+        begun.append((key, np.roll(ring, -first, axis=0)))
+    begun.sort(key=lambda pair: pair[0])
+    if sum(not key[0] for key, _ in begun) != 1:
+        raise AlphabetError(
+            f"symbol '{glyph.name}' falls into pieces", fix="join its strokes", place=place
+        )
+    return [ring for _, ring in begun]
+
+
+def _regular(lines: list[Lines], distances: list[float], stroke_mm: float) -> bool:
+    """Whether all edges survive at every distance and no two of them meet."""
+    normal = [moved(ring, 0.0) for ring in lines]
+    for distance in distances:
+        rings = [moved(ring, distance) for ring in lines]
+        short = SHORTEST_EDGE * stroke_mm
+        if not all(edges_kept(a, b, short) for a, b in zip(normal, rings, strict=True)):
+            return False
+        if crossing(rings):
+            return False
+    return True
+
+
+def _collapse(glyph: Glyph, unit_mm: float, style: SymbolStyle, place: str) -> AlphabetError:
+    """Return the error for a glyph whose tiers are not regular, with what would work."""
+
+    def works(trial: SymbolStyle) -> bool:
+        lines = _stroke_lines(glyph, unit_mm, trial.stroke_mm, place)
+        return _regular(lines, [d for _, d in _steps(trial)], trial.stroke_mm)
+
+    cause = (
+        f"stroke {style.stroke_mm:g} mm makes an edge or a gap of symbol '{glyph.name}' collapse "
+        f"at pitch {style.pitch_mm:g} mm, height {style.height_mm:g} mm, "
+        f"draft {math.degrees(style.draft_rad):.3g} degrees, chamfer {style.chamfer_mm:g} mm"
+    )
+    ways = []
+    for sign in (-1, 1):
+        for steps in range(1, 13):
+            width = round(style.stroke_mm * (1 + sign * steps / 20), 2)
+            if width > 0 and works(replace(style, stroke_mm=width)):
+                ways.append(f"stroke to {width:g} mm")
+                break
+    for share in np.arange(0.95, 0.0, -0.05):
+        if works(replace(style, draft_rad=style.draft_rad * share)):
+            degrees = math.floor(math.degrees(style.draft_rad) * share * 10) / 10
+            ways.append(f"draft to {degrees:g} degrees or less")
+            break
+    for share in np.arange(0.95, -0.01, -0.05):
+        if style.chamfer_mm and works(replace(style, chamfer_mm=style.chamfer_mm * share)):
+            chamfer = math.floor(style.chamfer_mm * share * 100) / 100
+            ways.append(f"chamfer to {chamfer:g} mm or less")
+            break
+    if not ways:
+        ways.append("pitch to more, or height to less")
+    return AlphabetError(cause, fix="set " + ", or ".join(ways), place=place)
+
+
+def _frozen(ring: Ring) -> Ring:
+    ring.setflags(write=False)
+    return ring

@@ -1,0 +1,156 @@
+"""Whether a printer can make the symbols of an alphabet as a style asks.
+
+Limits, from `Printer`: stroke and height; between neighbouring symbols the gap at the foot,
+because symbols that grow together change what is read; inside a symbol half of that gap
+between the tops of two strokes, because there a gap that half closes costs contrast only
+(strokes 0.2 mm too wide are still read without error).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from generator.alphabet.known import Alphabet
+from generator.alphabet.outline import SymbolStyle, Tiers, footprint_half_mm, outlines
+from generator.errors import AlphabetError
+from generator.printers import Printer
+
+#: Share of the printer's least gap that strokes of one symbol keep at their tops.
+INSIDE_SHARE = 0.5
+
+
+def gap_inside_mm(tiers: Tiers) -> float:
+    """Return the narrowest gap between two facing sides of one symbol at its top, mm.
+
+    Sides face each other when their normals are opposed within 25 degrees; `inf` if none do.
+    A chamfer is counted as open: the gap is that below it.
+    """
+    tier = tiers.rings[-2] if len(tiers.rings) > 2 else tiers.rings[-1]
+    a = np.concatenate(tier)
+    b = np.concatenate([np.roll(ring, -1, axis=0) for ring in tier])
+    length = np.hypot(*(b - a).T)
+    along = (b - a) / length[:, None]
+    normal = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    middle = (a + b) / 2
+    i, j = np.triu_indices(len(a), 1)
+    facing = (normal[i] * normal[j]).sum(axis=1) < -math.cos(math.radians(25))
+    i, j = i[facing], j[facing]
+    between = middle[j] - middle[i]
+    gap = (between * normal[i]).sum(axis=1)
+    beside = np.abs((between * along[i]).sum(axis=1)) - (length[i] + length[j]) / 2
+    gap, beside = gap[gap > 0], np.maximum(beside[gap > 0], 0.0)
+    return float(np.hypot(gap, beside).min(initial=np.inf))
+
+
+def gap_between_mm(alphabet: Alphabet, style: SymbolStyle) -> float:
+    """Return the least gap between the feet of two neighbouring symbols, mm."""
+    feet = np.concatenate([ring for tiers in outlines(alphabet, style) for ring in tiers.rings[0]])
+    return style.pitch_mm - float((feet.max(axis=0) - feet.min(axis=0)).max())
+
+
+def check_printable(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> None:
+    """Refuse symbols that the printer would lose.
+
+    Raises
+    ------
+    AlphabetError
+        With the number that is out of range, the printer's limit, and a stroke or pitch
+        that works; also if an edge collapses or neighbouring symbols touch.
+    """
+    place = f"alphabet {alphabet.name}"
+    if style.stroke_mm < printer.stroke_min_mm:
+        raise AlphabetError(
+            f"stroke {style.stroke_mm:g} mm, but {printer.name} prints no stroke under "
+            f"{printer.stroke_min_mm:g} mm",
+            fix=f"set stroke to {printer.stroke_min_mm:g} mm or more, or choose a finer printer",
+            place=place,
+        )
+    if style.height_mm < printer.height_min_mm:
+        raise AlphabetError(
+            f"height {style.height_mm:g} mm, but under {printer.height_min_mm:g} mm a symbol "
+            f"printed by {printer.name} cannot be felt",
+            fix=f"set height to {printer.height_min_mm:g} mm or more",
+            place=place,
+        )
+    top = style.stroke_mm - 2 * style.chamfer_mm * (1 - math.tan(style.draft_rad))
+    if top < printer.stroke_min_mm / 2:
+        most = (style.stroke_mm - printer.stroke_min_mm / 2) / 2
+        raise AlphabetError(
+            f"a chamfer of {style.chamfer_mm:g} mm leaves {top:.2g} mm of the stroke's top, but "
+            f"{printer.name} needs {printer.stroke_min_mm / 2:g} mm",
+            fix=f"set chamfer to {math.floor(100 * most) / 100:g} mm or less",
+            place=place,
+        )
+    footprint_half_mm(alphabet, style)
+    between = gap_between_mm(alphabet, style)
+    if between < printer.gap_min_mm:
+        raise AlphabetError(
+            f"{between:.2g} mm between the feet of neighbouring symbols, but {printer.name} keeps "
+            f"no gap under {printer.gap_min_mm:g} mm open",
+            fix=_ways_out(alphabet, style, printer),
+            place=place,
+        )
+    least = INSIDE_SHARE * printer.gap_min_mm
+    for glyph, tiers in zip(alphabet.glyphs, outlines(alphabet, style), strict=True):
+        inside = gap_inside_mm(tiers)
+        if inside < least * (1 - 1e-9):
+            raise AlphabetError(
+                f"{inside:.2g} mm between two strokes of symbol '{glyph.name}', but "
+                f"{printer.name} keeps no gap under {least:g} mm open inside a symbol",
+                fix=_ways_out(alphabet, style, printer),
+                place=place,
+            )
+
+
+def _ways_out(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> str:
+    """Return the nearest strokes and pitches that pass, as an instruction."""
+
+    def passes(trial: SymbolStyle) -> bool:
+        if trial.stroke_mm < printer.stroke_min_mm:
+            return False
+        try:
+            footprint_half_mm(alphabet, trial)
+        except AlphabetError:
+            return False
+        return gap_between_mm(alphabet, trial) >= printer.gap_min_mm and all(
+            gap_inside_mm(tiers) >= INSIDE_SHARE * printer.gap_min_mm * (1 - 1e-9)
+            for tiers in outlines(alphabet, trial)
+        )
+
+    def stroke(steps: int) -> SymbolStyle:
+        return replace(style, stroke_mm=round(style.stroke_mm + steps * 0.05 * style.stroke_mm, 2))
+
+    def pitch(steps: int) -> SymbolStyle:
+        return replace(style, pitch_mm=round(style.pitch_mm + steps * 0.05 * style.pitch_mm, 2))
+
+    ways = [
+        f"{name} to {value:g} mm"
+        for name, value in (
+            ("stroke", _first(passes, stroke, -1, "stroke_mm")),
+            ("stroke", _first(passes, stroke, 1, "stroke_mm")),
+            ("pitch", _first(passes, pitch, 1, "pitch_mm")),
+        )
+        if value is not None
+    ]
+    return "set " + ", or ".join(ways) if ways else "set draft or height to less, or pitch to more"
+
+
+def _first(
+    passes: Callable[[SymbolStyle], bool],
+    trial: Callable[[int], SymbolStyle],
+    direction: int,
+    value: str,
+) -> float | None:
+    """Return the first of up to 15 trials, 5 % apart, in one direction that passes."""
+    for steps in range(1, 16):
+        style = trial(direction * steps)
+        found = float(getattr(style, value))
+        if found <= 0:
+            return None
+        if passes(style):
+            return found
+    return None

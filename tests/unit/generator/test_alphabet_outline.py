@@ -1,0 +1,192 @@
+"""Outlines: exact widths, planar sides, refusals with a way out that works."""
+
+import math
+import re
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from generator.alphabet import (
+    ALPHABETS,
+    Alphabet,
+    Glyph,
+    SymbolStyle,
+    alphabet_named,
+    check_printable,
+    footprint_half_mm,
+    outline,
+    outlines,
+)
+from generator.alphabet.known import line
+from generator.alphabet.outline import engraved
+from generator.alphabet.printable import gap_between_mm, gap_inside_mm
+from generator.alphabet.rings import crossing, inside, signed_area
+from generator.errors import AlphabetError
+from generator.printers import PRINTERS
+
+FDM = PRINTERS["fdm-0.4"]
+DENSE = alphabet_named("dense-4")
+
+
+def style_for(alphabet, pitch, **changes):
+    return SymbolStyle(pitch_mm=pitch, stroke_mm=alphabet.stroke_ratio * pitch, **changes)
+
+
+def test_a_stroke_is_an_octagon_drawn_along():
+    tiers = outline(
+        Glyph("-", line((-1, 0), (1, 0))), 2.0, SymbolStyle(stroke_mm=1.0, draft_rad=0.0)
+    )
+    (ring,) = tiers.rings[-1]
+    octagon = 2 * (math.sqrt(2) - 1)  # of inradius 1/2: area 8 r^2 tan(22.5 degrees)
+    assert len(ring) == 8
+    assert signed_area(ring) == pytest.approx(octagon + 4.0, rel=1e-14)
+    assert np.ptp(ring, axis=0) == pytest.approx([5.0, 1.0], rel=1e-14)
+
+
+@pytest.mark.parametrize("alphabet", ALPHABETS.values(), ids=lambda a: a.name)
+@pytest.mark.parametrize("chamfer", [0.0, 0.1])
+def test_tiers_correspond_and_their_sides_are_planar(alphabet, chamfer):
+    style = style_for(alphabet, 10.0, chamfer_mm=chamfer)
+    for tiers in outlines(alphabet, style):
+        assert tiers.z_mm[0] == 0.0
+        assert tiers.z_mm[-1] == style.height_mm
+        assert len(tiers.z_mm) == (3 if chamfer else 2)
+        for rings in tiers.rings:
+            assert signed_area(rings[0]) > 0
+            assert all(signed_area(hole) < 0 for hole in rings[1:])
+            assert not crossing(rings)
+        steps = zip(tiers.z_mm, tiers.rings, strict=True)
+        for (z0, lower), (z1, upper) in pairwise(steps):
+            for a, b in zip(lower, upper, strict=True):
+                corners = np.stack([a, np.roll(a, -1, axis=0), np.roll(b, -1, axis=0), b], axis=1)
+                z = np.broadcast_to([z0, z0, z1, z1], corners.shape[:2])
+                p = np.concatenate([corners, z[..., None]], axis=2)
+                u, v, w = (p[:, k] - p[:, 0] for k in (1, 2, 3))
+                off = np.abs((np.cross(u, v) * w).sum(axis=1))
+                size = [np.linalg.norm(x, axis=1) for x in (u, v, w)]
+                assert (off <= 1e-13 * size[0] * size[1] * size[2]).all()
+
+
+def test_top_keeps_the_stroke_and_draft_widens_the_foot():
+    style = SymbolStyle(draft_rad=math.radians(10))
+    glyph = DENSE.glyphs[0]
+    tiers = outline(glyph, 1.82, style)
+    (foot,), (top,) = tiers.rings
+    draft = math.tan(math.radians(10))
+    assert np.ptp(top, axis=0) == pytest.approx([2 * 1.82 + 1.4] * 2, rel=1e-14)
+    assert np.ptp(foot, axis=0) == pytest.approx([2 * 1.82 + 1.4 + 2 * draft] * 2, rel=1e-14)
+    chamfered = outline(glyph, 1.82, replace(style, chamfer_mm=0.1))
+    assert np.ptp(chamfered.rings[-1][0], axis=0) == pytest.approx(
+        [2 * 1.82 + 1.4 + 2 * 0.1 * draft - 0.2] * 2, rel=1e-14
+    )
+    assert chamfered.rings[0][0] == pytest.approx(foot, rel=1e-14)
+
+
+def test_a_loop_leaves_a_hole():
+    tiers = outlines(alphabet_named("dense-8"), style_for(alphabet_named("dense-8"), 10.0))[2]
+    assert [len(rings) for rings in tiers.rings] == [2, 2]
+    assert -signed_area(tiers.rings[-1][1]) == pytest.approx(0.6**2, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("alphabet", "style", "printer"),
+    [
+        ("dense-4", SymbolStyle(), "fdm-0.4"),  # the default
+        ("dense-4", SymbolStyle(4.5, 0.5, 0.9), "resin"),
+        ("thesis-2", SymbolStyle(12.0, 1.0, 1.68), "fdm-0.4"),
+        ("dense-8", SymbolStyle(10.0, 1.0, 2.0), "fdm-0.4"),
+        ("letters-4", SymbolStyle(10.0, 1.0, 1.4), "fdm-0.4"),
+    ],
+)
+def test_profiles_can_be_printed(alphabet, style, printer):
+    known = alphabet_named(alphabet)
+    check_printable(known, style, PRINTERS[printer])
+    assert footprint_half_mm(known, style) < style.pitch_mm / 2
+
+
+@pytest.mark.parametrize(
+    ("style", "words"),
+    [
+        (SymbolStyle(stroke_mm=0.5), "prints no stroke under 0.8 mm"),
+        (SymbolStyle(height_mm=0.2), "cannot be felt"),
+        (SymbolStyle(pitch_mm=6.0, stroke_mm=1.2, height_mm=0.8), "two strokes of symbol '1'"),
+        (SymbolStyle(pitch_mm=7.0, stroke_mm=3.0), "touch at a pitch of 7 mm"),
+        (SymbolStyle(draft_rad=math.radians(14)), "collapse"),
+        (SymbolStyle(pitch_mm=8.0, stroke_mm=1.4), "collapse"),
+        (SymbolStyle(pitch_mm=8.0, stroke_mm=2.0, chamfer_mm=0.9), "chamfer"),
+        (SymbolStyle(chamfer_mm=1.0), "a chamfer of 1 mm leaves"),
+        (SymbolStyle(chamfer_mm=1e-9), "chamfer 1e-09 mm"),
+        (SymbolStyle(draft_rad=-0.1), "draft -5.7"),
+        (SymbolStyle(stroke_mm=math.nan), "stroke nan"),
+        (SymbolStyle(height_mm=0.0), "cannot be felt"),
+    ],
+)
+def test_what_cannot_be_printed_is_refused(style, words):
+    with pytest.raises(AlphabetError, match=words) as caught:
+        check_printable(DENSE, style, FDM)
+    assert "set " in caught.value.fix
+
+
+@pytest.mark.parametrize(
+    "style",
+    [
+        SymbolStyle(pitch_mm=6.0, stroke_mm=1.2, height_mm=0.8),
+        SymbolStyle(pitch_mm=8.0, stroke_mm=1.4),
+        SymbolStyle(stroke_mm=1.2),
+        SymbolStyle(draft_rad=math.radians(14)),
+        SymbolStyle(chamfer_mm=0.3),
+    ],
+)
+def test_each_advised_way_out_removes_its_cause(style):
+    with pytest.raises(AlphabetError) as caught:
+        check_printable(DENSE, style, FDM)
+    ways = re.findall(r"(stroke|pitch|draft|chamfer) to ([0-9.]+)", caught.value.fix)
+    assert ways
+    for name, value in ways:
+        number = math.radians(float(value)) if name == "draft" else float(value)
+        unit = "rad" if name == "draft" else "mm"
+        outlines(DENSE, replace(style, **{f"{name}_{unit}": number}))
+
+
+def test_pitch_advised_for_touching_symbols_works():
+    style = SymbolStyle(pitch_mm=7.0, stroke_mm=3.3, draft_rad=0.0)
+    open_ones = Alphabet("open", (DENSE.glyphs[0], DENSE.glyphs[3]), 0.26, 0.2)
+    with pytest.raises(AlphabetError, match="touch") as caught:
+        footprint_half_mm(open_ones, style)
+    pitch = float(re.search(r"pitch to ([0-9.]+)", caught.value.fix)[1])
+    stroke = float(re.search(r"stroke to ([0-9.]+)", caught.value.fix)[1])
+    assert footprint_half_mm(open_ones, replace(style, pitch_mm=pitch)) < pitch / 2
+    assert footprint_half_mm(open_ones, replace(style, stroke_mm=stroke)) < 3.5
+
+
+def test_gaps_are_measured_on_the_outline():
+    assert gap_inside_mm(outlines(DENSE, SymbolStyle())[1]) == pytest.approx(0.42, rel=1e-12)
+    assert gap_inside_mm(outlines(DENSE, SymbolStyle())[0]) == math.inf
+    foot = 2 * 0.26 * 7 + 1.4 + 2 * math.tan(math.radians(10))
+    assert gap_between_mm(DENSE, SymbolStyle()) == pytest.approx(7 - foot, rel=1e-12)
+
+
+def test_engraved_walls_stand_at_45_degrees():
+    tiers = engraved(Glyph("8", line((-1, 0), (1, 0))), 0.8, 0.8, 0.32)
+    (surface,), (floor,) = tiers.rings
+    assert tiers.z_mm == (0.0, -0.32)
+    assert np.ptp(surface, axis=0) - np.ptp(floor, axis=0) == pytest.approx([0.64] * 2)
+    with pytest.raises(AlphabetError, match="collapses"):
+        engraved(Glyph("8", line((-1, 0), (1, 0))), 0.8, 0.8, 0.4)
+
+
+def test_rings_tell_crossings_and_points_inside():
+    square = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
+    hole = np.array([[1.0, 1.0], [1.0, 2.0], [2.0, 2.0], [2.0, 1.0]])
+    assert not crossing([square, hole])
+    assert crossing([square, hole + np.array([2.5, 0.0])])
+    assert crossing([square[[0, 2, 1, 3]]])
+    assert crossing([square, hole - np.array([1.0, 0.0])])  # touching counts
+    points = np.array([[0.5, 0.5], [1.5, 1.5], [3.0, 3.0], [5.0, 1.0]])
+    assert inside(points, [square, hole]).tolist() == [True, False, True, False]
+    turned = np.linspace(0, 2 * math.pi, 700, endpoint=False)
+    many = np.stack([np.cos(turned), np.sin(turned)], axis=1)
+    assert not crossing([many])
+    assert crossing([many, 0.5 * many + [0.7, 0.0]])

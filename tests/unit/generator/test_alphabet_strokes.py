@@ -1,0 +1,105 @@
+"""Counts of end-points and vertices are those of thesis figures 6.4 and 6.12."""
+
+import json
+
+import pytest
+
+from generator.alphabet import ALPHABETS, Counts, Glyph, alphabet_from, alphabet_named, counts
+from generator.alphabet.figures import FIGURES
+from generator.alphabet.known import line
+from generator.alphabet.strokes import same_shape, turned
+from generator.errors import AlphabetError
+
+L, E, F, C = (2, 1), (3, 3), (3, 2), (2, 2)
+
+
+@pytest.mark.parametrize(
+    ("name", "wanted"),
+    [("thesis-2", [L, F]), ("dense-4", [L, E, F, C]), ("letters-4", [L, E, F, C])],
+)
+def test_ends_and_vertices_are_the_thesis_ones(name, wanted):
+    found = [counts(glyph) for glyph in alphabet_named(name).glyphs]
+    assert [(c.ends, c.vertices) for c in found] == wanted
+    assert all(c.pieces == 1 and c.loops == 0 for c in found)
+
+
+def test_dense_8_has_eight_different_counts():
+    found = {counts(glyph) for glyph in alphabet_named("dense-8").glyphs}
+    assert len(found) == 8
+    assert {c.pieces for c in found} == {1}
+    assert max(c.loops for c in found) == 1
+
+
+@pytest.mark.parametrize(
+    ("strokes", "wanted"),
+    [
+        (line((-1, 0), (0, 0), (1, 0)), Counts(2, 0, 0, 1)),  # straight on: no vertex
+        (line((-1, 0), (1, 0)) + line((0, 0), (0, 1)), Counts(3, 1, 0, 1)),  # T on an interior
+        (line((-1, -1), (1, 1)) + line((-1, 1), (1, -1)), Counts(4, 1, 0, 1)),  # X
+        (line((-1, 0), (0, 1)) + line((-1, 1), (0, 0)), Counts(4, 1, 0, 1)),  # X off the nodes
+        (line((-1, 0), (1, 0)) + line((0, 0), (1, 0)), Counts(2, 0, 0, 1)),  # drawn twice
+        (line((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)), Counts(0, 4, 1, 1)),
+        (line((-1, -1), (0, -1)) + line((-1, 1), (0, 1)), Counts(4, 0, 0, 2)),
+    ],
+)
+def test_counts_split_strokes_where_they_meet(strokes, wanted):
+    assert counts(Glyph("x", strokes)) == wanted
+
+
+@pytest.mark.parametrize("alphabet", ALPHABETS.values(), ids=lambda a: a.name)
+def test_definition_survives_json_and_is_checked(alphabet):
+    again = alphabet_from(json.loads(json.dumps(alphabet.definition())))
+    assert again == alphabet
+    assert again.order == len(alphabet.glyphs)
+
+
+def test_turned_glyphs_are_told_apart():
+    for alphabet in ALPHABETS.values():
+        for glyph in alphabet.glyphs:
+            assert not any(same_shape(glyph, turned(glyph, k)) for k in (1, 2, 3))
+    bar = Glyph("bar", line((-1, 0), (0, 0)))
+    assert same_shape(bar, turned(bar, 2))  # a shift does not help
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"glyphs": [{"name": "a", "strokes": [[[-1, 0], [1, 0]]]}] * 2}, "a name of its own"),
+        (
+            {
+                "glyphs": [
+                    {"name": "a", "strokes": [[[-1, 0], [1, 0]]]},
+                    {"name": "b", "strokes": [[[-1, 0], [0, 0]], [[0, 0], [0, 1]]]},
+                ]
+            },
+            "looks the same after 180 degrees",
+        ),
+        (
+            {
+                "glyphs": [
+                    {"name": "a", "strokes": [[[-1, 0], [0, 0]], [[0, 0], [0, 1]]]},
+                    {"name": "b", "strokes": [[[0, 1], [0, 0]], [[0, 0], [1, 0]]]},
+                ]
+            },
+            "turned by",
+        ),
+        ({"glyphs": [{"name": "a", "strokes": [[[-2, 0], [1, 0]]]}]}, "outside"),
+        ({"glyphs": [{"name": "a", "strokes": [[[0.5, 0], [1, 0]]]}]}, "not understood"),
+        ({"reach": "wide"}, "not understood"),
+        ({"reach": 0.7}, "reach 0.7"),
+    ],
+)
+def test_bad_definitions_say_why(change, words):
+    with pytest.raises(AlphabetError, match=words):
+        alphabet_from(alphabet_named("thesis-2").definition() | change)
+
+
+def test_unknown_alphabet_lists_the_known():
+    with pytest.raises(AlphabetError, match="thesis-2, dense-4, letters-4, dense-8"):
+        alphabet_named("morse")
+
+
+def test_figures_are_single_pieces_and_all_different():
+    assert all(counts(figure).pieces == 1 for figure in FIGURES)
+    shapes = [(a, b) for i, a in enumerate(FIGURES) for b in FIGURES[:i]]
+    assert not any(same_shape(a, b) for a, b in shapes)
