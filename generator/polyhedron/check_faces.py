@@ -1,0 +1,194 @@
+"""What every face must be, and that faces keep clear of each other.
+
+Checked: duplicate vertices, slivers, planarity, loops that cross or touch themselves, holes
+outside their face, faces that cut through others. Nothing is repaired here. Thesis 6.3.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.polyhedron.polygon import (
+    area_vector,
+    closest_pair,
+    is_convex,
+    plane_axes,
+    side_of_polygon,
+    signed_area,
+)
+from generator.polyhedron.surface import (
+    Loops,
+    Problem,
+    Surface,
+    Vertices,
+    directed_edges,
+    face_axes,
+)
+
+PLANARITY = 1e-5  #: most a vertex may lie off its face's plane, as a share of the size
+CLOSENESS = 1e-6  #: two points, or a point and an edge, nearer than this touch; same share
+
+
+def face_problems(surface: Surface) -> list[Problem]:
+    """Return what is wrong with single faces: repeated points, slivers, bends, crossings."""
+    tolerance = CLOSENESS * surface.size
+    problems = _duplicate_vertices(surface, tolerance)
+    if problems:
+        return problems  # every other measure would only repeat it
+    for name, loops in zip(surface.names, surface.faces, strict=True):
+        problems += _loop_problems(surface, name, loops, tolerance)
+    return problems
+
+
+def crossing_problems(surface: Surface) -> list[Problem]:
+    """Return the faces that are cut or touched by edges and vertices that are not their own.
+
+    A convex solid has no vertex in front of any face and is done after one product.
+    """
+    tolerance = CLOSENESS * surface.size
+    vertices, problems = surface.vertices, []
+    edges = np.array(sorted({(min(e), max(e)) for f in surface.faces for e in directed_edges(f)}))
+    for name, loops in zip(surface.names, surface.faces, strict=True):
+        own = np.zeros(len(vertices), dtype=bool)
+        own[[v for loop in loops for v in loop]] = True
+        origin = vertices[loops[0][0]]
+        x, y, z = face_axes(vertices, loops)
+        height = (vertices - origin) @ z
+        height[own] = 0.0
+        if height.max() <= tolerance and not (np.abs(height[~own]) <= tolerance).any():
+            continue
+        axes = np.stack([x, y], axis=1)
+        polygon = [(vertices[list(loop)] - origin) @ axes for loop in loops]
+        touching = np.flatnonzero(~own & (np.abs(height) <= tolerance))
+        for v in touching[_covered(polygon, (vertices[touching] - origin) @ axes, tolerance)]:
+            cause = f"{surface.vertex(int(v))} of another face lies on it"
+            problems.append(Problem(name, cause, "move it away, or join the faces there"))
+        a, b = height[edges[:, 0]], height[edges[:, 1]]
+        cut = np.flatnonzero((np.minimum(a, b) < -tolerance) & (np.maximum(a, b) > tolerance))
+        t = a[cut] / (a[cut] - b[cut])
+        start, end = vertices[edges[cut, 0]], vertices[edges[cut, 1]]
+        point = start + t[:, None] * (end - start)
+        for k in np.flatnonzero(_covered(polygon, (point - origin) @ axes, tolerance)):
+            v, w = edges[cut[k]]
+            cause = f"the edge between vertices {v} and {w} runs through it at {_point(point[k])}"
+            problems.append(Problem(name, cause, "a solid must not cut through itself"))
+    return problems
+
+
+def _duplicate_vertices(surface: Surface, tolerance: float) -> list[Problem]:
+    vertices, problems = surface.vertices, []
+    order = np.argsort(vertices[:, 0], kind="stable")
+    x = vertices[order, 0]
+    last = np.searchsorted(x, x + tolerance, side="right")
+    for i in np.flatnonzero(last > np.arange(len(x)) + 1):
+        near = order[i + 1 : last[i]]
+        for j in near[np.linalg.norm(vertices[near] - vertices[order[i]], axis=1) <= tolerance]:
+            a, b = sorted((int(order[i]), int(j)))
+            cause = (
+                f"{surface.vertex(a)} and vertex {b} are the same point within {tolerance:.2g} mm"
+            )
+            problems.append(Problem("", cause, f"use vertex {a} for both"))
+    return problems
+
+
+def _loop_problems(surface: Surface, name: str, loops: Loops, tolerance: float) -> list[Problem]:
+    for loop in loops:
+        if len(set(loop)) < len(loop):
+            twice = next(v for k, v in enumerate(loop) if v in loop[:k])
+            return [
+                Problem(
+                    name,
+                    f"its loop visits {surface.vertex(twice)} twice",
+                    "a loop must not touch itself; split the face there",
+                )
+            ]
+    vertices = surface.vertices
+    outer = vertices[list(loops[0])]
+    normal = area_vector(outer)
+    area = float(np.sqrt(normal @ normal))
+    longest = float(np.sqrt(((np.roll(outer, -1, axis=0) - outer) ** 2).sum(axis=1).max()))
+    if area <= longest * tolerance:
+        return [_no_area(name, outer, area, tolerance)]
+    x, y, z = plane_axes(normal, outer[1] - outer[0])
+    every = [v for loop in loops for v in loop]
+    height = (vertices[every] - outer.mean(axis=0)) @ z
+    worst = int(np.abs(height).argmax())
+    allowed = PLANARITY * surface.size
+    if abs(height[worst]) > allowed:
+        return [
+            Problem(
+                name,
+                f"not planar: its vertices lie up to {abs(height[worst]):.3g} mm off their plane, "
+                f"{allowed:.2g} mm is allowed; the farthest is {surface.vertex(every[worst])}",
+                "correct the coordinates or split the face into triangles",
+            )
+        ]
+    axes = np.stack([x, y], axis=1)
+    polygon = [(vertices[list(loop)] - outer[0]) @ axes for loop in loops]
+    if len(polygon) == 1 and is_convex(polygon[0]):
+        return []
+    gap, i, j = closest_pair(polygon)
+    if gap <= tolerance:
+        edges = list(directed_edges(loops))
+        cause = (
+            f"its edges {_edge(edges[i])} and {_edge(edges[j])} cross or touch "
+            f"near {_point(vertices[edges[i][0]])}"
+        )
+        return [Problem(name, cause, "list its vertices in the order in which the edge runs")]
+    return _hole_problems(name, polygon)
+
+
+def _no_area(name: str, outer: Vertices, area: float, tolerance: float) -> Problem:
+    """Tell a loop that crosses itself from a sliver."""
+    spread = np.linalg.svd(outer - outer.mean(axis=0), compute_uv=False)
+    if spread[1] > tolerance:
+        fix = "list its vertices in the order in which the edge runs"
+        return Problem(
+            name, f"its loop crosses itself: the parts of its area cancel to {area:.2g} mm^2", fix
+        )
+    fix = "remove it and join its neighbours, or correct its vertices"
+    return Problem(name, f"its area is {area:.2g} mm^2: a line, not a face", fix)
+
+
+def _hole_problems(name: str, polygon: list[Vertices]) -> list[Problem]:
+    problems = []
+    for k, hole in enumerate(polygon[1:], start=1):
+        others = [loop for i, loop in enumerate(polygon) if i not in (0, k)]
+        if side_of_polygon(polygon[:1], hole[:1])[0] < 0:
+            problems.append(Problem(name, f"hole {k} lies outside it", "list the outer loop first"))
+        elif any(side_of_polygon([loop], hole[:1])[0] > 0 for loop in others):
+            problems.append(
+                Problem(name, f"hole {k} lies inside another hole", "make it a face of its own")
+            )
+        elif signed_area(hole) > 0:
+            problems.append(
+                Problem(
+                    name,
+                    f"hole {k} runs counter-clockwise where the outer loop does",
+                    "reverse the order of its vertices",
+                )
+            )
+    return problems
+
+
+def _covered(polygon: list[Vertices], points: Vertices, tolerance: float) -> NDArray[np.bool_]:
+    """Whether points lie in a polygon, its boundary widened by the tolerance."""
+    covered = np.zeros(len(points), dtype=bool)
+    if len(points) == 0:
+        return covered
+    covered |= side_of_polygon(polygon, points) >= 0
+    for loop in polygon:
+        for a, b in zip(loop, np.roll(loop, -1, axis=0), strict=True):
+            along = b - a
+            t = np.clip((points - a) @ along / (along @ along), 0.0, 1.0)
+            covered |= np.hypot(*(points - a - t[:, None] * along).T) <= tolerance
+    return covered
+
+
+def _edge(edge: tuple[int, int]) -> str:
+    return f"{edge[0]}-{edge[1]}"
+
+
+def _point(point: Vertices) -> str:
+    return "({:.6g}, {:.6g}, {:.6g})".format(*point)

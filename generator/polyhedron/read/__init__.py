@@ -1,0 +1,86 @@
+"""Polyhedra from files: STL, OBJ and STEP with planar faces.
+
+A mesh file holds triangles or polygons in mm; coplanar ones that hang together become one
+face with its holes. A STEP file's own unit is honoured. One body per file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from generator.errors import ShapeError
+from generator.polyhedron.read.merge import merged
+from generator.polyhedron.read.obj import read_obj
+from generator.polyhedron.read.soup import Soup
+from generator.polyhedron.read.step import read_step
+from generator.polyhedron.read.stl import read_stl
+from generator.polyhedron.winged import Polyhedron, polyhedron
+
+LARGEST_BYTES = 64 * 2**20
+
+READERS: dict[str, Callable[[bytes, str], Soup]] = {
+    ".stl": read_stl,
+    ".obj": read_obj,
+    ".step": read_step,
+    ".stp": read_step,
+}
+
+
+def read_shape(path: str | Path) -> Polyhedron:
+    """Read one solid with planar faces from a file.
+
+    Parameters
+    ----------
+    path
+        A file that ends in .stl (binary or ASCII), .obj, .step or .stp.
+
+    Returns
+    -------
+    Polyhedron
+        Of kind `file`; its faces F1, F2, ... are in the order in which the file first shows
+        them, coordinates as in the file, mm.
+
+    Raises
+    ------
+    ShapeError
+        With file, place, cause and way out: no such file, too large, truncated, not closed,
+        several bodies, curved surfaces.
+    """
+    file = Path(path)
+    suffix = file.suffix.lower()
+    place = str(path)
+    if suffix not in READERS:
+        known = ", ".join(READERS)
+        raise ShapeError(
+            f"cannot read a shape from a '{suffix}' file" if suffix else "the file has no suffix",
+            fix=f"save it as one of {known}",
+            place=place,
+        )
+    soup = READERS[suffix](_content(file, place), place)
+    try:
+        vertices, faces = merged(soup)
+        return polyhedron("file", vertices, faces)
+    except ShapeError as error:
+        where = f"{place}, {error.place}" if error.place else place
+        raise ShapeError(error.cause, fix=error.fix, place=where) from None
+
+
+def _content(file: Path, place: str) -> bytes:
+    try:
+        size = file.stat().st_size
+        if size > LARGEST_BYTES:
+            raise ShapeError(
+                f"the file has {size / 2**20:.0f} MB; {LARGEST_BYTES // 2**20} MB are allowed",
+                fix="simplify the model: planar faces need few triangles",
+                place=place,
+            )
+        content = file.read_bytes()
+    except OSError as error:
+        reason = (error.strerror or "cannot be read").lower()
+        raise ShapeError(
+            reason, fix="give the path of a file that you can read", place=place
+        ) from None
+    if not content:
+        raise ShapeError("the file is empty", fix="export the model again", place=place)
+    return content

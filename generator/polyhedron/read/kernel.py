@@ -1,0 +1,163 @@
+"""The CAD kernel's part of reading STEP, in a process of its own: file -> planar faces in mm.
+
+    python -m generator.polyhedron.read.kernel model.step answer.json
+
+A damaged file can crash the kernel; here it takes only this process with it. The answer
+holds `points` and `faces` (loops of point numbers), or the `cause` and `fix` of a refusal.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from generator.errors import ShapeError
+
+PLANAR_MM = 1e-5  #: a spline surface this flat is a plane; kernel tolerances are smaller
+AGAIN = "export the model again; the file may be damaged"
+
+
+def main(model: str, answer: str) -> None:
+    """Read `model` and write `answer`."""
+    with open(os.devnull, "wb") as nowhere:  # the kernel prints beneath Python
+        os.dup2(nowhere.fileno(), 1)
+    try:
+        found = _read(model)
+    except ShapeError as error:
+        found = {"cause": error.cause, "fix": error.fix}
+    Path(answer).write_text(json.dumps(found))
+
+
+def _read(model: str) -> dict[str, Any]:
+    try:
+        import OCP.Standard
+    except ImportError:  # a library of the system may be missing
+        raise ShapeError(
+            "reading STEP needs the CAD kernel, which cannot be loaded",
+            fix='run: pip install "encoded-objects[cad]", or save the model as STL',
+        ) from None
+    try:
+        return _faces(_solid(model))
+    except OCP.Standard.Standard_Failure as error:
+        reason = str(error).strip().splitlines()
+        cause = f"the CAD kernel cannot read it: {reason[0] if reason else 'no reason given'}"
+        raise ShapeError(cause, fix=AGAIN) from None
+
+
+def _solid(model: str) -> Any:
+    from OCP.IFSelect import IFSelect_RetDone
+    from OCP.STEPControl import STEPControl_Reader
+    from OCP.TopAbs import TopAbs_SOLID
+
+    reader = STEPControl_Reader()
+    if reader.ReadFile(model) != IFSelect_RetDone:
+        raise ShapeError("the CAD kernel finds no STEP data in it", fix=AGAIN)
+    reader.TransferRoots()
+    shape = reader.OneShape()
+    solids = [] if shape.IsNull() else _explored(shape, TopAbs_SOLID)
+    if len(solids) != 1:
+        found = f"{len(solids)} solids" if solids else "no solid, at most surfaces"
+        raise ShapeError(
+            f"it holds {found}; one is needed",
+            fix="join them into one solid, or save each in a file of its own",
+        )
+    return solids[0]
+
+
+def _faces(solid: Any) -> dict[str, Any]:
+    from OCP.BRep import BRep_Tool
+    from OCP.TopAbs import TopAbs_FACE, TopAbs_VERTEX
+    from OCP.TopExp import TopExp
+    from OCP.TopoDS import TopoDS
+    from OCP.TopTools import TopTools_IndexedMapOfShape
+
+    faces = [TopoDS.Face_s(face) for face in _explored(solid, TopAbs_FACE)]
+    _refuse_curved(faces)
+    numbers = TopTools_IndexedMapOfShape()
+    TopExp.MapShapes_s(solid, TopAbs_VERTEX, numbers)
+    points = np.zeros((numbers.Extent(), 3))
+    for k in range(len(points)):
+        point = BRep_Tool.Pnt_s(TopoDS.Vertex_s(numbers.FindKey(k + 1)))
+        points[k] = point.X(), point.Y(), point.Z()
+    return {"points": points.tolist(), "faces": [_loops(face, numbers) for face in faces]}
+
+
+def _refuse_curved(faces: list[Any]) -> None:
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP.GeomLib import GeomLib_IsPlanarSurface
+
+    curved: Counter[str] = Counter()
+    for face in faces:
+        if not GeomLib_IsPlanarSurface(BRep_Tool.Surface_s(face), PLANAR_MM).IsPlanar():
+            kind = BRepAdaptor_Surface(face).GetType().name
+            curved[kind.removeprefix("GeomAbs_").lower()] += 1
+    if curved:
+        kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(curved.items()))
+        raise ShapeError(
+            f"{curved.total()} of {len(faces)} faces are not planar ({kinds})",
+            fix="leave out holes, fillets and other round parts, or replace them by planar faces",
+        )
+
+
+def _loops(face: Any, numbers: Any) -> list[list[int]]:
+    """Return the wires of a planar face as vertex numbers, counter-clockwise from outside."""
+    from OCP.BRepTools import BRepTools, BRepTools_WireExplorer
+    from OCP.TopAbs import TopAbs_WIRE
+    from OCP.TopoDS import TopoDS
+
+    outer = BRepTools.OuterWire_s(face)
+    wires = [TopoDS.Wire_s(wire) for wire in _explored(face, TopAbs_WIRE)]
+    wires.sort(key=lambda wire: not wire.IsSame(outer))
+    loops = []
+    for wire in wires:
+        loop = []
+        walk = BRepTools_WireExplorer(wire, face)
+        while walk.More():
+            _refuse_bent(walk.Current())
+            loop.append(numbers.FindIndex(walk.CurrentVertex()) - 1)
+            walk.Next()
+        loops.append(loop)  # the explorer keeps the material on its left, from outside
+    return loops
+
+
+def _refuse_bent(edge: Any) -> None:
+    """Refuse an edge that leaves the straight line between its ends."""
+    from OCP.BRepAdaptor import BRepAdaptor_Curve
+    from OCP.GeomAbs import GeomAbs_Line
+
+    curve = BRepAdaptor_Curve(edge)
+    if curve.GetType() == GeomAbs_Line:
+        return
+    parameters = np.linspace(curve.FirstParameter(), curve.LastParameter(), 17)
+    on_curve = [curve.Value(float(t)) for t in parameters]
+    points = np.array([(p.X(), p.Y(), p.Z()) for p in on_curve])
+    along = points[-1] - points[0]
+    length = float(np.linalg.norm(along))
+    offset = np.linalg.norm(np.cross(points - points[0], along), axis=1)
+    if length == 0.0 or offset.max() > PLANAR_MM * length:
+        x, y, z = points[0]
+        raise ShapeError(
+            f"an edge at ({x:.6g}, {y:.6g}, {z:.6g}) is not straight",
+            fix="leave out round parts: every edge joins two planar faces",
+        )
+
+
+def _explored(shape: Any, kind: Any) -> list[Any]:
+    """Return the sub-shapes of one kind, each once, in the kernel's order."""
+    from OCP.TopExp import TopExp
+    from OCP.TopTools import TopTools_IndexedMapOfShape
+
+    found = TopTools_IndexedMapOfShape()
+    TopExp.MapShapes_s(shape, kind, found)
+    return [found.FindKey(k + 1) for k in range(found.Extent())]
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

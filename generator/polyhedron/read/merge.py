@@ -1,0 +1,254 @@
+"""Polygons of a file -> faces of a solid: coplanar neighbours become one face with holes.
+
+Neighbours are coplanar if the smaller one lies in the larger one's plane by distance, and
+their normals agree by angle; slivers, whose normal is noise, join their best neighbour.
+Boundaries are walked around the vertices, so faces may be non-convex and have holes.
+Vertices between two faces alone, on their common line, are dropped.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.errors import ShapeError
+from generator.polyhedron.polygon import area_vector
+from generator.polyhedron.read.soup import Soup, joined
+
+DISTANCE = 1e-5  #: coplanar points lie this near to a plane, as a share of the size
+ANGLE_RAD = 1e-3  #: coplanar polygons turn by no more than this, besides the noise
+SLIVER = 8.0  #: a polygon thinner than this many times the noise has no direction
+MOST_FACES = 400
+
+_REPAIR = "repair the mesh (PrusaSlicer, MeshLab or the program that made it) and export it again"
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.intp]
+Faces = list[tuple[tuple[int, ...], ...]]
+
+
+def merged(soup: Soup) -> tuple[Floats, Faces]:
+    """Return vertices (V, 3) mm and faces as loops, the outer loop first, for `polyhedron`.
+
+    Raises
+    ------
+    ShapeError
+        An open, branching or inconsistently oriented mesh (with the first place), or a
+        curved surface: more than 400 faces, or a face that is not planar.
+    """
+    twin = _twins(soup)
+    group = _coplanar_groups(soup, twin)
+    boundary = group[soup.face] != group[soup.face[twin]]
+    loops = _boundary_loops(soup, twin, boundary)
+    kept = _corners(soup, loops, boundary)
+
+    faces: dict[int, list[tuple[int, ...]]] = {}
+    for loop in loops:
+        corners = [int(soup.origin[h]) for h in loop if kept[soup.origin[h]]]
+        start = corners.index(min(corners)) if corners else 0
+        faces.setdefault(int(group[soup.face[loop[0]]]), []).append(
+            tuple(corners[start:] + corners[:start])
+        )
+    used, number = np.unique([v for f in faces.values() for r in f for v in r], return_inverse=True)
+    renumber = dict(
+        zip((int(v) for f in faces.values() for r in f for v in r), number, strict=True)
+    )
+    return soup.points[used], [
+        tuple(tuple(int(renumber[v]) for v in loop) for loop in _outer_first(soup.points, faces[g]))
+        for g in sorted(faces)
+    ]
+
+
+def _twins(soup: Soup) -> Integers:
+    """Return for each half-edge the one that runs the same edge backwards; refuse if not one."""
+    target = soup.origin[soup.following]
+    low, high = np.minimum(soup.origin, target), np.maximum(soup.origin, target)
+    key = low * len(soup.points) + high
+    order = np.argsort(key, kind="stable")
+    _, first, count = np.unique(key[order], return_index=True, return_counts=True)
+    for bad, says in (
+        (count == 1, "not closed: {} edges have one face only"),
+        (count > 2, "not a solid: {} edges have more than two faces"),
+    ):
+        if bad.any():
+            _refuse_edges(soup, order[first[bad]], says)
+    a, b = order[0::2], order[1::2]
+    same = soup.origin[a] == soup.origin[b]
+    if same.any():
+        says = "not oriented: {} edges have two faces that disagree about outside"
+        _refuse_edges(soup, a[same], says)
+    twin = np.empty(len(order), dtype=np.intp)
+    twin[a], twin[b] = b, a
+    return twin
+
+
+def _refuse_edges(soup: Soup, edges: Integers, says: str) -> None:
+    first = int(edges.min())
+    a, b = soup.points[soup.origin[first]], soup.points[soup.origin[soup.following[first]]]
+    ends = " to ".join("({:.6g}, {:.6g}, {:.6g})".format(*p) for p in (a, b))
+    text = says.format(len(edges)).replace(" 1 edges have", " 1 edge has")
+    raise ShapeError(f"the surface is {text}, the first from {ends}", fix=_REPAIR)
+
+
+def _coplanar_groups(soup: Soup, twin: Integers) -> Integers:
+    """Return for each polygon the number of its face: that of the face's first polygon."""
+    start, end = soup.points[soup.origin], soup.points[soup.origin[soup.following]]
+    count = int(soup.face.max()) + 1
+    corner = np.zeros(count, dtype=np.intp)
+    corner[soup.face[::-1]] = soup.origin[::-1]  # a point of each polygon, to stay near it
+    near = soup.points[corner][soup.face]
+    vector = np.zeros((count, 3))
+    np.add.at(vector, soup.face, 0.5 * np.cross(start - near, end - near))
+    area = np.linalg.norm(vector, axis=1)
+    longest = np.zeros(count)
+    np.maximum.at(longest, soup.face, np.linalg.norm(end - start, axis=1))
+    width = area / longest
+    sliver = width <= SLIVER * soup.noise
+    normal = vector / np.where(area > 0.0, area, 1.0)[:, None]
+
+    half = np.flatnonzero(np.arange(len(twin)) < twin)
+    a, b = soup.face[half], soup.face[twin[half]]
+    swap = np.where(sliver[a] == sliver[b], area[b] > area[a], sliver[a])
+    large, small = np.where(swap, b, a), np.where(swap, a, b)
+    tolerance = _distance(soup)
+    off = _farthest(soup, large, small, normal, corner)
+    cross = np.linalg.norm(np.cross(normal[large], normal[small]), axis=1)
+    turn = np.arctan2(cross, np.einsum("ij,ij->i", normal[large], normal[small]))
+    allowed = np.maximum(ANGLE_RAD, 4.0 * soup.noise / np.maximum(width[small], soup.noise))
+    flat = (off <= tolerance) & (turn <= allowed) & ~sliver[large] & ~sliver[small]
+    group = joined(np.arange(count), large[flat], small[flat])
+    group = _with_slivers(group, sliver, large, small, off, turn, tolerance)
+    _check_groups(soup, group, vector, corner)
+    return group
+
+
+def _distance(soup: Soup) -> float:
+    size = float(np.linalg.norm(np.ptp(soup.points[soup.origin], axis=0)))
+    return DISTANCE * size + soup.noise
+
+
+def _farthest(
+    soup: Soup, large: Integers, small: Integers, normal: Floats, corner: Integers
+) -> Floats:
+    """Return for each pair how far the smaller polygon reaches off the larger one's plane, mm."""
+    by_face = np.argsort(soup.face, kind="stable")
+    edges = np.bincount(soup.face)
+    first = np.cumsum(edges) - edges
+    pair = np.repeat(np.arange(len(small)), edges[small])
+    within = np.arange(len(pair)) - np.repeat(np.cumsum(edges[small]) - edges[small], edges[small])
+    point = soup.points[soup.origin[by_face[first[small][pair] + within]]]
+    height = point - soup.points[corner[large]][pair]
+    off = np.zeros(len(small))
+    np.maximum.at(off, pair, np.abs(np.einsum("ij,ij->i", height, normal[large][pair])))
+    return off
+
+
+def _with_slivers(
+    group: Integers,
+    sliver: NDArray[np.bool_],
+    large: Integers,
+    small: Integers,
+    off: Floats,
+    turn: Floats,
+    tolerance: float,
+) -> Integers:
+    """Join each sliver to the one neighbour that it fits best, its normal being noise."""
+    group = group.copy()
+    waiting = {int(f) for f in np.flatnonzero(sliver)}
+    pairs = np.flatnonzero((sliver[large] | sliver[small]) & (off <= tolerance))
+    pairs = pairs[np.argsort(turn[pairs], kind="stable")]
+    while waiting:
+        before = len(waiting)
+        for k in pairs:
+            f, g = int(large[k]), int(small[k])
+            if (f in waiting) == (g in waiting):
+                continue
+            thin, other = (f, g) if f in waiting else (g, f)
+            group[thin] = group[other]
+            waiting.discard(thin)
+        if len(waiting) == before:
+            break
+    return group
+
+
+def _check_groups(soup: Soup, group: Integers, vector: Floats, corner: Integers) -> None:
+    """Refuse surfaces that are curved: too many faces, or faces that bend."""
+    numbers, compact = np.unique(group, return_inverse=True)
+    total = np.zeros((len(numbers), 3))
+    np.add.at(total, compact, vector)
+    area = np.linalg.norm(total, axis=1)
+    if len(numbers) > MOST_FACES:
+        raise ShapeError(
+            f"{len(numbers)} planar faces, the smallest of {area.min():.2g} mm^2: the surface "
+            f"is curved; {MOST_FACES} faces are allowed",
+            fix="encode a model whose faces are planar, or export round parts more coarsely",
+        )
+    face = compact[soup.face]
+    normal = total / np.where(area > 0.0, area, 1.0)[:, None]
+    seed = soup.points[corner[numbers]][face]
+    height = np.einsum("ij,ij->i", soup.points[soup.origin] - seed, normal[face])
+    middle = np.bincount(face, height) / np.bincount(face)
+    bend = np.zeros(len(numbers))
+    np.maximum.at(bend, face, np.abs(height - middle[face]))
+    worst = int(bend.argmax())
+    if bend[worst] > 2.0 * _distance(soup):
+        x, y, z = soup.points[corner[numbers[worst]]]
+        raise ShapeError(
+            f"a face near ({x:.6g}, {y:.6g}, {z:.6g}) is curved: it bends by {bend[worst]:.2g} mm; "
+            f"{2.0 * _distance(soup):.2g} mm are allowed",
+            fix="encode a model whose faces are planar",
+        )
+
+
+def _boundary_loops(soup: Soup, twin: Integers, boundary: NDArray[np.bool_]) -> list[list[int]]:
+    """Chain the half-edges between different faces; inside a face walk around its vertices."""
+    following, twins = soup.following.tolist(), twin.tolist()
+    is_boundary = boundary.tolist()
+    seen = bytearray(len(twins))
+    loops = []
+    for start in np.flatnonzero(boundary).tolist():
+        if seen[start]:
+            continue
+        loop, h = [], start
+        while not seen[h]:
+            seen[h] = 1
+            loop.append(h)
+            h = following[h]
+            while not is_boundary[h]:
+                h = following[twins[h]]
+        loops.append(loop)
+    if not loops:
+        raise ShapeError("all faces lie in one plane: there is no solid", fix=_REPAIR)
+    return loops
+
+
+def _corners(soup: Soup, loops: list[list[int]], boundary: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which vertices (V,) stay: not those between two faces on a straight edge."""
+    degree = np.bincount(soup.origin[boundary], minlength=len(soup.points))
+    kept = degree > 0
+    tolerance = _distance(soup)
+    decided: set[int] = set()
+    for loop in loops:
+        ring = soup.origin[loop]
+        corner = np.flatnonzero(degree[ring] != 2)
+        if len(corner) == 0:
+            continue
+        for i, j in zip(corner, np.roll(corner, -1), strict=True):
+            run = np.arange(i + 1, j if j > i else j + len(ring)) % len(ring)
+            if len(run) == 0 or int(ring[run[0]]) in decided:
+                continue
+            decided.update(int(v) for v in ring[run])
+            a, b = soup.points[ring[i]], soup.points[ring[j]]
+            along = b - a
+            length = float(np.linalg.norm(along))
+            offset = np.linalg.norm(np.cross(soup.points[ring[run]] - a, along), axis=1)
+            if length > 0.0 and offset.max() <= tolerance * length:
+                kept[ring[run]] = False
+    return kept
+
+
+def _outer_first(points: Floats, loops: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
+    """Sort the loops of one face: the outer one encloses the largest area."""
+    vectors = [area_vector(points[list(loop)]) if loop else np.zeros(3) for loop in loops]
+    normal = sum(vectors, np.zeros(3))
+    return [loops[k] for k in np.argsort([-(v @ normal) for v in vectors], kind="stable")]

@@ -1,0 +1,74 @@
+"""STEP: bytes -> planar faces in mm, through the CAD kernel in a process of its own."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from generator.errors import ShapeError
+from generator.polyhedron.read.soup import Soup, soup_of_loops
+
+LONGEST_S = 300.0
+KERNEL = "generator.polyhedron.read.kernel"
+_AGAIN = "export the model again; the file may be cut off or damaged"
+_START, _END = b"ISO-10303-21;", b"END-ISO-10303-21;"
+
+
+def read_step(content: bytes, place: str) -> Soup:
+    """Return the faces of the one solid in a STEP file; `place` names it in messages.
+
+    The file's unit is honoured. The kernel (`kernel.py`) is never loaded into this process:
+    it can crash on a damaged file, and weighs 300 MB.
+    """
+    if not content.lstrip().startswith(_START):
+        shown = content[:20].decode("ascii", "replace").strip()
+        cause = f"it starts with '{shown}', not with '{_START.decode()}': no STEP file"
+        raise ShapeError(cause, fix="export the model as STEP", place=place)
+    if _END not in content[-200:]:
+        cause = f"it ends at byte {len(content)} without '{_END.decode()}'"
+        raise ShapeError(cause, fix=_AGAIN, place=place)
+    if importlib.util.find_spec("OCP") is None:
+        raise ShapeError(
+            "reading STEP needs the CAD kernel, which is not installed",
+            fix='run: pip install "encoded-objects[cad]", or save the model as STL',
+            place=place,
+        )
+    found = _ask_kernel(content, place)
+    if "cause" in found:
+        raise ShapeError(found["cause"], fix=found["fix"], place=place)
+    points = np.array(found["points"], dtype=np.float64).reshape(-1, 3)
+    return soup_of_loops(points, found["faces"], place)
+
+
+def _ask_kernel(content: bytes, place: str) -> dict[str, Any]:
+    with tempfile.TemporaryDirectory() as folder:
+        model, answer = Path(folder) / "model.step", Path(folder) / "answer.json"
+        model.write_bytes(content)
+        command = [sys.executable, "-m", KERNEL, str(model), str(answer)]
+        path = os.pathsep.join(entry for entry in sys.path if entry)
+        try:
+            subprocess.run(  # noqa: S603 - our own module, no shell
+                command,
+                env={**os.environ, "PYTHONPATH": path},
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                timeout=LONGEST_S,
+                check=True,
+            )
+            found: dict[str, Any] = json.loads(answer.read_text())
+        except subprocess.TimeoutExpired:
+            cause = f"the CAD kernel did not finish in {LONGEST_S:.0f} s"
+            raise ShapeError(cause, fix="simplify the model", place=place) from None
+        except (subprocess.CalledProcessError, OSError, ValueError):
+            cause = "the CAD kernel broke down on it"
+            raise ShapeError(cause, fix=_AGAIN, place=place) from None
+    return found

@@ -1,0 +1,223 @@
+"""The solids that a person can name: cube, box, prisms, pyramids, three regular solids.
+
+Lengths in mm. Prisms and pyramids stand on z = 0 with their axis on z; the base runs
+counter-clockwise seen from above, its first edge in front (y < 0) along +x. Octahedron
+and dodecahedron have their centre at the origin.
+
+Prism over n corners (cube and box have n = 4): vertices 1 to n are the base, n + 1 to 2n
+lie above them; F1 is the base, F2 to Fn+1 the sides in order (F2 in front), Fn+2 the top.
+On a side the frame's origin is its lower left corner seen from outside, x level, y up.
+Pyramid: vertices 1 to n are the base, n + 1 the apex; F1 is the base, F2 to Fn+1 the sides.
+
+Thesis 6.3, figures 6.14 to 6.19: C, B and D name the vertices of cube, parallelepiped and
+triangular prism. Its screens show the faces C2C3C6C7, B5B6B7B8 and D1D2D4D5, which are
+F3, F6 and F2 here; A for the tetrahedron is ours, the thesis shows none.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from generator.errors import ShapeError
+from generator.polyhedron.winged import FaceLike, Polyhedron, polyhedron
+
+SHORTEST_MM = 1.0
+LONGEST_MM = 5000.0
+RATIO = 200.0  #: most a length may exceed another one of the same solid
+MOST_SIDES = 64
+
+VERTEX_LETTERS = {"tetrahedron": "A", "box": "B", "cube": "C", "triangular_prism": "D"}
+
+
+def cube(side: float) -> Polyhedron:
+    """Return a cube: 8 vertices, F1 base, F2 front, F3 right, F4 back, F5 left, F6 top."""
+    _check_lengths("cube", side=side)
+    return _prism("cube", _rectangle(side, side), side)
+
+
+def box(size: Sequence[float]) -> Polyhedron:
+    """Return a parallelepiped of `size` = (x, y, z); faces as those of a cube."""
+    if isinstance(size, str) or not isinstance(size, Sequence) or len(size) != 3:
+        raise ShapeError(f"box has three lengths, not {size!r}", fix="write [80 mm, 80 mm, 120 mm]")
+    x, y, z = size
+    _check_lengths("box", x=x, y=y, z=z)
+    return _prism("box", _rectangle(x, y), z)
+
+
+def triangular_prism(side: float, height: float) -> Polyhedron:
+    """Return a right prism over an equilateral triangle: F1 base, F2 to F4 sides, F5 top."""
+    _check_lengths("triangular_prism", side=side, height=height)
+    return _prism("triangular_prism", _regular_polygon(3, side), height)
+
+
+def prism(
+    sides: int, height: float, side: float | None = None, radius: float | None = None
+) -> Polyhedron:
+    """Return a right prism over a regular polygon given by its side or its circumradius."""
+    side = _side("prism", sides, side, radius)
+    _check_lengths("prism", side=side, height=height)
+    return _prism("prism", _regular_polygon(sides, side), height)
+
+
+def pyramid(
+    sides: int, height: float, side: float | None = None, radius: float | None = None
+) -> Polyhedron:
+    """Return a right pyramid over a regular polygon given by its side or its circumradius."""
+    side = _side("pyramid", sides, side, radius)
+    _check_lengths("pyramid", side=side, height=height)
+    return _pyramid("pyramid", _regular_polygon(sides, side), height)
+
+
+def tetrahedron(side: float) -> Polyhedron:
+    """Return a regular tetrahedron with edges of `side`: a pyramid of three sides, F1 its base."""
+    _check_lengths("tetrahedron", side=side)
+    return _pyramid("tetrahedron", _regular_polygon(3, side), side * math.sqrt(2.0 / 3.0))
+
+
+def octahedron(side: float) -> Polyhedron:
+    """Return a regular octahedron with edges of `side`.
+
+    Vertices: 1 to 4 on +x, +y, -x, -y, 5 on +z, 6 on -z. F1 to F4 are the upper faces from
+    the quadrant x, y > 0 on, F5 to F8 the lower ones below them.
+    """
+    _check_lengths("octahedron", side=side)
+    r = side / math.sqrt(2.0)
+    vertices = [(r, 0, 0), (0, r, 0), (-r, 0, 0), (0, -r, 0), (0, 0, r), (0, 0, -r)]
+    upper = [(i, (i + 1) % 4, 4) for i in range(4)]
+    lower = [((i + 1) % 4, i, 5) for i in range(4)]
+    return polyhedron("octahedron", vertices, upper + lower)
+
+
+def dodecahedron(side: float) -> Polyhedron:
+    """Return a regular dodecahedron with edges of `side`.
+
+    Vertices 1 to 8: (-, -, -), (-, -, +), ... (+, +, +) of the inscribed cube; 9 to 12 in
+    the plane x = 0, 13 to 16 in z = 0, 17 to 20 in y = 0, each from -, - to +, +. Faces F1
+    to F12 lie towards (0, -, -), (0, -, +), (0, +, -), (0, +, +) and these turned to
+    (-, -, 0) ... (+, +, 0), then (-, 0, -) ... (+, 0, +).
+    """
+    _check_lengths("dodecahedron", side=side)
+    golden = (1.0 + math.sqrt(5.0)) / 2.0
+    a = side * golden / 2.0  # half the edge of the inscribed cube
+    short, long = a / golden, a * golden
+    signs = [(s, t) for s in (-1, 1) for t in (-1, 1)]
+    vertices = [(a * s, a * t, a * u) for s in (-1, 1) for t in (-1, 1) for u in (-1, 1)]
+    vertices += [(0.0, s * short, t * long) for s, t in signs]
+    vertices += [(s * short, t * long, 0.0) for s, t in signs]
+    vertices += [(s * long, 0.0, t * short) for s, t in signs]
+    # Normals (0, s golden, t) and its rotations, by the icosahedron dual to it.
+    towards = [(0.0, s * golden, float(t)) for s, t in signs]
+    towards += [(s * golden, float(t), 0.0) for s, t in signs]
+    towards += [(float(s), 0.0, t * golden) for s, t in signs]
+    points = np.array(vertices)
+    return polyhedron("dodecahedron", points, [_cap(points, np.array(n)) for n in towards])
+
+
+def given(vertices: ArrayLike, faces: Sequence[FaceLike]) -> Polyhedron:
+    """Return the polyhedron of vertices [[x, y, z], ...] and faces [[0, 1, 2], ...].
+
+    Vertices are counted from 0, counter-clockwise seen from outside; a face with holes is a
+    list of loops, the outer one first. Faces are F1, F2, ... in the order given.
+    """
+    return polyhedron("polyhedron", vertices, faces)
+
+
+SHAPES: dict[str, Callable[..., Polyhedron]] = {
+    "cube": cube,
+    "box": box,
+    "triangular_prism": triangular_prism,
+    "tetrahedron": tetrahedron,
+    "octahedron": octahedron,
+    "dodecahedron": dodecahedron,
+    "prism": prism,
+    "pyramid": pyramid,
+    "polyhedron": given,
+}
+
+
+def vertex_names(solid: Polyhedron) -> tuple[str, ...]:
+    """Return the names of the vertices in the thesis's manner: C1, C2, ... of a cube."""
+    letter = VERTEX_LETTERS.get(solid.kind, "V")
+    return tuple(f"{letter}{number}" for number in range(1, len(solid.vertices) + 1))
+
+
+def thesis_name(solid: Polyhedron, face: int) -> str:
+    """Return the name of a face in the thesis's manner: its vertices in order, C2C3C6C7."""
+    names = vertex_names(solid)
+    return "".join(names[v] for v in sorted(solid.faces[face].loops[0]))
+
+
+def _prism(kind: str, base: NDArray[np.float64], height: float) -> Polyhedron:
+    n = len(base)
+    bottom = np.column_stack([base, np.zeros(n)])
+    top = np.column_stack([base, np.full(n, float(height))])
+    sides = [(i, (i + 1) % n, (i + 1) % n + n, i + n) for i in range(n)]
+    faces = [(1, 0, *range(n - 1, 1, -1)), *sides, tuple(range(n, 2 * n))]
+    return polyhedron(kind, np.concatenate([bottom, top]), faces)
+
+
+def _pyramid(kind: str, base: NDArray[np.float64], height: float) -> Polyhedron:
+    n = len(base)
+    vertices = np.column_stack([base, np.zeros(n)])
+    faces = [(1, 0, *range(n - 1, 1, -1)), *((i, (i + 1) % n, n) for i in range(n))]
+    return polyhedron(kind, np.concatenate([vertices, [(0.0, 0.0, float(height))]]), faces)
+
+
+def _rectangle(x: float, y: float) -> NDArray[np.float64]:
+    return 0.5 * np.array([(-x, -y), (x, -y), (x, y), (-x, y)], dtype=np.float64)
+
+
+def _regular_polygon(sides: int, side: float) -> NDArray[np.float64]:
+    """Corners (n, 2) of a regular polygon around the origin, its first edge in front along +x."""
+    step = 2.0 * math.pi / sides
+    angles = -math.pi / 2.0 - step / 2.0 + step * np.arange(sides)
+    radius = side / (2.0 * math.sin(math.pi / sides))
+    return radius * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def _cap(points: NDArray[np.float64], normal: NDArray[np.float64]) -> tuple[int, ...]:
+    """Return the vertices farthest along `normal`, counter-clockwise, the lowest number first."""
+    height = points @ normal
+    corners = np.flatnonzero(height > height.max() - 1e-6 * np.ptp(height))
+    spokes = points[corners] - points[corners].mean(axis=0)
+    across = np.cross(normal / np.linalg.norm(normal), spokes[0])
+    angle = np.arctan2(spokes @ across, spokes @ spokes[0])
+    return tuple(int(v) for v in corners[np.argsort(angle % (2.0 * math.pi))])
+
+
+def _side(shape: str, sides: int, side: float | None, radius: float | None) -> float:
+    """Return the side of a regular polygon of which the side or the circumradius is given."""
+    if isinstance(sides, bool) or not isinstance(sides, int) or not 3 <= sides <= MOST_SIDES:
+        fix = "give a whole number; a cylinder needs no more than 64 sides"
+        raise ShapeError(f"{shape} has 3 to {MOST_SIDES} sides, not {sides!r}", fix=fix)
+    if side is not None and radius is None:
+        return side
+    if radius is not None and side is None:
+        _check_lengths(shape, radius=radius)
+        return 2.0 * radius * math.sin(math.pi / sides)
+    which = "both side and radius" if side is not None else "neither side nor radius"
+    raise ShapeError(f"{shape} is given {which}", fix="give one of the two")
+
+
+def _check_lengths(shape: str, **lengths: float) -> None:
+    """Refuse lengths that are no lengths, out of range, or out of proportion."""
+    for name, length in lengths.items():
+        if isinstance(length, bool) or not isinstance(length, int | float | np.floating):
+            raise ShapeError(f"{shape}: {name} is {length!r}, not a length", fix="write 60 mm")
+        if not SHORTEST_MM <= length <= LONGEST_MM:
+            raise ShapeError(
+                f"{shape}: {name} is {length:.6g} mm; allowed are {SHORTEST_MM:g} to "
+                f"{LONGEST_MM:g} mm",
+                fix=f"give {name} in that range, with its unit",
+            )
+    short, long = min(lengths, key=lengths.__getitem__), max(lengths, key=lengths.__getitem__)
+    if lengths[long] > RATIO * lengths[short]:
+        raise ShapeError(
+            f"{shape}: {long} of {lengths[long]:.6g} mm is more than {RATIO:g} times {short} of "
+            f"{lengths[short]:.6g} mm",
+            fix=f"set {short} to {lengths[long] / RATIO:.4g} mm or more",
+        )

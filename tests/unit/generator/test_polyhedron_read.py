@@ -1,0 +1,281 @@
+"""Files of other programs: what they hold, and what is said of those that hold no solid."""
+
+import itertools
+import struct
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from generator.errors import ShapeError
+from generator.polyhedron import SHAPES, dihedral, face_area, polyhedron, surface_area, volume
+from generator.polyhedron.read import read_shape
+
+SHAPES_FOLDER = Path(__file__).parents[3] / "fixtures" / "shapes"
+HEXAGON = 1.5 * 3**0.5 * 12**2
+
+TETRAHEDRON = """\
+v 0 0 0
+v 60 0 0
+v 0 60 0
+v 0 0 60
+f 1 3 2
+f 1 2 4
+f 2 3 4
+f 3 1 4
+"""
+
+
+def refused(path):
+    with pytest.raises(ShapeError) as caught:
+        read_shape(path)
+    return caught.value
+
+
+def written(folder, name, content):
+    path = folder / name
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return path
+
+
+def binary_stl(triangles):
+    records = [struct.pack("<12fH", 0, 0, 0, *np.ravel(t), 0) for t in triangles]
+    return bytes(80) + struct.pack("<I", len(records)) + b"".join(records)
+
+
+def fan(polygon):
+    return [(polygon[0], b, c) for b, c in itertools.pairwise(polygon[1:])]
+
+
+def triangles_of(solid):
+    """Triangles of a solid whose faces are convex."""
+    return [t for f in solid.faces for t in fan(solid.vertices[list(f.loops[0])])]
+
+
+@pytest.mark.parametrize("name", ["l_bracket.stl", "l_bracket_ascii.stl"])
+def test_l_bracket_with_a_pocket(name):
+    solid = read_shape(SHAPES_FOLDER / name)
+    assert (solid.kind, solid.genus, solid.notes) == ("file", 0, ())
+    assert (len(solid.vertices), len(solid.edges), len(solid.faces)) == (20, 30, 13)
+    assert volume(solid) == pytest.approx(94400, rel=1e-12)
+    assert surface_area(solid) == pytest.approx(16560, rel=1e-12)
+    holed = [k for k, face in enumerate(solid.faces) if len(face.loops) == 2]
+    assert [face_area(solid, k) for k in holed] == [pytest.approx(2400 - 160)]
+    reflex = [k for k in range(30) if dihedral(solid, k) > 3.2]
+    assert len(reflex) == 1 + 4 + 4  # the inner corner; the pocket's floor and its sides
+
+
+def test_cube_with_a_through_hole():
+    solid = read_shape(SHAPES_FOLDER / "cube_with_hole.step")
+    assert (len(solid.vertices), len(solid.edges), len(solid.faces)) == (20, 30, 12)
+    assert solid.genus == 1
+    assert volume(solid) == pytest.approx(60**3 - 60 * HEXAGON, rel=1e-12)
+    assert sorted(len(face.loops) for face in solid.faces) == [1] * 10 + [2] * 2
+
+
+def test_prism_of_an_obj_file():
+    solid = read_shape(SHAPES_FOLDER / "prism.obj")
+    assert (len(solid.vertices), len(solid.edges), len(solid.faces)) == (12, 18, 8)
+    assert volume(solid) == pytest.approx(1.5 * 3**0.5 * 40**2 * 60, rel=1e-8)
+
+
+def test_unit_of_a_step_file_is_honoured(tmp_path):
+    text = (SHAPES_FOLDER / "cube_with_hole.step").read_text()
+    centimetres = written(tmp_path, "cm.stp", text.replace("SI_UNIT(.MILLI.,", "SI_UNIT(.CENTI.,"))
+    assert volume(read_shape(centimetres)) == pytest.approx(
+        1000 * (60**3 - 60 * HEXAGON), rel=1e-12
+    )
+
+
+def test_obj_with_non_convex_polygons_negative_numbers_and_textures(tmp_path):
+    profile = [(0, 0), (80, 0), (80, 20), (20, 20), (20, 60), (0, 60)]
+    lines = ["# an L", "mtllib l.mtl", "o L"]
+    lines += [f"v {x} {y} {z}" for z in (0, 40) for x, y in profile]
+    lines += ["vn 0 0 1", "f -12//1 -7//1 -8//1 -9//1 -10//1 -11//1", "f 7/1/1 8/2 9 10 11 12"]
+    lines += [f"f {k + 1} {(k + 1) % 6 + 1} {(k + 1) % 6 + 7} {k + 7}" for k in range(6)]
+    solid = read_shape(written(tmp_path, "l.obj", "\n".join(lines).replace("10 11", "10 \\\n11")))
+    assert (len(solid.faces), volume(solid)) == (8, pytest.approx(2400 * 40))
+
+
+def test_slivers_and_points_on_edges_vanish(tmp_path):
+    # A cube whose front has a point on its upper edge, filled on the top by a flat triangle.
+    cube = SHAPES["cube"](side=60)
+    a, b, c, d = cube.vertices[[4, 5, 6, 7]]
+    m = 0.3 * a + 0.7 * b
+    front = cube.vertices[[0, 1]]
+    triangles = [t for k in (0, 2, 3, 4) for t in fan(cube.vertices[list(cube.faces[k].loops[0])])]
+    triangles += [(front[0], front[1], m), (front[1], b, m), (front[0], m, a)]
+    triangles += [(a, b, c), (a, c, d), (a, m, b)]
+    solid = read_shape(written(tmp_path, "m.stl", binary_stl(triangles)))
+    assert (len(solid.vertices), len(solid.edges), len(solid.faces)) == (8, 12, 6)
+
+
+def test_mesh_inside_out_is_turned_and_says_so(tmp_path):
+    triangles = [t[::-1] for t in triangles_of(SHAPES["tetrahedron"](side=60))]
+    solid = read_shape(written(tmp_path, "in.stl", binary_stl(triangles)))
+    assert volume(solid) > 0
+    assert "turned outward" in solid.notes[0]
+
+
+def test_float32_far_from_the_origin(tmp_path):
+    solid = SHAPES["dodecahedron"](side=30)
+    moved = [np.array(t) + 1000.0 for t in triangles_of(solid)]
+    read = read_shape(written(tmp_path, "far.stl", binary_stl(moved)))
+    assert (len(read.vertices), len(read.edges), len(read.faces)) == (20, 30, 12)
+    assert volume(read) == pytest.approx(volume(solid), rel=1e-5)
+
+
+def test_open_mesh_gives_the_place_and_the_count(tmp_path):
+    triangles = triangles_of(SHAPES["cube"](side=60))[:-1]
+    error = refused(written(tmp_path, "open.stl", binary_stl(triangles)))
+    assert "not closed: 3 edges have one face only, the first from (" in error.cause
+    assert "repair the mesh" in error.fix
+    assert error.place.endswith("open.stl")
+
+
+def test_other_broken_meshes_are_told_apart(tmp_path):
+    triangles = triangles_of(SHAPES["cube"](side=60))
+    doubled = refused(written(tmp_path, "d.stl", binary_stl([*triangles, triangles[0]])))
+    assert "3 edges have more than two faces" in doubled.cause
+    turned = refused(written(tmp_path, "t.stl", binary_stl([triangles[0][::-1], *triangles[1:]])))
+    assert "disagree about outside" in turned.cause
+    far = [np.array(t) + 200 for t in triangles]
+    assert (
+        "2 separate shells"
+        in refused(written(tmp_path, "2.stl", binary_stl(triangles + far))).cause
+    )
+    flat = [(p, q, r) for p, q, r in triangles[:2]] + [(r, q, p) for p, q, r in triangles[:2]]
+    assert refused(written(tmp_path, "f.stl", binary_stl(flat))).fix
+    dot = [np.zeros((3, 3))] * 4
+    assert "smaller than a rounding" in refused(written(tmp_path, "0.stl", binary_stl(dot))).cause
+
+
+def sphere(rows, columns, radius=30.0):
+    theta, phi = np.pi * np.arange(rows + 1) / rows, 2 * np.pi * np.arange(columns) / columns
+    p = np.array([[(radius * np.sin(t) * np.cos(f), radius * np.sin(t) * np.sin(f),
+                    radius * np.cos(t)) for f in phi] for t in theta])  # fmt: skip
+    return [
+        t
+        for i in range(rows)
+        for j in range(columns)
+        for k in [(j + 1) % columns]
+        for t in ((p[i, j], p[i + 1, j], p[i + 1, k]), (p[i, j], p[i + 1, k], p[i, k]))
+    ]
+
+
+def test_sphere_is_refused_with_its_faces(tmp_path):
+    error = refused(written(tmp_path, "s.stl", binary_stl(sphere(24, 48))))
+    assert error.cause.startswith("1152 planar faces, the smallest of ")
+    assert "the surface is curved; 400 faces are allowed" in error.cause
+
+
+def test_coarse_sphere_is_a_polyhedron(tmp_path):
+    solid = read_shape(written(tmp_path, "s.stl", binary_stl(sphere(8, 12))))
+    assert (len(solid.faces), solid.genus) == (96, 0)
+
+
+def test_slightly_curved_face_is_refused(tmp_path):
+    # A plate with a bulge of 2 mm over 3000 mm, in steps too small for an edge each.
+    x = np.linspace(0, 3000, 400)
+    top = 2.0 - 2.0 * ((x - 1500) / 1500) ** 2 + 100
+    upper, lower = np.column_stack([x, top]), np.column_stack([x, 0 * x])
+    profile = np.concatenate([lower, upper[::-1]])
+    sides = []
+    for p, q in zip(profile, np.roll(profile, -1, axis=0), strict=True):
+        sides += [((*p, 0), (*q, 0), (*q, 500)), ((*p, 0), (*q, 500), (*p, 500))]
+    caps = []
+    for k in range(399):
+        a, b, c, d = lower[k], lower[k + 1], upper[k + 1], upper[k]
+        caps += [((*a, 500), (*b, 500), (*c, 500)), ((*a, 500), (*c, 500), (*d, 500))]
+        caps += [((*c, 0), (*b, 0), (*a, 0)), ((*d, 0), (*c, 0), (*a, 0))]
+    error = refused(written(tmp_path, "bulge.stl", binary_stl(sides + caps)))
+    assert "is curved: it bends by" in error.cause
+
+
+def test_step_with_a_bore_says_how_many_and_of_what_type():
+    error = refused(SHAPES_FOLDER / "block_with_bore.step")
+    assert error.cause == "1 of 7 faces are not planar (1 cylinder)"
+
+
+def test_step_without_the_kernel_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "OCP", None)  # as if it were not installed
+    error = refused(SHAPES_FOLDER / "cube_with_hole.step")
+    assert 'pip install "encoded-objects[cad]"' in error.fix
+
+
+def test_step_that_crashes_the_kernel_is_refused(tmp_path):
+    # Digits changed at random: kernel 7.9 ends with signal 11 on this one.
+    content = bytearray((SHAPES_FOLDER / "cube_with_hole.step").read_bytes())
+    rng = np.random.default_rng(2)
+    for _ in range(rng.integers(1, 40)):
+        content[rng.integers(900, len(content) - 60)] = ord("0") + rng.integers(0, 10)
+    error = refused(written(tmp_path, "damaged.step", bytes(content)))
+    assert "damaged" in error.fix
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "place", "says"),
+    [
+        ("a.stl", b"", "a.stl", "empty"),
+        ("a.stl", b"\x01" * 60, "a.stl", "neither ASCII nor binary STL: 60 bytes"),
+        (
+            "a.stl",
+            bytes(80) + b"\x04\0\0\0" + bytes(120),
+            "a.stl",
+            "announces 4 triangles, but ends",
+        ),
+        ("a.stl", bytes(84), "a.stl", "no faces"),
+        ("a.stl", binary_stl([[[np.nan] * 3] * 3]), "a.stl", "triangle 1 at byte 84"),
+        ("a.stl", binary_stl([[[1e9, 0, 0]] * 3]), "a.stl", "a coordinate is 1e+09 mm"),
+        ("a.stl", "solid\nfacet normal 0 0 1\n", "a.stl:2", "without 'endsolid'"),
+        ("a.stl", "solid\nvertex 1 2 x\n", "a.stl:2", "not a corner"),
+        ("a.stl", "solid\nvertex 1 2 nan\n", "a.stl:2", "not a number"),
+        ("a.stl", "solid\nfacet\nvertex 1 2 3\nendfacet\n", "a.stl:4", "a facet with 1 corners"),
+        ("a.stl", "solid\nendsolid\n", "a.stl", "no faces"),
+        ("a.stl", "solid\nfact normal\n", "a.stl:2", "'fact' is no word of STL"),
+        ("a.obj", TETRAHEDRON + "f 1 2 9\n", "a.obj:9", "there is no vertex 9; 4 are defined"),
+        ("a.obj", TETRAHEDRON + "f 1 0 2\n", "a.obj:9", "there is no vertex 0"),
+        ("a.obj", TETRAHEDRON + "f 1 2\n", "a.obj:9", "a face of 2 vertices"),
+        ("a.obj", TETRAHEDRON + "f a b c\n", "a.obj:9", "does not name vertices"),
+        ("a.obj", TETRAHEDRON + "v 1 2\n", "a.obj:9", "not a point"),
+        ("a.obj", TETRAHEDRON + "surf 1 2\n", "a.obj:9", "free-form"),
+        ("a.obj", TETRAHEDRON + "?\n", "a.obj:9", "no word of OBJ"),
+        ("a.obj", "v 0 0 0\n", "a.obj", "no faces"),
+        ("a.step", "solid\n", "a.step", "it starts with 'solid'"),
+        (
+            "a.step",
+            "ISO-10303-21;\nHEADER;",
+            "a.step",
+            "ends at byte 21 without 'END-ISO-10303-21;'",
+        ),
+        ("a.ply", "ply", "a.ply", "cannot read a shape from a '.ply' file"),
+        ("a", "x", "a", "no suffix"),
+    ],
+)
+def test_bad_files_give_place_cause_and_way_out(tmp_path, name, content, place, says):
+    error = refused(written(tmp_path, name, content))
+    assert error.place == str(tmp_path / place)
+    assert says in error.cause
+    assert error.fix
+
+
+def test_missing_and_large_files(tmp_path, monkeypatch):
+    assert refused(tmp_path / "none.stl").cause == "no such file or directory"
+    (tmp_path / "folder.stl").mkdir()
+    assert "directory" in refused(tmp_path / "folder.stl").cause
+    monkeypatch.setattr("generator.polyhedron.read.LARGEST_BYTES", 100)
+    assert "MB are allowed" in refused(SHAPES_FOLDER / "l_bracket.stl").cause
+
+
+def test_faces_of_a_file_are_named_with_the_file(tmp_path):
+    # Two cubes that share one corner: closed, but no solid.
+    cube = triangles_of(polyhedron("cube", *_cube()))
+    error = refused(written(tmp_path, "c.stl", binary_stl(cube + [np.array(t) + 60 for t in cube])))
+    assert error.place == str(tmp_path / "c.stl")
+    assert "touches itself at vertex" in error.cause
+
+
+def _cube():
+    solid = SHAPES["cube"](side=60)
+    return solid.vertices, solid.faces
