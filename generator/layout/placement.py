@@ -33,7 +33,7 @@ class Placement:
 
 @dataclass(frozen=True, slots=True)
 class FaceLayout:
-    """The symbols of one face."""
+    """The symbols of one face; a blank face has none, and a placement without a meaning."""
 
     face: int  #: number of the face in its polyhedron
     placement: Placement
@@ -50,4 +50,6 @@ class Layout:
 
     kind: str  #: "net" or "faces"
     pitch_mm: float
-    faces: tuple[FaceLayout, ...]
+    faces: tuple[FaceLayout, ...]  #: one per face of the polyhedron, in its order
+    blank_faces: tuple[int, ...] = ()  #: left blank, as asked or because nothing identifies
+    warnings: tuple[str, ...] = ()  #: for the person who asked: faces without a place

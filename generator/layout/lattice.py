@@ -1,0 +1,303 @@
+"""Choose how the lattice of symbols lies on a face, or on several faces of a net at once.
+
+Regions (mm) + pitch + window -> Lattice: rotation and shift that show the most identifiable
+places. Rotations: along the edges, and a search between them; shifts: a regular grid, and
+those at which a row of cells touches what an edge forbids. All shifts of one rotation are
+tried at once. The lattice frame is the face (or net) frame turned by `rotation_rad`; cell
+(j, i) has its centre at (x_mm + i p, y_mm + j p), j against the array's rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.layout.footprint import Region, free_grid, mirrored, moved, slack
+from generator.layout.places import Cells, Identifies, array_cells, count_places, windows_in
+
+Points = NDArray[np.float64]
+
+ANGLE = 1e-9  #: rotations nearer than this are the same, rad
+SEARCH_STEPS = 12  #: rotations tried over a quarter turn beside the edges' directions
+EDGE_ROTATIONS = 12  #: edge directions tried at most
+_POINTS = 1 << 17  #: candidate centres looked at for one rotation
+_FACE = 1 << 32  # a face that shows a place counts more than any number of places elsewhere
+_TRIED = 8  #: sets of cells with equal scores that are compared by their margin
+
+
+@dataclass(frozen=True, slots=True)
+class Lattice:
+    """One lattice and the cells that it shows on each region."""
+
+    rotation_rad: float  #: turns face (net) x into lattice x
+    x_mm: float  #: centre of cell (0, 0), lattice frame
+    y_mm: float
+    cells: tuple[Cells, ...]  #: per region (n, 2): j, i
+    places: tuple[int, ...]  #: per region
+    quarter: int  #: quarter turns from lattice x to array x (columns)
+    margin_mm: float  #: least way to the next edge along x or y
+
+
+@dataclass(frozen=True, slots=True)
+class _Set:
+    """The cells that one shift of the lattice shows."""
+
+    y: float
+    x: float
+    cells: tuple[Cells, ...]  # per region
+
+
+@dataclass(frozen=True, slots=True)
+class _Candidate:
+    worth: int  # places, and _FACE for every face that shows one
+    cells: int
+    rotation: float
+    sets: tuple[_Set, ...]  # with these numbers of places and cells
+
+
+def choose_lattice(
+    regions: Sequence[Region],
+    half_mm: float,
+    pitch_mm: float,
+    window: tuple[int, int],
+    identifies: Identifies | None = None,
+    *,
+    search: bool = True,
+) -> Lattice:
+    """Return the lattice that shows a place on the most faces, then the most places.
+
+    Ties are broken by more cells, then by the rotation (that of the first edge, then of longer
+    edges), then by the largest margin to the edges; at last the lattice is centred.
+
+    Parameters
+    ----------
+    regions
+        Faces that share the lattice, all in one frame (mm).
+    half_mm, pitch_mm
+        Half side of the footprint; distance of two symbols.
+    window
+        Rows and columns of the array's window.
+    identifies
+        Rank test for faces into which the window does not fit; None leaves it out.
+    search
+        Try rotations other than along the edges too.
+    """
+    found = _candidates(regions, half_mm, pitch_mm, window, search)
+    if not found:
+        return Lattice(0.0, 0.0, 0.0, (_no_cells(),) * len(regions), (0,) * len(regions), 0, 0.0)
+    best = max((c.worth, c.cells) for c in found)
+    if best[0] == 0 and identifies is not None:
+        for candidate in sorted(found, key=lambda c: -c.cells):
+            for cells in candidate.sets:
+                if any(any(_places(cells.cells, k, window, identifies)) for k in range(4)):
+                    lattice = _centred(regions, half_mm, pitch_mm, candidate.rotation, cells)
+                    return _with_places(lattice, window, identifies)
+    head = next(c for c in found if (c.worth, c.cells) == best)
+    choice = [_centred(regions, half_mm, pitch_mm, head.rotation, cells) for cells in head.sets]
+    lattice = max(choice, key=lambda lattice: lattice.margin_mm)
+    return _with_places(lattice, window, identifies)
+
+
+def _candidates(
+    regions: Sequence[Region],
+    half: float,
+    pitch: float,
+    window: tuple[int, int],
+    search: bool,
+) -> list[_Candidate]:
+    """Return the best shifts for every rotation worth a look, edge directions first."""
+    area = sum(abs(_area(region)) for region in regions) / pitch**2
+    fine = int(np.clip(np.sqrt(_POINTS / (2.0 * area + 8.0)), 4, 16))
+    found = []
+    best = (0, 0)
+    for rotation in edge_rotations(regions):
+        found += _best_shifts(regions, half, pitch, window, rotation, fine, best)
+        best = max(((c.worth, c.cells) for c in found), default=best)
+    if search:
+        for rotation in (np.arange(1, SEARCH_STEPS) / SEARCH_STEPS * np.pi / 2).tolist():
+            # A coarse look is enough to see whether a rotation may win.
+            coarse = _best_shifts(regions, half, pitch, window, rotation, 4, best)
+            if best[0] == 0:
+                found += coarse
+            elif coarse:
+                found += _best_shifts(regions, half, pitch, window, rotation, fine, best)
+            best = max(((c.worth, c.cells) for c in found), default=best)
+    return found
+
+
+def edge_rotations(regions: Sequence[Region]) -> list[float]:
+    """Return the rotations (rad) that lay the lattice along an edge; the first edge is first."""
+    side = np.concatenate([region.end - region.start for region in regions])
+    length = np.hypot(side[:, 0], side[:, 1])
+    order = np.concatenate([[0], 1 + np.argsort(-length[1:], kind="stable")])
+    quarter = np.pi / 2
+    rotations: list[float] = []
+    for dx, dy in side[order].tolist():
+        angle = -float(np.arctan2(dy, dx))
+        angle -= quarter * round(angle / quarter)
+        if angle <= -np.pi / 4 + ANGLE:
+            angle += quarter
+        if all(abs((angle - r + quarter / 2) % quarter - quarter / 2) > ANGLE for r in rotations):
+            rotations.append(0.0 if abs(angle) <= ANGLE else angle)
+        if len(rotations) == EDGE_ROTATIONS:
+            break
+    return rotations
+
+
+def _best_shifts(
+    regions: Sequence[Region],
+    half: float,
+    pitch: float,
+    window: tuple[int, int],
+    rotation: float,
+    steps: int,
+    best: tuple[int, int],
+) -> list[_Candidate]:
+    """Return the shifts with the most places, then cells, at one rotation.
+
+    None without cells, nor if it falls short of the best (worth, cells) so far.
+    """
+    turned = [moved(region, rotation) for region in regions]
+    ys = _shifts(turned, half, pitch, steps)
+    xs = _shifts([mirrored(region) for region in turned], half, pitch, steps)
+    along = np.zeros((len(ys), len(xs)), dtype=np.int64)
+    across, cells = along.copy(), along.copy()
+    grids: list[tuple[NDArray[np.bool_], tuple[int, int]]] = []
+    for region in turned:
+        j, y = _lines(region.start[:, 1], ys, pitch)
+        i, x = _lines(region.start[:, 0], xs, pitch)
+        free = free_grid(region, half, y.ravel(), x.ravel())
+        free = free.reshape(len(y), len(ys), len(x), len(xs))
+        grids.append((free, (j, i)))
+        cells += free.sum(axis=(0, 2))
+        for total, shape in ((along, window), (across, window[::-1])):
+            here = windows_in(free, *shape).sum(axis=(0, 2))
+            total += here + _FACE * (here > 0)
+    if cells.max() == 0:
+        return []
+    worth = np.maximum(along, across)
+    cells[worth < worth.max()] = -1
+    at = np.argwhere(cells == cells.max())
+    reached = int(worth.max()), int(cells.max())
+    if best[0] > 0 and reached < best:
+        return []
+    return [_Candidate(*reached, rotation, _different(grids, at, ys, xs))]
+
+
+def _different(
+    grids: Sequence[tuple[NDArray[np.bool_], tuple[int, int]]],
+    at: NDArray[np.intp],
+    ys: Points,
+    xs: Points,
+) -> tuple[_Set, ...]:
+    """Return the different sets of cells at some shifts (k, 2), the first few of them."""
+    if len(at) > 8 * _TRIED:
+        at = at[np.linspace(0, len(at) - 1, 8 * _TRIED).astype(int)]
+    sets: dict[bytes, _Set] = {}
+    for y, x in at.tolist():
+        masks = [free[:, y, :, x] for free, _ in grids]
+        key = b"".join(np.packbits(mask).tobytes() for mask in masks)
+        if key not in sets:
+            cells = tuple(
+                np.argwhere(mask).astype(np.int64) + first
+                for mask, (_, first) in zip(masks, grids, strict=True)
+            )
+            sets[key] = _Set(float(ys[y]), float(xs[x]), cells)
+        if len(sets) == _TRIED:
+            break
+    return tuple(sets.values())
+
+
+def _shifts(regions: Sequence[Region], half: float, pitch: float, steps: int) -> Points:
+    """Return shifts along y worth trying: a regular grid, and rows that touch what edges forbid."""
+    start, end = (
+        np.concatenate([getattr(r, name)[:, 1] for r in regions]) for name in ("start", "end")
+    )
+    reach = np.concatenate([r.clearance for r in regions]) + half
+    level = np.abs(end - start)
+    touching = np.concatenate([np.maximum(start, end) + reach, np.minimum(start, end) - reach])
+    order = np.argsort(np.tile(level, 2), kind="stable")[:steps]
+    shifts = np.concatenate([np.arange(steps) * (pitch / steps), np.mod(touching[order], pitch)])
+    shifts = np.sort(np.where(shifts >= pitch, 0.0, shifts))
+    return shifts[np.diff(shifts, prepend=-1.0) > 1e-6 * pitch]
+
+
+def _lines(values: Points, shifts: Points, pitch: float) -> tuple[int, Points]:
+    """Return the first cell number, and all lattice lines (k, shifts) that may meet the region."""
+    first = int(np.ceil(values.min() / pitch)) - 1
+    last = int(np.floor(values.max() / pitch))
+    return first, np.arange(first, last + 1)[:, None] * pitch + shifts
+
+
+def _centred(
+    regions: Sequence[Region],
+    half: float,
+    pitch: float,
+    rotation: float,
+    shown_set: _Set,
+) -> Lattice:
+    """Move the lattice to the middle of its play along x and y, keeping its cells."""
+    cells, y, x = shown_set.cells, shown_set.y, shown_set.x
+    turned = [moved(region, rotation) for region in regions]
+    shown = [(r, mirrored(r), c) for r, c in zip(turned, cells, strict=True) if len(c)]
+    margin = 0.0
+    for _ in range(3):
+        sides = [slack(r, half, _centres(c[:, ::-1], pitch, x, y)) for r, _, c in shown]
+        left, right = min(s[0] for s in sides), min(s[1] for s in sides)
+        x += (right - left) / 2
+        sides = [slack(m, half, _centres(c, pitch, y, x)) for _, m, c in shown]
+        down, up = min(s[0] for s in sides), min(s[1] for s in sides)
+        y += (up - down) / 2
+        margin = min(left + right, down + up) / 2
+        if abs(right - left) + abs(up - down) < 1e-9 * pitch:
+            break
+    places = (0,) * len(regions)
+    # Rounded, so that mirror images tie and the first of them is taken.
+    return Lattice(rotation, x, y, cells, places, 0, round(margin / pitch, 6) * pitch)
+
+
+def _centres(cells: Cells, pitch: float, first: float, second: float) -> Points:
+    return np.asarray(cells * pitch + np.array([first, second]), dtype=np.float64)
+
+
+def _with_places(
+    lattice: Lattice, window: tuple[int, int], identifies: Identifies | None
+) -> Lattice:
+    """Count the places and choose the quarter turn that shows the most."""
+    best: tuple[int, ...] = ()
+    quarter = 0
+    for turn in range(4):
+        places = _places(lattice.cells, turn, window, identifies)
+        if not best or _worth(places) > _worth(best):
+            best, quarter = places, turn
+    return Lattice(
+        lattice.rotation_rad,
+        lattice.x_mm,
+        lattice.y_mm,
+        lattice.cells,
+        best,
+        quarter,
+        lattice.margin_mm,
+    )
+
+
+def _places(
+    cells: Sequence[Cells], quarter: int, window: tuple[int, int], identifies: Identifies | None
+) -> tuple[int, ...]:
+    return tuple(count_places(*array_cells(own, quarter), window, identifies) for own in cells)
+
+
+def _worth(places: Sequence[int]) -> int:
+    return sum(n + _FACE * (n > 0) for n in places)
+
+
+def _area(region: Region) -> float:
+    (ax, ay), (bx, by) = region.start.T, region.end.T
+    return 0.5 * float(np.sum(ax * by - ay * bx))
+
+
+def _no_cells() -> Cells:
+    return np.empty((0, 2), dtype=np.int64)

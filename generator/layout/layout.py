@@ -1,0 +1,238 @@
+"""Lay the faces of an object onto the array: which cell stands where on which face.
+
+Polyhedron (mm) + Array + pitch + taken cells -> Layout. Two ways, of which `auto` takes the one
+that shows more places: `faces` gives every face a lattice of its own, `net` unfolds the object
+and lets one lattice run through each piece of the net (symbols that an edge would cut are left
+out). Either way a face ends with one rigid transform to the array. Thesis 6.3.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from generator.array.contract import SymbolArray
+from generator.errors import LayoutError
+from generator.layout.blank import Request, describe_blank, remedies
+from generator.layout.footprint import region_of
+from generator.layout.piece import Piece, turned
+from generator.layout.placement import FaceLayout, Layout, Placement
+from generator.layout.places import rank_test
+from generator.layout.plan import Plan, Task, alone, faces_plan, net_piece, net_plan
+from generator.layout.torus import Occupancy, Spot, place_pieces
+from generator.layout.unfold import split, unfold
+from generator.polyhedron.frame import face_polygon
+from generator.polyhedron.winged import Polyhedron
+
+Clearances = Sequence[Sequence[NDArray[np.float64]]]  #: [face][loop] -> (edges,) mm
+
+KINDS = ("auto", "faces", "net")
+
+
+def lay_out(
+    polyhedron: Polyhedron,
+    array: SymbolArray,
+    pitch_mm: float,
+    footprint_half_mm: float,
+    clearances_mm: Clearances,
+    occupied: tuple[ArrayLike, ArrayLike],
+    kind: str = "auto",
+    *,
+    blank_faces: Collection[int] = (),
+    allow_blank_faces: bool = False,
+) -> Layout:
+    """Choose the cells of every face, none of them used before.
+
+    Parameters
+    ----------
+    polyhedron
+        The object, mm.
+    array
+        The array that all objects of a database share.
+    pitch_mm
+        Distance of neighbouring symbols.
+    footprint_half_mm
+        Half side of the square, turned with the lattice, that a symbol needs.
+    clearances_mm
+        Per face and loop an array (k,): least distance from a footprint to each edge; entry e
+        belongs to the edge from vertex e to vertex e + 1 of the loop.
+    occupied
+        Rows and columns (n,) of the cells that are taken.
+    kind
+        `auto`, `faces` or `net`.
+    blank_faces
+        Faces that shall carry no symbols.
+    allow_blank_faces
+        Leave a face without an identifiable place blank and warn, instead of refusing.
+
+    Returns
+    -------
+    Layout
+        One `FaceLayout` per face, in the order of the polyhedron.
+
+    Raises
+    ------
+    LayoutError
+        A face shows no place, the array is full, or a length is impossible.
+    """
+    _check(polyhedron, pitch_mm, footprint_half_mm, clearances_mm, kind)
+    unknown = sorted(set(blank_faces) - set(range(len(polyhedron.faces))))
+    if unknown:
+        raise LayoutError(
+            f"there is no face {unknown[0]} to leave blank",
+            fix=f"give face numbers from 0 to {len(polyhedron.faces) - 1}",
+        )
+    regions = tuple(
+        region_of(face_polygon(polyhedron, face), clearances)
+        for face, clearances in enumerate(clearances_mm)
+    )
+    request = Request(footprint_half_mm, pitch_mm, array.window, rank_test(array))
+    task = Task(polyhedron, array, request, regions, frozenset(blank_faces))
+
+    plans = []
+    if kind != "net":
+        plans.append(faces_plan(task))
+    if kind != "faces":
+        plans.append(net_plan(task, unfold(polyhedron)))
+    plans.sort(key=lambda plan: plan.worth, reverse=True)  # stable: faces first among equals
+
+    warning = _without_place(task, plans[0], allow_blank_faces)
+    occupancy = Occupancy.from_cells(*occupied, array)
+    for plan in plans:
+        if plan.worth[0] < plans[0].worth[0]:
+            continue  # a full array is no reason to lose a face
+        placed = _placed(task, plan, occupancy)
+        if placed is not None:
+            if placed[0] is not plans[0]:  # other pieces may show other faces
+                warning = _without_place(task, placed[0], allow_blank_faces)
+            return _layout(task, *placed, warning)
+    raise _full(plans[0], occupancy)
+
+
+def _without_place(task: Task, plan: Plan, allowed: bool) -> tuple[str, ...]:
+    """Return the warning about faces without a place; raise it unless they are allowed."""
+    shown = {
+        face: places
+        for piece in plan.pieces
+        for face, places in zip(piece.faces, piece.places, strict=True)
+    }
+    faces = sorted(face for face, places in shown.items() if places == 0)
+    if not faces:
+        return ()
+    lattices = [alone(task, face) for face in faces]
+    names = {task.polyhedron.faces[face].name: task.regions[face] for face in faces}
+    cause = describe_blank(names, [len(lattice.cells[0]) for lattice in lattices], task.request)
+    if allowed:
+        return (f"{cause}; left blank",)
+    if plan.kind == "net" and all(any(lattice.places) for lattice in lattices):
+        raise LayoutError(
+            f"{cause} in the net's lattice", fix="set layout to faces, which turns each lattice"
+        )
+    raise LayoutError(cause, fix=remedies(list(names.values()), task.request))
+
+
+def _placed(
+    task: Task, plan: Plan, occupancy: Occupancy
+) -> tuple[Plan, tuple[Spot | None, ...]] | None:
+    """Place a plan; pieces of a net that find no place are cut in two until they do."""
+    while True:
+        spots = place_pieces(occupancy, [(p.owner >= 0, p.turns) for p in plan.pieces])
+        lost = [k for k, p in enumerate(plan.pieces) if p.cells and spots[k] is None]
+        if not lost:
+            return plan, tuple(spots)
+        if plan.net is None or any(len(plan.net.pieces[k]) < 2 for k in lost):
+            return None
+        net = plan.net
+        for k in reversed(lost):
+            net = split(net, k)
+        known = dict(zip(plan.net.pieces, plan.pieces, strict=True))
+        plan = Plan(
+            plan.kind,
+            tuple(known.get(faces) or net_piece(task, net, faces) for faces in net.pieces),
+            net,
+        )
+
+
+def _layout(
+    task: Task, plan: Plan, spots: tuple[Spot | None, ...], warnings: tuple[str, ...]
+) -> Layout:
+    """Return the finished layout of a plan whose pieces have their spots."""
+    none = np.empty(0, dtype=np.int64)
+    count = len(task.polyhedron.faces)
+    faces = [
+        FaceLayout(face, Placement(0, 0, 0.0, 0.0, 0.0), none, none, none, np.empty((0, 2)), 0)
+        for face in range(count)
+    ]
+    for piece, spot in zip(plan.pieces, spots, strict=True):
+        if spot is not None:
+            lying = turned(piece, spot.quarter, task.request.pitch_mm)
+            for k, face in enumerate(piece.faces):
+                if piece.places[k]:
+                    faces[face] = _face_layout(task, lying, k, spot)
+    blank = tuple(face.face for face in faces if len(face.rows) == 0)
+    return Layout(plan.kind, task.request.pitch_mm, tuple(faces), blank, warnings)
+
+
+def _face_layout(task: Task, piece: Piece, k: int, spot: Spot) -> FaceLayout:
+    """Return one face of a piece that has been turned and has its spot."""
+    pitch, array, pose = task.request.pitch_mm, task.array, piece.poses[k]
+    r, c = (index.astype(np.int64) for index in np.nonzero(piece.owner == k))
+    rotation = math.remainder(pose.rotation_rad, 2 * math.pi)
+    cosine, sine = math.cos(rotation), math.sin(rotation)
+    u, v = (c + 0.5) * pitch - pose.x_mm, -(r + 0.5) * pitch - pose.y_mm
+    rows, columns = (r + spot.row) % array.rows, (c + spot.column) % array.columns
+    return FaceLayout(
+        piece.faces[k],
+        Placement(spot.row, spot.column, rotation, pose.x_mm, pose.y_mm),
+        rows,
+        columns,
+        array.symbols(rows, columns),
+        np.column_stack([cosine * u + sine * v, cosine * v - sine * u]),
+        piece.places[k],
+    )
+
+
+def _full(plan: Plan, occupancy: Occupancy) -> LayoutError:
+    needed = -plan.worth[2]
+    cause = (
+        f"the array {occupancy.rows}x{occupancy.columns} is full: the object needs {needed} "
+        f"cells, {occupancy.free} of {occupancy.rows * occupancy.columns} are free"
+    )
+    if needed <= occupancy.free:
+        cause += ", but not in blocks that hold its faces"
+    fix = "take a larger array, such as profile large"
+    return LayoutError(cause, fix=f"{fix}, or start a new database" if occupancy.used else fix)
+
+
+def _check(
+    polyhedron: Polyhedron, pitch_mm: float, half_mm: float, clearances: Clearances, kind: str
+) -> None:
+    if kind not in KINDS:
+        raise LayoutError(f"unknown layout '{kind}'", fix=f"choose one of {', '.join(KINDS)}")
+    if not (math.isfinite(pitch_mm) and 0.0 < 2 * half_mm <= pitch_mm):
+        raise LayoutError(
+            f"symbols of {2 * half_mm:g} mm do not fit a pitch of {pitch_mm:g} mm",
+            fix=f"set pitch to {2 * half_mm:g} mm or more, or take smaller symbols",
+        )
+    if len(clearances) != len(polyhedron.faces):
+        raise LayoutError(
+            f"clearances are given for {len(clearances)} of {len(polyhedron.faces)} faces",
+            fix="give one array per loop of every face",
+        )
+    for face, given in zip(polyhedron.faces, clearances, strict=True):
+        if [len(loop) for loop in given] != [len(loop) for loop in face.loops]:
+            raise LayoutError(
+                "clearances do not match the edges",
+                fix="give one array per loop with one entry per edge",
+                place=face.name,
+            )
+        least = min(float(np.min(loop)) for loop in given)
+        if not (least >= 0.0 and all(np.isfinite(loop).all() for loop in given)):
+            raise LayoutError(
+                f"a clearance of {least:g} mm is not a length",
+                fix="give clearances of 0 mm or more",
+                place=face.name,
+            )

@@ -1,0 +1,226 @@
+"""Unfold a polyhedron into a net: cut along edges, lay the faces flat without overlap.
+
+Polyhedron -> Net: one plane rigid transform per face. Neighbours along a fold share their edge
+in the net, areas are kept, and faces of one piece never overlap. Not every polyhedron is known
+to have a net in one piece, so several spanning trees are tried (breadth first from large faces,
+steepest edges, random ones) and the one with the fewest pieces (islands) is taken. Thesis 6.3.
+
+References
+----------
+W. Schlickenrieder, Nets of polyhedra, 1997: steepest-edge cuts.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.layout.overlap import Triangles, overlap, triangles_of
+from generator.polyhedron.frame import face_polygon
+from generator.polyhedron.winged import Polyhedron
+
+Points = NDArray[np.float64]
+
+TOLERANCE = 1e-7  #: faces that overlap by less than this share of the net's size touch
+_WORK = 6000  #: faces laid down at most over all trees
+_RANDOM_TREES = 24
+_BREADTH_ROOTS = 12
+
+
+@dataclass(frozen=True, slots=True)
+class Net:
+    """The faces of a polyhedron laid flat, seen from outside."""
+
+    T_net_face: NDArray[np.float64]  #: (F, 3, 3) plane rigid transforms, mm
+    pieces: tuple[tuple[int, ...], ...]  #: faces of each island, each in a plane of its own
+    parents: tuple[int, ...]  #: the face at whose edge a face was laid down, -1 for the first
+
+
+@dataclass(frozen=True, slots=True)
+class _Hinge:
+    face: int  # the neighbour
+    edge: int
+    start: int  # vertex
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Surface:
+    points: list[dict[int, Points]]  # per face: vertex -> place in the face frame
+    triangles: list[Triangles]
+    hinges: list[list[_Hinge]]
+    tolerance: float
+
+
+Priority = Callable[[int, int], float]  # (edge, faces between this one and the first) -> order
+
+
+def unfold(polyhedron: Polyhedron, *, seed: int = 0) -> Net:
+    """Return the net with the fewest pieces among the trees that are tried.
+
+    Parameters
+    ----------
+    polyhedron
+        A closed solid; faces may be non-convex and have holes.
+    seed
+        Of the random trees; the same seed gives the same net.
+    """
+    surface = _surface(polyhedron)
+    best: Net | None = None
+    work = 0
+    for root, priority in _trees(polyhedron, surface, seed):
+        net = _laid_flat(surface, root, priority)
+        if best is None or len(net.pieces) < len(best.pieces):
+            best = net
+        work += len(polyhedron.faces)
+        if len(best.pieces) == 1 or work >= _WORK:
+            break
+    if best is None:
+        raise ValueError("a polyhedron without faces has no net")
+    return best
+
+
+def split(net: Net, piece: int) -> Net:
+    """Return the net with one piece cut in two along the fold that leaves the most equal halves.
+
+    Parameters
+    ----------
+    net, piece
+        A piece of at least two faces; the others are kept, the halves come last.
+    """
+    faces = net.pieces[piece]
+    below = {face: [face] for face in faces}
+    for face in reversed(faces):  # children stand after their parents
+        if net.parents[face] in below:
+            below[net.parents[face]] += below[face]
+    cut = min(faces[1:], key=lambda face: abs(2 * len(below[face]) - len(faces)))
+    half = set(below[cut])
+    parents = tuple(-1 if face == cut else parent for face, parent in enumerate(net.parents))
+    rest = tuple(face for face in faces if face not in half)
+    kept = tuple(p for k, p in enumerate(net.pieces) if k != piece)
+    return Net(net.T_net_face, (*kept, rest, tuple(f for f in faces if f in half)), parents)
+
+
+def _surface(polyhedron: Polyhedron) -> _Surface:
+    points, triangles = [], []
+    for number, face in enumerate(polyhedron.faces):
+        loops = face_polygon(polyhedron, number)
+        vertices = [vertex for loop in face.loops for vertex in loop]
+        points.append(dict(zip(vertices, np.concatenate(loops), strict=True)))
+        triangles.append(triangles_of(loops))
+    hinges: list[list[_Hinge]] = [[] for _ in polyhedron.faces]
+    for number, edge in enumerate(polyhedron.edges):
+        hinges[edge.left].append(_Hinge(edge.right, number, edge.start, edge.end))
+        hinges[edge.right].append(_Hinge(edge.left, number, edge.start, edge.end))
+    size = float(np.ptp(polyhedron.vertices, axis=0).max())
+    return _Surface(points, triangles, hinges, TOLERANCE * size)
+
+
+def _trees(polyhedron: Polyhedron, surface: _Surface, seed: int) -> Iterator[tuple[int, Priority]]:
+    """Yield the face to begin with and the order of folds, promising ones first."""
+    areas = [_area(triangles) for triangles in surface.triangles]
+    roots = sorted(range(len(areas)), key=lambda face: (-round(areas[face], 6), face))
+    for root in roots[:_BREADTH_ROOTS]:
+        yield root, lambda _edge, depth: float(depth)
+    for direction in _directions():
+        cuts = _steepest(polyhedron, direction)
+        yield roots[0], lambda edge, depth, cuts=cuts: float(cuts[edge] * 1e6 + depth)  # type: ignore[misc]
+    random = np.random.default_rng(seed)
+    for _ in range(_RANDOM_TREES):
+        order = random.permutation(len(polyhedron.edges))
+        yield roots[0], lambda edge, _depth, order=order: float(order[edge])  # type: ignore[misc]
+
+
+def _directions() -> Points:
+    """Return eight directions in general position: no edge of a usual solid is level for them."""
+    corners = np.array([[x, y, z] for x in (1, -1) for y in (1, -1) for z in (1, -1)])
+    return corners * (0.53, 0.31, 0.79)
+
+
+def _steepest(polyhedron: Polyhedron, direction: Points) -> NDArray[np.bool_]:
+    """Return which edges are cut: from each vertex the edge that rises most steeply."""
+    start = np.array([edge.start for edge in polyhedron.edges])
+    end = np.array([edge.end for edge in polyhedron.edges])
+    along = polyhedron.vertices[end] - polyhedron.vertices[start]
+    slope = along @ direction / np.sqrt(np.einsum("ei,ei->e", along, along))
+    number = np.arange(len(start))
+    steepest = np.full(len(polyhedron.vertices), -np.inf)
+    chosen = np.full(len(polyhedron.vertices), -1)
+    for vertices, rise in ((start, slope), (end, -slope)):
+        order = np.argsort(rise, kind="stable")
+        better = rise[order] > steepest[vertices[order]]
+        chosen[vertices[order][better]] = number[order][better]
+        steepest[vertices[order][better]] = rise[order][better]
+    top = int(np.argmax(polyhedron.vertices @ direction))
+    cut = np.zeros(len(start), dtype=bool)
+    cut[np.delete(chosen, top)] = True
+    return cut
+
+
+def _laid_flat(surface: _Surface, root: int, priority: Priority) -> Net:
+    """Lay face after face at the edges of those that lie already, leaving out what overlaps."""
+    count = len(surface.points)
+    transforms = np.tile(np.eye(3), (count, 1, 1))
+    parents = [-1] * count
+    placed = [False] * count
+    pieces: list[tuple[int, ...]] = []
+    for first in (root, *range(count)):
+        if placed[first]:
+            continue
+        placed[first] = True
+        faces, depth = [first], {first: 0}
+        lying = surface.triangles[first]
+        waiting: list[tuple[float, int, int, _Hinge]] = []
+        _push(waiting, surface, priority, first, 0)
+        while waiting:
+            *_, parent, hinge = heapq.heappop(waiting)
+            face = hinge.face
+            if placed[face]:
+                continue
+            T = transforms[parent] @ _folded(surface, parent, hinge)
+            triangles = surface.triangles[face] @ T[:2, :2].T + T[:2, 2]
+            if overlap(triangles, lying, surface.tolerance):
+                continue
+            lying = np.concatenate([lying, triangles])
+            transforms[face], parents[face], placed[face] = T, parent, True
+            faces.append(face)
+            depth[face] = depth[parent] + 1
+            _push(waiting, surface, priority, face, depth[face])
+        pieces.append(tuple(faces))
+    return Net(transforms, tuple(pieces), tuple(parents))
+
+
+def _push(
+    waiting: list[tuple[float, int, int, _Hinge]],
+    surface: _Surface,
+    priority: Priority,
+    face: int,
+    depth: int,
+) -> None:
+    for hinge in surface.hinges[face]:
+        # Equal priorities: the longer way in the list of edges decides, never the hinge itself.
+        item = (priority(hinge.edge, depth), 2 * hinge.edge + (hinge.face > face), face, hinge)
+        heapq.heappush(waiting, item)
+
+
+def _folded(surface: _Surface, parent: int, hinge: _Hinge) -> Points:
+    """Return T_parent_face: the neighbour laid into the parent's plane at their common edge."""
+    a, b = (surface.points[parent][v] for v in (hinge.start, hinge.end))
+    c, d = (surface.points[hinge.face][v] for v in (hinge.start, hinge.end))
+    p, q = b - a, d - c
+    cosine, sine = q @ p, q[0] * p[1] - q[1] * p[0]
+    length = np.hypot(cosine, sine)
+    R = np.array([[cosine, -sine], [sine, cosine]]) / length
+    T = np.eye(3)
+    T[:2, :2] = R
+    T[:2, 2] = (a + b) / 2 - R @ (c + d) / 2
+    return T
+
+
+def _area(triangles: Triangles) -> float:
+    a, b = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    return float(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])) / 2

@@ -1,0 +1,194 @@
+"""Whole layouts of known objects on the profiles' arrays."""
+
+import numpy as np
+import pytest
+
+from generator.array.profiles import profile
+from generator.errors import LayoutError
+from generator.layout.layout import lay_out
+from generator.layout.torus import Occupancy
+from generator.polyhedron import shapes
+
+NONE = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
+ARRAY = profile("one-touch").array()
+
+
+def clearances(solid, clearance=1.0):
+    return [[np.full(len(loop), clearance) for loop in face.loops] for face in solid.faces]
+
+
+def laid_out(solid, occupied=NONE, kind="auto", array=ARRAY, pitch=7.0, half=2.7, **options):
+    return lay_out(solid, array, pitch, half, clearances(solid), occupied, kind, **options)
+
+
+def cells_of(layout):
+    return tuple(np.concatenate([getattr(f, k) for f in layout.faces]) for k in ("rows", "columns"))
+
+
+def check(layout, array=ARRAY):
+    """Cells are used once, carry the array's symbols, and lie where the placement says."""
+    rows, columns = cells_of(layout)
+    assert len(set(zip(rows.tolist(), columns.tolist(), strict=True))) == len(rows)
+    p = layout.pitch_mm
+    for face in layout.faces:
+        here = face.placement
+        assert np.array_equal(face.labels, array.symbols(face.rows, face.columns))
+        c, s = np.cos(here.rotation_rad), np.sin(here.rotation_rad)
+        x, y = face.centres_mm.T
+        u, v = c * x - s * y + here.x_mm, s * x + c * y + here.y_mm
+        column, row = u / p - 0.5 + here.column, -v / p - 0.5 + here.row
+        assert np.allclose(column, np.rint(column), atol=1e-9)
+        assert np.allclose(row, np.rint(row), atol=1e-9)
+        assert np.array_equal(np.rint(row).astype(np.int64) % array.rows, face.rows)
+        assert np.array_equal(np.rint(column).astype(np.int64) % array.columns, face.columns)
+
+
+def test_the_60_mm_cube_carries_384_symbols():
+    layout = laid_out(shapes.cube(60.0))
+    check(layout)
+    assert layout.kind == "faces"
+    assert [len(face.rows) for face in layout.faces] == [64] * 6
+    assert [face.places for face in layout.faces] == [42] * 6
+    assert (layout.blank_faces, layout.warnings) == ((), ())
+    for face in layout.faces:
+        x = 30.0 + 7.0 * np.arange(-3.5, 4.0)
+        assert np.allclose(np.unique(np.round(face.centres_mm, 4)), x, atol=1e-4)
+
+
+@pytest.mark.parametrize("kind", ["faces", "net", "auto"])
+@pytest.mark.parametrize(
+    "solid",
+    [
+        shapes.cube(60.0),
+        shapes.box((80.0, 60.0, 40.0)),
+        shapes.triangular_prism(60.0, 80.0),
+        shapes.tetrahedron(80.0),
+        shapes.dodecahedron(30.0),
+    ],
+    ids=lambda solid: solid.kind,
+)
+def test_the_usual_solids(solid, kind):
+    layout = laid_out(solid, kind=kind)
+    check(layout)
+    assert all(face.places > 0 for face in layout.faces)
+    assert kind in ("auto", layout.kind)
+
+
+def test_auto_shows_as_many_places_as_either_kind():
+    solid = shapes.octahedron(70.0)
+    places = {
+        k: sum(f.places for f in laid_out(solid, kind=k).faces) for k in ("auto", "net", "faces")
+    }
+    assert places["auto"] == max(places.values())
+
+
+def test_a_net_lays_one_lattice_through_all_faces():
+    layout = laid_out(shapes.cube(56.0), kind="net")
+    check(layout)
+    anchors = {(face.placement.row, face.placement.column) for face in layout.faces}
+    assert len(anchors) == 1
+
+
+def test_the_same_object_gives_the_same_layout_and_a_second_one_other_cells():
+    solid = shapes.triangular_prism(60.0, 80.0)
+    first, again = laid_out(solid), laid_out(solid)
+    for one, two in zip(first.faces, again.faces, strict=True):
+        assert one.placement == two.placement
+        assert one.centres_mm.tobytes() == two.centres_mm.tobytes()
+        assert one.labels.tobytes() == two.labels.tobytes()
+    second = laid_out(solid, cells_of(first))
+    check(second)
+    both = Occupancy.from_cells(*cells_of(first), ARRAY).with_cells(*cells_of(second))
+    assert both.used == sum(len(f.rows) for layout in (first, second) for f in layout.faces)
+
+
+def test_the_net_falls_into_islands_where_the_array_is_too_small():
+    array = profile("product").array()  # 15 x 15
+    solid = shapes.tetrahedron(75.0)
+    layout = laid_out(solid, kind="net", array=array, pitch=8.0, half=3.0)
+    check(layout, array)
+    assert len({(f.placement.row, f.placement.column) for f in layout.faces}) > 1
+
+
+def test_a_face_identified_by_its_rank_alone_is_one_place():
+    layout = laid_out(shapes.box((80.0, 60.0, 12.0)), kind="faces")
+    check(layout)
+    assert sorted(face.places for face in layout.faces) == [1, 1, 1, 1, 63, 63]
+
+
+def test_faces_without_a_place_are_listed_with_what_would_help():
+    solid = shapes.box((80.0, 60.0, 5.0))
+    with pytest.raises(LayoutError) as caught:
+        laid_out(solid)
+    names = [solid.faces[k].name for k in (1, 2, 3, 4)]
+    assert all(name in caught.value.cause for name in names)
+    assert "80.0 x 5.0 mm, 0 cells" in caught.value.cause
+    assert "3x2 cells at 7 mm pitch" in caught.value.cause
+    assert "smaller window than 3x2" in caught.value.fix
+    pitch = float(caught.value.fix.split("set pitch to ")[1].split(" mm")[0])
+    better = laid_out(solid, pitch=pitch, half=2.7 * pitch / 7.0)
+    assert all(face.places > 0 for face in better.faces)
+    scale = float(caught.value.fix.split("make the object ")[1].split(" times")[0])
+    larger = laid_out(shapes.box((80.0 * scale, 60.0 * scale, 5.0 * scale)))
+    assert all(face.places > 0 for face in larger.faces)
+
+
+def test_faces_without_a_place_may_be_left_blank():
+    layout = laid_out(shapes.box((80.0, 60.0, 5.0)), allow_blank_faces=True)
+    check(layout)
+    assert layout.blank_faces == (1, 2, 3, 4)
+    assert len(layout.warnings) == 1
+    assert layout.warnings[0].endswith("left blank")
+
+
+def test_faces_are_left_blank_on_purpose_without_a_warning():
+    for kind in ("faces", "net"):
+        layout = laid_out(shapes.cube(60.0), kind=kind, blank_faces={0, 3})
+        check(layout)
+        assert (layout.blank_faces, layout.warnings) == ((0, 3), ())
+        assert len(layout.faces) == 6
+
+
+def test_a_net_that_loses_a_face_names_the_way_out():
+    with pytest.raises(LayoutError, match="set layout to faces"):
+        laid_out(shapes.prism(12, 40.0, side=20.0), kind="net")
+
+
+def test_a_full_array_says_how_many_cells_are_free_and_needed():
+    rows, columns = np.mgrid[:63, :65].reshape(2, -1)
+    with pytest.raises(LayoutError, match=r"needs 384 cells, 300 of 4095 are free") as caught:
+        laid_out(shapes.cube(60.0), (rows[:-300], columns[:-300]), kind="faces")
+    assert "profile large" in caught.value.fix
+    with pytest.raises(LayoutError, match="not in blocks"):
+        laid_out(shapes.cube(180.0))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"kind": "nets"}, "unknown layout 'nets'"),
+        ({"half": 4.0}, "8 mm do not fit a pitch of 7 mm"),
+        ({"half": 0.0}, "0 mm do not fit"),
+        ({"pitch": np.nan}, "pitch of nan mm"),
+        ({"blank_faces": (7,)}, "no face 7"),
+    ],
+)
+def test_impossible_requests_are_refused(options, message):
+    with pytest.raises(LayoutError, match=message):
+        laid_out(shapes.cube(60.0), **options)
+
+
+def test_clearances_must_match_the_edges():
+    solid = shapes.cube(60.0)
+    good = clearances(solid)
+    for bad in (good[:5], [[np.ones(3)]] * 6, [[np.full(4, -1.0)]] * 6, [[np.full(4, np.inf)]] * 6):
+        with pytest.raises(LayoutError, match="clearance"):
+            lay_out(solid, ARRAY, 7.0, 2.7, bad, NONE)
+
+
+def test_large_arrays_and_profiles():
+    for name, pitch, half in (("thesis", 12.0, 4.5), ("large", 7.0, 2.7), ("fine", 4.5, 1.8)):
+        array = profile(name).array()
+        layout = laid_out(shapes.cube(60.0), array=array, pitch=pitch, half=half)
+        check(layout, array)
+        assert all(face.places > 0 for face in layout.faces)

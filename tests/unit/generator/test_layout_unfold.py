@@ -1,0 +1,114 @@
+"""Nets of solids that are known by heart."""
+
+import numpy as np
+import pytest
+
+from generator.layout.overlap import overlap, triangles_of
+from generator.layout.unfold import split, unfold
+from generator.polyhedron import shapes
+from generator.polyhedron.frame import face_polygon
+from generator.polyhedron.winged import polyhedron
+
+SOLIDS = {
+    "cube": lambda: shapes.cube(60.0),
+    "box": lambda: shapes.box((80.0, 60.0, 12.0)),
+    "triangular_prism": lambda: shapes.triangular_prism(60.0, 80.0),
+    "tetrahedron": lambda: shapes.tetrahedron(80.0),
+    "octahedron": lambda: shapes.octahedron(70.0),
+    "dodecahedron": lambda: shapes.dodecahedron(30.0),
+    "prism": lambda: shapes.prism(17, 90.0, side=20.0),
+    "pyramid": lambda: shapes.pyramid(24, 150.0, side=15.0),
+}
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_solids_unfold_in_one_piece(name):
+    solid = SOLIDS[name]()
+    net = unfold(solid)
+    assert len(net.pieces) == 1
+    assert sorted(net.pieces[0]) == list(range(len(solid.faces)))
+    assert net.parents.count(-1) == 1
+
+
+def laid(solid, net, face):
+    T = net.T_net_face[face]
+    return dict(
+        zip(
+            [v for loop in solid.faces[face].loops for v in loop],
+            np.concatenate(face_polygon(solid, face)) @ T[:2, :2].T + T[:2, 2],
+            strict=True,
+        )
+    )
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_neighbours_share_their_edge_in_the_net(name):
+    solid = SOLIDS[name]()
+    net = unfold(solid)
+    for face, parent in enumerate(net.parents):
+        if parent >= 0:
+            own, other = laid(solid, net, face), laid(solid, net, parent)
+            shared = [v for v in own if v in other]
+            near = [v for v in shared if np.allclose(own[v], other[v], atol=1e-9)]
+            assert len(near) >= 2
+
+
+def test_transforms_are_rigid_and_do_not_mirror():
+    net = unfold(shapes.dodecahedron(30.0))
+    R = net.T_net_face[:, :2, :2]
+    assert np.allclose(R @ np.swapaxes(R, 1, 2), np.eye(2))
+    assert np.allclose(np.linalg.det(R), 1.0)
+
+
+def test_splitting_halves_a_piece_along_a_fold():
+    net = split(unfold(shapes.cube(60.0)), 0)
+    assert sorted(map(len, net.pieces)) in ([2, 4], [3, 3])
+    for faces in net.pieces:
+        assert [net.parents[face] for face in faces].count(-1) == 1
+        assert all(net.parents[face] in (-1, *faces) for face in faces)
+    while any(len(faces) > 1 for faces in net.pieces):
+        net = split(net, next(k for k, faces in enumerate(net.pieces) if len(faces) > 1))
+    assert net.parents == (-1,) * 6
+
+
+def test_a_frame_with_a_hole_right_through_is_unfolded_without_overlap():
+    outer = [(0, 0), (60, 0), (60, 60), (0, 60)]
+    inner = [(20, 20), (40, 20), (40, 40), (20, 40)]
+    vertices = [(x, y, z) for z in (0, 20) for x, y in outer + inner]
+    top = ((8, 9, 10, 11), (15, 14, 13, 12))
+    bottom = ((3, 2, 1, 0), (4, 5, 6, 7))
+    sides = [((k, (k + 1) % 4, 8 + (k + 1) % 4, 8 + k),) for k in range(4)]
+    walls = [((4 + (k + 1) % 4, 4 + k, 12 + k, 12 + (k + 1) % 4),) for k in range(4)]
+    solid = polyhedron("polyhedron", vertices, [top, bottom, *sides, *walls])
+    assert solid.genus == 1
+    net = unfold(solid)
+    assert sorted(face for piece in net.pieces for face in piece) == list(range(10))
+
+
+def square(x, y, side=1.0):
+    return triangles_of([np.array([[x, y], [x + side, y], [x + side, y + side], [x, y + side]])])
+
+
+def test_touching_polygons_do_not_overlap():
+    assert not overlap(square(0, 0), square(1, 0), 1e-9)
+    assert not overlap(square(0, 0), square(1, 1), 1e-9)
+    assert not overlap(square(0, 0), square(5, 5), 1e-9)
+
+
+def test_overlaps_that_cross_no_edge_are_seen():
+    assert overlap(square(0, 0), square(0, 0), 1e-9)
+    assert overlap(square(0, 0), square(0.5, 0), 1e-9)
+    assert overlap(square(0, 0), square(0.4, 0.4, 0.1), 1e-9)
+    assert overlap(square(0, 0), square(1 - 1e-6, 0), 1e-9)
+
+
+def test_a_square_in_a_hole_or_a_bay_does_not_overlap():
+    ring = [
+        np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 3.0], [0.0, 3.0]]),
+        np.array([[1.0, 1.0], [1.0, 2.0], [2.0, 2.0], [2.0, 1.0]]),
+    ]
+    assert not overlap(triangles_of(ring), square(1, 1), 1e-9)
+    assert overlap(triangles_of(ring), square(1.1, 1), 1e-9)
+    bay = np.array([[0, 0], [3, 0], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]], dtype=float)
+    assert not overlap(triangles_of([bay]), square(1, 1), 1e-9)
+    assert overlap(triangles_of([bay]), square(1, 0.9), 1e-9)
