@@ -3,7 +3,11 @@
 A part is a plain polyhedral body plus embossings. An embossing repeats a few symbol
 outlines (tiers) many times on one facet, so a part with 20,000 symbols stays as small
 as its list of centres; exporters instance each outline instead of repeating geometry.
-Part frame: mm, local origin, as the part lies on the printer's bed (z up).
+Part frame: mm, local origin, as the part lies on the printer's bed (z up); its box is
+centred on x and y and stands on z = 0.
+
+A point q of a symbol (its own axes, mm) lies at T_part_facet (R q + centre, z) with R the
+turn by rotation_rad and z the tier's height; `Tiers` tells how its loops run.
 """
 
 from __future__ import annotations
@@ -36,6 +40,7 @@ class Embossing:
     labels: NDArray[np.int64]  #: (n,) which outline of `tiers`
     names: tuple[str, ...]  #: (n,) name of each symbol, "r12c34"
     tiers: tuple[Tiers, ...]  #: one per label, in the symbol's own axes
+    pitch_mm: float = 0.0  #: of the lattice that all centres lie on; 0 where there is none
 
 
 @dataclass(frozen=True, slots=True)

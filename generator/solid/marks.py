@@ -1,0 +1,217 @@
+"""Numbers engraved on the back of a panel, so that a box of panels can be assembled.
+
+Back polygon + edge numbers -> embossings of V-grooves with 45 degree walls, which print
+without support on the bed. Facet frame of the back, seen from outside the panel: mm, every
+number stands on its edge. All numbers of a panel have one size: the largest of a few at
+which all of them find room, or the smallest, and then those without room are reported.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.alphabet.figures import BAR, FIGURES, figures_of, underlined
+from generator.alphabet.outline import Tiers, engraved
+from generator.alphabet.rings import inside, segments
+from generator.printers import Printer
+from generator.solid.emboss import turn
+from generator.solid.part import Embossing
+
+Ring = NDArray[np.float64]
+
+#: Lattice unit of the figures, in strokes; the smallest keeps a gap of one stroke.
+SIZES = (2.0, 1.5, 1.25, 1.0)
+#: Where along its edge a number may stand, best first.
+PLACES = (0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.1, 0.9)
+#: Depth over stroke: a fifth of the stroke is left as a floor.
+DEPTH = 0.4
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A number and the line it stands on; `end` equal to `start` means the middle of the face."""
+
+    text: str  #: digits, or F and digits
+    start: Ring  #: (2,) mm
+    end: Ring  #: (2,) mm
+
+
+@dataclass(frozen=True, slots=True)
+class _Pen:
+    """Sizes of the figures, mm."""
+
+    unit: float
+    stroke: float
+    clear: float
+
+    def half_size(self, text: str) -> tuple[float, float]:
+        """Half width and half height of a text with its bar."""
+        width = len(text) * (2 * self.unit + self.stroke) + (len(text) - 1) * self.clear
+        height = 4 * self.unit + self.stroke
+        return width / 2, (height + (2 * self.stroke if underlined(text) else 0.0)) / 2
+
+
+@dataclass(frozen=True, slots=True)
+class _Box:
+    """A text's place: centre, direction of reading, half sizes."""
+
+    text: str
+    centre: Ring
+    angle: float
+    half: tuple[float, float]
+
+
+def marks_on(
+    marks: Sequence[Mark],
+    rings: Sequence[Ring],
+    facet: int,
+    T_part_facet: NDArray[np.float64],
+    wall_mm: float,
+    printer: Printer,
+) -> tuple[tuple[Embossing, ...], tuple[str, ...]]:
+    """Return the numbers engraved on a facet, and the texts that found no room.
+
+    Parameters
+    ----------
+    marks
+        In order of importance.
+    rings
+        (k, 2) loops of the facet in its frame, mm.
+    facet, T_part_facet
+        Number and frame of the facet.
+    wall_mm
+        Thickness of the panel; grooves take a third of it at most.
+    printer
+        Gives the stroke.
+    """
+    stroke = printer.stroke_min_mm
+    depth = min(DEPTH * stroke, wall_mm / 3)
+    best: list[_Box] = []
+    pen = _Pen(SIZES[-1] * stroke, stroke, stroke)
+    edges = [mark for mark in marks if (mark.start != mark.end).any()]
+    for size in SIZES:
+        trial = _Pen(size * stroke, stroke, stroke)
+        boxes = _placed(edges, rings, trial)
+        if len(boxes) > len(best) or not edges:
+            best, pen = boxes, trial
+        if len(boxes) == len(edges):
+            break
+    middle = [mark for mark in marks if (mark.start == mark.end).all()]
+    best = best + _placed(middle, rings, pen, best)
+    done = [box.text for box in best]
+    missing = [mark.text for mark in marks if mark.text not in done]
+    tiers: dict[int, Tiers] = {}
+    return (
+        tuple(_embossing(box, pen, depth, facet, T_part_facet, tiers) for box in best),
+        tuple(missing),
+    )
+
+
+def _placed(
+    marks: Sequence[Mark], rings: Sequence[Ring], pen: _Pen, taken: Sequence[_Box] = ()
+) -> list[_Box]:
+    """Return places for the marks that find room beside those already taken."""
+    placed: list[_Box] = []
+    for mark in marks:
+        half = pen.half_size(mark.text)
+        along = mark.end - mark.start
+        length = float(np.hypot(*along))
+        if length > 0:
+            axis = along / length
+            inward = np.array([-axis[1], axis[0]])
+            angle = math.atan2(axis[1], axis[0])
+            lift = (half[1] + pen.clear * (1 + 1e-6)) * inward
+            centres = mark.start + np.array(PLACES)[:, None] * along + lift
+        else:
+            angle = 0.0
+            centres = _middles(mark.start, rings)
+        for centre in centres[_roomy(centres, angle, half, pen.clear, rings)]:
+            box = _Box(mark.text, centre, angle, half)
+            if not any(_near(box, other, pen.clear) for other in [*taken, *placed]):
+                placed.append(box)
+                break
+    return placed
+
+
+def _middles(centre: Ring, rings: Sequence[Ring]) -> Ring:
+    """Return points to try for the face's own number: its middle, then a grid by distance."""
+    low, high = rings[0].min(axis=0), rings[0].max(axis=0)
+    shares = np.linspace(0.1, 0.9, 9)
+    grid = np.stack(np.meshgrid(shares, shares), axis=-1).reshape(-1, 2) * (high - low) + low
+    order = np.argsort(np.round(((grid - centre) ** 2).sum(axis=1), 9), kind="stable")
+    return np.concatenate([centre[None], grid[order]])
+
+
+def _roomy(
+    centres: Ring, angle: float, half: tuple[float, float], clear: float, rings: Sequence[Ring]
+) -> NDArray[np.bool_]:
+    """Whether rectangles at `centres` keep clear of all edges and lie inside."""
+    R = turn(angle)
+    at = centres @ R
+    size = np.array(half) + clear
+    turned = [ring @ R for ring in rings]
+    free = inside(at, turned)
+    starts, ends, _, _ = segments(turned)
+    for p, q in zip(starts, ends, strict=True):
+        low, high = np.minimum(p, q) - size, np.maximum(p, q) + size
+        near = ((at > low) & (at < high)).all(axis=1)
+        away = np.array([q[1] - p[1], p[0] - q[0]])
+        near &= np.abs((at - p) @ away) < size @ np.abs(away)
+        free &= ~near
+    return free
+
+
+def _near(one: _Box, other: _Box, clear: float) -> bool:
+    """Whether two turned rectangles are closer than `clear`, by separating axes."""
+    between = other.centre - one.centre
+    for angle in (one.angle, other.angle):
+        axes = turn(angle)
+        for axis in axes.T:
+            reach = clear
+            for box in (one, other):
+                reach += float(np.abs(axis @ turn(box.angle)) @ np.array(box.half))
+            if abs(float(axis @ between)) >= reach:
+                return False
+    return True
+
+
+def _embossing(
+    box: _Box,
+    pen: _Pen,
+    depth: float,
+    facet: int,
+    T_part_facet: NDArray[np.float64],
+    tiers: dict[int, Tiers],
+) -> Embossing:
+    """Return one text as an embossing: a label for each figure, then the bars."""
+    step = 2 * pen.unit + pen.stroke + pen.clear
+    figures = figures_of(box.text)
+    bars = underlined(box.text)
+    x = (np.arange(len(figures)) - (len(figures) - 1) / 2) * step
+    y = np.full(len(figures), pen.stroke if bars else 0.0)
+    local = np.stack([x, y], axis=1)
+    names = [f"{box.text} figure {k + 1}" for k in range(len(figures))]
+    if bars:
+        figures = figures + [BAR] * len(figures)
+        low = np.stack([x, np.full(len(x), pen.stroke / 2 - box.half[1])], axis=1)
+        local = np.concatenate([local, low])
+        names += [f"{box.text} bar {k + 1}" for k in range(len(x))]
+    used = sorted(set(figures))
+    for figure in used:
+        if figure not in tiers:
+            tiers[figure] = engraved(FIGURES[figure], pen.unit, pen.stroke, depth)
+    return Embossing(
+        facet=facet,
+        face=None,
+        T_part_facet=T_part_facet,
+        rotation_rad=box.angle,
+        centres_mm=box.centre + local @ turn(box.angle).T,
+        labels=np.array([used.index(figure) for figure in figures], dtype=np.int64),
+        names=tuple(names),
+        tiers=tuple(tiers[figure] for figure in used),
+    )

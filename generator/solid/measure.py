@@ -1,0 +1,58 @@
+"""Box and volume of a part, from its plain body and one shape per symbol."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.alphabet.outline import Tiers
+from generator.alphabet.rings import signed_area
+from generator.solid.emboss import to_part, turn
+from generator.solid.part import Part
+
+
+def symbol_volume(tiers: Tiers) -> float:
+    """Return what a symbol adds to its body, mm^3; negative when engraved.
+
+    Between two tiers every corner moves on a straight line, so the cross-section is a
+    quadratic function of height and Simpson's rule is exact.
+    """
+    total = 0.0
+    pairs = zip(tiers.z_mm, tiers.rings, tiers.z_mm[1:], tiers.rings[1:], strict=False)
+    for z0, lower, z1, upper in pairs:
+        middle = [(a + b) / 2 for a, b in zip(lower, upper, strict=True)]
+        areas = [sum(signed_area(ring) for ring in rings) for rings in (lower, middle, upper)]
+        total += (z1 - z0) * (areas[0] + 4 * areas[1] + areas[2]) / 6
+    return total
+
+
+def volume(part: Part) -> float:
+    """Return the volume of a part with all its symbols, in closed form, mm^3."""
+    total = 0.0
+    for facet in part.facets:
+        for loop in facet.loops:
+            corners = part.vertices[list(loop)]
+            arms = corners[1:] - corners[0]
+            total += float(np.cross(arms[:-1], arms[1:]).sum(axis=0) @ corners[0]) / 6
+    for embossing in part.embossings:
+        counts = np.bincount(embossing.labels, minlength=len(embossing.tiers))
+        for count, tiers in zip(counts.tolist(), embossing.tiers, strict=True):
+            if count:
+                total += count * symbol_volume(tiers)
+    return total
+
+
+def box(part: Part) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the lowest and highest x, y, z of a part with all its symbols, mm."""
+    low, high = part.vertices.min(axis=0), part.vertices.max(axis=0)
+    for embossing in part.embossings:
+        R = turn(embossing.rotation_rad)
+        for label in np.unique(embossing.labels).tolist():
+            centres = to_part(embossing, embossing.centres_mm[embossing.labels == label], 0.0)
+            tiers = embossing.tiers[label]
+            for z, rings in zip(tiers.z_mm, tiers.rings, strict=True):
+                shape = to_part(embossing, np.concatenate(rings) @ R.T, z)
+                shape -= embossing.T_part_facet[:3, 3]
+                low = np.minimum(low, centres.min(axis=0) + shape.min(axis=0))
+                high = np.maximum(high, centres.max(axis=0) + shape.max(axis=0))
+    return low, high

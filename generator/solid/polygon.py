@@ -1,0 +1,116 @@
+"""A polygon with holes and islands into triangles, keeping every point, proven by its area."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from manifold3d import triangulate as ear_clipped
+from numpy.typing import NDArray
+
+from generator.alphabet.rings import signed_area
+from generator.errors import SolidError
+
+Ring = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+def triangulated(rings: Sequence[Ring], numbers: Index, name: str) -> Index:
+    """Return the (m, 3) triangles of an area bounded by rings.
+
+    Parameters
+    ----------
+    rings
+        (k, 2) each; the area lies to the left of every edge, so outer loops run
+        counter-clockwise, holes clockwise.
+    numbers
+        (sum of k,) what to call the points, ring after ring.
+    name
+        Of the facet, for the error.
+
+    Raises
+    ------
+    SolidError
+        If the triangles do not cover the area exactly once.
+    """
+    points = np.concatenate(rings)
+    if len(points) == 3:
+        found: Index = np.array([[0, 1, 2]])
+    elif len(points) == 4 and len(rings) == 1 and _strictly_convex(points):
+        found = np.array([[0, 1, 2], [0, 2, 3]])
+    else:
+        # The fast path for convex rings makes triangles of three points on a line.
+        found = np.asarray(ear_clipped(list(rings), allow_convex=False), dtype=np.int64)
+        found = without_slivers(points, found)
+    u, v = points[found[:, 1]] - points[found[:, 0]], points[found[:, 2]] - points[found[:, 0]]
+    areas = (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
+    size = float(np.ptp(points, axis=0).max()) ** 2
+    wanted = sum(signed_area(ring) for ring in rings)
+    if len(found) == 0 or areas.min() < -1e-12 * size or abs(areas.sum() - wanted) > 1e-9 * size:
+        raise SolidError(
+            "its outline, holes or symbols overlap, so it has no triangulation",
+            fix="keep symbols inside their face and apart from each other",
+            place=name,
+        )
+    named: Index = numbers[found]
+    return named
+
+
+def without_slivers(points: Ring, triangles: Index) -> Index:
+    """Return a triangulation in which triangles of three points on a line are flipped away.
+
+    Such a triangle has its longest side in common with another one; exchanging that side
+    for the other diagonal leaves two proper triangles. The outline stays.
+
+    Parameters
+    ----------
+    points
+        (n, 2).
+    triangles
+        (m, 3), counter-clockwise, flat ones included.
+    """
+    flat = _flat(points, triangles)
+    if not flat.any():
+        return triangles
+    faces = [tuple(face) for face in triangles.tolist()]
+    holder = {
+        (face[k], face[(k + 1) % 3]): number for number, face in enumerate(faces) for k in range(3)
+    }
+    waiting = np.flatnonzero(flat).tolist()
+    for _ in range(10 * len(faces)):
+        if not waiting:
+            break
+        number = waiting.pop()
+        face = faces[number]
+        if not _flat(points, np.array([face]))[0]:
+            continue
+        sides = [(face[k], face[(k + 1) % 3]) for k in range(3)]
+        a, c = max(sides, key=lambda side: float(np.hypot(*(points[side[1]] - points[side[0]]))))
+        b = next(corner for corner in face if corner not in (a, c))
+        other = holder.get((c, a))
+        if other is None:
+            continue
+        d = next(corner for corner in faces[other] if corner not in (a, c))
+        for place, made in ((number, (a, d, b)), (other, (d, c, b))):
+            faces[place] = made
+            for k in range(3):
+                holder[made[k], made[(k + 1) % 3]] = place
+        waiting += [number, other]
+    return np.array(faces, dtype=np.int64)
+
+
+def _flat(points: Ring, triangles: Index) -> NDArray[np.bool_]:
+    """Whether triangles are thinner than 1e-9 of their longest side."""
+    corners = points[triangles]
+    u = np.roll(corners, -1, axis=1) - corners
+    longest = (u**2).sum(axis=2).max(axis=1)
+    twice = u[:, 0, 0] * u[:, 1, 1] - u[:, 0, 1] * u[:, 1, 0]
+    thin: NDArray[np.bool_] = np.abs(twice) <= 1e-9 * longest
+    return thin
+
+
+def _strictly_convex(ring: Ring) -> bool:
+    edge = np.roll(ring, -1, axis=0) - ring
+    ahead = np.roll(edge, -1, axis=0)
+    turn = edge[:, 0] * ahead[:, 1] - edge[:, 1] * ahead[:, 0]
+    return bool((turn > 1e-9 * np.hypot(*edge.T) * np.hypot(*ahead.T)).all())

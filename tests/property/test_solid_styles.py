@@ -1,0 +1,168 @@
+"""Any style, any solid: an outline or a refusal; a part that is closed and of its volume."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from generator.alphabet import (
+    ALPHABETS,
+    SymbolStyle,
+    check_printable,
+    footprint_half_mm,
+    outlines,
+)
+from generator.alphabet.rings import crossing, distance, inside, signed_area
+from generator.errors import AlphabetError, SolidError
+from generator.layout.placement import FaceLayout, Layout, Placement
+from generator.polyhedron.frame import face_polygon
+from generator.polyhedron.shapes import prism, pyramid
+from generator.printers import PRINTERS
+from generator.solid import explicit, panels, prove_closed, triangles, volume, whole
+from generator.solid.closed import edges_once
+from generator.solid.emboss import turn
+from generator.solid.inset import inset, regular
+from generator.solid.lattice import inside_by
+
+ALPHABET = st.sampled_from(list(ALPHABETS.values()))
+STYLE = st.builds(
+    SymbolStyle,
+    pitch_mm=st.floats(3.0, 20.0),
+    height_mm=st.floats(0.1, 2.0),
+    stroke_mm=st.floats(0.3, 4.0),
+    draft_rad=st.floats(0.0, 0.5),
+    chamfer_mm=st.floats(0.0, 0.5),
+)
+
+
+def refusal(make, *arguments):
+    """Return the error with which a stage refuses, or None."""
+    try:
+        make(*arguments)
+    except (AlphabetError, SolidError) as error:
+        return error
+    return None
+
+
+@given(ALPHABET, STYLE, st.sampled_from(list(PRINTERS.values())))
+@settings(max_examples=40, deadline=None)
+def test_a_style_gives_proper_outlines_or_says_what_to_change(alphabet, style, printer):
+    refused = refusal(check_printable, alphabet, style, printer)
+    if refused is not None:
+        assert refused.fix.startswith(("set ", "give "))
+        return
+    half = footprint_half_mm(alphabet, style)
+    assert half < style.pitch_mm / 2
+    for tiers in outlines(alphabet, style):
+        for rings in tiers.rings:
+            assert not crossing(rings)
+            assert np.abs(np.concatenate(rings)).max() < half
+        shares = [sum(signed_area(ring) for ring in rings) for rings in tiers.rings]
+        assert all(a >= b for a, b in pairwise(shares))  # it gets narrower
+    if style.chamfer_mm == 0.0:  # at the top, the nib keeps half a stroke around every node
+        unit = alphabet.reach * style.pitch_mm
+        for glyph, tiers in zip(alphabet.glyphs, outlines(alphabet, style), strict=True):
+            nodes = unit * np.array([node for stroke in glyph.strokes for node in stroke])
+            assert inside(nodes, tiers.rings[-1]).all()
+            assert distance(nodes, tiers.rings[-1]).min() >= style.stroke_mm / 2 * (1 - 1e-9)
+
+
+def solids():
+    return st.one_of(
+        st.builds(prism, st.integers(3, 7), st.floats(25, 60), radius=st.floats(25, 50)),
+        st.builds(pyramid, st.integers(3, 6), st.floats(30, 70), radius=st.floats(30, 50)),
+    )
+
+
+def scattered(solid, half, clear, turned, pitch, order, chance):
+    """Return a layout: on each face a turned lattice, some cells left out at random."""
+    R = turn(-turned)
+    faces = []
+    for face in range(len(solid.faces)):
+        rings = [ring @ R for ring in face_polygon(solid, face)]
+        low, high = rings[0].min(axis=0), rings[0].max(axis=0)
+        count = np.ceil((high - low) / pitch).astype(int)
+        places = np.stack(np.meshgrid(np.arange(count[0]), np.arange(count[1])), axis=-1)
+        cells = places.reshape(-1, 2)
+        centres = low + (cells + chance.random(2)) * pitch
+        keep = inside_by(centres, half + clear, rings) & (chance.random(len(cells)) < 0.8)
+        faces.append(
+            FaceLayout(
+                face,
+                Placement(0, 0, turned, 0.0, 0.0),
+                -cells[keep, 1] % 63,
+                cells[keep, 0],
+                chance.integers(0, order, int(keep.sum())),
+                centres[keep] @ R.T,
+                1,
+            )
+        )
+    return Layout("faces", pitch, tuple(faces))
+
+
+@given(
+    solids(),
+    st.sampled_from(["dense-4", "dense-8", "thesis-2"]),
+    st.floats(-4.0, 4.0),
+    st.sampled_from([0.0, 0.1]),
+    st.integers(0, 2**32 - 1),
+)
+@settings(max_examples=25, deadline=None)
+def test_parts_are_closed_planar_and_of_their_volume(solid, name, turned, chamfer, seed):
+    alphabet = ALPHABETS[name]
+    pitch = 9.0
+    style = SymbolStyle(
+        pitch, 0.8, round(alphabet.stroke_ratio * pitch, 2), math.radians(8), chamfer
+    )
+    tiers, half = outlines(alphabet, style), footprint_half_mm(alphabet, style)
+    chance = np.random.default_rng(seed)
+    layout = scattered(solid, half, 6.5, turned, pitch, alphabet.order, chance)
+    parts = [whole(solid, layout, tiers, "body")]
+    refused = refusal(panels, solid, layout, tiers, 2.0, PRINTERS["fdm-0.4"])
+    if refused is None:
+        parts += panels(solid, layout, tiers, 2.0, PRINTERS["fdm-0.4"]).parts
+    else:
+        assert "print it whole" in refused.fix
+    for part in parts:
+        prove_closed(part)
+        mesh = triangles(part)
+        t = mesh.triangles
+        assert edges_once(t.ravel(), np.roll(t, -1, axis=1).ravel())
+        p = mesh.vertices[t]
+        six = np.einsum("ij,ij->", p[:, 0], np.cross(p[:, 1], p[:, 2]))
+        assert six / 6 == pytest.approx(volume(part), rel=1e-9)
+        areas = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
+        assert areas.min() > 0.0
+    solid_part = explicit(parts[-1])
+    size = float(np.ptp(solid_part.vertices, axis=0).max())
+    for polygon in solid_part.polygons:
+        points = solid_part.vertices[[v for loop in polygon.loops for v in loop]]
+        assert np.abs((points - points[0]) @ polygon.normal).max() <= 1e-12 * size
+
+
+@given(
+    st.lists(st.tuples(st.floats(0.5, 2.0), st.floats(0.3, 1.0)), min_size=3, max_size=12),
+    st.lists(st.floats(-0.2, 0.4), min_size=12, max_size=12),
+)
+@settings(max_examples=100, deadline=None)
+def test_inset_edges_stay_parallel_at_their_distance(polar, insets):
+    steps = np.array([step for _, step in polar])
+    angles = np.cumsum(steps) * (2 * math.pi / steps.sum())
+    radii = 10 * np.array([radius for radius, _ in polar])
+    ring = np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)
+    assume(not crossing([ring]))
+    each = np.array(insets[: len(ring)])
+    moved = inset(ring, each)
+    assume(regular([ring], [moved], 1e-3))
+    edge = np.roll(ring, -1, axis=0) - ring
+    normal = np.stack([-edge[:, 1], edge[:, 0]], axis=1) / np.hypot(*edge.T)[:, None]
+    for corner in (moved, np.roll(moved, -1, axis=0)):
+        reach = np.abs(corner - ring).max() + 1.0
+        assert ((corner - ring) * normal).sum(axis=1) == pytest.approx(
+            each, abs=1e-12 * reach * 1e3
+        )
+    if each.min() >= 0:
+        assert inside(moved, [ring]).all() or distance(moved, [ring]).min() < 1e-9

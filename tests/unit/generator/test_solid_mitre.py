@@ -1,0 +1,234 @@
+"""Mitres, insets, numbers on backs, and triangles of points on a line."""
+
+import math
+
+import numpy as np
+import pytest
+
+from generator.alphabet.rings import crossing, inside, signed_area
+from generator.errors import SolidError
+from generator.layout.placement import Layout
+from generator.polyhedron.frame import dihedral
+from generator.polyhedron.shapes import box as solid_box
+from generator.polyhedron.shapes import cube, pyramid
+from generator.polyhedron.winged import polyhedron
+from generator.printers import PRINTERS
+from generator.solid import panels, prove_closed, symbol_clearance_mm, top_inset_mm, top_insets_mm
+from generator.solid.emboss import turn
+from generator.solid.frame import in_frame
+from generator.solid.inset import inset, regular, shared_insets
+from generator.solid.mitre import mitre
+from generator.solid.polygon import triangulated
+
+FDM = PRINTERS["fdm-0.4"]
+EMPTY = Layout("faces", 7.0, ())
+SQUARE = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
+
+
+@pytest.mark.parametrize("printer", PRINTERS.values(), ids=lambda p: p.name)
+@pytest.mark.parametrize(
+    "degrees", [5, 30, 60, 70.53, 89.9, 90, 90.1, 110, 179, 180, 200, 270, 350]
+)
+@pytest.mark.parametrize("wall", [1.0, 3.0, 8.0])
+def test_sides_print_without_support_inside_the_bisecting_plane(printer, degrees, wall):
+    theta = math.radians(degrees)
+    side = mitre(theta, wall, printer)
+    slope = 1 / math.tan(theta / 2)
+    steepest = math.tan(printer.overhang_max_rad)
+    assert side.top_mm >= 0.0
+    assert side.back_mm >= wall * slope + 0.1 - 1e-12 or degrees == 350
+    assert side.back_mm - side.top_mm <= (wall - side.land_mm) * steepest + 1e-12
+    assert (side.land_mm > 0) == (degrees <= 90)
+    for depth in np.linspace(0.0, wall, 50):  # never beyond the bisecting plane
+        share = max(0.0, depth - side.land_mm) / (wall - side.land_mm)
+        stands_back = side.top_mm + share * (side.back_mm - side.top_mm)
+        assert stands_back >= depth * slope - 1e-9
+
+
+def test_mitre_of_a_cube_by_hand():
+    # Back edge: 3 mm + gap 0.1. At 45 degrees from there to under the land: 2.8 mm.
+    side = mitre(math.pi / 2, 3.0, FDM)
+    assert (side.top_mm, side.land_mm, side.back_mm) == pytest.approx((0.3, 0.2, 3.1), rel=1e-12)
+    assert top_inset_mm(math.pi / 2, 3.0, FDM) == side.top_mm
+    assert top_inset_mm(math.radians(120), 3.0, FDM) == 0.0
+    assert top_inset_mm(1.5 * math.pi, 3.0, FDM) == 0.0
+    assert mitre(1.5 * math.pi, 3.0, FDM).back_mm == pytest.approx(-2.9)
+    assert math.isfinite(top_inset_mm(1e-12, 3.0, FDM))
+
+
+def test_symbols_keep_apart_at_reflex_edges():
+    assert symbol_clearance_mm(math.pi / 2, 1.0) == 0.0
+    assert symbol_clearance_mm(1.5 * math.pi, 1.0) == pytest.approx(1.0)
+    assert symbol_clearance_mm(math.radians(300), 1.0) == pytest.approx(math.sqrt(3))
+
+
+def test_inset_moves_each_edge_by_its_own_distance():
+    found = inset(SQUARE, np.array([1.0, 2.0, 3.0, -0.5]))
+    assert found == pytest.approx(np.array([[-0.5, 1], [8, 1], [8, 7], [-0.5, 7]]), abs=1e-14)
+    hole = SQUARE[::-1]  # clockwise: material outside, insets grow it
+    assert signed_area(inset(hole, np.ones(4))) == pytest.approx(-144.0)
+
+
+@pytest.mark.parametrize("bend", [0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3])
+def test_inset_at_flat_corners_has_its_limit(bend):
+    ring = np.array([[0.0, 0.0], [5.0, -bend], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
+    equal = inset(ring, np.ones(5))
+    assert equal[1] == pytest.approx([5.0, 1.0 - bend], abs=1e-6)
+    insets = shared_insets(ring, np.array([1.0, 2.0, 1.0, 1.0, 1.0]))
+    assert insets.tolist() == [2.0, 2.0, 1.0, 1.0, 1.0]
+    assert inset(ring, insets)[1] == pytest.approx([5.0, 2.0 - bend], abs=1e-6)
+    assert regular([ring], [inset(ring, insets)], 0.1)
+
+
+def test_collapsed_and_crossing_insets_are_found():
+    def fine(distance):
+        return regular([SQUARE], [inset(SQUARE, np.full(4, distance))], 0.1)
+
+    assert fine(4.0)
+    assert not fine(4.99)
+    assert not fine(6.0)
+    hole = np.array([[4.0, 4.0], [4.0, 6.0], [6.0, 6.0], [6.0, 4.0]])
+    rings = [SQUARE, hole]
+    for distance, wanted in ((1.9, True), (2.1, False)):
+        moved = [inset(ring, np.full(4, distance)) for ring in rings]
+        assert regular(rings, moved, 0.1) == wanted
+
+
+def test_too_thick_walls_name_the_face_and_a_wall_that_fits():
+    thin = solid_box([60.0, 60.0, 8.0])
+    with pytest.raises(SolidError, match=r"F2: .*set wall to 3.7 mm or less") as caught:
+        panels(thin, EMPTY, (), 5.0, FDM)
+    assert caught.value.place == "F2"
+    assert len(panels(thin, EMPTY, (), 3.7, FDM).parts) == 6
+    with pytest.raises(SolidError, match="print it whole"):
+        panels(solid_box([60.0, 60.0, 1.0]), EMPTY, (), 3.0, FDM)
+    with pytest.raises(SolidError, match="wall nan"):
+        panels(thin, EMPTY, (), math.nan, FDM)
+
+
+def test_collinear_edges_with_different_neighbours():
+    # A step on one side of a block: the bottom has two edges in one line.
+    flat = [(0, 0), (30, 0), (60, 0), (60, 30), (0, 30)]
+    vertices = [(x, y, 0) for x, y in flat]
+    vertices += [(0, 0, 30), (30, 0, 30), (60, 8, 30), (60, 30, 30), (0, 30, 30)]
+    faces = [
+        [0, 4, 3, 2, 1], [5, 6, 9], [6, 8, 9], [6, 7, 8], [0, 1, 6, 5], [1, 2, 7], [1, 7, 6],
+        [2, 3, 8, 7], [3, 4, 9, 8], [4, 0, 5, 9],
+    ]  # fmt: skip
+    solid = polyhedron("polyhedron", np.array(vertices, dtype=float), faces)
+    insets = top_insets_mm(solid, 0, 3.0, FDM)[0]
+    assert insets[3] == insets[4]
+    for part in panels(solid, EMPTY, (), 3.0, FDM).parts:
+        prove_closed(part)
+
+
+def test_panels_of_a_cube_meet_but_do_not_overlap():
+    solid = cube(60.0)
+    made = panels(solid, EMPTY, (), 3.0, FDM, numbers=False).parts
+    for number, edge in enumerate(solid.edges):
+        assert dihedral(solid, number) == pytest.approx(math.pi / 2)
+        for part, other in ((edge.left, edge.right), (edge.right, edge.left)):
+            T = made[part].T_object_part
+            points = made[part].vertices @ T[:3, :3].T + T[:3, 3]
+            mine, its = (made[f].T_object_part[:3, 2] for f in (part, other))
+            # The bisecting plane of the two faces: this panel stays on its own side.
+            side = (points - solid.vertices[edge.start]) @ (its - mine)
+            assert side.max() <= 1e-9
+            assert side.max() >= -0.2 * math.sqrt(2)
+
+
+@pytest.mark.parametrize("side", [20.0, 40.0, 90.0])
+def test_numbers_keep_clear_of_edges_and_each_other(side):
+    solid = pyramid(4, side, side)
+    made = panels(solid, EMPTY, (), 2.0, FDM)
+    for part in made.parts:
+        prove_closed(part)
+        back = part.facets[1]
+        texts = {}
+        for embossing in part.embossings:
+            assert embossing.facet == 1
+            assert embossing.face is None
+            rings = [
+                in_frame(embossing.T_part_facet, part.vertices[list(loop)])[:, :2]
+                for loop in back.loops
+            ]
+            R = turn(embossing.rotation_rad)
+            feet = [
+                embossing.tiers[label].rings[0][0] @ R.T + centre
+                for label, centre in zip(
+                    embossing.labels.tolist(), embossing.centres_mm, strict=True
+                )
+            ]
+            assert not crossing([*rings, *feet])
+            assert inside(np.concatenate(feet), rings).all()
+            assert min(embossing.tiers[0].z_mm) >= -2.0 / 3
+            texts[embossing.names[0].split()[0]] = embossing
+        if side == 90.0:
+            assert len(texts) == len(back.loops[0]) + 1
+    if side == 90.0:
+        assert made.warnings == ()
+        assert all(
+            f"F{k + 1}" in str(part.embossings[-1].names) for k, part in enumerate(made.parts)
+        )
+    else:
+        assert len(made.warnings) <= 1
+        assert all(w.startswith("no room for the numbers of ") for w in made.warnings)
+
+
+def test_shared_edges_bear_the_same_number_and_six_is_underlined():
+    solid = cube(60.0)
+    made = panels(solid, EMPTY, (), 3.0, FDM)
+    seen = {}
+    for face, part in enumerate(made.parts):
+        for embossing in part.embossings:
+            text = embossing.names[0].split()[0]
+            bars = [name for name in embossing.names if " bar " in name]
+            assert bool(bars) == ("6" in text or "9" in text)
+            if text[0] != "F":
+                seen.setdefault(int(text), []).append(face)
+                # The number stands beside its own edge: nearest of all edge middles.
+                T = part.T_object_part @ embossing.T_part_facet
+                middle = embossing.centres_mm.mean(axis=0)
+                at = T[:3, :2] @ middle + T[:3, 3]
+                ends = [(solid.vertices[e.start] + solid.vertices[e.end]) / 2 for e in solid.edges]
+                nearest = int(np.argmin([np.linalg.norm(at - end) for end in ends]))
+                assert nearest + 1 == int(text)
+    assert seen == {
+        number + 1: sorted((edge.left, edge.right)) for number, edge in enumerate(solid.edges)
+    }
+
+
+def test_numbers_read_from_behind():
+    """On the back, seen from outside, x of the text, up, and the view make a right-handed frame."""
+    part = panels(cube(60.0), EMPTY, (), 3.0, FDM).parts[0]
+    for embossing in part.embossings:
+        T = embossing.T_part_facet
+        assert np.linalg.det(T[:3, :3]) == pytest.approx(1.0)
+        assert T[:3, 2] == pytest.approx([0.0, 0.0, -1.0])
+
+
+def test_points_on_a_line_are_kept_without_flat_triangles():
+    outer = np.array([[0, 0], [1, 0], [2, 0], [3, 0], [3, 1], [3, 3], [1, 3], [0, 3], [0, 1.0]])
+    hole = np.array([[1, 1], [1, 2], [2, 2], [2, 1.0]])
+    found = triangulated([outer, hole], np.arange(13), "plate")
+    p = np.concatenate([outer, hole])[found]
+    u, v = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
+    areas = (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
+    assert set(found.ravel()) == set(range(13))
+    assert areas.min() > 1e-3
+    assert areas.sum() == pytest.approx(8.0)
+    with pytest.raises(SolidError, match="plate"):
+        triangulated([outer, hole + np.array([1.5, 0.0])], np.arange(13), "plate")
+
+
+def test_numbers_without_room_make_one_short_warning():
+    solid = solid_box((60.0, 60.0, 7.0))
+    made = panels(solid, EMPTY, (), 2.0, FDM)
+    (warning,) = made.warnings
+    backs = [k for k in range(6) if f"F{k + 1}" in warning]
+    written = [
+        {name.split()[0] for e in part.embossings for name in e.names} for part in made.parts
+    ]
+    assert backs == [k for k in range(6) if len(written[k]) < 5]
+    assert warning.startswith("no room for the numbers of ")
+    assert len(warning) < 250

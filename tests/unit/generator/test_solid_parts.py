@@ -1,0 +1,282 @@
+"""Parts of known solids: closed, planar, of the right volume, without self-intersection."""
+
+import math
+
+import numpy as np
+import pymeshlab
+import pytest
+
+from generator.alphabet import SymbolStyle, alphabet_named, footprint_half_mm, outlines
+from generator.errors import SolidError
+from generator.layout.placement import FaceLayout, Layout, Placement
+from generator.polyhedron.frame import face_polygon
+from generator.polyhedron.frame import volume as body_volume
+from generator.polyhedron.shapes import cube, tetrahedron
+from generator.polyhedron.winged import polyhedron
+from generator.printers import PRINTERS
+from generator.solid import (
+    body_mesh,
+    box,
+    explicit,
+    panels,
+    prove_closed,
+    symbol_meshes,
+    triangles,
+    volume,
+    whole,
+)
+from generator.solid.closed import edges_once
+from generator.solid.emboss import turn
+from generator.solid.lattice import inside_by
+from generator.solid.measure import symbol_volume
+
+FDM = PRINTERS["fdm-0.4"]
+
+
+def block(outline, hole, height):
+    """Return a right prism over a polygon with a hole: faces bottom, top, sides."""
+    n, m = len(outline), len(hole)
+    flat = np.array([*outline, *hole], dtype=float)
+    vertices = np.concatenate([np.c_[flat, np.full(n + m, z)] for z in (0.0, height)])
+    rim, bore = list(range(n)), list(range(n, n + m))
+    up = n + m
+    faces = [[rim[::-1]], [[up + i for i in rim]]]
+    if m:
+        faces[0].append(bore[::-1])
+        faces[1].append([up + i for i in bore])
+    for ring in (rim, bore):
+        for a, b in zip(ring, ring[1:] + ring[:1], strict=True):
+            faces.append([[a, b, up + b, up + a]])
+    return polyhedron("polyhedron", vertices, faces)
+
+
+ELL = block(
+    [(0, 0), (60, 0), (60, 30), (30, 30), (30, 60), (0, 60)],
+    [(7, 7), (7, 23), (23, 23), (23, 7)],
+    40.0,
+)
+SOLIDS = {"cube": cube(60.0), "tetrahedron": tetrahedron(90.0), "ell": ELL}
+
+
+def filled(solid, pitch, free, *, turned=0.0, shift=(0.0, 0.0), order=4, seed=0):
+    """Return a layout with a symbol wherever a square of half side `free` fits into a face."""
+    chance = np.random.default_rng(seed)
+    R = turn(-turned)
+    faces = []
+    for face in range(len(solid.faces)):
+        rings = [ring @ R for ring in face_polygon(solid, face)]
+        low, high = rings[0].min(axis=0), rings[0].max(axis=0)
+        count = np.ceil((high - low) / pitch).astype(int) + 1
+        down, right = np.meshgrid(np.arange(count[1]), np.arange(count[0]), indexing="ij")
+        cells = np.stack([right.ravel(), down.ravel()], axis=1)
+        spare = (high - low) % pitch
+        centres = low + spare / 2 + shift + (cells + 0.5) * pitch
+        keep = inside_by(centres, free, rings)
+        faces.append(
+            FaceLayout(
+                face,
+                Placement(0, 0, turned, 0.0, 0.0),
+                -cells[keep, 1] % 63,
+                cells[keep, 0],
+                chance.integers(0, order, int(keep.sum())),
+                centres[keep] @ R.T,
+                1,
+            )
+        )
+    return Layout("faces", pitch, tuple(faces))
+
+
+def symbols(alphabet="dense-4", **style):
+    known = alphabet_named(alphabet)
+    chosen = SymbolStyle(**style)
+    return outlines(known, chosen), footprint_half_mm(known, chosen), known.order
+
+
+def assert_one_solid(mesh, wanted_volume):
+    t = mesh.triangles
+    assert edges_once(t.ravel(), np.roll(t, -1, axis=1).ravel())
+    assert len(np.unique(t)) == len(mesh.vertices)
+    p = mesh.vertices[t]
+    six = np.einsum("ij,ij->i", p[:, 0], np.cross(p[:, 1], p[:, 2]))
+    assert six.sum() / 6 == pytest.approx(wanted_volume, rel=1e-9)
+    checked = pymeshlab.MeshSet()
+    # As an STL holds them. In float64 neighbours in a slanted plane differ by 1e-15, and the
+    # checker's triangle test takes the rounding of two parallel planes for an intersection.
+    single = mesh.vertices.astype(np.float32).astype(np.float64)
+    checked.add_mesh(pymeshlab.Mesh(single, t.astype(np.int32)))
+    measures = checked.get_topological_measures()
+    assert measures["is_mesh_two_manifold"]
+    assert measures["boundary_edges"] == 0
+    checked.compute_selection_by_self_intersections_per_face()
+    assert checked.current_mesh().selected_face_number() == 0
+
+
+def assert_explicit(part):
+    """Check planarity to 1e-12, closure and volume of the expanded solid."""
+    solid = explicit(part)
+    size = float(np.ptp(solid.vertices, axis=0).max())
+    loops = [loop for polygon in solid.polygons for loop in polygon.loops]
+    start = np.concatenate([np.array(loop) for loop in loops])
+    end = np.concatenate([np.roll(loop, -1) for loop in loops])
+    assert edges_once(start, end)
+    total = 0.0
+    for polygon in solid.polygons:
+        corners = [solid.vertices[list(loop)] for loop in polygon.loops]
+        points = np.concatenate(corners)
+        assert np.abs((points - points[0]) @ polygon.normal).max() <= 1e-12 * size
+        for ring in corners:
+            total += (
+                np.cross(ring - ring[0], np.roll(ring, -1, axis=0) - ring[0]).sum(axis=0)
+                @ ring[0]
+                / 6
+            )
+    assert total == pytest.approx(volume(part), rel=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("name", "turned"),
+    [("cube", 0.0), ("cube", 0.3), ("tetrahedron", 0.3), ("ell", 0.0), ("ell", math.pi / 2)],
+)
+def test_whole_bodies_are_closed_and_do_not_meet_themselves(name, turned):
+    tiers, half, order = symbols(chamfer_mm=0.1)
+    solid = SOLIDS[name]
+    layout = filled(solid, 7.0, half + 1.0, turned=turned, order=order)
+    part = whole(solid, layout, tiers, name)
+    prove_closed(part)
+    assert_explicit(part)
+    count = np.bincount(np.concatenate([face.labels for face in layout.faces]), minlength=4)
+    wanted = body_volume(solid) + sum(
+        n * symbol_volume(t) for n, t in zip(count, tiers, strict=True)
+    )
+    assert volume(part) == pytest.approx(wanted, rel=1e-12)
+    mesh = triangles(part)
+    assert_one_solid(mesh, volume(part))
+    low, high = box(part)
+    assert mesh.vertices.min(axis=0) == pytest.approx(low, abs=1e-12)
+    assert mesh.vertices.max(axis=0) == pytest.approx(high, abs=1e-12)
+    assert low + high == pytest.approx([0.0, 0.0, high[2]], abs=1e-12)
+    assert low[2] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_panels_are_closed_lie_flat_and_do_not_meet_themselves(name):
+    tiers, half, order = symbols()
+    solid = SOLIDS[name]
+    layout = filled(solid, 7.0, half + (6.0 if name == "tetrahedron" else 1.4), order=order)
+    made = panels(solid, layout, tiers, 3.0, FDM, name=name)
+    assert [part.name for part in made.parts] == [f"{name}-{face.name}" for face in solid.faces]
+    for part in made.parts:
+        prove_closed(part)
+        assert_explicit(part)
+        assert_one_solid(triangles(part), volume(part))
+        low, high = box(part)
+        symbols_on = any(embossing.face is not None for embossing in part.embossings)
+        assert low[2] == 0.0
+        assert high[2] == pytest.approx(4.0 if symbols_on else 3.0, rel=1e-14)
+        assert low[:2] + high[:2] == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+def test_mesh_owners_and_separate_bodies_add_up():
+    tiers, half, order = symbols()
+    solid = SOLIDS["cube"]
+    part = whole(solid, filled(solid, 7.0, half + 0.8, order=order), tiers, "cube")
+    mesh, plain, stands = triangles(part), body_mesh(part), symbol_meshes(part)
+    assert_one_solid(plain, body_volume(solid))
+    assert len(stands) == 6
+    total = 0.0
+    for stand in stands:
+        p = stand.vertices[stand.triangles]
+        total += np.einsum("ij,ij->", p[:, 0], np.cross(p[:, 1], p[:, 2])) / 6
+        assert edges_once(stand.triangles.ravel(), np.roll(stand.triangles, -1, axis=1).ravel())
+        assert stand.embossings.min() >= 0
+    assert total == pytest.approx(volume(part) - body_volume(solid), rel=1e-9)
+    owned = mesh.embossings >= 0
+    assert (mesh.symbols >= 0).tolist() == owned.tolist()
+    assert len(set(zip(mesh.embossings[owned], mesh.symbols[owned], strict=True))) == 384
+    facets = [part.embossings[e].facet for e in mesh.embossings[owned]]
+    assert mesh.facets[owned].tolist() == facets
+
+
+def test_marks_stay_on_a_body_without_symbols():
+    tiers, half, order = symbols()
+    solid = SOLIDS["cube"]
+    part = panels(solid, filled(solid, 7.0, half + 1.4, order=order), tiers, 3.0, FDM).parts[0]
+    marks = [embossing for embossing in part.embossings if embossing.face is None]
+    groove = sum(
+        symbol_volume(embossing.tiers[label])
+        for embossing in marks
+        for label in embossing.labels.tolist()
+    )
+    assert groove < 0
+    plain = whole(solid, Layout("faces", 7.0, ()), tiers, "cube")
+    assert len(plain.embossings) == 0
+    assert_one_solid(
+        body_mesh(part),
+        volume(part)
+        - sum(
+            symbol_volume(part.embossings[0].tiers[label])
+            for label in part.embossings[0].labels.tolist()
+        ),
+    )
+
+
+def test_symbols_beyond_an_edge_or_on_each_other_are_found():
+    tiers, half, order = symbols()
+    solid = SOLIDS["cube"]
+    layout = filled(solid, 7.0, half + 0.8, order=order)
+    face = layout.faces[0]
+
+    def with_centres(change, pitch=7.0):
+        centres = face.centres_mm.copy()
+        centres[0] += change
+        moved = FaceLayout(0, face.placement, face.rows, face.columns, face.labels, centres, 1)
+        return whole(solid, Layout("faces", pitch, (moved,)), tiers, "cube")
+
+    prove_closed(with_centres((0.01, 0.0)))  # off the lattice, but free
+    assert_one_solid(triangles(with_centres((0.01, 0.0))), volume(with_centres((0.01, 0.0))))
+    with pytest.raises(SolidError, match="reaches over the edge"):
+        prove_closed(with_centres((-4.0, 0.0)))
+    with pytest.raises(SolidError, match="overlap"):
+        prove_closed(with_centres(face.centres_mm[1] - face.centres_mm[0] + 0.3))
+    with pytest.raises(SolidError, match="overlap"):
+        triangles(with_centres((-4.0, 0.0)))
+    missing = FaceLayout(
+        0, face.placement, face.rows, face.columns, face.labels + 1, face.centres_mm, 1
+    )
+    with pytest.raises(SolidError, match="symbol 4 on an alphabet of 4"):
+        whole(solid, Layout("faces", 7.0, (missing,)), tiers, "cube")
+
+
+def test_an_open_body_is_found():
+    tiers, _, _ = symbols()
+    part = whole(SOLIDS["cube"], Layout("faces", 7.0, ()), tiers, "cube")
+    prove_closed(part)
+    opened = type(part)(
+        part.name, part.vertices, part.facets[:-1], part.embossings, part.T_object_part
+    )
+    with pytest.raises(SolidError, match="not closed"):
+        prove_closed(opened)
+
+
+def test_same_input_gives_the_same_numbers():
+    tiers, half, order = symbols("dense-8", pitch_mm=10.0, stroke_mm=2.0)
+    solid = SOLIDS["ell"]
+    layout = filled(solid, 10.0, half + 1.4, turned=0.4, order=order)
+    first, second = (panels(solid, layout, tiers, 3.0, FDM) for _ in range(2))
+    for one, other in zip(first.parts, second.parts, strict=True):
+        a, b = triangles(one), triangles(other)
+        assert a.vertices.tobytes() == b.vertices.tobytes()
+        assert a.triangles.tobytes() == b.triangles.tobytes()
+
+
+def test_placed_parts_cover_the_object():
+    tiers, half, order = symbols()
+    solid = SOLIDS["ell"]
+    layout = filled(solid, 7.0, half + 1.4, order=order)
+    for part, face in zip(panels(solid, layout, tiers, 3.0, FDM).parts, layout.faces, strict=True):
+        corners = part.vertices[[v for loop in part.facets[0].loops for v in loop]]
+        placed = corners @ part.T_object_part[:3, :3].T + part.T_object_part[:3, 3]
+        loops = solid.faces[face.face].loops
+        wanted = solid.vertices[[v for loop in loops for v in loop]]
+        # The top keeps its corners, but for what the mitre cuts off at right angles.
+        assert np.abs(placed - wanted).max() <= 0.3 + 1e-9
