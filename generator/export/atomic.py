@@ -1,0 +1,208 @@
+"""All files of an object, or none: write beside the outputs, rename at the end.
+
+`Staging` holds a hidden folder `.encode-object-<process>` in the output folder. Files are
+written there, flushed to the disk, and moved under their final names by `commit`; leaving
+without `commit` removes everything, also the folders that were made for it. A process that
+died leaves its hidden folder; the next one removes it. Whether its owner lives is asked of
+the lock that the owner holds on the folder, not of the process number, which may be reused
+or belong to another container.
+"""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import hashlib
+import os
+import shutil
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+from generator.errors import GeneratorError
+
+_PREFIX = ".encode-object-"
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """A file that waits to be moved under its final name."""
+
+    path: Path  #: final name
+    staged: Path  #: where it is until then
+    size: int  #: bytes
+    sha256: str
+
+
+class Staging:
+    """Files that appear together.
+
+    Parameters
+    ----------
+    folder
+        Where the files shall be in the end; made if it is not there.
+
+    Raises
+    ------
+    GeneratorError
+        The folder cannot be made or written, a file cannot be written or moved.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> folder = Path(tempfile.mkdtemp())
+    >>> with Staging(folder) as staging:
+    ...     written = staging.write("a.txt", b"abc")
+    ...     files = staging.commit()
+    >>> [path.name for path in folder.iterdir()]
+    ['a.txt']
+    """
+
+    def __init__(self, folder: Path | str) -> None:
+        self.folder = Path(folder)
+        self.written: list[Written] = []
+        self._made: list[Path] = []
+        self._lock = -1
+
+    def __enter__(self) -> Staging:
+        with _explained(self.folder, "make the folder"):
+            self._made = _missing(self.folder)
+            self.folder.mkdir(parents=True, exist_ok=True)
+        try:
+            with _explained(self.folder, "write into the folder"):
+                _remove_leftovers(self.folder)
+                self._hidden, self._lock = _locked_folder(self.folder)
+        except BaseException:
+            self._remove_made()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        shutil.rmtree(self._hidden, ignore_errors=True)
+        os.close(self._lock)
+        self._remove_made()
+
+    def write(self, name: str, content: bytes | Iterable[bytes]) -> Written:
+        """Write one file into the staging folder, from bytes or from a stream of pieces."""
+        final = self.folder / name
+        pieces = (content,) if isinstance(content, bytes) else content
+        digest = hashlib.sha256()
+        size = 0
+        with _explained(final, "write the file"):
+            if final.is_dir():
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(final))
+            with open(self._hidden / name, "xb") as file:
+                for piece in pieces:
+                    file.write(piece)
+                    digest.update(piece)
+                    size += len(piece)
+                file.flush()
+                os.fsync(file.fileno())
+        self.written.append(Written(final, self._hidden / name, size, digest.hexdigest()))
+        return self.written[-1]
+
+    def commit(self) -> tuple[Written, ...]:
+        """Move all files under their final names; files of those names are replaced.
+
+        Each file is whole at any moment; a process killed between two moves leaves some old
+        and some new files, and the rest of the new ones is removed by the next run.
+        """
+        for written in self.written:
+            with _explained(written.path, "replace the file"):
+                os.replace(self._hidden / written.path.name, written.path)
+        with _explained(self.folder, "write into the folder"):
+            _flush_folder(self.folder)
+        done, self.written = tuple(self.written), []
+        return done
+
+    def _remove_made(self) -> None:
+        """Remove the folders that were made and are empty, the innermost first."""
+        for folder in self._made:
+            try:
+                folder.rmdir()
+            except OSError:
+                return
+
+
+def _missing(folder: Path) -> list[Path]:
+    """Return the folders on the way that do not exist, the innermost first."""
+    return [path for path in (folder, *folder.parents) if not path.exists()]
+
+
+def _locked_folder(folder: Path) -> tuple[Path, int]:
+    """Make a hidden folder that this process has locked; return it and the lock."""
+    number = 0
+    while True:
+        hidden = folder / (f"{_PREFIX}{os.getpid()}" + (f"-{number}" if number else ""))
+        number += 1
+        try:
+            hidden.mkdir()
+        except FileExistsError:
+            continue
+        try:
+            lock = os.open(hidden, os.O_RDONLY)
+        except FileNotFoundError:
+            continue
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        # Another process may have taken the folder for a leftover before it was locked.
+        if hidden.exists() and os.path.samestat(os.fstat(lock), hidden.stat()):
+            return hidden, lock
+        os.close(lock)
+
+
+def _remove_leftovers(folder: Path) -> None:
+    """Remove the hidden folders whose owner is gone."""
+    for hidden in sorted(folder.glob(_PREFIX + "*")):
+        try:
+            lock = os.open(hidden, os.O_RDONLY)
+        except OSError:
+            continue
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            shutil.rmtree(hidden, ignore_errors=True)
+        except BlockingIOError:
+            pass  # its owner is at work
+        finally:
+            os.close(lock)
+
+
+def _flush_folder(folder: Path) -> None:
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+@contextmanager
+def _explained(path: Path, action: str) -> Iterator[None]:
+    """Turn an error of the operating system into one that names place, cause and way out."""
+    try:
+        yield
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        fix = _FIXES.get(error.errno or 0, "check the folder or choose another one with -o")
+        raise GeneratorError(f"cannot {action}: {reason}", fix=fix, place=str(path)) from error
+
+
+_OTHER_FOLDER = "choose a folder that you may write with -o"
+_FIXES = {
+    errno.ENOSPC: "free some space or choose a folder on another disk with -o",
+    errno.EDQUOT: "free some of your quota or choose a folder on another disk with -o",
+    errno.EFBIG: "choose a folder on a file system that takes larger files with -o",
+    errno.EACCES: _OTHER_FOLDER,
+    errno.EPERM: _OTHER_FOLDER,
+    errno.EROFS: _OTHER_FOLDER,
+    errno.ENOTDIR: "a file stands where the folder should be: move it or choose another -o",
+    errno.EEXIST: "a file stands where the folder should be: move it or choose another -o",
+    errno.EISDIR: "a folder has the name of the file: move it or choose another -o",
+    errno.ENAMETOOLONG: "give the object a shorter name",
+    errno.ENOENT: "the folder was removed meanwhile: run the command again",
+}

@@ -1,0 +1,152 @@
+"""Arrange the footprints of parts on the printer's bed, several plates where needed.
+
+Rectangles are placed on a skyline from the largest to the smallest, each as low as it
+gets and then as far left, also turned by a quarter (bottom-left, Jylänki, A thousand ways
+to pack the bin, 2010, section 2.4). Plate frame: mm, x right, y back, origin at the front left
+corner of the bed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+Size = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class BedPlace:
+    """Where one part lies."""
+
+    part: int  #: number of the part
+    x_mm: float  #: lower left corner of the footprint, as it lies
+    y_mm: float
+    turned: bool  #: by a quarter, counter-clockwise
+
+
+@dataclass(frozen=True, slots=True)
+class Plate:
+    """The parts of one print."""
+
+    places: tuple[BedPlace, ...]
+    overhang_mm: Size = (0.0, 0.0)  #: by how much the parts exceed the bed in x and y
+
+    @property
+    def fits(self) -> bool:
+        """Whether the plate can be printed on this bed."""
+        return self.overhang_mm == (0.0, 0.0)
+
+
+@dataclass(slots=True)
+class _Skyline:
+    """The upper contour of what lies on one plate: steps from left to right."""
+
+    steps: list[tuple[float, float]]  # (x where the step begins, height), x rising
+    places: list[BedPlace]
+
+
+def arranged(sizes: Sequence[Size], bed_mm: Size, gap_mm: float = 5.0) -> tuple[Plate, ...]:
+    """Arrange rectangles on as many plates as needed.
+
+    Parameters
+    ----------
+    sizes
+        Width and depth of each part, mm.
+    bed_mm
+        Usable width and depth of the bed, mm.
+    gap_mm
+        Least distance between two parts, mm.
+
+    Returns
+    -------
+    tuple of Plate
+        The parts of each plate, centred on the bed as a group. A part that the bed cannot
+        take in either direction has a plate of its own with an `overhang_mm`.
+
+    Examples
+    --------
+    >>> [len(plate.places) for plate in arranged([(60, 60)] * 6, (250, 210))]
+    [6]
+    """
+    room = (bed_mm[0] + gap_mm, bed_mm[1] + gap_mm)
+    order = sorted(range(len(sizes)), key=lambda i: (-max(sizes[i]), -min(sizes[i]), i))
+    open_plates: list[_Skyline] = []
+    plates: list[Plate] = []
+    for part in order:
+        size = (sizes[part][0] + gap_mm, sizes[part][1] + gap_mm)
+        if not any(_fits(turned, room) for turned in (size, size[::-1])):
+            plates.append(_alone(part, sizes[part], bed_mm))
+            continue
+        for plate in open_plates:
+            if _placed(plate, part, size, room):
+                break
+        else:
+            open_plates.append(_Skyline([(0.0, 0.0)], []))
+            _placed(open_plates[-1], part, size, room)
+    return (*(_centred(plate, sizes, bed_mm) for plate in open_plates), *plates)
+
+
+def _fits(size: Size, room: Size) -> bool:
+    slack = 1e-9 * max(room)
+    return size[0] <= room[0] + slack and size[1] <= room[1] + slack
+
+
+def _alone(part: int, size: Size, bed_mm: Size) -> Plate:
+    """Place a part that is too large in the direction in which it exceeds the bed less."""
+    beyond = [
+        (max(0.0, width - bed_mm[0]), max(0.0, depth - bed_mm[1]))
+        for width, depth in (size, size[::-1])
+    ]
+    turned = sum(beyond[1]) < sum(beyond[0])
+    width, depth = size[::-1] if turned else size
+    place = BedPlace(part, (bed_mm[0] - width) / 2, (bed_mm[1] - depth) / 2, turned)
+    return Plate((place,), beyond[int(turned)])
+
+
+def _placed(plate: _Skyline, part: int, size: Size, room: Size) -> bool:
+    """Add a part to the plate where it lies lowest; False when it finds no place."""
+    best: tuple[float, float, bool] | None = None
+    for turned in (False, True):
+        width, depth = size[::-1] if turned else size
+        for i, (x, _) in enumerate(plate.steps):
+            if not _fits((x + width, 0.0), room):
+                break
+            y = _height(plate.steps, i, x + width)
+            if _fits((0.0, y + depth), room) and (best is None or (y + depth, x) < best[:2]):
+                best = (y + depth, x, turned)
+    if best is None:
+        return False
+    top, x, turned = best
+    width, depth = size[::-1] if turned else size
+    plate.places.append(BedPlace(part, x, top - depth, turned))
+    _raise(plate.steps, x, x + width, top)
+    return True
+
+
+def _height(steps: list[tuple[float, float]], first: int, end: float) -> float:
+    """Return the greatest height from step `first` up to x = `end`."""
+    tops = [steps[first][1]]
+    tops += [height for x, height in steps[first + 1 :] if x < end - 1e-9 * abs(end)]
+    return max(tops)
+
+
+def _raise(steps: list[tuple[float, float]], start: float, end: float, height: float) -> None:
+    """Set the contour between two x to `height`."""
+    after = [h for x, h in steps if x <= end][-1]
+    kept = [(x, h) for x, h in steps if x < start or x > end]
+    steps[:] = sorted([*kept, (start, height), (end, after)])
+
+
+def _centred(plate: _Skyline, sizes: Sequence[Size], bed_mm: Size) -> Plate:
+    extents = []
+    for place in plate.places:
+        width, depth = sizes[place.part]
+        if place.turned:
+            width, depth = depth, width
+        extents.append((place.x_mm + width, place.y_mm + depth))
+    dx = (bed_mm[0] - max(x for x, _ in extents)) / 2
+    dy = (bed_mm[1] - max(y for _, y in extents)) / 2
+    places = sorted(plate.places, key=lambda place: place.part)
+    return Plate(
+        tuple(BedPlace(p.part, p.x_mm + dx, p.y_mm + dy, p.turned) for p in places),
+    )

@@ -1,0 +1,130 @@
+"""Text with fields of fixed width, stamped many times at the speed of an array copy.
+
+A template is written once with marked fields (entity numbers, decimals, names); every
+instance is a row of bytes in which only the fields are overwritten. All numbers of one
+kind have the same width, so that every row has the same length and a block of a thousand
+instances is one (m, length) array of bytes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Bytes = NDArray[np.uint8]
+
+NUMBER, DECIMAL = "\x01", "\x02"  #: marks of the bytes of number and decimal fields
+NAMES = "\x03\x04\x05"  #: marks of up to three kinds of names
+_SPACE, _ZERO, _POINT, _MINUS = 32, 48, 46, 45
+
+
+@dataclass(frozen=True, slots=True)
+class Template:
+    """A text and where its fields stand."""
+
+    text: Bytes  #: (length,) ASCII with marked fields
+    numbers: NDArray[np.int64]  #: (n,) value of each number field, relative to the instance
+    number_columns: NDArray[np.intp]  #: (n * width,) bytes of the number fields
+    decimal_columns: NDArray[np.intp]  #: (d * width,) bytes of the decimal fields
+    name_columns: tuple[NDArray[np.intp], ...]  #: per kind of name: (k * width,) bytes
+
+
+def template_of(text: str, numbers: list[int]) -> Template:
+    """Return the template of `text`, whose number fields hold `numbers` in their order."""
+    array = np.frombuffer(text.encode("ascii"), np.uint8)
+    return Template(
+        array,
+        np.array(numbers, np.int64),
+        np.flatnonzero(array == ord(NUMBER)),
+        np.flatnonzero(array == ord(DECIMAL)),
+        tuple(np.flatnonzero(array == ord(mark)) for mark in NAMES),
+    )
+
+
+def stamped(
+    template: Template,
+    first: NDArray[np.int64],
+    width: int,
+    decimals: Bytes,
+    names: tuple[Bytes, ...],
+) -> bytes:
+    """Return the text of m instances.
+
+    Parameters
+    ----------
+    template
+        The text and its fields.
+    first
+        (m,) added to the relative numbers of each instance.
+    width
+        Digits of a number field; every number has exactly as many.
+    decimals
+        (m, d, decimal width) text of the decimal fields of each instance.
+    names
+        Per kind of name: (m, width) text that fills every field of that kind.
+    """
+    m = len(first)
+    block = np.empty((m, len(template.text)), np.uint8)
+    block[:] = template.text
+    span = int(template.numbers.max(initial=0)) + 1
+    table = whole_numbers(first[:, None] + np.arange(span), width)
+    block[:, template.number_columns] = table[:, template.numbers].reshape(m, -1)
+    block[:, template.decimal_columns] = decimals.reshape(m, -1)
+    for columns, rows in zip(template.name_columns, names, strict=True):
+        if len(columns):
+            block[:, columns] = np.tile(rows, (1, len(columns) // rows.shape[1]))
+    return block.tobytes()
+
+
+def whole_numbers(values: NDArray[np.int64], width: int) -> Bytes:
+    """Return the decimal digits of non-negative integers, shape (..., width), zero-padded."""
+    out = np.empty((*values.shape, width), np.uint8)
+    rest = values
+    for column in range(width - 1, -1, -1):
+        quotient = rest // 10
+        out[..., column] = rest - 10 * quotient + _ZERO
+        rest = quotient
+    return out
+
+
+def decimal_width(largest: float, places: int) -> int:
+    """Return the width that holds every number up to `largest` with sign and `places` decimals."""
+    return len(str(int(abs(largest)) + 1)) + places + 2
+
+
+def decimal_numbers(values: NDArray[np.float64], width: int, places: int) -> Bytes:
+    """Return `values` rounded to `places` decimals as text, shape (..., width), spaces in front.
+
+    Zero has no sign. `width` is at least `decimal_width` of the largest value.
+    """
+    scaled = np.rint(values * 10.0**places).astype(np.int64)
+    rest = np.abs(scaled)
+    unsigned = scaled >= 0
+    out = np.full((*values.shape, width), _SPACE, np.uint8)
+    for column in range(width - 1, width - 1 - places, -1):
+        quotient = rest // 10
+        out[..., column] = rest - 10 * quotient + _ZERO
+        rest = quotient
+    out[..., width - 1 - places] = _POINT
+    for column in range(width - 2 - places, -1, -1):
+        quotient = rest // 10
+        digit = (rest - 10 * quotient + _ZERO).astype(np.uint8)
+        if column == width - 2 - places:  # the digit before the point is always written
+            out[..., column] = digit
+        else:
+            ended = rest == 0
+            sign = np.where(unsigned, _SPACE, _MINUS).astype(np.uint8)
+            out[..., column] = np.where(ended, sign, digit)
+            unsigned = unsigned | ended
+        rest = quotient
+    assert not rest.any(), "a number is wider than its field"
+    return out
+
+
+def padded(names: list[str]) -> Bytes:
+    """Return ASCII texts as rows of equal width, spaces behind, shape (m, width)."""
+    width = max(map(len, names), default=0)
+    text = "".join(name.ljust(width) for name in names)
+    return np.frombuffer(text.encode("ascii"), np.uint8).reshape(len(names), width)

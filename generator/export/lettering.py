@@ -1,0 +1,86 @@
+"""Letters of the preview: title, captions, names of faces, the scale. Pixels."""
+
+from __future__ import annotations
+
+import unicodedata
+from dataclasses import dataclass
+
+from PIL import Image, ImageDraw, ImageFont
+
+from generator.export.labels import HALF_HEIGHT
+
+Font = ImageFont.ImageFont | ImageFont.FreeTypeFont
+
+MARGIN = 30  #: px beside what is drawn and written
+FONT_SIZES = (30, 16, 15)  #: title, names, all else
+CAPTIONS = ("from the front, right, above", "from behind, left, below")
+INK, GREY = (15, 23, 42), (100, 116, 139)
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """The name of a face and its place in the picture."""
+
+    text: str
+    x: float  #: px, the centre
+    y: float
+    half_width: float  #: px
+
+
+def plain(text: str) -> str:
+    """Return `text` in the letters of the built-in font: ASCII, accents left out."""
+    letters = unicodedata.normalize("NFKD", text)
+    kept = "".join(letter for letter in letters if not unicodedata.combining(letter))
+    return kept.encode("ascii", "replace").decode("ascii")
+
+
+def lettered(
+    image: Image.Image,
+    subtitle: str,
+    name: str,
+    labels: list[Label],
+    scale: float,
+    fonts: list[Font],
+    *,
+    apart: bool,
+) -> None:
+    """Write title, captions, names of faces and the scale.
+
+    Parameters
+    ----------
+    image
+        The picture, changed in place.
+    labels
+        Names of faces, where they belong.
+    scale
+        Pixels for a mm.
+    fonts
+        Of the title, of names and of all else.
+    apart
+        Whether panels are moved apart in the second view.
+    """
+    draw = ImageDraw.Draw(image)
+    width, height = image.size
+    large, medium, small = fonts
+    draw.text((MARGIN, 20), plain(name), INK, large)
+    draw.text((MARGIN, 58), subtitle, GREY, small)
+    for i, caption in enumerate(CAPTIONS):
+        text = caption + (", panels moved apart" if i and apart else "")
+        draw.text(((2 * i + 1) * width // 4, height - 24), text, GREY, small, anchor="mm")
+    for label in labels:
+        x, y, half = label.x, label.y, label.half_width
+        outline = (x - half, y - HALF_HEIGHT, x + half, y + HALF_HEIGHT)
+        draw.rounded_rectangle(outline, HALF_HEIGHT, (255, 255, 255), INK)
+        draw.text((x, y), label.text, INK, medium, anchor="mm")
+    length = next(
+        digit * 10.0**power
+        for power in range(-3, 9)
+        for digit in (1, 2, 5)
+        if digit * 10.0**power * scale > 60
+    )
+    right, y = width - MARGIN, 44
+    left = right - length * scale
+    draw.line((left, y, right, y), GREY, 2)
+    for x in (left, right):
+        draw.line((x, y - 5, x, y + 5), GREY, 2)
+    draw.text(((left + right) / 2, y - 8), f"{length:g} mm", GREY, small, anchor="mb")

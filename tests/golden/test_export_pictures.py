@@ -1,0 +1,183 @@
+"""Preview and array picture: what they show, and byte identity of everything written."""
+
+from __future__ import annotations
+
+import io
+import os
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from generator.alphabet.known import alphabet_named
+from generator.alphabet.outline import SymbolStyle, outlines
+from generator.export.array_svg import FaceOnArray, array_svg
+from generator.export.colours import BODY_RGB, SYMBOL_RGB
+from generator.export.preview import HEIGHT, WIDTH, preview_png
+from generator.export.raster import visible
+from generator.layout.placement import FaceLayout, Placement
+from generator.polyhedron.shapes import cube
+from generator.solid.part import Facet, Part
+from generator.solid.triangulate import triangles
+
+SVG = "{http://www.w3.org/2000/svg}"
+SQUARE = np.array([[0.0, 0.0], [28.0, 0.0], [28.0, 28.0], [0.0, 28.0]])
+
+
+def face(row: int, column: int, rows: int, columns: int) -> FaceOnArray:
+    """Return a face of 4 x 4 cells whose origin is the lower left corner of the anchor cell."""
+    r, c = np.mgrid[row - 3 : row + 1, column : column + 4]
+    labels = np.arange(16, dtype=np.int64) % 4
+    centres = np.zeros((16, 2))
+    placement = Placement(row, column, 0.0, 0.0, -7.0)
+    layout = FaceLayout(0, placement, r.ravel() % rows, c.ravel() % columns, labels, centres, 6)
+    return FaceOnArray("F1", layout, (SQUARE,))
+
+
+def drawn(rows: int, columns: int, one: FaceOnArray) -> ET.Element:
+    tiers = outlines(alphabet_named("dense-4"), SymbolStyle())
+    return ET.fromstring(array_svg("A & B", rows, columns, 7.0, [one], tiers))
+
+
+def texts(picture: ET.Element) -> list[str]:
+    return [element.text or "" for element in picture.iter(f"{SVG}text")]
+
+
+def uses(picture: ET.Element) -> set[tuple[float, float]]:
+    return {(float(u.get("x", "")), float(u.get("y", ""))) for u in picture.iter(f"{SVG}use")}
+
+
+def test_each_cell_of_a_face_has_its_glyph() -> None:
+    picture = drawn(63, 65, face(10, 20, 63, 65))
+    assert uses(picture) == {(c + 0.5, r + 0.5) for r in range(7, 11) for c in range(20, 24)}
+    assert texts(picture)[0] == "A & B"
+    assert texts(picture).count("F1") == 1
+    outline = next(p for p in picture.iter(f"{SVG}path") if p.get("stroke-width") == "0.16")
+    assert outline.get("d") == "M20 11 24 11 24 7 20 7z"
+
+
+def test_a_face_over_the_corner_of_the_torus_appears_four_times() -> None:
+    picture = drawn(63, 65, face(1, 63, 63, 65))
+    assert len(uses(picture)) == 16
+    assert all(0 < x < 65 and 0 < y < 63 for x, y in uses(picture))
+    assert texts(picture).count("F1") == 4
+
+
+@pytest.mark.parametrize("size", [2**20 + 1, 2**62, 2**63])
+def test_a_large_array_is_cropped_to_the_faces(size: int) -> None:
+    row, column = size // 2 + 5, size // 2 + 7
+    r, c = np.mgrid[row - 3 : row + 1, column : column + 4]
+    layout = FaceLayout(
+        0,
+        Placement(row, column, 0.0, 0.0, -7.0),
+        r.ravel().astype(np.int64),
+        c.ravel().astype(np.int64),
+        np.zeros(16, np.int64),
+        np.zeros((16, 2)),
+        6,
+    )
+    picture = drawn(size, size, FaceOnArray("F1", layout, (SQUARE,)))
+    assert uses(picture) == {(x + 3.5, y + 3.5) for x in range(4) for y in range(4)}
+    assert float(picture.get("width", "")) < 500
+
+
+def test_the_nearest_triangle_wins() -> None:
+    points = np.array(
+        [[0, 0, 0], [20, 0, 0], [0, 20, 0], [20, 20, 0], [5, 5, -1], [15, 5, 3], [5, 15, 3]], float
+    )
+    order = np.array([[0, 2, 1], [1, 2, 3], [4, 6, 5], [4, 5, 6]])
+    screen = np.empty((20, 20), np.int64)
+    seen = visible(points, order, screen)
+    picture = np.zeros((20, 20), np.uint32)
+    seen.paint(picture, np.array([1, 2, 3, 4], np.uint32))
+    assert picture[0, 0] == 1
+    assert picture[19, 19] == 2
+    assert picture[5, 5] == 1  # there the third triangle lies behind
+    assert picture[9, 9] == 3
+    assert set(np.unique(picture).tolist()) == {1, 2, 3}  # the fourth turns its back
+    assert seen.depths(np.array([9]), np.array([9]))[0] == pytest.approx(-1 + 4 * 9 / 10, abs=1e-6)
+
+
+def body_parts() -> list[Part]:
+    shape = cube(60.0)
+    facets = tuple(Facet(f.name, f.loops) for f in shape.faces)
+    return [Part("Cube", shape.vertices, facets, (), np.eye(4))]
+
+
+def test_the_preview_shows_a_plain_body_twice_on_paper() -> None:
+    parts = body_parts()
+    data = preview_png("Würfel", (60.0, 60.0, 60.0), parts, [triangles(p) for p in parts])
+    image = np.asarray(Image.open(io.BytesIO(data)))
+    assert image.shape == (HEIGHT, WIDTH, 3)
+    for half in (image[:, : WIDTH // 2], image[:, WIDTH // 2 :]):
+        body = np.unique(half[150:600, 100:500].reshape(-1, 3), axis=0, return_counts=True)
+        large = body[0][body[1] > 5000].astype(float)
+        assert len(large) >= 3  # three faces in three shades
+        tint = np.array(BODY_RGB) / np.linalg.norm(BODY_RGB)
+        for shade in large:
+            assert shade @ tint / np.linalg.norm(shade) > 0.999
+
+
+_WRITE = """
+import hashlib, sys
+import numpy as np
+from generator.alphabet.known import alphabet_named
+from generator.alphabet.outline import SymbolStyle, outlines
+from generator.array.profiles import profile
+from generator.export.array_svg import FaceOnArray, array_svg
+from generator.export.glb import glb_bytes
+from generator.export.preview import preview_png
+from generator.export.step import step_chunks
+from generator.export.stl import stl_bytes
+from generator.export.threemf import print_files
+from generator.layout.layout import lay_out
+from generator.polyhedron.frame import face_polygon
+from generator.polyhedron.shapes import cube
+from generator.printers import printer_named
+from generator.solid.panels import panels
+from generator.solid.triangulate import triangles
+tiers = outlines(alphabet_named("dense-4"), SymbolStyle())
+half = max(float(np.abs(ring).max()) for symbol in tiers for ring in symbol.rings[0])
+body = cube(45.0)
+none = np.zeros(0, np.int64)
+array = profile().array()
+clear = [[np.full(len(loop), 1.0) for loop in face.loops] for face in body.faces]
+layout = lay_out(body, array, 7.0, half, clear, (none, none))
+parts = panels(body, layout, tiers, 3.0, printer_named("fdm-0.4"), name="Cube").parts
+meshes = [triangles(part) for part in parts]
+faces = [FaceOnArray(body.faces[f.face].name, f, face_polygon(body, f.face)) for f in layout.faces]
+files = {
+    "step": b"".join(step_chunks(parts[0])),
+    "stl": stl_bytes(meshes[0]),
+    "3mf": print_files("Cube", parts, (250.0, 210.0))[0].content,
+    "3mf volumes": print_files("Cube", parts, (250.0, 210.0))[0].prusaslicer,
+    "glb": glb_bytes("Cube", parts, meshes),
+    "png": preview_png("Cube", (45.0, 45.0, 45.0), parts, meshes),
+    "svg": array_svg("Cube", array.rows, array.columns, 7.0, faces, tiers).encode(),
+}
+if sys.argv[1:]:
+    open(sys.argv[1], "wb").write(files["png"])
+for name, content in files.items():
+    print(name, len(content), hashlib.sha256(content).hexdigest())
+"""
+
+
+def test_the_same_object_gives_the_same_bytes_and_an_orange_preview(tmp_path: Path) -> None:
+    outputs = []
+    for seed, zone, folder in (("1", "UTC", tmp_path), ("2", "Asia/Tokyo", tmp_path.parent)):
+        environment = os.environ | {"PYTHONHASHSEED": seed, "TZ": zone}
+        run = subprocess.run(
+            [sys.executable, "-c", _WRITE, str(tmp_path / "a.png")],
+            capture_output=True, text=True, check=True, cwd=folder, env=environment,
+        )  # fmt: skip
+        outputs.append(run.stdout)
+    assert outputs[0] == outputs[1]
+    assert len(outputs[0].splitlines()) == 7
+    image = np.asarray(Image.open(tmp_path / "a.png")).reshape(-1, 3).astype(float)
+    tint = np.array(SYMBOL_RGB) / np.linalg.norm(SYMBOL_RGB)
+    orange = image @ tint / np.linalg.norm(image, axis=1).clip(1) > 0.995
+    assert orange.sum() > 20_000

@@ -1,0 +1,271 @@
+"""What is written, as independent programs read it: kernel, mesh library, lib3mf, glTF."""
+
+from __future__ import annotations
+
+import io
+import json
+import struct
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from generator.alphabet.known import alphabet_named
+from generator.alphabet.outline import SymbolStyle, outlines
+from generator.array.profiles import profile
+from generator.errors import GeneratorError, SolidError
+from generator.export.check import STEP_VOLUME, verify
+from generator.export.colours import SYMBOL_RGB
+from generator.export.glb import glb_bytes
+from generator.export.step import step_chunks
+from generator.export.stl import stl_bytes
+from generator.export.threemf import print_files
+from generator.layout.layout import lay_out
+from generator.polyhedron.shapes import cube, octahedron
+from generator.polyhedron.winged import Polyhedron
+from generator.printers import printer_named
+from generator.solid.measure import volume
+from generator.solid.panels import panels
+from generator.solid.part import Part
+from generator.solid.triangulate import triangles
+from generator.solid.whole import whole
+
+BED = (250.0, 210.0)
+
+
+def parts_of(polyhedron: Polyhedron, *, in_panels: bool, chamfer_mm: float = 0.0) -> list[Part]:
+    """Return the parts of an object with symbols of dense-4 (one of them has a hole)."""
+    tiers = outlines(alphabet_named("dense-4"), SymbolStyle(chamfer_mm=chamfer_mm))
+    half = max(float(np.abs(ring).max()) for symbol in tiers for ring in symbol.rings[0])
+    clearances = [[np.full(len(loop), 1.0) for loop in face.loops] for face in polyhedron.faces]
+    nothing = np.zeros(0, np.int64)
+    layout = lay_out(polyhedron, profile().array(), 7.0, half, clearances, (nothing, nothing))
+    if in_panels:
+        return list(
+            panels(polyhedron, layout, tiers, 3.0, printer_named("fdm-0.4"), name="Cube").parts
+        )
+    return [whole(polyhedron, layout, tiers, "Body 'ü'")]
+
+
+@pytest.fixture(scope="module")
+def panel() -> Part:
+    """A panel with symbols in front and engraved numbers behind."""
+    return parts_of(cube(36.0), in_panels=True)[0]
+
+
+@pytest.fixture(scope="module")
+def slanted() -> Part:
+    """A whole octahedron: every face slanted, chamfered symbols, a name to be escaped."""
+    return parts_of(octahedron(45.0), in_panels=False, chamfer_mm=0.2)[0]
+
+
+@pytest.fixture(params=["panel", "slanted"])
+def part(request: pytest.FixtureRequest) -> Part:
+    made: Part = request.getfixturevalue(request.param)
+    return made
+
+
+def engraved(part: Part) -> Part:
+    """Return the part with its symbols cut in: every height turned about, narrower below."""
+
+    def turned(embossing):
+        tiers = tuple(
+            replace(
+                symbol,
+                z_mm=tuple(-z / 4 for z in symbol.z_mm),
+            )
+            for symbol in embossing.tiers
+        )
+        return replace(embossing, tiers=tiers)
+
+    return replace(
+        part, embossings=tuple(e if e.face is None else turned(e) for e in part.embossings)
+    )
+
+
+def written(part: Part, folder: Path) -> tuple[Path, Path]:
+    step, stl = folder / "part.step", folder / "part.stl"
+    step.write_bytes(b"".join(step_chunks(part)))
+    stl.write_bytes(stl_bytes(triangles(part)))
+    return step, stl
+
+
+def test_step_and_stl_are_one_valid_closed_solid(part: Part, tmp_path: Path) -> None:
+    step, stl = written(part, tmp_path)
+    report = verify(part.name, volume(part), step=step, stl=stl)
+    assert report.step is not None
+    assert report.stl is not None
+    assert report.step.solids == 1
+    assert report.step.valid
+    assert abs(report.step.volume_error) <= STEP_VOLUME
+    assert report.stl.boundary_edges == report.stl.non_manifold_edges == 0
+    assert report.stl.self_intersections == 0
+    assert abs(report.stl.volume_error) <= 1e-6
+
+
+def test_engraved_symbols(panel: Part, tmp_path: Path) -> None:
+    part = engraved(panel)
+    step, stl = written(part, tmp_path)
+    report = verify(part.name, volume(part), step=step, stl=stl)
+    assert report.step is not None
+    assert report.step.volume_mm3 < volume(panel)
+
+
+def test_names_and_colours_in_step(part: Part, tmp_path: Path) -> None:
+    from OCP.Interface import Interface_Static
+    from OCP.Quantity import Quantity_Color, Quantity_TypeOfColor
+    from OCP.STEPCAFControl import STEPCAFControl_Controller, STEPCAFControl_Reader
+    from OCP.TCollection import TCollection_ExtendedString
+    from OCP.TDataStd import TDataStd_Name
+    from OCP.TDF import TDF_ChildIterator, TDF_LabelSequence
+    from OCP.TDocStd import TDocStd_Document
+    from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
+
+    def name_of(label) -> str:
+        name = TDataStd_Name()
+        return (
+            name.Get().ToExtString() if label.FindAttribute(TDataStd_Name.GetID_s(), name) else ""
+        )
+
+    step, _ = written(part, tmp_path)
+    STEPCAFControl_Controller.Init_s()
+    Interface_Static.SetIVal_s("read.stepcaf.subshapes.name", 1)
+    document = TDocStd_Document(TCollection_ExtendedString("document"))
+    reader = STEPCAFControl_Reader()
+    reader.SetNameMode(True)
+    reader.SetColorMode(True)
+    reader.ReadFile(str(step))
+    assert reader.Transfer(document)
+    shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    colours = XCAFDoc_DocumentTool.ColorTool_s(document.Main())
+    free = TDF_LabelSequence()
+    shapes.GetFreeShapes(free)
+    assert free.Length() == 1
+    assert name_of(free.Value(1)) == part.name
+
+    expected: Counter[tuple[str, bool]] = Counter((facet.name, False) for facet in part.facets)
+    for embossing in part.embossings:
+        facet, coloured = part.facets[embossing.facet].name, embossing.face is not None
+        for name, label in zip(embossing.names, embossing.labels.tolist(), strict=True):
+            rings = embossing.tiers[label].rings
+            sides = (len(rings) - 1) * sum(len(ring) for ring in rings[0])
+            expected[f"{facet}/{name}/side", coloured] += sides
+            expected[f"{facet}/{name}/top", coloured] += 1
+            if len(rings[0]) > 1:
+                expected[f"{facet}/{name}/inside", False] += len(rings[0]) - 1
+    found: Counter[tuple[str, bool]] = Counter()
+    children = TDF_ChildIterator(free.Value(1))
+    while children.More():
+        colour = Quantity_Color()
+        coloured = colours.GetColor_s(children.Value(), XCAFDoc_ColorType.XCAFDoc_ColorSurf, colour)
+        found[name_of(children.Value()), coloured] += 1
+        if coloured:
+            rgb = colour.Values(Quantity_TypeOfColor.Quantity_TOC_sRGB)
+            assert rgb == pytest.approx([value / 255 for value in SYMBOL_RGB], abs=1e-3)
+        children.Next()
+    assert found == expected
+
+
+def test_a_broken_file_is_named_with_its_reason(
+    panel: Part, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    step, stl = written(panel, tmp_path)
+    exact = volume(panel)
+    with pytest.raises(SolidError, match=r"part 'Cube-F1'.*volume"):
+        verify(panel.name, exact * (1 + 1e-8), step=step)
+    step.write_bytes(step.read_bytes()[:-5000])
+    with pytest.raises(SolidError, match="0 solids") as caught:
+        verify(panel.name, exact, step=step)
+    assert caught.value.place == str(step)
+    whole_file = stl.read_bytes()
+    count = struct.unpack_from("<I", whole_file, 80)[0]
+    stl.write_bytes(whole_file[:80] + struct.pack("<I", count - 1) + whole_file[84:-50])
+    with pytest.raises(SolidError, match="3 open edges"):
+        verify(panel.name, exact, stl=stl)
+    stl.write_bytes(b"")
+    with pytest.raises(SolidError, match="no triangles"):
+        verify(panel.name, exact, stl=stl)
+    assert capfd.readouterr().out == ""
+
+
+def test_missing_extras_say_how_to_install_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import sys
+
+    for module, arguments in (
+        ("OCP.BRepCheck", {"step": tmp_path / "a.step"}),
+        ("pymeshlab", {"stl": tmp_path / "a.stl"}),
+    ):
+        monkeypatch.setitem(sys.modules, module, None)
+        with pytest.raises(GeneratorError) as caught:
+            verify("a", 1.0, **arguments)
+        assert 'pip install "encoded-objects[cad,mesh]"' in caught.value.fix
+
+
+@pytest.mark.parametrize("grouping", ["components", "volumes"])
+def test_3mf_passes_the_strict_reader(panel: Part, grouping: str, tmp_path: Path) -> None:
+    import lib3mf
+
+    parts = [panel, replace(panel, name='A & "B" <ü>')]
+    (file,) = print_files("Two panels", parts, BED)
+    path = tmp_path / "plate.3mf"
+    path.write_bytes(file.content if grouping == "components" else file.prusaslicer)
+    model = lib3mf.get_wrapper().CreateModel()
+    reader = model.QueryReader("3mf")
+    reader.SetStrictModeActive(True)
+    reader.ReadFromFile(str(path))
+    assert reader.GetWarningCount() == 0
+    names = []
+    objects = model.GetMeshObjects()
+    while objects.MoveNext():
+        mesh = objects.GetCurrentMeshObject()
+        names.append(mesh.GetName())
+        assert mesh.IsManifoldAndOriented()
+    items = model.GetBuildItems()
+    boxes = []
+    while items.MoveNext():
+        item = items.GetCurrent()
+        box = model.GetBuildItems and item.GetObjectResource().GetOutbox()
+        shift = item.GetObjectTransform().Fields[3]
+        boxes.append(
+            [(box.MinCoordinate[i] + shift[i], box.MaxCoordinate[i] + shift[i]) for i in range(3)]
+        )
+    if grouping == "components":
+        assert names == [f"{part.name} {kind}" for part in parts for kind in ("body", "symbols")]
+    else:
+        assert names == [part.name for part in parts]
+    assert len(boxes) == 2
+    for x, y, z in boxes:
+        assert 0 <= x[0] < x[1] <= BED[0]
+        assert 0 <= y[0] < y[1] <= BED[1]
+        assert z == pytest.approx((0.0, 4.0), abs=1e-5)
+    assert boxes[0][0][1] + 5 <= boxes[1][0][0] + 1e-4
+
+
+def test_3mf_uses_as_many_plates_as_needed(panel: Part) -> None:
+    files = print_files("Panels", [panel] * 3, (80.0, 40.0))
+    assert [len(file.plate.places) for file in files] == [2, 1]
+
+
+def test_glb_has_a_node_for_each_face(slanted: Part, panel: Part) -> None:
+    import trimesh
+
+    content = glb_bytes("Octahedron", [slanted], [triangles(slanted)])
+    length = struct.unpack_from("<I", content, 12)[0]
+    nodes = json.loads(content[20 : 20 + length])["nodes"]
+    assert [node["name"] for node in nodes] == ["Octahedron", *(f.name for f in slanted.facets)]
+    scene = trimesh.load(io.BytesIO(content), file_type="glb")
+    merged = scene.to_geometry()
+    assert merged.volume == pytest.approx(volume(slanted) * 1e-9, rel=1e-5)
+    # Upright: what is z in the object frame is y in glTF.
+    T = slanted.T_object_part
+    points = triangles(slanted).vertices @ T[:3, :3].T + T[:3, 3]
+    low, high = points.min(axis=0) / 1000, points.max(axis=0) / 1000
+    expected = [[low[0], low[2], -high[1]], [high[0], high[2], -low[1]]]
+    np.testing.assert_allclose(scene.bounds, expected, atol=1e-7)
+    pair = glb_bytes("Cube", [panel, panel], [triangles(panel)] * 2)
+    length = struct.unpack_from("<I", pair, 12)[0]
+    assert [n["name"] for n in json.loads(pair[20 : 20 + length])["nodes"]] == ["Cube", "F1", "F1"]

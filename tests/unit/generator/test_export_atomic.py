@@ -1,0 +1,165 @@
+"""All files or none: commit, leaving, interruption, and errors of the operating system."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from generator.errors import GeneratorError
+from generator.export.atomic import Staging
+
+
+def hidden(folder: Path) -> list[str]:
+    return [path.name for path in folder.glob(".encode-object-*")]
+
+
+def test_commit_moves_all_files_and_leaves_nothing_hidden(tmp_path: Path) -> None:
+    (tmp_path / "a.stl").write_bytes(b"old")
+    with Staging(tmp_path) as staging:
+        first = staging.write("a.stl", b"new")
+        staging.write("b.step", (piece for piece in (b"one", b"two")))
+        assert (tmp_path / "a.stl").read_bytes() == b"old"
+        assert not (tmp_path / "b.step").exists()
+        committed = staging.commit()
+    assert (tmp_path / "a.stl").read_bytes() == b"new"
+    assert (tmp_path / "b.step").read_bytes() == b"onetwo"
+    assert committed[0] == first
+    assert committed[1].size == 6
+    assert committed[1].sha256 == hashlib.sha256(b"onetwo").hexdigest()
+    assert hidden(tmp_path) == []
+
+
+def test_an_error_leaves_no_file_and_no_folder(tmp_path: Path) -> None:
+    folder = tmp_path / "out" / "cube"
+
+    def pieces() -> Iterator[bytes]:
+        yield b"abc"
+        raise KeyError
+
+    with pytest.raises(KeyError), Staging(folder) as staging:
+        staging.write("a.stl", pieces())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_leaving_without_commit_keeps_the_old_file(tmp_path: Path) -> None:
+    (tmp_path / "a.stl").write_bytes(b"old")
+    with Staging(tmp_path) as staging:
+        staging.write("a.stl", b"new")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.stl"]
+    assert (tmp_path / "a.stl").read_bytes() == b"old"
+
+
+def test_two_stagings_at_once_do_not_disturb_each_other(tmp_path: Path) -> None:
+    with Staging(tmp_path) as one, Staging(tmp_path) as two:
+        one.write("a", b"1")
+        two.write("a", b"2")
+        assert len(hidden(tmp_path)) == 2
+        one.commit()
+        two.commit()
+    assert (tmp_path / "a").read_bytes() == b"2"
+    assert hidden(tmp_path) == []
+
+
+_WRITER = """
+import sys, time
+from generator.export.atomic import Staging
+with Staging(sys.argv[1]) as staging:
+    staging.write("a.stl", b"x" * 100000)
+    print("written", flush=True)
+    time.sleep(60)
+"""
+
+
+def test_leftovers_of_a_killed_process_are_removed_and_those_of_a_living_one_kept(
+    tmp_path: Path,
+) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", _WRITER, str(tmp_path)], stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "written\n"
+        left = hidden(tmp_path)
+        assert len(left) == 1
+        with Staging(tmp_path) as staging:
+            assert left[0] in hidden(tmp_path)  # its owner is at work
+            staging.write("b.stl", b"b")
+            staging.commit()
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    assert hidden(tmp_path) == left
+    assert not (tmp_path / "a.stl").exists()
+    deadline = time.monotonic() + 10
+    while hidden(tmp_path) and time.monotonic() < deadline:
+        with Staging(tmp_path):
+            pass
+    assert hidden(tmp_path) == []
+    assert [path.name for path in tmp_path.iterdir()] == ["b.stl"]
+
+
+def test_a_file_where_the_folder_should_be(tmp_path: Path) -> None:
+    (tmp_path / "out").write_bytes(b"")
+    for folder in (tmp_path / "out", tmp_path / "out" / "cube"):
+        with pytest.raises(GeneratorError) as caught, Staging(folder):
+            pass
+        assert caught.value.place == str(folder)
+        assert "-o" in caught.value.fix
+
+
+def test_a_folder_under_the_name_of_a_file(tmp_path: Path) -> None:
+    (tmp_path / "a.stl").mkdir()
+    with (
+        pytest.raises(GeneratorError, match="Is a directory") as caught,
+        Staging(tmp_path) as staging,
+    ):
+        staging.write("a.stl", b"")
+    assert caught.value.place == str(tmp_path / "a.stl")
+
+
+def test_a_name_that_is_too_long(tmp_path: Path) -> None:
+    with pytest.raises(GeneratorError, match="too long") as caught, Staging(tmp_path) as staging:
+        staging.write("a" * 300 + ".stl", b"")
+    assert "shorter name" in caught.value.fix
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_no_room_for_the_file(tmp_path: Path) -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
+    try:
+        with (
+            pytest.raises(GeneratorError, match=r"cannot write the file") as caught,
+            Staging(tmp_path) as staging,
+        ):
+            staging.write("a.stl", (b"x" * 600 for _ in range(20)))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, handler)
+    assert caught.value.place.endswith("a.stl")
+    assert "-o" in caught.value.fix
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_may_not_be_written(tmp_path: Path) -> None:
+    folder = tmp_path / "locked"
+    folder.mkdir(mode=0o555)
+    root = os.geteuid() == 0
+    if root:
+        os.seteuid(65534)
+    try:
+        with pytest.raises(GeneratorError, match="Permission denied") as caught, Staging(folder):
+            pass
+    finally:
+        if root:
+            os.seteuid(0)
+    assert caught.value.place == str(folder)
+    assert "may write" in caught.value.fix

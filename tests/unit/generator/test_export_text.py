@@ -1,0 +1,89 @@
+"""Fixed-width text and STEP strings against Python's own formatting."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from generator.export.fixed_text import (
+    DECIMAL,
+    NAMES,
+    NUMBER,
+    decimal_numbers,
+    decimal_width,
+    padded,
+    stamped,
+    template_of,
+    whole_numbers,
+)
+from generator.export.step_entities import Entities, listed, numbers_listed, step_string
+
+lengths = st.floats(-1e6, 1e6, allow_nan=False)
+
+
+@given(st.lists(lengths, min_size=1, max_size=20), st.integers(1, 10))
+def test_decimals_are_the_rounded_number(values: list[float], places: int) -> None:
+    width = decimal_width(max(map(abs, values)), places)
+    rows = decimal_numbers(np.array(values), width, places)
+    assert rows.shape == (len(values), width)
+    for row, value in zip(rows, values, strict=True):
+        text = row.tobytes().decode("ascii")
+        assert len(text.split(".")[1]) == places
+        scaled = int(np.rint(value * 10.0**places))
+        assert int(text.strip().replace(".", "")) == scaled
+        assert "-0." not in text or scaled < 0
+
+
+def test_decimals_by_hand() -> None:
+    values = np.array([0.0, -0.0, -0.04, 12.5, -12.5, 999.96, -0.5])
+    rows = decimal_numbers(values, decimal_width(1000.0, 1), 1)
+    texts = [row.tobytes().decode("ascii") for row in rows]
+    assert texts == ["    0.0", "    0.0", "    0.0", "   12.5", "  -12.5", " 1000.0", "   -0.5"]
+
+
+@given(st.lists(st.integers(0, 10**9 - 1), min_size=1, max_size=20))
+def test_whole_numbers(values: list[int]) -> None:
+    rows = whole_numbers(np.array(values), 9)
+    assert [row.tobytes().decode("ascii") for row in rows] == [f"{v:09d}" for v in values]
+
+
+def test_a_template_is_stamped_with_numbers_decimals_and_names() -> None:
+    text = f"#{NUMBER * 3}=P('',{DECIMAL * 6});#{NUMBER * 3}=N({NAMES[0] * 5},#{NUMBER * 3});\n"
+    template = template_of(text, [0, 1, 0])
+    decimals = decimal_numbers(np.array([[1.5], [-20.25]]), 6, 2)[:, :, :]
+    nothing = padded(["", ""])
+    out = stamped(
+        template, np.array([100, 107]), 3, decimals, (padded(["'ab'", "'abc'"]), nothing, nothing)
+    )
+    assert out.decode("ascii") == (
+        "#100=P('',  1.50);#101=N('ab' ,#100);\n#107=P('',-20.25);#108=N('abc',#107);\n"
+    )
+
+
+def test_step_strings_are_ascii_and_keep_quotes() -> None:
+    assert step_string("F1/r12c34") == "F1/r12c34"
+    assert step_string("it's") == "it''s"
+    assert step_string("a\\b") == "a\\\\b"
+    assert step_string("ä\n") == "\\X2\\00E4\\X0\\\\X2\\000A\\X0\\"
+    assert step_string("𝔸") == "\\X4\\0001D538\\X0\\"
+
+
+def test_entities_share_directions_and_keep_one_width() -> None:
+    entities = Entities(at_most=500_000)
+    x = np.array([1.0, 0.0, 0.0])
+    assert entities.vector(x) == entities.vector(x.copy())
+    assert entities.direction(-x) != entities.direction(x)
+    text = entities.taken().decode("ascii")
+    assert text.count("DIRECTION('',(1.,0.,0.))") == 1
+    assert "(-1.,0.,0.)" in text
+    assert entities.taken() == b""
+    first = entities.reserve(500_000 - 3)
+    assert len(str(first)) == len(str(entities.next)) == entities.width
+
+
+def test_long_lists_break_into_lines() -> None:
+    numbers = np.arange(10000, 10030)
+    joined = b"".join(numbers_listed(numbers, 5, block=12)).decode("ascii")
+    assert joined == listed(f"#{number}" for number in numbers.tolist())
+    assert joined.count("\n") == 2
