@@ -1,0 +1,284 @@
+"""Read objects and cells back, exactly as they were registered. Thesis 6.3.
+
+Every function takes a connection, so that several of them see one state of the
+database: `with reading(engine) as connection: ...` (`generator.database.transaction`).
+"""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import Connection, Select, Table, func, literal, select
+
+from generator.alphabet.outline import SymbolStyle
+from generator.database import tables
+from generator.database.cells import faces_at
+from generator.database.registered import (
+    ObjectEntry,
+    RegisteredArray,
+    RegisteredFace,
+    RegisteredObject,
+    RegisteredPart,
+)
+from generator.database.transaction import place_of
+from generator.errors import DatabaseError
+from generator.layout.placement import FaceLayout, Layout, Placement
+from generator.polyhedron.frame import face_frame, face_polygon
+from generator.polyhedron.winged import Face, Polyhedron, WingedEdge
+
+__all__ = [
+    "faces_at",
+    "find_object",
+    "list_objects",
+    "read_array",
+    "read_layout",
+    "read_object",
+    "read_parts",
+]
+
+
+def list_objects(connection: Connection) -> tuple[ObjectEntry, ...]:
+    """Return one entry per object, in the order of their names."""
+    return tuple(_entries(connection, _select_entries().order_by(tables.objects.c.name)))
+
+
+def find_object(connection: Connection, name: str) -> ObjectEntry | None:
+    """Return the entry of the object called `name`, None if there is none."""
+    found = _entries(connection, _select_entries().where(tables.objects.c.name == name))
+    return next(iter(found), None)
+
+
+def read_object(connection: Connection, name: str) -> RegisteredObject:
+    """Return everything about the object called `name`; all numbers bit for bit.
+
+    Raises
+    ------
+    DatabaseError
+        When no object has this name; the fix lists names that are known.
+    """
+    entry = _existing(connection, name)
+    polyhedron = _read_polyhedron(connection, entry)
+    layout = read_layout(connection, name)
+    row = connection.execute(
+        select(tables.objects, tables.alphabets.c.definition, tables.provenance.c.spec)
+        .join(tables.alphabets)
+        .join(tables.provenance)
+        .where(tables.objects.c.object_id == entry.object_id)
+    ).one()
+    return RegisteredObject(
+        entry=entry,
+        polyhedron=polyhedron,
+        faces=_read_faces(connection, entry, polyhedron, layout),
+        layout=layout,
+        style=SymbolStyle(
+            pitch_mm=row.pitch_mm,
+            height_mm=row.height_mm,
+            stroke_mm=row.stroke_mm,
+            draft_rad=row.draft_rad,
+            chamfer_mm=row.chamfer_mm,
+        ),
+        array=read_array(connection, entry.array_id),
+        alphabet=json.loads(row.definition),
+        parts=read_parts(connection, entry.object_id),
+        spec=json.loads(row.spec),
+    )
+
+
+def read_layout(connection: Connection, name: str) -> Layout:
+    """Return the layout of the object called `name`, bit for bit what was registered."""
+    entry = _existing(connection, name)
+    known = connection.execute(
+        select(tables.objects.c.layout, tables.objects.c.layout_warnings).where(
+            tables.objects.c.object_id == entry.object_id
+        )
+    ).one()
+    symbols: dict[int, list[tuple[Any, ...]]] = defaultdict(list)
+    cells = tables.cells.c
+    for face, *symbol in connection.execute(
+        select(cells.face_id, cells.row, cells.column, cells.label, cells.x_mm, cells.y_mm)
+        .where(cells.object_id == entry.object_id)
+        .order_by(cells.face_id, cells.position)
+    ):
+        symbols[face].append(tuple(symbol))
+    faces, blank = [], []
+    for row in connection.execute(_of(tables.placements, entry, "position")):
+        if row.blank:
+            blank.append(row.face_id)
+        r, c, label, x, y = (
+            zip(*symbols[row.face_id], strict=True) if symbols[row.face_id] else ((),) * 5
+        )
+        faces.append(
+            FaceLayout(
+                face=row.face_id,
+                placement=Placement(row.row, row.column, row.rotation_rad, row.x_mm, row.y_mm),
+                rows=_frozen(r, np.int64),
+                columns=_frozen(c, np.int64),
+                labels=_frozen(label, np.int64),
+                centres_mm=_frozen(np.array([x, y], dtype=np.float64).T, np.float64),
+                places=row.places,
+            )
+        )
+    return Layout(
+        kind=known.layout,
+        pitch_mm=entry.pitch_mm,
+        faces=tuple(faces),
+        blank_faces=tuple(sorted(blank)),
+        warnings=tuple(json.loads(known.layout_warnings)),
+    )
+
+
+def read_array(connection: Connection, array_id: int) -> RegisteredArray:
+    """Return the array with this number."""
+    row = connection.execute(
+        select(tables.arrays).where(tables.arrays.c.array_id == array_id)
+    ).one()
+    return RegisteredArray(
+        array_id=row.array_id,
+        profile=row.profile,
+        definition=json.loads(row.definition),
+        rows=row.rows,
+        columns=row.columns,
+        window=(row.window_rows, row.window_columns),
+        order=row.order,
+    )
+
+
+def read_parts(connection: Connection, object_id: int) -> tuple[RegisteredPart, ...]:
+    """Return the parts of an object in the order in which they were written."""
+    parts = tables.parts.c
+    return tuple(
+        RegisteredPart(
+            row.name,
+            row.format,
+            row.file,
+            row.sha256,
+            _frozen(json.loads(row.T_object_part), np.float64),
+        )
+        for row in connection.execute(
+            select(tables.parts).where(parts.object_id == object_id).order_by(parts.position)
+        )
+    )
+
+
+def _existing(connection: Connection, name: str) -> ObjectEntry:
+    entry = find_object(connection, name)
+    if entry is None:
+        names = connection.execute(
+            select(tables.objects.c.name).order_by(tables.objects.c.name).limit(8)
+        ).scalars()
+        known = ", ".join(names) or "none yet"
+        raise DatabaseError(
+            f"no object is called '{name}'",
+            fix=f"registered objects: {known}",
+            place=place_of(connection.engine.url),
+        )
+    return entry
+
+
+def _select_entries() -> Select[Any]:
+    objects, arrays, provenance = tables.objects.c, tables.arrays.c, tables.provenance.c
+    symbols = (
+        select(func.count())
+        .select_from(tables.cells)
+        .where(tables.cells.c.object_id == objects.object_id)
+        .scalar_subquery()
+    )
+    return (
+        select(
+            objects.object_id,
+            objects.name,
+            objects.object_type,
+            objects.number_of_vertices,
+            objects.number_of_faces,
+            symbols,
+            objects.array_id,
+            arrays.profile,
+            arrays.rows,
+            arrays.columns,
+            objects.pitch_mm,
+            provenance.spec_hash,
+            provenance.tool_version,
+            provenance.utc,
+        )
+        .select_from(tables.objects)
+        .join(tables.arrays)
+        .join(tables.provenance)
+    )
+
+
+def _entries(connection: Connection, query: Select[Any]) -> Iterable[ObjectEntry]:
+    return (ObjectEntry(*row) for row in connection.execute(query))
+
+
+def _of(table: Table, entry: ObjectEntry, *order: str) -> Select[Any]:
+    """Return the query for an object's rows of a table, in a stated order."""
+    return (
+        select(table)
+        .where(table.c.object_id == literal(entry.object_id))
+        .order_by(*(table.c[name] for name in order))
+    )
+
+
+def _read_polyhedron(connection: Connection, entry: ObjectEntry) -> Polyhedron:
+    points = [
+        (row.x_vertex, row.y_vertex, row.z_vertex)
+        for row in connection.execute(_of(tables.vertices, entry, "vertex_id"))
+    ]
+    loops: dict[int, dict[int, list[int]]] = defaultdict(lambda: defaultdict(list))
+    query = _of(tables.faces_to_vertices, entry, "face_id", "loop", "position")
+    for row in connection.execute(query):
+        loops[row.face_id][row.loop].append(row.vertex_id)
+    faces = tuple(
+        Face(row.name, tuple(tuple(loop) for loop in loops[row.face_id].values()))
+        for row in connection.execute(_of(tables.faces, entry, "face_id"))
+    )
+    edges = tuple(
+        WingedEdge(
+            start=row.start_vertex_id,
+            end=row.end_vertex_id,
+            left=row.face_id,
+            right=row.right_face_id,
+            left_previous=row.left_previous_id,
+            left_next=row.left_next_id,
+            right_previous=row.right_previous_id,
+            right_next=row.right_next_id,
+        )
+        for row in connection.execute(_of(tables.edges, entry, "edge_id"))
+    )
+    return Polyhedron(entry.object_type, _frozen(points, np.float64), faces, edges)
+
+
+def _read_faces(
+    connection: Connection, entry: ObjectEntry, polyhedron: Polyhedron, layout: Layout
+) -> tuple[RegisteredFace, ...]:
+    placements = {
+        face.face: face.placement for face in layout.faces if face.face not in layout.blank_faces
+    }
+    faces = []
+    for row in connection.execute(_of(tables.faces, entry, "face_id")):
+        faces.append(
+            RegisteredFace(
+                face_id=row.face_id,
+                name=row.name,
+                face_type=row.face_type,
+                area_mm2=row.face_area,
+                T_object_face=_frozen(face_frame(polyhedron, row.face_id), np.float64),
+                polygon_mm=tuple(
+                    _frozen(loop, np.float64) for loop in face_polygon(polyhedron, row.face_id)
+                ),
+                placement=placements.get(row.face_id),
+            )
+        )
+    return tuple(faces)
+
+
+def _frozen(values: Any, dtype: type[np.generic]) -> NDArray[Any]:
+    """Return a read-only array of its own, contiguous."""
+    array = np.array(values, dtype=dtype, order="C")
+    array.setflags(write=False)
+    return array

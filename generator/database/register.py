@@ -1,0 +1,288 @@
+"""Register an object: all of it, or nothing. Thesis 6.3.
+
+::
+
+    with writing(engine) as connection:                 # nobody else writes from here on
+        known = find_object(connection, name)
+        taken = occupied(connection, find_array(connection, array))
+        layout = ...                                    # place the faces beside `taken`
+        register(connection, Registration(...))
+                                                        # committed here, undone on any error
+
+Polyhedron + Layout + array + alphabet -> rows of every table of `tables.py`. The primary
+key of `cells` is the last defence of the promise that no cell is used twice.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+from sqlalchemy import Connection, Table, delete, func, insert, select
+
+from generator.alphabet.known import Alphabet
+from generator.alphabet.outline import SymbolStyle
+from generator.array.contract import SymbolArray
+from generator.database import tables
+from generator.database.canonical import canonical, digest
+from generator.database.cells import array_key, find_array, occupied
+from generator.database.read import find_object, read_layout
+from generator.database.registered import ObjectEntry, RegisteredPart
+from generator.database.rows import Rows, layout_rows, polyhedron_rows
+from generator.database.transaction import place_of, writing
+from generator.errors import DatabaseError
+from generator.layout.placement import Layout
+from generator.polyhedron.winged import Polyhedron
+
+__all__ = [
+    "Registration",
+    "find_array",
+    "find_object",
+    "occupied",
+    "record_parts",
+    "register",
+    "remove_object",
+    "require_same_spec",
+    "same_layout",
+    "writing",
+]
+
+_LARGEST = 2**63 - 1  #: of a whole number in the database
+
+
+@dataclass(frozen=True, slots=True)
+class Registration:
+    """An object, ready to be registered."""
+
+    name: str
+    polyhedron: Polyhedron
+    layout: Layout
+    array: SymbolArray
+    profile: str  #: name under which the array was asked for
+    alphabet: Alphabet
+    style: SymbolStyle
+    spec: Mapping[str, Any]  #: plain values; equal values are the same object
+    tool_version: str
+    parts: tuple[RegisteredPart, ...] = ()
+
+
+def register(connection: Connection, registration: Registration, *, replace: bool = False) -> int:
+    """Insert an object with its faces, edges, cells and parts; return its number.
+
+    The same spec under a registered name changes nothing but its parts; pass the layout
+    that `read_layout` returns.
+
+    Parameters
+    ----------
+    connection
+        Of a `writing` transaction.
+    replace
+        Remove what the name held before, and free its cells; the number stays.
+
+    Raises
+    ------
+    DatabaseError
+        When another spec is registered under this name (without `replace`), another
+        object holds a cell, or the array is beyond what a database can count.
+    """
+    _check(registration)
+    known = find_object(connection, registration.name)
+    if known is not None and not replace:
+        _check_same(connection, known, registration)
+        record_parts(connection, known.object_id, registration.parts)
+        return known.object_id
+    if known is not None:
+        remove_object(connection, known.object_id)
+    array_id, object_id = _insert_object(connection, registration, known)
+    for table, rows in polyhedron_rows(object_id, registration.polyhedron):
+        _insert(connection, table, rows)
+    for table, rows in layout_rows(object_id, array_id, registration.layout):
+        _insert(connection, table, rows)
+    record_parts(connection, object_id, registration.parts)
+    spec = canonical(registration.spec)
+    _insert(
+        connection,
+        tables.provenance,
+        [
+            {
+                "object_id": object_id,
+                "tool_version": registration.tool_version,
+                "spec_hash": digest(spec),
+                "spec": spec,
+                "utc": datetime.now(UTC).isoformat(timespec="seconds"),
+            }
+        ],
+    )
+    return object_id
+
+
+def require_same_spec(connection: Connection, known: ObjectEntry, spec: Any) -> None:
+    """Refuse a spec that is not the one under which an object is registered.
+
+    Raises
+    ------
+    DatabaseError
+        With the way out: another name, or `--replace`.
+    """
+    if not known.same_spec(spec):
+        raise DatabaseError(
+            f"'{known.name}' is registered already, with another spec ({known.utc})",
+            fix="give this object another name, or replace the registered one with --replace",
+            place=place_of(connection.engine.url),
+        )
+
+
+def record_parts(connection: Connection, object_id: int, written: Sequence[RegisteredPart]) -> None:
+    """Note the files of an object; a part of the same name and format is written anew."""
+    parts = tables.parts.c
+    for part in written:
+        connection.execute(
+            delete(tables.parts).where(
+                parts.object_id == object_id,
+                parts.name == part.name,
+                parts.format == part.format,
+            )
+        )
+    last = connection.execute(
+        select(func.coalesce(func.max(parts.position), -1)).where(parts.object_id == object_id)
+    ).scalar_one()
+    _insert(
+        connection,
+        tables.parts,
+        [
+            {
+                "object_id": object_id,
+                "position": last + 1 + k,
+                "name": part.name,
+                "format": part.format,
+                "file": part.file,
+                "sha256": part.sha256,
+                "T_object_part": json.dumps(part.T_object_part.tolist()),
+            }
+            for k, part in enumerate(written)
+        ],
+    )
+
+
+def remove_object(connection: Connection, object_id: int) -> None:
+    """Remove an object and all that belongs to it; its cells are free again."""
+    # Children first: a parent's cascade would search every table once per row.
+    for table in reversed(tables.metadata.sorted_tables):
+        if "object_id" in table.c:
+            connection.execute(delete(table).where(table.c.object_id == object_id))
+
+
+def same_layout(one: Layout, other: Layout) -> bool:
+    """Whether two layouts are equal bit for bit."""
+    return (
+        (one.kind, one.pitch_mm, len(one.faces)) == (other.kind, other.pitch_mm, len(other.faces))
+        and (one.blank_faces, one.warnings) == (other.blank_faces, other.warnings)
+    ) and all(
+        (a.face, a.placement, a.places) == (b.face, b.placement, b.places)
+        and np.array_equal(a.rows, b.rows)
+        and np.array_equal(a.columns, b.columns)
+        and np.array_equal(a.labels, b.labels)
+        and a.centres_mm.tobytes() == b.centres_mm.tobytes()
+        for a, b in zip(one.faces, other.faces, strict=True)
+    )
+
+
+def _check(registration: Registration) -> None:
+    """Refuse what the tables could not say."""
+    array, layout = registration.array, registration.layout
+    if max(array.rows, array.columns) > _LARGEST:
+        raise DatabaseError(
+            f"an array of {array.rows} x {array.columns} is beyond what a database counts, "
+            f"{_LARGEST} rows and columns",
+            fix="fold it into a more square array",
+        )
+    if layout.pitch_mm != registration.style.pitch_mm:
+        raise ValueError(
+            f"layout at {layout.pitch_mm} mm, symbols at {registration.style.pitch_mm}"
+        )
+    for face in layout.faces:
+        if len(face.rows) and not (
+            0 <= face.rows.min() <= face.rows.max() < array.rows
+            and 0 <= face.columns.min() <= face.columns.max() < array.columns
+        ):
+            raise ValueError(f"cells of face {face.face} lie beyond the array")
+
+
+def _check_same(connection: Connection, known: ObjectEntry, registration: Registration) -> None:
+    require_same_spec(connection, known, registration.spec)
+    if not same_layout(read_layout(connection, registration.name), registration.layout):
+        raise DatabaseError(
+            f"'{registration.name}' is registered already, on other cells or at other places",
+            fix="replace the registered one with --replace",
+            place=place_of(connection.engine.url),
+        )
+
+
+def _insert_object(
+    connection: Connection, registration: Registration, known: ObjectEntry | None
+) -> tuple[int, int]:
+    """Return the numbers of array and object."""
+    array, style = registration.array, registration.style
+    window_rows, window_columns = array.window
+    array_id = _number_of(
+        connection,
+        tables.arrays,
+        "array_id",
+        array_key(array),
+        definition=canonical(array.definition()),
+        profile=registration.profile,
+        rows=array.rows,
+        columns=array.columns,
+        window_rows=window_rows,
+        window_columns=window_columns,
+        order=array.order,
+    )
+    alphabet = canonical(registration.alphabet.definition())
+    alphabet_id = _number_of(
+        connection,
+        tables.alphabets,
+        "alphabet_id",
+        digest(alphabet),
+        definition=alphabet,
+        name=registration.alphabet.name,
+    )
+    values = {
+        "name": registration.name,
+        "object_type": registration.polyhedron.kind,
+        "number_of_vertices": len(registration.polyhedron.vertices),
+        "number_of_faces": len(registration.polyhedron.faces),
+        "array_id": array_id,
+        "alphabet_id": alphabet_id,
+        "pitch_mm": style.pitch_mm,
+        "height_mm": style.height_mm,
+        "stroke_mm": style.stroke_mm,
+        "draft_rad": style.draft_rad,
+        "chamfer_mm": style.chamfer_mm,
+        "layout": registration.layout.kind,
+        "layout_warnings": canonical(list(registration.layout.warnings)),
+    }
+    if known is not None:
+        values["object_id"] = known.object_id
+    objects = tables.objects
+    inserted = insert(objects).values(values).returning(objects.c.object_id)
+    return array_id, connection.execute(inserted).scalar_one()
+
+
+def _number_of(connection: Connection, table: Table, number: str, key: str, **values: Any) -> int:
+    """Return the number of the row with this definition; insert it where there is none."""
+    found = connection.execute(select(table.c[number]).where(table.c.definition_sha256 == key))
+    known: int | None = found.scalar_one_or_none()
+    if known is not None:
+        return known
+    new = insert(table).values(definition_sha256=key, **values).returning(table.c[number])
+    inserted: int = connection.execute(new).scalar_one()
+    return inserted
+
+
+def _insert(connection: Connection, table: Table, rows: Rows) -> None:
+    if rows:
+        connection.execute(insert(table), rows)

@@ -1,0 +1,94 @@
+"""What the database holds of an object, as values. Thesis 6.3.
+
+Lengths in mm, angles in radians. A face's frame has its origin at the face's first
+vertex, x along its first edge, z outward; `T_object_face` takes it to the object frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.alphabet.outline import SymbolStyle
+from generator.database.canonical import spec_hash
+from generator.layout.placement import Layout, Placement
+from generator.polyhedron.winged import Polyhedron
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectEntry:
+    """One line of the list of objects."""
+
+    object_id: int
+    name: str
+    object_type: str  #: cube, box, tetrahedron, ..., file
+    number_of_vertices: int
+    number_of_faces: int
+    symbols: int  #: cells that the object holds
+    array_id: int
+    profile: str
+    rows: int  #: of the array
+    columns: int
+    pitch_mm: float
+    spec_hash: str
+    tool_version: str
+    utc: str  #: when it was registered, ISO 8601
+
+    def same_spec(self, spec: Any) -> bool:
+        """Whether this object was registered from the same plain values."""
+        return self.spec_hash == spec_hash(spec)
+
+
+@dataclass(frozen=True, slots=True)
+class RegisteredPart:
+    """A printable part in one file."""
+
+    name: str
+    format: str  #: step, stl, 3mf, glb
+    file: str  #: as the person who made it named it
+    sha256: str  #: of the file's bytes
+    T_object_part: NDArray[np.float64]  #: (4, 4), mm: the file has a local origin
+
+
+@dataclass(frozen=True, slots=True)
+class RegisteredFace:
+    """A face with its frame, its outline and its place on the array."""
+
+    face_id: int
+    name: str
+    face_type: str  #: triangle, square, rectangle, quadrilateral, polygon
+    area_mm2: float
+    T_object_face: NDArray[np.float64]  #: (4, 4)
+    polygon_mm: tuple[NDArray[np.float64], ...]  #: loops (k, 2), face frame; holes after the first
+    placement: Placement | None  #: None where the face is blank
+
+
+@dataclass(frozen=True, slots=True)
+class RegisteredArray:
+    """An array that objects share."""
+
+    array_id: int
+    profile: str
+    definition: dict[str, Any]  #: for `array_from`
+    rows: int
+    columns: int
+    window: tuple[int, int]
+    order: int
+
+
+@dataclass(frozen=True, slots=True)
+class RegisteredObject:
+    """Everything that is known about one object."""
+
+    entry: ObjectEntry
+    polyhedron: Polyhedron
+    faces: tuple[RegisteredFace, ...]
+    layout: Layout
+    style: SymbolStyle
+    array: RegisteredArray
+    alphabet: dict[str, Any]  #: for `alphabet_from`
+    parts: tuple[RegisteredPart, ...]
+    spec: Any  #: plain values

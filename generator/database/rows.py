@@ -1,0 +1,129 @@
+"""Rows of the tables from a polyhedron and its layout. Thesis 6.3, figure 6.16.
+
+Each function yields tables with their rows in an order that foreign keys allow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from sqlalchemy import Table
+
+from generator.database import tables
+from generator.database.face_type import face_type
+from generator.layout.placement import FaceLayout, Layout
+from generator.polyhedron.frame import edge_length, face_area, face_polygon
+from generator.polyhedron.winged import Polyhedron
+
+Rows = list[dict[str, Any]]
+
+
+def polyhedron_rows(object_id: int, polyhedron: Polyhedron) -> Iterator[tuple[Table, Rows]]:
+    """Yield the thesis's vertices, faces, edges, and the tables that connect them."""
+    of_object = {"object_id": object_id}
+    yield (
+        tables.vertices,
+        [
+            {**of_object, "vertex_id": k, "x_vertex": x, "y_vertex": y, "z_vertex": z}
+            for k, (x, y, z) in enumerate(polyhedron.vertices.tolist())
+        ],
+    )
+    yield (
+        tables.faces,
+        [
+            {
+                **of_object,
+                "face_id": k,
+                "name": face.name,
+                "face_type": face_type(face_polygon(polyhedron, k)),
+                "number_of_edges": sum(map(len, face.loops)),
+                "face_area": face_area(polyhedron, k),
+            }
+            for k, face in enumerate(polyhedron.faces)
+        ],
+    )
+    yield (
+        tables.edges,
+        [
+            {
+                **of_object,
+                "edge_id": k,
+                "face_id": edge.left,
+                "right_face_id": edge.right,
+                "start_vertex_id": edge.start,
+                "end_vertex_id": edge.end,
+                "left_previous_id": edge.left_previous,
+                "left_next_id": edge.left_next,
+                "right_previous_id": edge.right_previous,
+                "right_next_id": edge.right_next,
+                "edge_length": edge_length(polyhedron, k),
+            }
+            for k, edge in enumerate(polyhedron.edges)
+        ],
+    )
+    yield (
+        tables.faces_to_vertices,
+        [
+            {**of_object, "face_id": face_id, "loop": loop_id, "position": k, "vertex_id": vertex}
+            for face_id, face in enumerate(polyhedron.faces)
+            for loop_id, loop in enumerate(face.loops)
+            for k, vertex in enumerate(loop)
+        ],
+    )
+    yield (
+        tables.edges_to_vertices,
+        [
+            {**of_object, "edge_id": k, "position": position, "vertex_id": vertex}
+            for k, edge in enumerate(polyhedron.edges)
+            for position, vertex in enumerate((edge.start, edge.end))
+        ],
+    )
+
+
+def layout_rows(object_id: int, array_id: int, layout: Layout) -> Iterator[tuple[Table, Rows]]:
+    """Yield the placements of the faces, and the cells that they hold."""
+    yield (
+        tables.placements,
+        [
+            {
+                "object_id": object_id,
+                "face_id": face.face,
+                "position": k,
+                "row": face.placement.row,
+                "column": face.placement.column,
+                "rotation_rad": face.placement.rotation_rad,
+                "x_mm": face.placement.x_mm,
+                "y_mm": face.placement.y_mm,
+                "places": face.places,
+                "blank": int(face.face in layout.blank_faces),
+            }
+            for k, face in enumerate(layout.faces)
+        ],
+    )
+    for face in layout.faces:
+        yield tables.cells, _cell_rows(object_id, array_id, face)
+
+
+def _cell_rows(object_id: int, array_id: int, face: FaceLayout) -> Rows:
+    symbols = zip(
+        face.rows.tolist(),
+        face.columns.tolist(),
+        face.labels.tolist(),
+        face.centres_mm.tolist(),
+        strict=True,
+    )
+    return [
+        {
+            "array_id": array_id,
+            "row": row,
+            "column": column,
+            "object_id": object_id,
+            "face_id": face.face,
+            "position": k,
+            "label": label,
+            "x_mm": x,
+            "y_mm": y,
+        }
+        for k, (row, column, label, (x, y)) in enumerate(symbols)
+    ]

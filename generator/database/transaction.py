@@ -1,0 +1,146 @@
+"""Transactions that are whole or not at all, and what a failed one means to a person.
+
+Writers take turns from their first statement (SQLite: BEGIN IMMEDIATE, PostgreSQL: one
+advisory lock for the transaction), so that the occupied cells a writer reads stay what
+they are until it commits. Nobody waits longer than the engine's `wait_s`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from sqlalchemy import URL, Connection, Engine, text
+from sqlalchemy.exc import DBAPIError
+
+from generator.errors import DatabaseError
+
+WAIT_S = 60.0  #: how long a writer waits for its turn, and a reader for a commit to end
+
+_TURN = int.from_bytes(b"encoded", "big")  #: the advisory lock of writers on PostgreSQL
+
+
+@contextmanager
+def writing(engine: Engine) -> Iterator[Connection]:
+    """Open a transaction that alone may write; commits at the end, undone on any error.
+
+    Raises
+    ------
+    DatabaseError
+        When other writers keep the database for too long, the place is read-only or
+        full, or the database refuses a row (a cell that another object holds).
+    """
+    try:
+        with engine.connect() as connection:
+            connection.execution_options(writing=True)
+            with connection.begin():
+                take_turn(connection)
+                yield connection
+    except DBAPIError as error:
+        raise explained(error, engine.url) from error
+
+
+@contextmanager
+def reading(engine: Engine) -> Iterator[Connection]:
+    """Open a transaction that sees one state of the database, whatever others write."""
+    try:
+        with engine.connect() as connection:
+            if connection.dialect.name == "postgresql":
+                connection.execution_options(
+                    isolation_level="REPEATABLE READ", postgresql_readonly=True
+                )
+            with connection.begin():
+                yield connection
+    except DBAPIError as error:
+        raise explained(error, engine.url) from error
+
+
+def take_turn(connection: Connection) -> None:
+    """Wait until no other transaction writes; held until this one ends."""
+    if connection.dialect.name == "postgresql":
+        wait_ms = int(1000 * connection.get_execution_options().get("wait_s", WAIT_S))
+        connection.execute(text(f"SET LOCAL lock_timeout = {wait_ms}"))
+        connection.execute(text("SELECT pg_advisory_xact_lock(:turn)"), {"turn": _TURN})
+
+
+def begin_sqlite(connection: Connection) -> None:
+    """Begin a SQLite transaction: a writer's at once, a reader's with its first read."""
+    options = connection.get_execution_options()
+    connection.exec_driver_sql("BEGIN IMMEDIATE" if options.get("writing") else "BEGIN")
+
+
+def place_of(url: URL) -> str:
+    """Return how messages name a database: a SQLite file by its path, others without password."""
+    if url.get_backend_name() == "sqlite":
+        return url.database or "sqlite"
+    return url.render_as_string(hide_password=True)
+
+
+def explained(error: DBAPIError, url: URL) -> DatabaseError:
+    """Return the cause and the way out of what the database driver reports."""
+    # SQLite names its errors (SQLITE_BUSY), PostgreSQL numbers them (SQLSTATE 55P03).
+    code = getattr(error.orig, "sqlite_errorname", None) or getattr(error.orig, "sqlstate", None)
+    said = str(error.orig).strip().splitlines()
+    first_line = said[0] if said else type(error.orig).__name__
+    place = place_of(url)
+    for codes, cause, fix in _MEANINGS:
+        if code is not None and code.startswith(codes):
+            return DatabaseError(cause, fix=fix, place=place)
+    if code is not None and code.startswith(("SQLITE_CONSTRAINT", "23")):
+        if code in _NOT_UNIQUE and "cells" in first_line:
+            return DatabaseError(
+                "the object needs cells of the array that another object holds",
+                fix="place it again on the cells that are free now",
+                place=place,
+            )
+        return DatabaseError(f"the database refuses the object: {first_line}", place=place)
+    if code is None:  # PostgreSQL was not reached at all
+        fix = "check that the server runs, and host, port, user and name in the URL"
+        return DatabaseError(f"cannot connect: {first_line}", fix=fix, place=place)
+    return DatabaseError(f"the database failed: {first_line} ({code})", place=place)
+
+
+_NOT_UNIQUE = ("SQLITE_CONSTRAINT_PRIMARYKEY", "SQLITE_CONSTRAINT_UNIQUE", "23505")
+
+_MEANINGS: tuple[tuple[tuple[str, ...], str, str], ...] = (
+    (
+        ("SQLITE_BUSY", "SQLITE_LOCKED", "55P03", "40001", "40P01"),
+        "other programs keep the database locked",
+        "wait until they have ended, then run the same command again",
+    ),
+    (
+        ("SQLITE_NOTADB",),
+        "this file is not a database",
+        "name another file, or move this one away",
+    ),
+    (
+        ("SQLITE_CORRUPT",),
+        "the database file is damaged",
+        "restore it from a copy, or rescue what is left with `sqlite3 FILE .recover`",
+    ),
+    (
+        ("SQLITE_READONLY", "25006", "42501"),
+        "the database may not be written",
+        "allow writing to it and its folder, or choose another with --database",
+    ),
+    (
+        ("SQLITE_CANTOPEN",),
+        "the database file cannot be opened",
+        "check that its folder exists and that you may read and write there",
+    ),
+    (
+        ("SQLITE_FULL", "53100"),
+        "no space is left for the database",
+        "free some space, then run the same command again",
+    ),
+    (
+        ("28",),
+        "the server refuses the user or the password",
+        "correct them in the URL, or in PGUSER and ~/.pgpass",
+    ),
+    (
+        ("3D000",),
+        "the server has no database of this name",
+        "create it with `createdb`, or correct the name in the URL",
+    ),
+)

@@ -1,0 +1,46 @@
+"""How people name a database: a file, `sqlite:///file`, or `postgresql://user@host/name`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from sqlalchemy import URL, make_url
+from sqlalchemy.exc import ArgumentError
+
+from generator.errors import DatabaseError
+
+
+def normal_url(url: str) -> URL:
+    """Return the URL of a file name, `sqlite:///file` or `postgresql://...`; checks no more.
+
+    Examples
+    --------
+    >>> normal_url("postgresql://lab@host/objects").drivername
+    'postgresql+psycopg'
+    """
+    if not url.strip():
+        raise DatabaseError("no database is named", fix="give a file such as lab.db")
+    if "://" not in url:
+        return URL.create("sqlite", database=str(Path(url).expanduser()))
+    try:
+        parsed = make_url(url)
+    except (ArgumentError, ValueError) as error:
+        fix = "write sqlite:///lab.db or postgresql://user@host:5432/name"
+        raise DatabaseError(f"'{url}' is not a database URL", fix=fix) from error
+    if parsed.drivername in ("sqlite", "sqlite+pysqlite"):
+        if parsed.host:
+            fix = f"write three strokes: sqlite:///{parsed.host}"
+            raise DatabaseError(f"'{url}' names a host and no file", fix=fix)
+        if not parsed.database or parsed.database == ":memory:":
+            fix = "give a file, such as sqlite:///lab.db"
+            raise DatabaseError(f"'{url}' names no file, so nothing would be kept", fix=fix)
+        if parsed.query:
+            fix = "write sqlite:///lab.db alone; a file with '?' in its name as a plain file name"
+            raise DatabaseError(f"'{url}' has settings that are not known", fix=fix)
+        return URL.create("sqlite", database=parsed.database)
+    if parsed.drivername in ("postgresql", "postgres", "postgresql+psycopg"):
+        return parsed.set(drivername="postgresql+psycopg")
+    raise DatabaseError(
+        f"cannot keep objects in '{parsed.drivername}'; allowed are sqlite and postgresql",
+        fix="write sqlite:///lab.db or postgresql://user@host:5432/name",
+    )

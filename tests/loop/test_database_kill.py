@@ -1,0 +1,178 @@
+"""Writers that are killed or that meet each other: an object is there whole, or not at all."""
+
+import os
+import random
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+
+import pytest
+
+from generator.database.open import open_database
+from generator.database.read import list_objects, read_layout
+from generator.database.transaction import reading
+
+# One process loads everything and forks a writer per line that it reads, so that a kill
+# costs no start-up. A line: what to do, and the number of the writer.
+WRITERS = """
+import os, sys
+import numpy as np
+from generator.alphabet.known import alphabet_named
+from generator.alphabet.outline import SymbolStyle
+from generator.array.profiles import PROFILES
+from generator.database.open import open_database
+from generator.database.register import Registration, find_array, occupied, register
+from generator.database.transaction import writing
+from generator.layout.placement import FaceLayout, Layout, Placement
+from generator.polyhedron.shapes import cube
+
+array = PROFILES["large"].array()
+solid = cube(60.0)
+url = sys.argv[1]
+
+def write(name, symbols):
+    # The first cells that are free, as a layout would choose them: a race on purpose.
+    with writing(open_database(url)) as connection:
+        taken_rows, taken_columns = occupied(connection, find_array(connection, array))
+        taken = taken_rows * array.columns + taken_columns
+        free = np.setdiff1d(np.arange(array.rows * array.columns), taken)[: 6 * symbols]
+        faces = []
+        for face, cells in enumerate(np.split(free, 6)):
+            rows, columns = cells // array.columns, cells % array.columns
+            centres = np.stack([rows / 7, columns / 3], axis=1)
+            labels = array.symbols(rows, columns)
+            placement = Placement(0, 0, 0.0, 0.0, 0.0)
+            faces.append(FaceLayout(face, placement, rows, columns, labels, centres, 1))
+        register(connection, Registration(
+            name, solid, Layout("faces", 7.0, tuple(faces)), array, "large",
+            alphabet_named("dense-4"), SymbolStyle(), {"name": name}, "0"))
+
+print("ready", flush=True)
+while line := sys.stdin.readline():
+    first, count, symbols = map(int, line.split())
+    writer = os.fork()
+    if writer == 0:
+        for number in range(first, first + count):
+            write(f"object {number}", symbols)
+        os._exit(0)
+    print(writer, flush=True)
+    sys.stdin.readline()  # until asked, an ended writer keeps its number
+    _, status = os.waitpid(writer, 0)
+    print(status, flush=True)
+"""
+
+
+class Writers:
+    """A process that forks writers."""
+
+    def __init__(self, database):
+        environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", WRITERS, str(database)],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment,
+        )  # fmt: skip
+        assert self.process.stdout.readline() == "ready\n"
+
+    def start(self, first, count, symbols):
+        self.process.stdin.write(f"{first} {count} {symbols}\n")
+        self.process.stdin.flush()
+        return int(self.process.stdout.readline())
+
+    def status(self):
+        self.process.stdin.write("status\n")
+        self.process.stdin.flush()
+        return int(self.process.stdout.readline())
+
+    def close(self):
+        self.process.stdin.close()
+        self.process.stdout.close()
+        self.process.wait(timeout=30)
+
+
+@pytest.fixture
+def writers_on():
+    running = []
+
+    def start(database):
+        running.append(Writers(database))
+        return running[-1]
+
+    yield start
+    for writers in running:
+        writers.close()
+
+
+def whole_objects(path):
+    """Check that the file is sound and every object complete; return their names."""
+    with reading(open_database(str(path))) as connection:
+        entries = list_objects(connection)
+        for entry in entries:
+            layout = read_layout(connection, entry.name)
+            assert [len(face.rows) for face in layout.faces] == [entry.symbols // 6] * 6
+            assert (entry.number_of_vertices, entry.number_of_faces) == (8, 6)
+    plain = sqlite3.connect(path)
+    assert plain.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
+    assert plain.execute("PRAGMA foreign_key_check").fetchall() == []
+    orphans = "SELECT count(*) FROM cells WHERE object_id NOT IN (SELECT object_id FROM provenance)"
+    assert plain.execute(orphans).fetchone() == (0,)
+    plain.close()
+    return {entry.name: entry.symbols for entry in entries}
+
+
+def test_a_writer_killed_at_any_moment_leaves_all_or_nothing(tmp_path, writers_on):
+    path = tmp_path / "lab.db"
+    writers = writers_on(path)
+    symbols = 1000  # per face: large enough that rows reach the file before the commit
+    start = time.perf_counter()
+    writers.start(0, 1, symbols)
+    assert writers.status() == 0
+    duration = time.perf_counter() - start
+    expected = {"object 0"}
+    moments = random.Random(6).sample(range(1000), 20)
+    for number, moment in enumerate(moments, start=1):
+        writer = writers.start(number, 1, symbols)
+        time.sleep(duration * 1.1 * moment / 1000)
+        os.kill(writer, signal.SIGKILL)
+        finished = writers.status() == 0
+        found = whole_objects(path)
+        assert set(found.values()) == {6 * symbols}
+        new = set(found) - expected
+        assert new == {f"object {number}"} if finished else new <= {f"object {number}"}
+        assert expected <= set(found)
+        expected = set(found)
+        if len(expected) > 5:  # the array is filling up
+            path.unlink()
+            expected = set()
+            open_database(str(path))
+    # After all that the database takes objects as ever.
+    writers.start(99, 1, 10)
+    assert writers.status() == 0
+    assert "object 99" in whole_objects(path)
+
+
+def test_a_kill_while_the_database_is_made_leaves_it_usable(tmp_path, writers_on):
+    path = tmp_path / "lab.db"
+    writers = writers_on(path)
+    for moment in range(6):
+        path.unlink(missing_ok=True)
+        writer = writers.start(0, 1, 1)
+        time.sleep(0.002 * moment)
+        os.kill(writer, signal.SIGKILL)
+        writers.status()
+        assert set(whole_objects(path)) <= {"object 0"}
+
+
+def test_writers_at_once_never_share_a_cell(tmp_path, writers_on):
+    path = tmp_path / "lab.db"
+    pair = [writers_on(path), writers_on(path)]
+    for number, writers in enumerate(pair):
+        writers.start(100 * number, 10, 30)
+    assert [writers.status() for writers in pair] == [0, 0]
+    found = whole_objects(path)
+    assert len(found) == 20
+    plain = sqlite3.connect(path)
+    (cells,) = plain.execute('SELECT count(DISTINCT "row" * 1000 + "column") FROM cells').fetchone()
+    plain.close()
+    assert cells == 20 * 6 * 30

@@ -1,0 +1,169 @@
+"""Whatever is registered comes back bit for bit, and no cell is ever held twice."""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from generator.alphabet.known import ALPHABETS
+from generator.alphabet.outline import SymbolStyle
+from generator.array.profiles import PROFILES
+from generator.database.canonical import canonical
+from generator.database.open import open_database
+from generator.database.read import faces_at, list_objects, read_object
+from generator.database.register import (
+    Registration,
+    find_array,
+    find_object,
+    occupied,
+    register,
+    remove_object,
+    same_layout,
+)
+from generator.database.registered import RegisteredPart
+from generator.database.transaction import reading, writing
+from generator.errors import DatabaseError
+from generator.layout.placement import FaceLayout, Layout, Placement
+from generator.polyhedron.shapes import tetrahedron
+
+ARRAY = PROFILES["one-touch"].array()
+CELLS = ARRAY.rows * ARRAY.columns
+SOLID = tetrahedron(60.0)
+
+floats = st.floats(allow_nan=False, allow_infinity=False)
+positive = st.floats(min_value=1e-300, max_value=1e300)
+names = st.text(st.characters(blacklist_categories=["Cs"], blacklist_characters="\0"), min_size=1)
+formats = st.sampled_from(["step", "stl"])
+values = st.recursive(
+    st.none() | st.booleans() | st.integers() | floats | names,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(names, inner, max_size=3),
+    max_leaves=10,
+)
+
+
+@st.composite
+def layouts(draw):
+    cells = np.array(draw(st.lists(st.integers(0, CELLS - 1), unique=True, max_size=60)), np.int64)
+    numbers = draw(st.lists(st.integers(0, 3), unique=True, min_size=1, max_size=4))
+    cuts = sorted(draw(st.integers(0, len(cells))) for _ in numbers[1:])
+    faces = []
+    for number, part in zip(numbers, np.split(cells, cuts), strict=True):
+        centres = draw(arrays.arrays(np.float64, (len(part), 2), elements=floats))
+        row, column = draw(st.integers(0, 2**63 - 1)), draw(st.integers(0, 2**63 - 1))
+        placement = Placement(row, column, draw(floats), draw(floats), draw(floats))
+        rows, columns = part // ARRAY.columns, part % ARRAY.columns
+        labels = ARRAY.symbols(rows, columns)
+        places = draw(st.integers(0, 2**40))
+        faces.append(FaceLayout(number, placement, rows, columns, labels, centres, places))
+    blank = tuple(face.face for face in faces if len(face.rows) == 0)
+    return Layout(
+        draw(st.sampled_from(["net", "faces"])), draw(positive), tuple(faces),
+        tuple(sorted(blank)), tuple(draw(st.lists(names, max_size=2))),
+    )  # fmt: skip
+
+
+@st.composite
+def registrations(draw):
+    layout = draw(layouts())
+    style = SymbolStyle(layout.pitch_mm, draw(floats), draw(positive), draw(floats), draw(floats))
+    matrix = arrays.arrays(np.float64, (4, 4), elements=floats)
+    parts = [
+        RegisteredPart(name, draw(formats), draw(names), "0" * 64, draw(matrix))
+        for name in draw(st.lists(names, unique=True, max_size=3))
+    ]
+    alphabet = draw(st.sampled_from(sorted(ALPHABETS)))
+    return Registration(
+        draw(names), SOLID, layout, ARRAY, draw(names), ALPHABETS[alphabet], style,
+        {"spec": draw(values)}, draw(names), tuple(parts),
+    )  # fmt: skip
+
+
+@settings(deadline=None, max_examples=60)
+@given(registrations())
+def test_everything_comes_back_bit_for_bit(registration):
+    with tempfile.TemporaryDirectory() as folder:
+        engine = open_database(str(Path(folder) / "lab.db"))
+        with writing(engine) as connection:
+            register(connection, registration)
+        with writing(engine) as connection:  # the same once more changes nothing
+            register(connection, registration)
+        with reading(engine) as connection:
+            known = read_object(connection, registration.name)
+            for face in registration.layout.faces:
+                objects, faces = faces_at(connection, 1, face.rows, face.columns)
+                assert (objects == known.entry.object_id).all()
+                assert (faces == face.face).all()
+    assert same_layout(known.layout, registration.layout)
+    assert repr(known.style) == repr(registration.style)  # repr tells -0.0 from 0.0
+    assert canonical(known.spec) == canonical(dict(registration.spec))
+    assert known.alphabet == registration.alphabet.definition()
+    assert known.entry.profile == registration.profile
+    assert len(known.parts) == len(registration.parts)
+    for part, given_part in zip(known.parts, registration.parts, strict=True):
+        assert (part.name, part.format, part.file) == (
+            given_part.name, given_part.format, given_part.file,
+        )  # fmt: skip
+        assert part.T_object_part.tobytes() == given_part.T_object_part.tobytes()
+
+
+steps = st.lists(
+    st.tuples(
+        st.sampled_from(["register", "replace", "remove"]),
+        st.sampled_from(["a", "b", "c"]),
+        st.integers(0, 30),  # first cell
+        st.integers(0, 12),  # number of cells
+    ),
+    max_size=12,
+)
+
+
+def small(name, first, count):
+    cells = np.arange(first, first + count)
+    face = FaceLayout(
+        0, Placement(0, first, 0.0, 0.0, 0.0), cells // 65, cells % 65,
+        ARRAY.symbols(cells // 65, cells % 65), np.zeros((count, 2)), 0,
+    )  # fmt: skip
+    return Registration(
+        name, SOLID, Layout("faces", 7.0, (face,)), ARRAY, "one-touch", ALPHABETS["dense-4"],
+        SymbolStyle(), {"first": first, "count": count}, "0",
+    )  # fmt: skip
+
+
+@settings(deadline=None, max_examples=40)
+@given(steps)
+def test_objects_never_share_a_cell(steps):
+    """Any run of registrations, replacements and removals against a dictionary of sets."""
+    held: dict[str, range] = {}
+    spec: dict[str, tuple[int, int]] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        engine = open_database(str(Path(folder) / "lab.db"))
+        for step, name, first, count in steps:
+            asked = range(first, first + count)  # equal to any other where it is empty
+            others = {c for other, cells in held.items() if other != name for c in cells}
+            try:
+                with writing(engine) as connection:
+                    if step == "remove":
+                        entry = find_object(connection, name)
+                        if entry is not None:
+                            remove_object(connection, entry.object_id)
+                    else:
+                        replace = step == "replace"
+                        register(connection, small(name, first, count), replace=replace)
+            except DatabaseError:
+                changed = step == "register" and spec.get(name) not in (None, (first, count))
+                assert changed or others & set(asked)
+            else:
+                assert step == "remove" or not others & set(asked)
+                if step == "remove":
+                    held.pop(name, None)
+                    spec.pop(name, None)
+                else:
+                    held[name], spec[name] = asked, (first, count)
+            with reading(engine) as connection:
+                assert [e.name for e in list_objects(connection)] == sorted(held)
+                rows, columns = occupied(connection, find_array(connection, ARRAY))
+                cells = (rows * 65 + columns).tolist()
+                assert cells == sorted(c for cells in held.values() for c in cells)

@@ -1,0 +1,334 @@
+"""Registering and reading back."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from sqlalchemy import select
+
+from generator.alphabet.known import alphabet_named
+from generator.alphabet.outline import SymbolStyle
+from generator.array.definition import array_from
+from generator.array.profiles import PROFILES
+from generator.database import tables
+from generator.database.canonical import canonical, spec_hash
+from generator.database.face_type import face_type
+from generator.database.open import open_database
+from generator.database.read import faces_at, list_objects, read_layout, read_object
+from generator.database.register import (
+    Registration,
+    find_array,
+    find_object,
+    occupied,
+    register,
+    remove_object,
+    same_layout,
+)
+from generator.database.registered import RegisteredPart
+from generator.database.transaction import reading, writing
+from generator.errors import DatabaseError
+from generator.layout.placement import FaceLayout, Layout, Placement
+from generator.polyhedron.shapes import cube, triangular_prism
+from generator.polyhedron.winged import polyhedron
+
+ARRAY = PROFILES["one-touch"].array()
+
+
+def layout_from(first, faces=6, symbols=64):
+    """Consecutive cells from number `first`; centres that a decimal fraction cannot say."""
+    made = []
+    for face in range(faces):
+        cells = first + face * symbols + np.arange(symbols)
+        rows, columns = cells // ARRAY.columns, cells % ARRAY.columns
+        made.append(
+            FaceLayout(
+                face=face,
+                placement=Placement(
+                    int(rows[0]), int(columns[0]), math.pi / (face + 1), -0.0, 1 / 3
+                ),
+                rows=rows,
+                columns=columns,
+                labels=ARRAY.symbols(rows, columns),
+                centres_mm=np.stack([rows / 7, -columns * 0.0], axis=1),
+                places=symbols - 3,
+            )
+        )
+    return Layout("faces", 7.0, tuple(made))
+
+
+def cube_on(first, name="Cube", **changes):
+    registration = Registration(
+        name=name,
+        polyhedron=cube(60.0),
+        layout=layout_from(first),
+        array=ARRAY,
+        profile="one-touch",
+        alphabet=alphabet_named("dense-4"),
+        style=SymbolStyle(),
+        spec={"name": name, "shape": {"cube": 60.0}, "first": first},
+        tool_version="0.1.0",
+        parts=(RegisteredPart("F1", "stl", "cube/F1.stl", "ab" * 32, np.eye(4) / 3),),
+    )
+    return dataclasses.replace(registration, **changes)
+
+
+def register_one(engine, registration, **options):
+    with writing(engine) as connection:
+        return register(connection, registration, **options)
+
+
+def held(engine):
+    with reading(engine) as connection:
+        rows, columns = occupied(connection, find_array(connection, ARRAY))
+        return sorted((rows * ARRAY.columns + columns).tolist())
+
+
+@pytest.fixture
+def engine(tmp_path):
+    return open_database(str(tmp_path / "lab.db"))
+
+
+def test_an_object_comes_back_exactly(engine):
+    given = cube_on(100)
+    number = register_one(engine, given)
+    with reading(engine) as connection:
+        known = read_object(connection, "Cube")
+    assert known.entry.object_id == number
+    assert known.entry.symbols == 384
+    assert known.entry.spec_hash == spec_hash(given.spec)
+    assert (known.entry.rows, known.entry.columns, known.entry.profile) == (63, 65, "one-touch")
+    assert known.polyhedron.vertices.tobytes() == given.polyhedron.vertices.tobytes()
+    assert known.polyhedron.faces == given.polyhedron.faces
+    assert known.polyhedron.edges == given.polyhedron.edges
+    assert same_layout(known.layout, given.layout)
+    assert known.style == given.style
+    assert known.spec == given.spec
+    assert known.alphabet == given.alphabet.definition()
+    assert array_from(known.array.definition).symbols(5, 7) == ARRAY.symbols(5, 7)
+    (part,) = known.parts
+    assert (part.name, part.format, part.file, part.sha256) == (
+        "F1", "stl", "cube/F1.stl", "ab" * 32,
+    )  # fmt: skip
+    assert part.T_object_part.tobytes() == (np.eye(4) / 3).tobytes()
+
+
+def test_faces_have_frames_that_put_their_outlines_back_on_the_vertices(engine):
+    given = cube_on(0)
+    register_one(engine, given)
+    with reading(engine) as connection:
+        known = read_object(connection, "Cube")
+    for face, shape, placed in zip(
+        known.faces, given.polyhedron.faces, given.layout.faces, strict=True
+    ):
+        (polygon,) = face.polygon_mm
+        plane = np.column_stack([polygon, np.zeros(4), np.ones(4)])
+        corners = (face.T_object_face @ plane.T).T[:, :3]
+        np.testing.assert_allclose(
+            corners, given.polyhedron.vertices[list(shape.loops[0])], atol=1e-12
+        )
+        assert face.area_mm2 == pytest.approx(3600.0, rel=1e-14)
+        assert face.face_type == "square"
+        assert face.placement == placed.placement
+
+
+def test_a_face_without_symbols_has_no_placement(engine):
+    bare = cube_on(0)
+    none = np.empty(0, np.int64)
+    nowhere = Placement(0, 0, 0.0, 0.0, 0.0)
+    faces = [
+        *bare.layout.faces[:2],
+        *(FaceLayout(face, nowhere, none, none, none, np.empty((0, 2)), 0) for face in range(2, 6)),
+    ]
+    layout = Layout("net", 7.0, tuple(faces), (2, 3, 4, 5), ("4 faces are blank",))
+    register_one(engine, dataclasses.replace(bare, layout=layout))
+    with reading(engine) as connection:
+        faces = read_object(connection, "Cube").faces
+        assert same_layout(read_layout(connection, "Cube"), layout)
+    assert [face.placement is not None for face in faces] == [
+        True,
+        True,
+        False,
+        False,
+        False,
+        False,
+    ]
+
+
+def test_an_object_with_holes_and_a_layout_in_its_own_order(engine):
+    """A square frame: faces with holes, genus 1; faces of the layout last to first."""
+    corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+    points = [(40 * s * x, 40 * s * y, z) for z in (0, 20) for s in (1, 0.5) for x, y in corners]
+    ring = [0, 1, 2, 3]
+    faces = [((3, 2, 1, 0), (4, 5, 6, 7)), ((8, 9, 10, 11), (15, 14, 13, 12))]
+    faces += [((a, b, b + 8, a + 8),) for a, b in zip(ring, [1, 2, 3, 0], strict=True)]
+    faces += [((b + 4, a + 4, a + 12, b + 12),) for a, b in zip(ring, [1, 2, 3, 0], strict=True)]
+    frame = polyhedron("polyhedron", points, faces)
+    layout = layout_from(0, faces=10, symbols=8)
+    layout = dataclasses.replace(layout, faces=layout.faces[::-1])
+    register_one(engine, cube_on(0, "Frame", polyhedron=frame, layout=layout))
+    with reading(engine) as connection:
+        known = read_object(connection, "Frame")
+    assert known.polyhedron.faces == frame.faces
+    assert known.polyhedron.genus == 1
+    assert same_layout(known.layout, layout)
+    assert [len(face.polygon_mm) for face in known.faces] == [2, 2] + 8 * [1]
+    assert known.faces[0].face_type == "polygon"
+    assert known.faces[0].area_mm2 == pytest.approx(80**2 - 40**2)
+
+
+def test_the_same_spec_again_changes_nothing_but_its_parts(engine):
+    first = register_one(engine, cube_on(100))
+    with reading(engine) as connection:
+        utc = find_object(connection, "Cube").utc
+        stored = read_layout(connection, "Cube")
+    parts = (
+        RegisteredPart("F1", "stl", "elsewhere/F1.stl", "cd" * 32, np.eye(4)),
+        RegisteredPart("F1", "step", "elsewhere/F1.step", "ef" * 32, np.eye(4)),
+    )
+    assert register_one(engine, cube_on(100, layout=stored, parts=parts)) == first
+    with reading(engine) as connection:
+        known = read_object(connection, "Cube")
+    assert known.entry.utc == utc
+    assert [(part.format, part.file) for part in known.parts] == [
+        ("stl", "elsewhere/F1.stl"),
+        ("step", "elsewhere/F1.step"),
+    ]
+
+
+def test_a_changed_spec_is_refused_and_replaced_on_request(engine):
+    number = register_one(engine, cube_on(0))
+    register_one(engine, cube_on(1000, "Other"))
+    with pytest.raises(DatabaseError, match="another spec") as caught:
+        register_one(engine, cube_on(500))
+    assert "--replace" in caught.value.fix
+    assert held(engine) == [*range(384), *range(1000, 1384)]
+    with reading(engine) as connection:
+        array_id = find_array(connection, ARRAY)
+        assert len(occupied(connection, array_id, without=number)[0]) == 384
+    assert register_one(engine, cube_on(200), replace=True) == number
+    assert held(engine) == [*range(200, 584), *range(1000, 1384)]
+
+
+def test_the_same_spec_on_other_cells_is_refused(engine):
+    register_one(engine, cube_on(0))
+    with pytest.raises(DatabaseError, match="on other cells"):
+        register_one(engine, cube_on(0, layout=layout_from(1)))
+
+
+def test_a_cell_that_another_object_holds_undoes_the_whole_object(engine):
+    register_one(engine, cube_on(0))
+    with pytest.raises(DatabaseError, match="another object holds"):
+        register_one(engine, cube_on(383, "Other"))
+    assert held(engine) == list(range(384))
+    with reading(engine) as connection:
+        assert [entry.name for entry in list_objects(connection)] == ["Cube"]
+        for table in tables.metadata.sorted_tables:
+            if "object_id" in table.c:
+                assert set(connection.execute(select(table.c.object_id)).scalars()) == {1}
+
+
+def test_an_error_of_the_caller_undoes_everything(engine):
+    def interrupted():
+        with writing(engine) as connection:
+            register(connection, cube_on(0))
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert held(engine) == []
+
+
+def test_removing_frees_the_cells(engine):
+    number = register_one(engine, cube_on(0))
+    with writing(engine) as connection:
+        remove_object(connection, number)
+    assert held(engine) == []
+    register_one(engine, cube_on(0, "Other"))
+    assert held(engine) == list(range(384))
+
+
+def test_cells_name_object_and_face(engine):
+    register_one(engine, cube_on(0))
+    register_one(engine, cube_on(1000, "Other"))
+    cells = np.array([0, 63, 64, 383, 384, 999, 1000, 1383, 0])
+    with reading(engine) as connection:
+        array_id = find_array(connection, ARRAY)
+        objects, faces = faces_at(connection, array_id, cells // 65, cells % 65)
+        everything = faces_at(
+            connection, array_id, np.arange(63)[:, None].repeat(65), np.tile(np.arange(65), 63)
+        )
+    assert objects.tolist() == [1, 1, 1, 1, -1, -1, 2, 2, 1]
+    assert faces.tolist() == [0, 0, 1, 5, -1, -1, 0, 5, 0]
+    assert [(everything[0] == number).sum() for number in (1, 2)] == [384, 384]
+
+
+def test_objects_with_other_windows_stand_on_the_same_cells(engine):
+    """A window changes no symbol, so it must not open the array a second time."""
+    definition = ARRAY.definition()
+    other = array_from(definition | {"window": [4, 3]})
+    assert other.definition() != definition
+    register_one(engine, cube_on(0))
+    with pytest.raises(DatabaseError, match="another object holds"):
+        register_one(engine, cube_on(0, "Other", array=other))
+
+
+def test_an_array_that_nobody_used_has_no_cells_taken(engine):
+    with reading(engine) as connection:
+        assert find_array(connection, ARRAY) is None
+        rows, columns = occupied(connection, None)
+    assert len(rows) == len(columns) == 0
+
+
+def test_objects_are_listed_by_name(engine):
+    register_one(engine, cube_on(400, "b"))
+    prism = cube_on(0, "a", polyhedron=triangular_prism(60.0, 60.0), layout=layout_from(0, faces=5))
+    register_one(engine, prism)
+    with reading(engine) as connection:
+        entries = list_objects(connection)
+    assert [(e.name, e.object_type, e.number_of_faces, e.symbols) for e in entries] == [
+        ("a", "triangular_prism", 5, 320),
+        ("b", "cube", 6, 384),
+    ]
+
+
+def test_an_unknown_object_is_named_beside_the_known_ones(engine):
+    register_one(engine, cube_on(0))
+    with (
+        reading(engine) as connection,
+        pytest.raises(DatabaseError, match="called 'cub'") as caught,
+    ):
+        read_object(connection, "cub")
+    assert "Cube" in caught.value.fix
+
+
+def test_impossible_registrations_are_refused_before_anything_is_written(engine):
+    with pytest.raises(ValueError, match="beyond the array"):
+        register_one(engine, cube_on(63 * 65 - 300))
+    with pytest.raises(ValueError, match="mm"):
+        register_one(engine, cube_on(0, style=SymbolStyle(pitch_mm=6.0)))
+    assert held(engine) == []
+
+
+def test_canonical_text_is_one_for_equal_values():
+    assert canonical({"b": 0.1, "a": [1, None, "µ"]}) == '{"a":[1,null,"µ"],"b":0.1}'
+    assert spec_hash({"b": 1, "a": 2}) == spec_hash({"a": 2, "b": 1}) != spec_hash({"a": 2, "b": 2})
+    with pytest.raises(ValueError, match="JSON"):
+        canonical(math.nan)
+
+
+@pytest.mark.parametrize(
+    ("corners", "kind"),
+    [
+        ([(0, 0), (2, 0), (1, 1)], "triangle"),
+        ([(0, 0), (2, 0), (2, 2), (0, 2)], "square"),
+        ([(0, 0), (3, 0), (3, 2), (0, 2)], "rectangle"),
+        ([(0, 0), (2, 0), (3, 1), (1, 1)], "quadrilateral"),
+        ([(0, 0), (2, 1), (4, 0), (2, 3)], "quadrilateral"),
+        ([(0, 0), (2, 0), (3, 1), (1, 3), (0, 1)], "polygon"),
+    ],
+)
+def test_face_types(corners, kind):
+    assert face_type([np.array(corners, dtype=float)]) == kind
+    turn = np.array([[0.6, -0.8], [0.8, 0.6]]) * 1e3
+    assert face_type([np.array(corners) @ turn]) == kind
