@@ -1,0 +1,72 @@
+"""What every block of settings shares: unknown names are refused, empty lines are left out."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, model_validator
+
+from generator.spec.quantity import refuse
+
+NAME_LENGTH_MAX = 60
+_NAME = re.compile(r"[^\W_][\w .()+-]*\Z")
+
+
+class Block(BaseModel):
+    """A block of settings."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_empty_lines(cls, value: Any) -> Any:
+        """Take a known setting without a value (`symbols:`) as not given."""
+        if not isinstance(value, dict):
+            return value
+        return {k: v for k, v in value.items() if v is not None or k not in cls.model_fields}
+
+
+def object_name(value: Any) -> str:
+    """Return the name of an object: it names files and rows of the database too."""
+    if not isinstance(value, str):
+        raise refuse(f"a name must be text, not {value!r}", f"put it in quotes: '{value}'")
+    if not value.strip():
+        raise refuse("the name is empty", "write, for example, name: Cube")
+    if len(value) > NAME_LENGTH_MAX:
+        cause = f"the name has {len(value)} characters, {NAME_LENGTH_MAX} are allowed"
+        raise refuse(cause, "shorten it")
+    if not _NAME.match(value) or value[-1] in " .":
+        fix = "use letters, digits, spaces and - _ . ( ) +, a letter or digit first"
+        raise refuse(f"{value!r} cannot be part of a file name", fix)
+    return value
+
+
+def path_text(value: Any) -> str:
+    """Return the name of a file or folder."""
+    if not isinstance(value, str):
+        raise refuse(f"a path must be text, not {value!r}", f"put it in quotes: '{value}'")
+    if not value.isprintable() or not value.strip():
+        raise refuse(f"{value!r} is no path", "leave control characters out")
+    return value
+
+
+def whole_number(low: int, high: int, what: str) -> BeforeValidator:
+    """Return a validator of whole numbers from `low` to `high`."""
+
+    def check(value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise refuse(f"{what} must be a whole number", f"write a number from {low} to {high}")
+        if not low <= value <= high:
+            shown = str(value) if abs(value) < 10**12 else "the number given"
+            raise refuse(
+                f"{what} must be {low} to {high}, not {shown}",
+                f"write a number from {low} to {high}",
+            )
+        return value
+
+    return BeforeValidator(check)
+
+
+PathText = Annotated[str, BeforeValidator(path_text)]
+ObjectName = Annotated[str, BeforeValidator(object_name)]

@@ -1,0 +1,38 @@
+"""Settings that are given as options of a command, read by the rules of the spec."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+from pydantic_core import PydanticCustomError
+
+from generator.spec.problem import Problem, SpecError, did_you_mean
+from generator.spec.settings import Format, database_url
+
+
+def format_option(text: str) -> tuple[str, ...]:
+    """Return the formats of `--format step,stl`; raises `SpecError`."""
+    known = get_args(Format)
+    names = [part.strip().lower().lstrip(".") for part in text.split(",") if part.strip()]
+    problems = []
+    for name in names:
+        if name not in known:
+            near = did_you_mean(name, known)
+            fix = f"did you mean '{near}'?" if near else f"choose from {','.join(known)}"
+            problems.append(Problem(f"unknown format '{name}'", fix, file="--format"))
+    if not names:
+        fix = f"choose from {','.join(known)}"
+        problems.append(Problem("no format is named", fix, file="--format"))
+    if problems:
+        raise SpecError(problems)
+    return tuple(dict.fromkeys(names))
+
+
+def database_option(text: str) -> str:
+    """Return the URL of `--database`; raises `SpecError`."""
+    try:
+        return database_url(text)
+    except PydanticCustomError as error:
+        context = error.context or {}
+        problem = Problem(context["cause"], context["fix"], file="--database")
+        raise SpecError([problem]) from None

@@ -1,0 +1,150 @@
+"""Lengths and angles as people write them.
+
+`40`, `40 mm`, `4 cm`, `1.6 in` -> mm; `10`, `10 deg`, `0.17 rad` -> radians (a bare
+angle is in degrees). Values are rounded to 1e-9 mm and 1e-12 rad, so that the same
+length in two units is the same number.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, WithJsonSchema
+from pydantic_core import PydanticCustomError
+
+from generator.spec.problem import did_you_mean
+
+LENGTH_MAX_MM = 10_000.0
+MILLIMETRES = {
+    "mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 0.001, "µm": 0.001, "μm": 0.001,
+    "in": 25.4, "inch": 25.4, "inches": 25.4, '"': 25.4,
+}  # fmt: skip
+RADIANS = {
+    "deg": math.pi / 180, "degree": math.pi / 180, "degrees": math.pi / 180, "°": math.pi / 180,
+    "rad": 1.0,
+}  # fmt: skip
+SHOWN_UNITS = {"a length": "mm, cm, m, um, in", "an angle": "deg, rad"}
+_QUANTITY = re.compile(
+    r"\s*(?P<number>[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]{1,4})?)\s*"
+    r"(?P<unit>[^\s0-9.,+-][^\s]{0,40})?\s*\Z"
+)
+_COMMA = re.compile(r"\s*[-+]?[0-9]+,[0-9]+(?![0-9,])")
+_SIDES = re.compile(r"\s*(?:x|×|by)\s*")
+
+
+def refuse(cause: str, fix: str) -> PydanticCustomError:
+    """Return the error that a validator raises: what is wrong, and the way out."""
+    return PydanticCustomError("refused", "{cause}", {"cause": cause, "fix": fix})
+
+
+def length_mm(value: Any) -> float:
+    """Return a length above zero, mm."""
+    length = coordinate_mm(value)
+    if length <= 0:
+        raise refuse(f"a length must be above 0, not {length:g} mm", "write, for example, 40 mm")
+    return length
+
+
+def length_or_zero_mm(value: Any) -> float:
+    """Return a length of zero or more, mm."""
+    length = coordinate_mm(value)
+    if length < 0:
+        raise refuse(f"a length must not be below 0, but is {length:g} mm", "write 0 for none")
+    return length
+
+
+def coordinate_mm(value: Any) -> float:
+    """Return a length of either sign, mm."""
+    number = _number(value, MILLIMETRES, "mm", "a length", "40, 40 mm, 4 cm or 1.6 in")
+    if abs(number) > LENGTH_MAX_MM:
+        raise refuse(f"{number:g} mm is more than {LENGTH_MAX_MM / 1000:g} m", "check the unit")
+    return round(number, 9) + 0.0
+
+
+def angle_rad(value: Any) -> float:
+    """Return an angle, radians."""
+    return round(_number(value, RADIANS, "deg", "an angle", "10, 10 deg or 0.17 rad"), 12) + 0.0
+
+
+def sides(value: Any) -> Any:
+    """Return the three sides of a box as a list; `80 x 80 x 120 mm` is one too."""
+    parts = value
+    if isinstance(value, str):
+        parts = _SIDES.split(value)
+        unit = re.sub(r"[-+0-9.eE\s]*", "", parts[-1], count=1)
+        parts = [part if re.search(r"[^-+0-9.eE\s]", part) else f"{part} {unit}" for part in parts]
+    if not isinstance(parts, list) or len(parts) != 3:
+        had = f", not {len(parts)}" if isinstance(parts, list) else ""
+        raise refuse(f"a box has three sides{had}", "write box: [80 mm, 80 mm, 120 mm]")
+    return parts
+
+
+def coordinates(value: Any) -> Any:
+    """Return the three coordinates of a corner as they are."""
+    if not isinstance(value, list) or len(value) != 3:
+        had = f", not {len(value)}" if isinstance(value, list) else ""
+        raise refuse(f"a corner has three coordinates{had}", "write [x, y, z]")
+    return value
+
+
+def _number(value: Any, units: dict[str, float], bare: str, what: str, example: str) -> float:
+    """Return a number with a unit in the base unit; raises the error that `refuse` makes."""
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise refuse(f"this must be {what}", f"write, for example, {example}")
+    if isinstance(value, str):
+        match = _QUANTITY.match(value)
+        if match is None:
+            raise _unreadable(value, what, example)
+        number, unit = float(match["number"]), match["unit"] or bare
+        if unit not in units:
+            raise _unknown_unit(unit, units, what)
+    else:
+        try:
+            number, unit = float(value), bare
+        except OverflowError:
+            number, unit = math.inf, bare
+    if not math.isfinite(number * units[unit]):
+        raise refuse(f"{what} must be a finite number", f"write, for example, {example}")
+    return number * units[unit]
+
+
+def _unreadable(value: str, what: str, example: str) -> PydanticCustomError:
+    if _COMMA.match(value):
+        fix = f"write a point: {value.strip().replace(',', '.', 1)}"
+        return refuse(f"'{value}' has a decimal comma", fix)
+    return refuse(f"'{_short(value)}' is not {what}", f"write, for example, {example}")
+
+
+def _unknown_unit(unit: str, units: dict[str, float], what: str) -> PydanticCustomError:
+    near = unit.lower() if unit.lower() in units else ""
+    if len(unit) > 4:
+        near = near or did_you_mean(unit, (name for name in units if len(name) > 2))
+    fix = f"did you mean '{near}'?" if near else f"use one of {SHOWN_UNITS[what]}"
+    return refuse(f"unknown unit '{_short(unit)}' for {what}", fix)
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+_LENGTH_TEXT = r"^\s*[0-9.]+([eE][-+]?[0-9]+)?\s*(mm|cm|m|um|in|inch|inches)?\s*$"
+_COORDINATE_TEXT = r"^\s*[-+]?[0-9.]+([eE][-+]?[0-9]+)?\s*(mm|cm|m|um|in|inch|inches)?\s*$"
+_ANGLE_TEXT = r"^\s*[-+]?[0-9.]+([eE][-+]?[0-9]+)?\s*(deg|degree|degrees|°|rad)?\s*$"
+
+
+def _schema(number: dict[str, Any], pattern: str) -> WithJsonSchema:
+    return WithJsonSchema(
+        {"anyOf": [{"type": "number", **number}, {"type": "string", "pattern": pattern}]}
+    )
+
+
+Length = Annotated[
+    float, BeforeValidator(length_mm), _schema({"exclusiveMinimum": 0}, _LENGTH_TEXT)
+]
+LengthOrZero = Annotated[
+    float, BeforeValidator(length_or_zero_mm), _schema({"minimum": 0}, _LENGTH_TEXT)
+]
+Coordinate = Annotated[float, BeforeValidator(coordinate_mm), _schema({}, _COORDINATE_TEXT)]
+Angle = Annotated[float, BeforeValidator(angle_rad), _schema({}, _ANGLE_TEXT)]

@@ -1,0 +1,224 @@
+"""Read specs: one object a file, or a set of objects that share one array.
+
+Files -> Located objects. All problems of all files are reported at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from generator.spec.document import Place, Tree, read_tree
+from generator.spec.explain import explained
+from generator.spec.located import Located, mark_of
+from generator.spec.problem import Problem, SpecError
+from generator.spec.resolve import resolved
+from generator.spec.settings import Defaults, ObjectSettings
+
+OBJECTS_MAX = 10_000
+PROBLEMS_SHOWN = 25
+SHARED_BLOCKS = ("symbols", "print", "output")  # merged setting by setting
+
+
+def read_specs(paths: Sequence[Path | str], *, database: str | None = None) -> tuple[Located, ...]:
+    """Read all objects of one run.
+
+    Parameters
+    ----------
+    paths
+        Spec files; each holds one object or a set.
+    database
+        URL that takes the place of the one in the files; they may then name different ones.
+
+    Returns
+    -------
+    tuple of Located
+        One for each object and copy, in the order of the files.
+
+    Raises
+    ------
+    SpecError
+        Every problem of every file; also objects with one name, or on different arrays.
+
+    Examples
+    --------
+    >>> read_specs(["fixtures/cube.yaml"])[0].spec.style.pitch_mm
+    7.0
+    """
+    problems: list[Problem] = []
+    found: list[Located] = []
+    for path in paths:
+        for tree in _collected(_objects(Path(path), problems), problems):
+            try:
+                settings = ObjectSettings.model_validate(tree.value)
+                if len(found) + settings.copies <= OBJECTS_MAX:
+                    found += [Located(spec, tree) for spec in resolved(settings, tree)]
+                else:
+                    problems.append(_too_many(tree))
+            except ValidationError as error:
+                problems += explained(error, tree, ObjectSettings)
+            except SpecError as error:
+                problems += error.problems
+    if not problems:
+        problems += _shared_problems(found, database)
+    if problems:
+        raise SpecError(_shown(problems))
+    return tuple(found)
+
+
+def _collected(trees: Iterable[Tree], problems: list[Problem]) -> list[Tree]:
+    """Return the trees; a file that cannot be read adds its problems."""
+    try:
+        return list(trees)
+    except SpecError as error:
+        problems += error.problems
+        return []
+
+
+def _objects(path: Path, problems: list[Problem]) -> Iterable[Tree]:
+    """Yield the objects of a file; those of a set with the set's defaults merged in."""
+    tree = read_tree(path)
+    problems += tree.problems
+    if not isinstance(tree.value, dict) or "objects" not in tree.value:
+        yield tree
+        return
+    shared = tree.without("objects")
+    try:
+        Defaults.model_validate(shared.value)
+    except ValidationError as error:
+        problems += explained(error, tree, Defaults)
+    entries = tree.value["objects"]
+    if not isinstance(entries, list) or not entries:
+        fix = "write  objects:  and below it a list of  - name: ...  or  - file.yaml"
+        problems.append(
+            Problem("'objects' takes a list of objects", fix, tree.key_mark(("objects",)))
+        )
+        return
+    for own in tree.parts()["objects"].parts().values():
+        entry = own.value
+        if isinstance(entry, str):
+            if file := _object_file(path.parent / entry, own, problems):
+                yield _merged(shared, file)
+        elif isinstance(entry, dict):
+            if "objects" in entry:
+                fix = "list all objects in one set"
+                problems.append(Problem("a set inside a set", fix, own.key_mark(("objects",))))
+            else:
+                yield _merged(shared, own)
+        else:
+            fix = "write  - name: ...  or  - file.yaml"
+            cause = "an object of a set is a block of settings or a file name"
+            problems.append(Problem(cause, fix, own.value_mark(())))
+
+
+def _object_file(path: Path, entry: Tree, problems: list[Problem]) -> Tree | None:
+    """Return the object in a file that a set names; problems with the file stand in the set."""
+    try:
+        tree = read_tree(path)
+    except SpecError as error:
+        here = entry.value_mark(())
+        problems += [
+            Problem(f"{p.file}: {p.cause}", p.fix, here) if p.mark is None else p
+            for p in error.problems
+        ]
+        return None
+    problems += tree.problems
+    if isinstance(tree.value, dict) and "objects" in tree.value:
+        fix = "name files that hold one object each"
+        problems.append(Problem(f"'{path}' is itself a set", fix, entry.value_mark(())))
+        return None
+    return tree
+
+
+def _merged(shared: Tree, own: Tree) -> Tree:
+    """Return an object with a set's defaults where it says nothing itself."""
+    if not isinstance(own.value, dict):
+        return own
+    values, value_marks, key_marks = dict(own.value), dict(own.values), dict(own.keys)
+    for key in Defaults.model_fields:
+        default = shared.value.get(key)
+        if default is None or (key in ("profile", "encoding") and _names_array(own)):
+            continue
+        present = values.get(key)
+        if key in SHARED_BLOCKS and isinstance(present, dict) and isinstance(default, dict):
+            names = [name for name in default if present.get(name) is None]
+            values[key] = present | {name: default[name] for name in names}
+            taken: list[Place] = [(key, name) for name in names]
+        elif present is None:
+            taken = [(key,)]
+            values[key] = default
+        else:
+            continue
+        for marks, source in ((value_marks, shared.values), (key_marks, shared.keys)):
+            marks |= {place: mark for place, mark in source.items() if _within(place, taken)}
+    return Tree(values, value_marks, key_marks, own.folder)
+
+
+def _within(place: Place, taken: Sequence[Place]) -> bool:
+    return any(place[: len(top)] == top for top in taken)
+
+
+def _names_array(tree: Tree) -> bool:
+    return any(tree.value.get(key) is not None for key in ("profile", "encoding"))
+
+
+def _shared_problems(found: Sequence[Located], database: str | None) -> list[Problem]:
+    """Return what keeps the objects from standing on one array, in one database."""
+    problems: list[Problem] = []
+    first = found[0]
+    names: dict[str, Located] = {}
+    for located in found:
+        spec = located.spec
+        other = names.setdefault(spec.name.casefold(), located)
+        if other is not located:
+            where = mark_of(other.tree, "name")
+            problems.append(
+                Problem(
+                    f"two objects are called '{spec.name}', the first in {where}",
+                    "give it another name",
+                    mark_of(located.tree, "name"),
+                )
+            )
+        path = ""
+        if spec.encoding != first.spec.encoding:
+            path, what = "profile, encoding", "array"
+            one, two = spec.profile, first.spec.profile
+        elif database is None and spec.database != first.spec.database:
+            path, what = "output.database", "database"
+            one, two = spec.database, first.spec.database
+        if path:
+            cause = f"'{spec.name}' is on another {what} ({one}) than '{first.spec.name}' ({two})"
+            fix = f"run encode-object once for each {what}"
+            problems.append(Problem(cause, fix, mark_of(located.tree, path)))
+    return problems
+
+
+def _too_many(tree: Tree) -> Problem:
+    cause = f"more than {OBJECTS_MAX} objects in one run"
+    return Problem(cause, "make them in several runs", mark_of(tree, "copies, name"))
+
+
+def _shown(problems: Sequence[Problem]) -> list[Problem]:
+    """Return each problem once, in the order of files and lines, at most `PROBLEMS_SHOWN`."""
+    once: dict[tuple[str, str], Problem] = {}
+    for problem in problems:
+        once.setdefault((problem.place, problem.cause), problem)
+    files: dict[str, int] = {}
+    for problem in once.values():
+        files.setdefault(_file(problem), len(files))
+    ordered = sorted(once.values(), key=lambda p: (files[_file(p)], _position(p)))
+    if len(ordered) > PROBLEMS_SHOWN:
+        more = len(ordered) - PROBLEMS_SHOWN
+        rest = Problem(f"and {more} more problems", "correct these first", file=_file(ordered[-1]))
+        return [*ordered[:PROBLEMS_SHOWN], rest]
+    return ordered
+
+
+def _file(problem: Problem) -> str:
+    return problem.mark.source.name if problem.mark else problem.file
+
+
+def _position(problem: Problem) -> tuple[int, int]:
+    return (problem.mark.line, problem.mark.column) if problem.mark else (0, 0)

@@ -1,0 +1,196 @@
+"""From settings to a resolved object: defaults by profile, and what settings mean together.
+
+ObjectSettings + Tree -> ObjectSpec for each copy, or every problem with its place.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from generator.alphabet.known import ALPHABETS, Alphabet
+from generator.alphabet.outline import SymbolStyle
+from generator.alphabet.printable import check_printable
+from generator.array.definition import array_from
+from generator.array.profiles import PROFILES
+from generator.errors import AlphabetError, ArrayError
+from generator.printers import PRINTERS, printer_named
+from generator.spec.document import Tree
+from generator.spec.encoding import Encoding
+from generator.spec.located import mark_of
+from generator.spec.problem import Problem, SpecError
+from generator.spec.profile import (
+    DATABASE,
+    DEFAULT_PROFILE,
+    DRAFTS_RAD,
+    EXPLICIT,
+    FORMATS,
+    HEIGHT_MM,
+    WALL_MM,
+    SymbolDefaults,
+    defaults_of_order,
+    defaults_of_profile,
+)
+from generator.spec.resolve_shape import Refuse, resolved_shape
+from generator.spec.resolved import ObjectSpec
+from generator.spec.settings import ObjectSettings
+
+WALL_STROKES = 2  # least wall, in narrowest strokes of the printer
+
+
+def resolved(settings: ObjectSettings, tree: Tree) -> tuple[ObjectSpec, ...]:
+    """Return the object, or its copies, with all settings resolved.
+
+    Parameters
+    ----------
+    settings
+        One object as it was read.
+    tree
+        Where its settings stand.
+
+    Returns
+    -------
+    tuple of ObjectSpec
+        One, or `copies` of them called NAME-1, NAME-2, ...
+
+    Raises
+    ------
+    SpecError
+        With every setting that does not go with the others.
+    """
+    problems: list[Problem] = []
+
+    def refuse(path: str, cause: str, fix: str) -> None:
+        problems.append(Problem(cause, fix, mark_of(tree, path)))
+
+    shape = resolved_shape(settings.shape, tree, refuse)
+    encoding, order = _array(settings, refuse)
+    if settings.encoding is None or order is None:
+        defaults = defaults_of_profile(settings.profile or DEFAULT_PROFILE)
+    else:
+        defaults = defaults_of_order(order)
+    printer = settings.print.printer or defaults.printer
+    style = _style(settings, defaults)
+    alphabet = ALPHABETS[settings.symbols.alphabet or defaults.alphabet]
+    if order is not None and alphabet.order < order:
+        _refuse_order(alphabet, order, refuse)
+    elif order is not None:
+        found = _printable(alphabet, style, printer, settings.symbols.draft is None)
+        if isinstance(found, AlphabetError):
+            _refuse_style(found, refuse)
+        else:
+            style = found
+    wall = settings.print.wall or WALL_MM
+    thinnest = WALL_STROKES * printer_named(printer).stroke_min_mm
+    if wall < thinnest:
+        refuse(
+            "print.wall",
+            f"a wall of {wall:g} mm is thinner than {printer} prints solid",
+            f"set wall to {thinnest:g} mm or more",
+        )
+    if problems or shape is None:
+        raise SpecError(problems)
+    spec = ObjectSpec(
+        name=settings.name,
+        shape=shape,
+        profile=EXPLICIT if settings.encoding else settings.profile or DEFAULT_PROFILE,
+        encoding=encoding,
+        alphabet=alphabet.name,
+        style=style,
+        layout=settings.layout,
+        parts=settings.print.parts,
+        wall_mm=wall,
+        printer=printer,
+        formats=tuple(dict.fromkeys(settings.output.formats or FORMATS)),
+        folder=Path(settings.output.folder or f"out/{_folder_name(settings.name)}"),
+        database=settings.output.database or DATABASE,
+    )
+    if settings.copies == 1:
+        return (spec,)
+    return tuple(replace(spec, name=f"{spec.name}-{k + 1}") for k in range(settings.copies))
+
+
+def _folder_name(name: str) -> str:
+    return re.sub(r"\s+", "-", name.lower())
+
+
+def _style(settings: ObjectSettings, defaults: SymbolDefaults) -> SymbolStyle:
+    """Return how symbols are embossed; the stroke follows the pitch and the alphabet."""
+    symbols = settings.symbols
+    pitch = symbols.pitch or defaults.pitch_mm
+    ratio = ALPHABETS[symbols.alphabet or defaults.alphabet].stroke_ratio
+    return SymbolStyle(
+        pitch_mm=pitch,
+        height_mm=symbols.height or HEIGHT_MM,
+        stroke_mm=symbols.stroke or round(ratio * pitch, 2),
+        draft_rad=DRAFTS_RAD[0] if symbols.draft is None else symbols.draft,
+        chamfer_mm=symbols.chamfer or 0.0,
+    )
+
+
+def _printable(
+    alphabet: Alphabet, style: SymbolStyle, printer: str, steeper: bool
+) -> SymbolStyle | AlphabetError:
+    """Return the style, with less draft where `steeper` allows it and strokes need the room.
+
+    The error is that of the steepest sides, where no style prints.
+    """
+    trials = [replace(style, draft_rad=draft) for draft in DRAFTS_RAD] if steeper else [style]
+    refused = None
+    for trial in trials:
+        try:
+            check_printable(alphabet, trial, PRINTERS[printer])
+            return trial
+        except AlphabetError as error:
+            refused = error
+    assert refused is not None
+    return refused
+
+
+def _refuse_style(error: AlphabetError, refuse: Refuse) -> None:
+    """Point at the number that the message starts with, or at what is written of the others."""
+    names = ("stroke", "pitch", "height", "draft", "chamfer")
+    first = [name for name in names if re.match(rf"(a )?{name}\b", error.cause)]
+    written = [f"symbols.{name}" for name in (*first, *names)]
+    rest = ["symbols.alphabet", "print.printer", "symbols", "profile", "encoding", "shape"]
+    refuse(", ".join(written + rest), error.cause, error.fix)
+
+
+def _refuse_order(alphabet: Alphabet, order: int, refuse: Refuse) -> None:
+    """Refuse an alphabet with too few symbols."""
+    enough = [name for name, other in ALPHABETS.items() if other.order >= order]
+    most = max(other.order for other in ALPHABETS.values())
+    fix = f"set alphabet to {' or '.join(enough)}" if enough else f"take an order of {most} or less"
+    cause = f"the array has {order} symbols, but the alphabet {alphabet.name} has {alphabet.order}"
+    refuse("symbols.alphabet, encoding, profile", cause, fix)
+
+
+def _array(settings: ObjectSettings, refuse: Refuse) -> tuple[dict[str, Any], int | None]:
+    """Return the complete definition of the array, and its number of symbols."""
+    if settings.encoding is None:
+        return _profile_definition(settings.profile or DEFAULT_PROFILE)
+    if settings.profile is not None:
+        refuse(
+            "encoding",
+            f"the array is given twice: profile {settings.profile} and encoding",
+            "leave one of them out",
+        )
+    try:
+        array = array_from(settings.encoding.model_dump(exclude_none=True))
+    except ArrayError as error:
+        mentioned = [key for key in Encoding.model_fields if re.search(rf"\b{key}\b", error.cause)]
+        if error.cause.startswith("'"):
+            mentioned = ["polynomial", *mentioned]
+        paths = [f"encoding.{key}" for key in mentioned]
+        refuse(", ".join([*paths, "encoding"]), error.cause, error.fix)
+        return {}, None
+    return array.definition(), array.order
+
+
+@cache
+def _profile_definition(name: str) -> tuple[dict[str, Any], int]:
+    array = PROFILES[name].array()
+    return array.definition(), array.order

@@ -1,0 +1,75 @@
+"""One object, all settings resolved: what the pipeline works from.
+
+Lengths in mm, angles in radians. Nothing here depends on how the spec was written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from generator.alphabet.outline import SymbolStyle
+
+
+@dataclass(frozen=True, slots=True)
+class ShapeSpec:
+    """A shape by name and sizes.
+
+    ============================================  ===============================================
+    kind                                          parameters
+    ============================================  ===============================================
+    cube, tetrahedron, octahedron, dodecahedron   side
+    box                                           size: [x, y, z]
+    triangular_prism                              side, height
+    prism, pyramid                                sides, height, side or radius
+    polyhedron                                    vertices: [[x, y, z], ...],
+                                                  faces: [[loop, hole, ...], ...]
+    file                                          sha256 (of the content of `file`)
+    ============================================  ===============================================
+
+    All but `file` are those that the functions of `generator.polyhedron.shapes.SHAPES` take.
+    """
+
+    kind: str
+    parameters: Mapping[str, Any]
+    file: Path | None = None  #: the model, for kind "file"
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectSpec:
+    """One object to make."""
+
+    name: str  #: copies are called NAME-1, NAME-2, ...
+    shape: ShapeSpec
+    profile: str  #: name of the array's profile; "explicit" where the encoding is written out
+    encoding: Mapping[str, Any]  #: the array, complete: what `array.definition()` returns
+    alphabet: str
+    style: SymbolStyle
+    layout: Literal["auto", "net", "faces"]
+    parts: Literal["panels", "whole"]
+    wall_mm: float  #: thickness of panels
+    printer: str
+    formats: tuple[str, ...]  #: of step, stl, 3mf, glb
+    folder: Path  #: for the files; relative to the current folder
+    database: str  #: URL
+
+    @property
+    def meaning(self) -> dict[str, Any]:
+        """What a spec means, as plain values; equal specs mean the same object.
+
+        Comments, key order, units, names, folders, formats and the database do not count;
+        a default counts as if it had been written; a file counts by its content.
+        """
+        style = {name: round(value, 9) for name, value in asdict(self.style).items()}
+        return {
+            "shape": {"kind": self.shape.kind, **self.shape.parameters},
+            "array": dict(self.encoding),
+            "alphabet": self.alphabet,
+            "style": style,
+            "layout": self.layout,
+            "parts": self.parts,
+            "wall_mm": self.wall_mm,
+            "printer": self.printer,
+        }

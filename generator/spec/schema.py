@@ -1,0 +1,36 @@
+"""The JSON schema of a spec, so that editors complete and check while one writes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import TypeAdapter
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+from pydantic_core import core_schema
+
+from generator.spec.settings import ObjectSettings, SetSettings
+from generator.spec.shape import Shape
+
+
+class _SpecSchema(GenerateJsonSchema):
+    """Says what a person may write: a setting is there with a value, or it is left out."""
+
+    def nullable_schema(self, schema: core_schema.NullableSchema) -> JsonSchemaValue:
+        return self.generate_inner(schema["schema"])
+
+    def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
+        inner = super().default_schema(schema)
+        return {k: v for k, v in inner.items() if k != "default" or isinstance(v, str | int)}
+
+
+def spec_schema() -> dict[str, Any]:
+    """Return the JSON schema (draft 2020-12) of a spec file: an object, or a set."""
+    schema = TypeAdapter(ObjectSettings | SetSettings).json_schema(schema_generator=_SpecSchema)
+    shape = schema["$defs"][Shape.__name__]
+    shape |= {"minProperties": 1, "maxProperties": 1}
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "encoded object",
+        "description": "What encode-object makes: one object, or a set that shares one array.",
+        **schema,
+    }

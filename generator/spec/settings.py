@@ -1,0 +1,149 @@
+"""The settings of a spec, as people write them: names, defaults and descriptions.
+
+These models read one object (`ObjectSettings`) or a set (`SetSettings`) and are the
+source of the JSON schema. Lengths are in mm and angles in radians after reading.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+from generator.spec.block import Block, ObjectName, PathText, whole_number
+from generator.spec.encoding import Encoding
+from generator.spec.quantity import Angle, Length, LengthOrZero, refuse
+from generator.spec.shape import EXAMPLES, Shape
+
+SPEC_VERSION = 1
+COPIES_MAX = 1000
+
+ProfileName = Literal["one-touch", "thesis", "product", "large", "fine"]
+AlphabetName = Literal["thesis-2", "dense-4", "letters-4", "dense-8"]
+Format = Literal["step", "stl", "3mf", "glb"]
+
+
+def version(value: Any) -> Any:
+    """Return the version of the spec format; only the present one is read."""
+    if type(value) is int and value > SPEC_VERSION:
+        raise refuse(
+            f"version {value} is newer than this tool, which reads version {SPEC_VERSION}",
+            "update encoded-objects",
+        )
+    if type(value) is not int or value != SPEC_VERSION:
+        raise refuse("the version of a spec is a number", f"write version: {SPEC_VERSION}")
+    return value
+
+
+def shape_block(value: Any) -> Any:
+    """Refuse a shape without its size: `cube`, or `60 mm`."""
+    if isinstance(value, str) and value in EXAMPLES:
+        raise refuse(f"the shape '{value}' needs its size", f"write shape: {EXAMPLES[value]}")
+    if not isinstance(value, dict):
+        raise refuse("a shape has a name and its size", f"write shape: {EXAMPLES['cube']}")
+    if not value:
+        raise refuse("the shape is empty", f"write shape: {EXAMPLES['cube']}")
+    return value
+
+
+def format_list(value: Any) -> Any:
+    """Return a list of formats; `step, stl` is one too."""
+    return [part.strip() for part in value.split(",")] if isinstance(value, str) else value
+
+
+def database_url(value: Any) -> str:
+    """Return the address of a database; `lab.db` is that of a file."""
+    if not isinstance(value, str) or not value.strip() or not value.isprintable():
+        raise refuse("a database is a file name or an address", "write, for example, lab.db")
+    scheme, separator, _ = value.partition("://")
+    if not separator:
+        return f"sqlite:///{value}"
+    if scheme not in ("sqlite", "postgresql", "postgres", "postgresql+psycopg"):
+        raise refuse(
+            f"objects cannot be kept in '{scheme}', only in sqlite or postgresql",
+            "write sqlite:///lab.db or postgresql://user@host/name",
+        )
+    return value
+
+
+Version = Annotated[Literal[1], BeforeValidator(version)]
+Copies = Annotated[int, Field(ge=1, le=COPIES_MAX), whole_number(1, COPIES_MAX, "copies")]
+FormatList = Annotated[
+    list[Format],
+    Field(min_length=1),
+    BeforeValidator(format_list, json_schema_input_type=list[Format] | str),
+]
+DatabaseUrl = Annotated[str, BeforeValidator(database_url)]
+
+
+class Symbols(Block):
+    """How the symbols are embossed; what is left out follows from the profile."""
+
+    pitch: Length | None = None
+    """Distance between neighbouring symbols; 7 mm for one-touch."""
+    height: Length | None = None
+    """How far symbols stand out; 1 mm."""
+    stroke: Length | None = None
+    """Width of the strokes at their top; a share of the pitch, 1.4 mm for one-touch."""
+    draft: Angle | None = None
+    """Slope of the strokes' sides from the vertical; 10 deg, or less where there is no room."""
+    chamfer: LengthOrZero | None = None
+    """Chamfer of the strokes' top edges; 0 for none."""
+    alphabet: AlphabetName | None = None
+    """The symbols themselves."""
+
+
+class Print(Block):
+    """How the object is printed."""
+
+    parts: Literal["panels", "whole"] = "panels"
+    """panels: one mitred plate for each face, without overhang; whole: one solid body."""
+    wall: Length | None = None
+    """Thickness of the panels; 3 mm."""
+    printer: Literal["fdm-0.4", "fdm-0.25", "resin"] | None = None
+    """What prints: its limits hold for strokes, gaps and the bed."""
+
+
+class Output(Block):
+    """Where the result goes."""
+
+    folder: PathText | None = None
+    """Folder for the files, made if it is not there; out/NAME if left out."""
+    formats: FormatList | None = None
+    """Files to write: step, stl, 3mf, glb; the first three if left out."""
+    database: DatabaseUrl | None = None
+    """Database that registers the cells: sqlite:///lab.db, postgresql://host/name."""
+
+
+class Defaults(Block):
+    """What an object can set, and a set for all of its objects."""
+
+    version: Version = 1
+    """Version of this file format."""
+    profile: ProfileName | None = None
+    """The array, its alphabet and its pitch by name; one-touch if left out."""
+    encoding: Encoding | None = None
+    """The array, named explicitly, in place of a profile."""
+    layout: Literal["auto", "net", "faces"] = "auto"
+    """net: one lattice runs through the unfolded object; faces: each face alone; auto: what
+    shows more places."""
+    symbols: Symbols = Symbols()
+    print: Print = Print()
+    copies: Copies = 1
+    """Copies with cells of their own, so that two of them are told apart."""
+    output: Output = Output()
+
+
+class ObjectSettings(Defaults):
+    """An object to emboss."""
+
+    name: ObjectName
+    """Name in the database and of the files."""
+    shape: Annotated[Shape, BeforeValidator(shape_block)]
+
+
+class SetSettings(Defaults):
+    """Objects that share one array, and what holds for all of them."""
+
+    objects: Annotated[list[ObjectSettings | str], Field(min_length=1)]
+    """Objects written out, or names of their files, relative to this one."""

@@ -1,0 +1,141 @@
+"""The shapes a spec can ask for.
+
+Sizes in mm after reading. What only geometry can tell (closed, planar, oriented) is
+checked where the polyhedron is made.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, WithJsonSchema
+
+from generator.spec.block import Block, PathText, whole_number
+from generator.spec.quantity import Coordinate, Length, coordinates, refuse, sides
+
+SIDES_MAX = 64
+Sides = Annotated[int, Field(ge=3, le=SIDES_MAX), whole_number(3, SIDES_MAX, "sides")]
+
+
+def face_loops(value: Any) -> tuple[tuple[int, ...], ...]:
+    """Return the loops of a face: `[0, 1, 2]`, or `[[0, 1, 2, 3], [4, 5, 6]]` with a hole."""
+    if not isinstance(value, list) or not value:
+        raise refuse("a face is a list of vertex numbers", "write, for example, [0, 1, 2]")
+    loops = value if isinstance(value[0], list) else [value]
+    for loop in loops:
+        if not isinstance(loop, list) or any(type(vertex) is not int for vertex in loop):
+            raise refuse(
+                "a face holds whole numbers, the numbers of its vertices",
+                "write, for example, [0, 1, 2]; holes as [[0, 1, 2, 3], [4, 5, 6]]",
+            )
+        if len(loop) < 3:
+            raise refuse(
+                f"a loop of a face needs 3 vertices or more, not {len(loop)}",
+                "add vertices, or leave the face out",
+            )
+        if len(set(loop)) < len(loop):
+            twice = next(vertex for vertex in loop if loop.count(vertex) > 1)
+            raise refuse(f"vertex {twice} occurs twice in one loop", "leave one of them out")
+    return tuple(tuple(loop) for loop in loops)
+
+
+_LOOP_SCHEMA = {"type": "array", "minItems": 3, "items": {"type": "integer", "minimum": 0}}
+FaceLoops = Annotated[
+    tuple[tuple[int, ...], ...],
+    BeforeValidator(face_loops),
+    WithJsonSchema({"anyOf": [_LOOP_SCHEMA, {"type": "array", "items": _LOOP_SCHEMA}]}),
+]
+Point = Annotated[tuple[Coordinate, Coordinate, Coordinate], BeforeValidator(coordinates)]
+BoxSides = Annotated[
+    tuple[Length, Length, Length],
+    BeforeValidator(sides, json_schema_input_type=tuple[Length, Length, Length] | str),
+]
+
+
+class TriangularPrism(Block):
+    """A prism on an equilateral triangle."""
+
+    side: Length
+    """Side of the triangle, mm unless a unit is written."""
+    height: Length
+    """Distance between the triangles, mm unless a unit is written."""
+
+
+class Prism(Block):
+    """A right prism on a regular polygon."""
+
+    sides: Sides
+    """Number of sides of the base."""
+    side: Length | None = None
+    """Length of a side of the base, mm unless a unit is written."""
+    radius: Length | None = None
+    """Distance from the middle of the base to its corners, in place of side."""
+    height: Length
+    """Distance between the bases, mm unless a unit is written."""
+
+
+class Pyramid(Block):
+    """A right pyramid on a regular polygon."""
+
+    sides: Sides = 4
+    """Number of sides of the base."""
+    side: Length | None = None
+    """Length of a side of the base, mm unless a unit is written."""
+    radius: Length | None = None
+    """Distance from the middle of the base to its corners, in place of side."""
+    height: Length
+    """Height of the apex above the base, mm unless a unit is written."""
+
+
+class VerticesAndFaces(Block):
+    """Any polyhedron with planar faces."""
+
+    vertices: Annotated[list[Point], Field(min_length=4)]
+    """Corners [x, y, z], mm unless a unit is written; numbered from 0."""
+    faces: Annotated[list[FaceLoops], Field(min_length=4)]
+    """For each face the numbers of its vertices, counter-clockwise seen from outside; a face
+    with holes is a list of loops, the outer one first."""
+
+
+class Shape(Block):
+    """The object's shape: exactly one of these."""
+
+    cube: Length | None = None
+    """Edge of a cube."""
+    box: BoxSides | None = None
+    """Three sides of a parallelepiped: [80, 80, 120] or 80 x 80 x 120 mm."""
+    triangular_prism: TriangularPrism | None = None
+    tetrahedron: Length | None = None
+    """Edge of a regular tetrahedron."""
+    octahedron: Length | None = None
+    """Edge of a regular octahedron."""
+    dodecahedron: Length | None = None
+    """Edge of a regular dodecahedron."""
+    prism: Prism | None = None
+    pyramid: Pyramid | None = None
+    polyhedron: VerticesAndFaces | None = None
+    file: PathText | None = None
+    """A model with planar faces: a .step, .stl or .obj file, relative to the spec."""
+
+
+KINDS = tuple(Shape.model_fields)
+MODEL_SUFFIXES = (".step", ".stp", ".stl", ".obj")
+EXAMPLES = {
+    "cube": "{cube: 60 mm}",
+    "box": "{box: [80 mm, 80 mm, 120 mm]}",
+    "triangular_prism": "{triangular_prism: {side: 80 mm, height: 120 mm}}",
+    "tetrahedron": "{tetrahedron: 120 mm}",
+    "octahedron": "{octahedron: 80 mm}",
+    "dodecahedron": "{dodecahedron: 40 mm}",
+    "prism": "{prism: {sides: 6, side: 40 mm, height: 80 mm}}",
+    "pyramid": "{pyramid: {sides: 4, side: 80 mm, height: 70 mm}}",
+    "polyhedron": "{polyhedron: {vertices: [[0, 0, 0], ...], faces: [[0, 2, 1], ...]}}",
+    "file": "{file: part.step}",
+}
+"""How each shape is written, for messages and for `encode-object init`."""
+OTHER_NAMES = {
+    "parallelepiped": "box", "cuboid": "box", "block": "box", "brick": "box", "rectangle": "box",
+    "wedge": "triangular_prism", "hexagonal_prism": "prism", "cylinder": "prism", "cone": "pyramid",
+    "mesh": "file", "stl": "file", "step": "file", "obj": "file", "model": "file", "path": "file",
+}  # fmt: skip
+"""Names people try, and what they are called here."""

@@ -1,0 +1,69 @@
+"""Commented specs to begin with: what `encode-object init SHAPE` writes."""
+
+from __future__ import annotations
+
+from generator.spec.problem import Problem, SpecError, did_you_mean
+from generator.spec.shape import EXAMPLES, OTHER_NAMES
+
+_POLYHEDRON = """shape:
+  polyhedron:
+    # corners x, y, z in mm, numbered from 0
+    vertices: [[0, 0, 0], [80, 0, 0], [0, 80, 0], [0, 0, 80]]
+    # vertices of each face, counter-clockwise seen from outside; a hole: [[outer], [hole]]
+    faces: [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]"""
+
+_TEMPLATE = """\
+# {name}: make it with  encode-object {file}
+# A line that starts with # is off: delete the # to use it. The values shown are those
+# that hold without it. Lengths: 40, 40 mm, 4 cm, 1.6 in. Angles: 10 deg, 0.17 rad.
+version: 1
+name: {name}
+{shape}
+
+# profile: one-touch     # one-touch | thesis | product | large | fine
+# layout: auto           # auto | net (one lattice through the unfolded object) | faces
+# copies: 1              # each copy has cells of its own, so that two are told apart
+
+# symbols:
+#   pitch: 7 mm          # distance between neighbouring symbols
+#   height: 1 mm         # best a multiple of the layer height
+#   stroke: 1.4 mm       # width of the strokes at their top
+#   draft: 10 deg        # slope of their sides
+#   chamfer: 0 mm        # of their top edges
+#   alphabet: dense-4    # dense-4 | letters-4 | thesis-2 | dense-8
+
+# print:
+#   parts: panels        # panels (mitred plates, no supports) | whole (one body)
+#   wall: 3 mm           # thickness of the panels
+#   printer: fdm-0.4     # encode-object printers lists them
+
+# output:
+#   folder: out/{folder}
+#   formats: [step, stl, 3mf]        # and glb
+#   database: sqlite:///lab.db       # or postgresql://host/name
+"""
+
+
+def starter(shape: str) -> str:
+    """Return a commented spec for one of the shapes of `EXAMPLES`; it can be made as it is.
+
+    >>> starter("cube").splitlines()[5]
+    'shape: {cube: 60 mm}'
+    """
+    name = "Part" if shape == "file" else shape.replace("_", " ").capitalize()
+    folder = name.lower().replace(" ", "-")
+    line = _POLYHEDRON if shape == "polyhedron" else f"shape: {EXAMPLES[shape]}"
+    if shape == "file":
+        line += "    # .step, .stl or .obj with planar faces, relative to this file"
+    return _TEMPLATE.format(name=name, file=f"{folder}.yaml", shape=line, folder=folder)
+
+
+def starter_named(shape: str) -> tuple[str, str]:
+    """Return the shape's own name and its commented spec; raises `SpecError` for no shape."""
+    word = shape.lower().replace("-", "_").replace(" ", "_")
+    kind = OTHER_NAMES.get(word, word)
+    if kind not in EXAMPLES:
+        near = did_you_mean(word, EXAMPLES)
+        fix = f"did you mean '{near}'?" if near else f"choose one of {', '.join(EXAMPLES)}"
+        raise SpecError([Problem(f"unknown shape '{shape}'", fix)])
+    return kind, starter(kind)
