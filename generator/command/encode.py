@@ -1,0 +1,129 @@
+"""`encode-object SPEC.yaml...`: read the specs, make the objects, say what was made."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from generator.command import Action
+
+if TYPE_CHECKING:
+    from generator.spec import Located
+
+HELP = """Emboss objects with a pseudo-random array, so that a touch tells object, face and place.
+
+Each SPEC.yaml gives STEP, STL and 3MF files that print, a picture, and an entry in the lab's \
+database. The smallest one has two lines: [bold]name: Cube[/] and [bold]shape: {cube: 60 mm}[/]
+"""
+EPILOG = """Exit codes: 0 done, 1 could not be written, 2 bad input, 4 database, 130 interrupted.
+
+More commands, each with --help:
+
+[bold]encode-object init[/] SHAPE      a commented spec to begin with
+
+[bold]encode-object schema[/]          the JSON schema of specs, for editors
+
+[bold]encode-object printers[/]        printers and their limits
+
+[bold]encode-object list[/]            the objects in a database
+"""
+
+app = typer.Typer(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+@app.command(help=HELP, epilog=EPILOG)
+def encode(
+    specs: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="SPEC.yaml...", help="What to make: objects or sets.",
+                       show_default=False),
+    ] = None,
+    folder: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="DIR", show_default=False,
+                     help="Folder for the files, in place of output: folder:."),
+    ] = None,
+    formats: Annotated[
+        str, typer.Option("--format", metavar="LIST", show_default=False,
+                          help="step, stl, 3mf, glb: files to write, with commas between."),
+    ] = "",
+    database: Annotated[
+        str, typer.Option(metavar="URL", show_default=False,
+                          help="Registers the cells: lab.db, sqlite:///lab.db, postgresql://host/name."),
+    ] = "",
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Say what would be made; write nothing."),
+    ] = False,
+    verify: Annotated[
+        bool, typer.Option("--verify", help="Read every file back and prove it (needs the cad and "
+                                            "mesh extras)."),
+    ] = False,
+    replace: Annotated[
+        bool, typer.Option("--replace", help="Allow a changed spec under a registered name."),
+    ] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="One JSON object on stdout, also for errors."),
+    ] = False,
+    version: Annotated[
+        bool, typer.Option("--version", help="Say which version this is."),
+    ] = False,
+) -> Action:  # fmt: skip
+    """Read the options of `encode-object SPEC.yaml...`; `HELP` is what people see."""
+
+    def action() -> int:
+        from generator.command import report
+
+        if version:
+            report.version(as_json=as_json)
+            return 0
+        if not specs:
+            raise typer.BadParameter("no spec is named")
+        _make(specs, folder, formats, database, dry_run=dry_run, verify=verify, replace=replace,
+              as_json=as_json)  # fmt: skip
+        return 0
+
+    return action
+
+
+def _make(
+    specs: list[Path],
+    folder: Path | None,
+    formats: str,
+    database: str,
+    *,
+    dry_run: bool,
+    verify: bool,
+    replace: bool,
+    as_json: bool,
+) -> None:
+    """Make the objects and report them."""
+    from generator.command import report
+    from generator.command.progress import progress_bar
+    from generator.spec.option import database_option, format_option
+    from generator.spec.read import read_specs
+
+    wanted = format_option(formats) if formats else None
+    url = database_option(database) if database else None
+    located: tuple[Located, ...] = read_specs(specs, database=url)
+
+    from generator.pipeline import encode as make
+
+    with progress_bar() as progress:
+        encoded = make(
+            located,
+            folder=folder,
+            formats=wanted,
+            database=url,
+            dry_run=dry_run,
+            verify=verify,
+            replace=replace,
+            progress=progress,
+        )
+    report.encoded(encoded, dry_run=dry_run, as_json=as_json)

@@ -1,0 +1,207 @@
+"""`encode-object init | schema | printers | list`: what one needs around the making."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from generator.command import Action
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+WIDTH = 120  # characters of a table that is written to a file
+
+app = typer.Typer(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, also for errors.")]
+
+
+@app.command()
+def init(
+    shape: Annotated[
+        str, typer.Argument(help="cube, box, triangular_prism, tetrahedron, octahedron, "
+                                 "dodecahedron, prism, pyramid, polyhedron or file."),
+    ] = "cube",
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="FILE", show_default=False,
+                     help="File to write; stdout if left out."),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
+    as_json: Json = False,
+) -> Action:  # fmt: skip
+    """Write a commented spec to begin with; it can be made as it is."""
+
+    def action() -> int:
+        from generator.command import report
+        from generator.spec.starter import starter_named
+
+        kind, text = starter_named(shape)
+        if output is not None:
+            _write_new(output, text, force)
+        if as_json:
+            report.write_json(
+                {"shape": kind, "file": str(output) if output else None, "spec": text}
+            )
+        elif output is None:
+            report.write(text)
+        else:
+            report.write(f"wrote {output}; make it with: encode-object {output}")
+        return 0
+
+    return action
+
+
+@app.command()
+def schema(
+    as_json: Annotated[  # noqa: ARG001  the schema is JSON with or without it
+        bool, typer.Option("--json", help="The schema is JSON anyway.")
+    ] = False,
+) -> Action:
+    """Print the JSON schema of specs, so that an editor completes and checks them."""
+
+    def action() -> int:
+        from generator.command import report
+        from generator.spec.schema import spec_schema
+
+        report.write_json(spec_schema())
+        return 0
+
+    return action
+
+
+@app.command()
+def printers(as_json: Json = False) -> Action:
+    """Print the printers that specs can name, with their limits."""
+
+    def action() -> int:
+        from generator.command import report
+        from generator.printers import PRINTERS
+
+        if as_json:
+            report.write_json({"printers": [_printer_values(name) for name in PRINTERS]})
+            return 0
+        rows = [_printer_values(name) for name in PRINTERS]
+        table = _table("printer", "bed", "layer", "stroke >=", "gap >=", "height >=", "made for")
+        for row in rows:
+            bed = " x ".join(f"{side:g}" for side in row["bed_mm"])
+            limits = ("layer_mm", "stroke_min_mm", "gap_min_mm", "height_min_mm")
+            table.add_row(
+                row["name"], bed, *(f"{row[key]:g}" for key in limits), row["description"]
+            )
+        _show(table)
+        report.write("lengths in mm; choose one with  print: {printer: NAME}")
+        return 0
+
+    return action
+
+
+@app.command(name="list")
+def list_(
+    database: Annotated[
+        str, typer.Option(metavar="URL", help="lab.db, sqlite:///lab.db, postgresql://host/name."),
+    ] = "sqlite:///lab.db",
+    as_json: Json = False,
+) -> Action:  # fmt: skip
+    """Print the objects that a database holds."""
+
+    def action() -> int:
+        from generator.command import report
+        from generator.spec.option import database_option
+
+        rows = _registered(url := database_option(database))
+        if as_json:
+            report.write_json({"objects": rows, "database": url})
+            return 0
+        if not rows:
+            report.write(f"no objects in {url}; make one with: encode-object SPEC.yaml")
+            return 0
+        table = _table("object", "shape", "faces", "symbols", "array", "pitch", "registered (UTC)")
+        for row in rows:
+            array = f"{row['profile']} {row['array']['rows']}x{row['array']['columns']}"
+            table.add_row(row["name"], row["shape"], str(row["faces"]), str(row["symbols"]), array,
+                          f"{row['pitch_mm']:g} mm", row["utc"][:16].replace("T", " "))  # fmt: skip
+        _show(table)
+        return 0
+
+    return action
+
+
+def _registered(url: str) -> list[dict[str, Any]]:
+    """Return the objects of a database as plain values, by name."""
+    from generator.database.open import open_database
+    from generator.database.read import list_objects
+    from generator.database.transaction import reading
+
+    with reading(open_database(url, writable=False)) as connection:
+        entries = list_objects(connection)
+    return [
+        {
+            "name": entry.name,
+            "shape": entry.object_type,
+            "faces": entry.number_of_faces,
+            "symbols": entry.symbols,
+            "profile": entry.profile,
+            "array": {"rows": entry.rows, "columns": entry.columns},
+            "pitch_mm": entry.pitch_mm,
+            "spec_hash": entry.spec_hash,
+            "tool_version": entry.tool_version,
+            "utc": entry.utc,
+        }
+        for entry in entries
+    ]
+
+
+def _printer_values(name: str) -> dict[str, Any]:
+    """Return a printer's limits as plain values; angles in degrees."""
+    from dataclasses import asdict
+
+    from generator.printers import PRINTERS
+
+    values = asdict(PRINTERS[name])
+    values["overhang_max_deg"] = round(math.degrees(values.pop("overhang_max_rad")), 6)
+    return values
+
+
+def _write_new(path: Path, text: str, force: bool) -> None:
+    """Write a file whole or not at all; one that is there only with `force`."""
+    from generator.spec.problem import Problem, SpecError
+
+    if path.exists() and not force:
+        fix = "choose another name, or replace it with --force"
+        raise SpecError([Problem("the file is there already", fix, file=str(path))])
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        beside.write_text(text, encoding="utf-8")
+        if force:
+            beside.replace(path)
+        else:
+            os.link(beside, path)  # fails, unlike a rename, if the file has come up meanwhile
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def _table(*titles: str) -> Table:
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    for title in titles:
+        table.add_column(title, no_wrap=title != "made for")
+    return table
+
+
+def _show(table: Table) -> None:
+    from rich.console import Console
+
+    Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH).print(table)

@@ -1,0 +1,138 @@
+"""Parts -> files: everything that belongs to one object, staged to appear together.
+
+`NAME-F1.step`, `NAME-F1.stl`, ... one per part in its local origin; `NAME.3mf` and
+`NAME-prusaslicer.3mf` for each plate of the printer; `NAME.glb` assembled; `NAME.png`, the
+picture; `NAME-array.svg`, the faces on the array.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from generator.database.registered import RegisteredPart
+from generator.export.array_svg import FaceOnArray, array_svg
+from generator.export.atomic import Staging, Written
+from generator.export.glb import glb_bytes
+from generator.export.preview import preview_png
+from generator.export.step import step_chunks
+from generator.export.stl import stl_bytes
+from generator.export.threemf import print_files
+from generator.layout.placement import Layout
+from generator.pipeline.plan import Plan, blaming
+from generator.pipeline.progress import Progress
+from generator.polyhedron import face_polygon
+from generator.solid import Part, panels, prove_closed, triangles, volume, whole
+
+
+@dataclass(frozen=True, slots=True)
+class Staged:
+    """All files of one object, written but not yet under their final names."""
+
+    registered: tuple[RegisteredPart, ...]
+    parts: int
+    warnings: tuple[str, ...]
+
+
+def stage(
+    plan: Plan,
+    layout: Layout,
+    formats: Sequence[str],
+    staging: Staging,
+    *,
+    verify: bool,
+    progress: Progress,
+) -> Staged:
+    """Build the parts of an object and write all its files into the staging folder.
+
+    Parameters
+    ----------
+    plan, layout
+        The object and its symbols.
+    formats
+        Of step, stl, 3mf, glb; the pictures are always made.
+    verify
+        Read STEP and STL back by independent programs before anything is kept.
+
+    Raises
+    ------
+    SolidError
+        A part did not pass its proof of closure or its verification.
+    GeneratorError
+        A file cannot be written.
+    """
+    spec = plan.spec
+    progress("building the parts", 0.0)
+    parts, warnings = parts_of(plan, layout)
+    for part in parts:
+        prove_closed(part)
+    meshes = [triangles(part) for part in parts]
+    registered: list[RegisteredPart] = []
+    for number, (part, mesh) in enumerate(zip(parts, meshes, strict=True)):
+        progress(f"writing {part.name}", 0.1 + 0.6 * number / len(parts))
+        step = stl = None
+        if "step" in formats:
+            step = staging.write(f"{part.name}.step", step_chunks(part))
+            registered.append(_registered(part, "step", step))
+        if "stl" in formats:
+            stl = staging.write(f"{part.name}.stl", stl_bytes(mesh))
+            registered.append(_registered(part, "stl", stl))
+        if verify and (step or stl):
+            progress(f"verifying {part.name}", 0.1 + 0.6 * (number + 0.5) / len(parts))
+            from generator.export.check import verify as read_back  # loads the CAD kernel
+
+            read_back(
+                part.name,
+                volume(part),
+                step=step.staged if step else None,
+                stl=stl.staged if stl else None,
+            )
+    if "3mf" in formats:
+        progress("arranging the bed", 0.7)
+        plates = print_files(spec.name, parts, plan.printer.bed_mm)
+        for number, plate in enumerate(plates, 1):
+            suffix = f"-plate-{number}" if len(plates) > 1 else ""
+            staging.write(f"{spec.name}{suffix}.3mf", plate.content)
+            staging.write(f"{spec.name}{suffix}-prusaslicer.3mf", plate.prusaslicer)
+            if not plate.plate.fits:
+                dx, dy = plate.plate.overhang_mm
+                bed = f"the bed of {plan.printer.name} by {dx:.0f} x {dy:.0f} mm"
+                warnings += (f"plate {number} exceeds {bed}: print it elsewhere",)
+    if "glb" in formats:
+        progress("writing the model", 0.8)
+        staging.write(f"{spec.name}.glb", glb_bytes(spec.name, parts, meshes))
+    progress("drawing", 0.85)
+    size = np.ptp(plan.polyhedron.vertices, axis=0).tolist()
+    staging.write(f"{spec.name}.png", preview_png(spec.name, size, parts, meshes))
+    staging.write(f"{spec.name}-array.svg", _array_picture(plan, layout).encode())
+    return Staged(tuple(registered), len(parts), warnings)
+
+
+def parts_of(plan: Plan, layout: Layout) -> tuple[tuple[Part, ...], tuple[str, ...]]:
+    """Return the parts of an object, panels or the whole body, and what they lack."""
+    spec = plan.spec
+    if spec.parts == "whole":
+        return (whole(plan.polyhedron, layout, plan.outlines, spec.name),), ()
+    with blaming(plan.located, "print.wall, print, shape"):
+        made = panels(
+            plan.polyhedron, layout, plan.outlines, spec.wall_mm, plan.printer, name=spec.name
+        )
+    return made.parts, made.warnings
+
+
+def _registered(part: Part, kind: str, written: Written) -> RegisteredPart:
+    return RegisteredPart(part.name, kind, written.path.name, written.sha256, part.T_object_part)
+
+
+def _array_picture(plan: Plan, layout: Layout) -> str:
+    faces = [
+        FaceOnArray(
+            plan.polyhedron.faces[face.face].name, face, face_polygon(plan.polyhedron, face.face)
+        )
+        for face in layout.faces
+    ]
+    array = plan.array
+    title = f"{plan.spec.name} on the array {array.rows} x {array.columns}"
+    return array_svg(title, array.rows, array.columns, layout.pitch_mm, faces, plan.outlines)

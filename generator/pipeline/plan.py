@@ -1,0 +1,117 @@
+"""Spec -> what the stages need: polyhedron, array, outlines and clearances.
+
+Every error is given the line of the setting that causes it. Lengths in mm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+
+from generator.alphabet.known import Alphabet, alphabet_named
+from generator.alphabet.outline import Tiers, footprint_half_mm, outlines
+from generator.alphabet.printable import check_printable
+from generator.array import SymbolArray, array_from
+from generator.errors import ArrayError, GeneratorError
+from generator.layout.layout import Clearances
+from generator.polyhedron import Polyhedron, dihedral
+from generator.polyhedron.shapes import SHAPES
+from generator.printers import Printer, printer_named
+from generator.solid.frame import edge_numbers
+from generator.solid.mitre import symbol_clearance_mm
+from generator.solid.panels import top_insets_mm
+from generator.spec import Located, ObjectSpec, ShapeSpec, blamed
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """One object, ready to be laid out and built."""
+
+    located: Located
+    polyhedron: Polyhedron
+    array: SymbolArray
+    alphabet: Alphabet
+    outlines: tuple[Tiers, ...]  #: one per label of the array
+    footprint_half_mm: float  #: half side of the square that holds every symbol's foot
+    clearances_mm: Clearances  #: [face][loop][edge], from the edge to the nearest foot
+    printer: Printer
+
+    @property
+    def spec(self) -> ObjectSpec:
+        """The spec that this plan comes from."""
+        return self.located.spec
+
+
+def planned(located: Located) -> Plan:
+    """Return the plan of one object.
+
+    Raises
+    ------
+    SpecError
+        The shape is not a solid, the array cannot be made, its symbols do not suit the
+        alphabet, or the printer cannot make them: at the line that says so.
+    """
+    spec = located.spec
+    with blaming(located, "print.printer"):
+        printer = printer_named(spec.printer)
+    with blaming(located, "shape"):
+        polyhedron = _polyhedron(spec.shape)
+    with blaming(located, "encoding, profile"):
+        array = array_from(spec.encoding)
+    with blaming(located, "symbols.alphabet, encoding.alphabet, profile"):
+        alphabet = alphabet_named(spec.alphabet)
+        _check_order(alphabet, array)
+    with blaming(located, "symbols.pitch, symbols, profile"):
+        check_printable(alphabet, spec.style, printer)
+        shapes = outlines(alphabet, spec.style)
+        half = footprint_half_mm(alphabet, spec.style)
+    clearances = _clearances(polyhedron, spec, printer)
+    return Plan(located, polyhedron, array, alphabet, shapes, half, clearances, printer)
+
+
+@contextmanager
+def blaming(located: Located, path: str) -> Iterator[None]:
+    """Give errors of a stage the place of the setting at `path`."""
+    try:
+        yield
+    except GeneratorError as error:
+        raise blamed(located, error, path) from error
+
+
+def _polyhedron(shape: ShapeSpec) -> Polyhedron:
+    if shape.file is not None:
+        from generator.polyhedron.read import read_shape  # readers load only for files
+
+        return read_shape(shape.file)
+    return SHAPES[shape.kind](**shape.parameters)
+
+
+def _check_order(alphabet: Alphabet, array: SymbolArray) -> None:
+    if alphabet.order < array.order:
+        raise ArrayError(
+            f"the array has {array.order} symbols, but alphabet {alphabet.name} shows "
+            f"{alphabet.order}",
+            fix=f"choose an alphabet with {array.order} symbols or more",
+        )
+
+
+def _clearances(polyhedron: Polyhedron, spec: ObjectSpec, printer: Printer) -> Clearances:
+    """Return what printer, mitre and the neighbouring face's symbols need along each edge."""
+    apart = {
+        edge: symbol_clearance_mm(dihedral(polyhedron, number), spec.style.height_mm)
+        for edge, number in edge_numbers(polyhedron).items()
+    }
+    clearances = []
+    for number, face in enumerate(polyhedron.faces):
+        needs = [
+            np.array([apart[edge] for edge in zip(loop, loop[1:] + loop[:1], strict=True)])
+            for loop in face.loops
+        ]
+        if spec.parts == "panels":
+            insets = top_insets_mm(polyhedron, number, spec.wall_mm, printer)
+            needs = [np.maximum(need, inset) for need, inset in zip(needs, insets, strict=True)]
+        clearances.append(tuple(printer.edge_min_mm + need for need in needs))
+    return tuple(clearances)

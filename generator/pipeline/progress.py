@@ -1,0 +1,16 @@
+"""How long work tells how far it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+Progress = Callable[[str, float], None]  #: what is being done, and the share of the run done
+
+
+def silent(_what: str, _share: float) -> None:
+    """Tell nobody."""
+
+
+def within(progress: Progress, start: float, end: float) -> Progress:
+    """Return the progress of a step that fills the run from share `start` to `end`."""
+    return lambda what, share: progress(what, start + share * (end - start))

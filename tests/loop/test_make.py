@@ -1,0 +1,187 @@
+"""From spec to files and database, and back: what is printed is what is registered."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from generator.database.open import open_database
+from generator.database.read import list_objects, read_object
+from generator.database.transaction import reading
+from generator.errors import DatabaseError
+from generator.pipeline import encode
+from generator.spec import read_specs
+
+ROOT = Path(__file__).parents[2]
+SPECS = ROOT / "fixtures" / "specs"
+GOLDEN = json.loads((ROOT / "fixtures" / "golden.json").read_text())
+ENTRY = "from generator.command import main; main()"
+
+
+def made(folder: Path, text: str, **options: object):
+    spec = folder / "spec.yaml"
+    spec.write_text(text)
+    url = f"sqlite:///{folder / 'lab.db'}"
+    return encode(read_specs([spec]), folder=folder / "out", database=url, **options)
+
+
+def registered(folder: Path, name: str):
+    with reading(open_database(f"sqlite:///{folder / 'lab.db'}", writable=False)) as connection:
+        return read_object(connection, name)
+
+
+def digests(folder: Path) -> dict[str, str]:
+    return {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in sorted(folder.iterdir())}
+
+
+def thesis_array() -> np.ndarray:
+    """Fold appendix 4's recurrence by hand; checked against the golden digest."""
+    s = [0] * 11 + [1]
+    while len(s) < 4095:
+        s.append(s[-5] ^ s[-8] ^ s[-9] ^ s[-12])
+    t = np.arange(4095)
+    array = np.zeros((63, 65), int)
+    array[t % 63, t % 65] = s
+    text = "".join(map(str, array.ravel()))
+    assert hashlib.sha256(text.encode()).hexdigest() == GOLDEN["prba_63x65"]["sha256_rowmajor"]
+    return array
+
+
+def triangles_of(stl: Path) -> np.ndarray:
+    """Read (m, 3, 3) triangles of a binary STL, mm."""
+    data = stl.read_bytes()[84:]
+    kind = np.dtype([("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
+    return np.frombuffer(data, kind)["v"].astype(float)
+
+
+def is_raised(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Whether the part's highest level lies over points (n, 2)."""
+    top = triangles[:, :, 2].max()
+    flat = triangles[np.ptp(triangles[:, :, 2], axis=1) < 1e-4]
+    flat = flat[np.abs(flat[:, 0, 2] - top) < 1e-4][:, :, :2]
+    a, b, c = (flat[:, i] for i in range(3))
+
+    def side(p, q):
+        d, e = q - p, points[:, None, :] - p
+        return d[:, 0] * e[:, :, 1] - d[:, 1] * e[:, :, 0]
+
+    return ((side(a, b) >= 0) & (side(b, c) >= 0) & (side(c, a) >= 0)).any(axis=1)
+
+
+# "0" of the thesis is an L, "1" a stem, a step and two branches: these nodes tell them apart.
+NODES = np.array([(-1, 1), (-1, -1), (1, -1), (0, -1), (0, 0), (1, 0), (-1, 0)])
+RAISED = {0: [1, 1, 1, 1, 0, 0, 1], 1: [1, 1, 0, 1, 1, 1, 0]}
+
+
+def test_printed_thesis_cube_carries_the_thesis_array_where_the_database_says(tmp_path):
+    result = made(tmp_path, (SPECS / "thesis-cube.yaml").read_text(), formats=("stl",))
+    cube = registered(tmp_path, result.objects[0].name)
+    truth = thesis_array()
+    pitch, seen = cube.style.pitch_mm, 0
+    for part in cube.parts:
+        number = int(part.name.rsplit("F", 1)[1]) - 1
+        face = cube.faces[number]
+        assert face.placement is not None
+        cells = cube.layout.faces[number]
+        T = np.linalg.inv(part.T_object_part) @ face.T_object_face
+        turn = -face.placement.rotation_rad
+        R = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+        triangles = triangles_of(tmp_path / "out" / part.file)
+        for r, c, centre in zip(cells.rows, cells.columns, cells.centres_mm, strict=True):
+            at = centre + 0.26 * pitch * NODES @ R.T
+            here = at @ T[:2, :2].T + T[:2, 3]
+            assert is_raised(triangles, here).astype(int).tolist() == RAISED[truth[r, c]]
+            seen += 1
+    assert seen == result.objects[0].symbols > 100
+
+
+def test_placements_map_cells_to_symbol_centres(tmp_path):
+    made(tmp_path, "name: T\nshape: {tetrahedron: 90 mm}\n", formats=())
+    solid = registered(tmp_path, "T")
+    for face in solid.layout.faces:
+        p, place = solid.style.pitch_mm, face.placement
+        c, s = np.cos(place.rotation_rad), np.sin(place.rotation_rad)
+        u = face.centres_mm @ np.array([[c, -s], [s, c]]).T + (place.x_mm, place.y_mm)
+        columns = np.rint(u[:, 0] / p - 0.5).astype(int)
+        rows = np.rint(-u[:, 1] / p - 0.5).astype(int)
+        assert np.abs(u[:, 0] - (columns + 0.5) * p).max() < 1e-9
+        assert ((rows + place.row) % 63 == face.rows).all()
+        assert ((columns + place.column) % 65 == face.columns).all()
+
+
+def test_same_spec_gives_same_bytes_in_other_processes_and_folders(tmp_path):
+    everything = []
+    for folder in (tmp_path / "a", tmp_path / "another" / "place"):
+        folder.mkdir(parents=True)
+        command = [sys.executable, "-c", ENTRY, str(ROOT / "fixtures" / "cube.yaml"), "--format",
+                   "step,stl,3mf,glb", "-o", str(folder / "out")]  # fmt: skip
+        subprocess.run(command, cwd=folder, check=True, capture_output=True)
+        everything.append(digests(folder / "out"))
+    assert everything[0] == everything[1]
+    assert len(everything[0]) == 6 * 2 + 5
+
+
+def test_registered_spec_gives_its_files_again_and_other_objects_other_cells(tmp_path):
+    text = "name: A\nshape: {cube: 40 mm}\n"
+    first = made(tmp_path, text, formats=("stl",))
+    before = digests(tmp_path / "out")
+    for path in (tmp_path / "out").iterdir():
+        path.unlink()
+    other = made(tmp_path, "name: B\nshape: {cube: 40 mm}\n", formats=("stl",))
+    again = made(tmp_path, text, formats=("stl",))
+    after = digests(tmp_path / "out")
+    assert again.objects[0].reused
+    assert not other.objects[0].reused
+    assert {name: after[name] for name in before} == before
+    a, b = (registered(tmp_path, name).layout.faces for name in "AB")
+    cells = [set(zip(f.rows.tolist(), f.columns.tolist(), strict=True)) for f in (*a, *b)]
+    assert sum(map(len, cells)) == len(set().union(*cells)) == again.used_cells
+    assert first.objects[0].symbols + other.objects[0].symbols == again.used_cells
+
+
+def test_changed_spec_is_refused_without_replace(tmp_path):
+    made(tmp_path, "name: A\nshape: {cube: 40 mm}\n", formats=("stl",))
+    before = digests(tmp_path / "out")
+    changed = "name: A\nshape: {cube: 50 mm}\n"
+    with pytest.raises(DatabaseError, match="another spec"):
+        made(tmp_path, changed, formats=("stl",))
+    assert digests(tmp_path / "out") == before
+    done = made(tmp_path, changed, formats=("stl",), replace=True)
+    assert done.used_cells == done.objects[0].symbols
+    assert registered(tmp_path, "A").polyhedron.vertices.max() == 50.0
+
+
+def test_dry_run_tells_what_will_be_made_and_writes_nothing(tmp_path):
+    text = "objects:\n- {name: A, shape: {cube: 40 mm}}\n- {name: B, shape: {cube: 40 mm}}\n"
+    dry = made(tmp_path, text, dry_run=True)
+    assert [path.name for path in tmp_path.iterdir()] == ["spec.yaml"]
+    done = made(tmp_path, text, formats=("stl",))
+    assert [(o.name, o.symbols, o.places, o.parts) for o in dry.objects] == [
+        (o.name, o.symbols, o.places, o.parts) for o in done.objects
+    ]
+    assert dry.used_cells == done.used_cells
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"A", "B"}
+
+
+def test_verified_files_are_kept_and_known(tmp_path):
+    result = made(tmp_path, (ROOT / "fixtures" / "cube.yaml").read_text(), verify=True)
+    cube = registered(tmp_path, "Cube")
+    files = {path.name: path for path in result.objects[0].files}
+    assert len(cube.parts) == 12
+    for part in cube.parts:
+        assert hashlib.sha256(files[part.file].read_bytes()).hexdigest() == part.sha256
+
+
+@pytest.mark.parametrize("path", sorted(SPECS.glob("*.yaml")), ids=lambda path: path.stem)
+def test_every_fixture_can_be_made(path, tmp_path):
+    url = f"sqlite:///{tmp_path / 'lab.db'}"
+    result = encode(read_specs([path]), folder=tmp_path, database=url, formats=("stl", "glb"))
+    assert all(made.symbols and made.places for made in result.objects)
+    with reading(open_database(url, writable=False)) as connection:
+        assert len(list_objects(connection)) == len(result.objects)
