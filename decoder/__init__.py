@@ -1,1 +1,42 @@
-"""Window -> index: the code conversions of thesis 5.1, 5.4.3 and appendix 5."""
+"""Window -> index: the code conversions of thesis 5.1, 5.4.3 and appendix 5, and their heirs.
+
+Windows (N, rows, columns) -> `Decodings`, one `Decoded` each: place, margin, reason.
+
+    window, decoded                   what goes in, what comes out
+    view                              rank and minimum distance of any set of visible cells
+    exact, convert, product           windows without errors, by one of the four methods:
+      table, serial, milestones         the thesis's, parallel, serial and serial-parallel
+      logarithm                         closed form, any size
+    likelihood                        wrong and missing symbols, soft scores, prior, rotations:
+      ranking: transform, ordered,      small arrays, large ones,
+      joint, places                     product arrays, a prior
+    good_tuple                        the thesis's way with wrong symbols, the baseline
+    element, register, scattered, keys,
+                                      field elements, linear maps, look-up, character sums,
+      spectrum, dual, score, ranked     elimination, log-likelihoods, ranking
+    command, plot                     decode-window
+"""
+
+from decoder.decoded import Candidate, Decoded, Decodings, Reason
+from decoder.errors import DecoderError, MethodError, WindowError
+from decoder.exact import decode_exact
+from decoder.good_tuple import decode_good_tuple
+from decoder.likelihood import Likelihood, decode_likelihood
+from decoder.view import Strength, strength, strength_of_window
+
+__all__ = [
+    "Candidate",
+    "Decoded",
+    "DecoderError",
+    "Decodings",
+    "Likelihood",
+    "MethodError",
+    "Reason",
+    "Strength",
+    "WindowError",
+    "decode_exact",
+    "decode_good_tuple",
+    "decode_likelihood",
+    "strength",
+    "strength_of_window",
+]

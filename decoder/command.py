@@ -1,0 +1,270 @@
+"""`decode-window ROWS`: where on the array a window lies.
+
+Results go to stdout, messages to stderr. Exit codes: 0 decoded, 1 not decoded (ambiguous, too
+few symbols, no such window) or not written, 2 bad input, 4 database, 130 interrupted. The
+array comes from a profile, from its definition, or from a lab's database, which also tells
+where windows can lie and which object and face an answer belongs to.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+
+from generator.errors import GeneratorError
+
+if TYPE_CHECKING:
+    from decoder.decoded import Candidate, Decoded
+    from decoder.registered import Registered
+    from generator.array import FoldedArray, ProductArray
+    from generator.array.contract import Labels
+
+HELP = """Find the place of a window on its array.
+
+ROWS are the symbols, rows apart by spaces, ? where none is seen: [bold]decode-window "01 11 \
+01 01 00 01" --profile thesis[/]. Symbols of GF(q) are 0, 1, 2 (=A), 3 (=A^2), ...
+"""
+EPILOG = "Exit codes: 0 decoded, 1 not decoded, 2 bad input, 4 database, 130 interrupted."
+METHODS = ("table", "serial", "milestones", "logarithm", "likelihood")
+NOT_DECODED, BAD_INPUT, INTERRUPTED = 1, 2, 130
+
+app = typer.Typer(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run `decode-window` and leave with its exit code."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        code = run(given)
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        sys.stderr.write("\ndecode-window: interrupted\n")
+        code = INTERRUPTED
+    except BrokenPipeError:  # the reader of our output has gone, as in `| head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = NOT_DECODED
+    sys.exit(code)
+
+
+def run(arguments: list[str]) -> int:
+    """Run the command; returns its exit code. Errors are reported, not raised."""
+    usage_error: type[Exception] = typer.BadParameter.__mro__[1]  # of every misused option
+    as_json = "--json" in arguments
+    try:
+        code = app(arguments or ["--help"], prog_name="decode-window", standalone_mode=False)
+        return int(code or 0) if arguments else BAD_INPUT
+    except typer.Exit as leaving:
+        return leaving.exit_code
+    except GeneratorError as error:
+        cause = f"{error.place}: {error.cause}" if error.place else error.cause
+        _report(cause, error.fix, as_json=as_json)
+        return error.exit_code
+    except usage_error as error:
+        message = str(getattr(error, "message", error))
+        _report(message, "see decode-window --help", as_json=as_json)
+        return BAD_INPUT
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        what = f"cannot write '{error.filename}': {error.strerror}"
+        _report(what, "check folder, space and rights", as_json=as_json)
+        return NOT_DECODED
+
+
+@app.command(help=HELP, epilog=EPILOG)
+def decode(
+    rows: Annotated[list[str], typer.Argument(metavar="ROWS", help="The window.",
+                                              show_default=False)],
+    profile: Annotated[
+        str, typer.Option(help="thesis, one-touch, product, large, fine; one-touch by default.",
+                          show_default=False)] = "",
+    array: Annotated[
+        str, typer.Option("--array", metavar="JSON", show_default=False,
+                          help="An array's definition, as JSON or as a file, in place of a "
+                               "profile.")] = "",
+    database: Annotated[
+        str, typer.Option(metavar="URL", show_default=False,
+                          help="A lab's database: its array, the registered cells as prior, and "
+                               "the object and face of the answer.")] = "",
+    method: Annotated[str, typer.Option(help=", ".join(METHODS) + ".")] = "logarithm",
+    error: Annotated[
+        float, typer.Option(help="likelihood: how often a symbol is wrong.")] = 0.05,
+    doubt: Annotated[
+        float, typer.Option(help="likelihood: largest probability of a wrong answer.")] = 5e-4,
+    blank: Annotated[
+        float, typer.Option(help="likelihood: probability that there is no code.")] = 0.01,
+    rotations: Annotated[
+        str, typer.Option(metavar="LIST", help="likelihood: quarter turns that may bring the "
+                                               "window upright, with commas between.")] = "0",
+    top: Annotated[int, typer.Option(min=0, help="List the K best candidates.")] = 0,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="PNG", show_default=False,
+                                  help="Draw the window on the array.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
+) -> int:  # fmt: skip
+    """Decode one window; `HELP` is what people see."""
+    from decoder.exact import decode_exact
+    from decoder.likelihood import decode_likelihood
+    from decoder.window import parsed
+
+    if method not in METHODS:
+        raise typer.BadParameter(f"unknown method '{method}'; choose one of {', '.join(METHODS)}")
+    held: Registered | None = None
+    if database:
+        from decoder.registered import prior, registered
+
+        if array:
+            raise typer.BadParameter("both --array and --database were given; give one of them")
+        held = registered(database, profile)
+    chosen = held.array if held else _array(profile, array)
+    window = parsed(" ".join(rows), chosen.order)
+    if method == "likelihood":
+        found = decode_likelihood(
+            chosen, window, prior=prior(held, window) if held else None,
+            rotations=_turns(rotations), error=error, doubt=doubt, blank=blank, top=top,
+        )[0]  # fmt: skip
+    else:
+        found = decode_exact(chosen, window, method)[0]
+    known = _described(chosen, window, found, method, top)
+    if held:
+        known |= _holder(held, found)
+    if plot is not None:
+        from decoder.plot import draw
+
+        draw(chosen, window, found, plot)
+        known["plot"] = str(plot)
+    _print(known, as_json=as_json)
+    return 0 if found else NOT_DECODED
+
+
+def _array(profile_name: str, definition: str) -> FoldedArray | ProductArray:
+    from generator.array import DEFAULT_PROFILE, array_from, profile
+
+    if not definition:
+        return profile(profile_name or DEFAULT_PROFILE).array()
+    if profile_name:
+        raise typer.BadParameter("both --profile and --array were given; give one of them")
+    try:
+        text = definition if definition.lstrip().startswith("{") else Path(definition).read_text()
+        values = json.loads(text)
+    except (OSError, ValueError) as problem:
+        raise typer.BadParameter(f"--array cannot be read: {problem}") from None
+    if not isinstance(values, dict):
+        raise typer.BadParameter('--array must be a JSON object, as {"family": "prba", ...}')
+    return array_from(values)
+
+
+def _turns(text: str) -> list[int]:
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError:
+        raise typer.BadParameter(f"--rotations {text}: give quarter turns as 0,1,2,3") from None
+
+
+def _described(
+    array: FoldedArray | ProductArray, window: Labels, found: Decoded, method: str, top: int
+) -> dict[str, Any]:
+    """Return what `--json` prints."""
+    import numpy as np
+
+    from decoder.view import strength
+    from generator.errors import ArrayError
+
+    cells = np.nonzero(window >= 0)
+    seen: dict[str, Any] = {
+        "cells": int(cells[0].size),
+        "rank": array.rank(*cells) if cells[0].size else 0,
+        "full_rank": array.full_rank,
+        "errors_corrected": None,
+        "erasures_corrected": None,
+    }
+    try:
+        if cells[0].size:
+            able = strength(array, *cells)
+            seen |= {"errors_corrected": able.errors, "erasures_corrected": able.erasures}
+    except ArrayError:
+        pass  # out of reach for a view and an array so large: stays unknown
+    return {
+        "row": found.row,
+        "column": found.column,
+        "t": found.t,
+        "margin": found.margin,
+        "doubt": found.doubt,
+        "rotation": found.rotation,
+        "reason": found.reason,
+        "runner_up": None if found.runner_up is None else _place(found.runner_up),
+        "candidates": [_place(place) for place in found.candidates[: top or None]],
+        "method": method,
+        "array": {"rows": array.rows, "columns": array.columns, "symbols": array.order},
+        "seen": seen,
+    }
+
+
+def _holder(held: Registered, found: Decoded) -> dict[str, Any]:
+    """Return object and face of an answer, None where nothing is registered."""
+    from decoder.registered import holder
+
+    names = None
+    if found.row is not None and found.column is not None:
+        names = holder(held, found.row, found.column)
+    return {"object": names[0] if names else None, "face": names[1] if names else None}
+
+
+def _place(candidate: Candidate) -> dict[str, Any]:
+    return {
+        "row": candidate.row,
+        "column": candidate.column,
+        "rotation": candidate.rotation,
+        "score": candidate.score,
+    }
+
+
+def _print(known: dict[str, Any], *, as_json: bool) -> None:
+    if as_json:
+        sys.stdout.write(json.dumps(known) + "\n")
+        return
+    if known["row"] is None:
+        sys.stdout.write(f"not decoded: {known['reason']}\n")
+    else:
+        turned = f", turned by {90 * known['rotation']} degrees" if known["rotation"] else ""
+        sys.stdout.write(
+            f"row {known['row']}, column {known['column']} (t = {known['t']}){turned}\n"
+        )
+        if known.get("object"):
+            sys.stdout.write(f"{known['object']}, face {known['face']}\n")
+        elif "object" in known:
+            sys.stdout.write("no object is registered there\n")
+    if known["doubt"] is not None:
+        margin = "none" if known["margin"] is None else f"{known['margin']:.1f} nats"
+        sys.stdout.write(f"margin {margin}, doubt {known['doubt']:.2g}\n")
+    seen = known["seen"]
+    sys.stdout.write(f"{seen['cells']} symbols seen, rank {seen['rank']} of {seen['full_rank']}")
+    if seen["errors_corrected"] is not None:
+        sys.stdout.write(
+            f"; always corrects {seen['errors_corrected']} wrong or "
+            f"{seen['erasures_corrected']} missing"
+        )
+    sys.stdout.write("\n")
+    for place in known["candidates"]:
+        score = "" if place["score"] is None else f"  {place['score']:9.3f} nats"
+        turn = f"  turned {90 * place['rotation']}" if place["rotation"] else ""
+        sys.stdout.write(f"  row {place['row']}, column {place['column']}{score}{turn}\n")
+
+
+def _report(cause: str, fix: str, *, as_json: bool) -> None:
+    if as_json:
+        sys.stdout.write(json.dumps({"error": {"message": cause, "fix": fix}}) + "\n")
+    sys.stderr.write(f"error: {cause}\n")
+    if fix:
+        sys.stderr.write(f"  fix: {fix}\n")

@@ -1,0 +1,121 @@
+"""Window -> field element: the fixed linear map that appendix 5 of the thesis leaves out.
+
+Symbols seen at given offsets of an m-sequence are linear functionals of the field element
+x^t, so x^t = M w. Elimination over GF(p) of the functionals gives M, the checks that a
+window must pass if it shows more cells than it needs, and the elements that stay open if
+it shows fewer. The thesis takes the window tuple itself for the remainder r(t) (appendix
+5); that holds only after M.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from itertools import islice, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from decoder.element import Element, elements_of
+from generator.array.contract import Labels
+from generator.array.residue import Digits, packed
+from generator.array.sequence import Sequence
+
+LISTED = 64  #: most candidates that are listed
+
+
+class Register:
+    """Symbols seen at fixed offsets of one sequence, as linear equations.
+
+    Parameters
+    ----------
+    sequence
+        The m-sequence.
+    offsets
+        (k,) indices seen, relative to the place, one for each column of the labels.
+    """
+
+    def __init__(self, sequence: Sequence, offsets: list[int]) -> None:
+        self.sequence = sequence
+        self.elements = elements_of(sequence.ring)
+        maps = sequence.functionals(sequence.element(offsets))
+        equations = maps.reshape(-1, sequence.ring.degree)
+        self._combinations, self._reduced, self.pivots = eliminated(equations, sequence.ring.prime)
+
+    @property
+    def determined(self) -> bool:
+        """Whether the symbols seen name the place."""
+        return len(self.pivots) == self.sequence.ring.degree
+
+    @cached_property
+    def _tables(self) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
+        """Characteristic 2: (k, q) words of the element, (checks / 64, k, q) words of checks."""
+        field, degree = self.sequence.field, self.sequence.ring.degree
+        split = self._combinations.T.reshape(-1, field.degree, len(self._combinations))
+        parts = np.einsum("qm,kmr->kqr", field.digits.astype(np.float64), split) % 2
+        words = np.zeros((*parts.shape[:2], degree))
+        words[..., self.pivots] = parts[..., : len(self.pivots)]
+        checks = parts[..., len(self.pivots) :]
+        starts = range(0, checks.shape[-1], 64)
+        blocks = [packed(checks[..., start : start + 64]) for start in starts]
+        empty = np.zeros((0, *parts.shape[:2]), dtype=np.uint64)
+        return packed(words), np.array(blocks) if blocks else empty
+
+    def read(self, labels: Labels) -> tuple[Element, NDArray[np.bool_]]:
+        """Return the elements (N,) of windows, and which windows pass their checks.
+
+        Parameters
+        ----------
+        labels
+            (N, k) symbols seen. Open digits of the element are 0 if they are too few.
+        """
+        if self.sequence.ring.prime == 2:
+            words, checks = self._tables
+            places = labels + np.arange(labels.shape[1]) * words.shape[1]
+            state = np.bitwise_xor.reduce(words.ravel().take(places), axis=1)
+            right = np.ones(len(labels), dtype=np.bool_)
+            for block in checks:
+                right &= np.bitwise_xor.reduce(block.ravel().take(places), axis=1) == 0
+            return state, right
+        digits = self.sequence.field.digits[labels].reshape(len(labels), -1).astype(np.float64)
+        solved = self.sequence.ring.reduced(digits @ self._combinations.T)
+        state = np.zeros((len(labels), self.sequence.ring.degree))
+        state[:, self.pivots] = solved[:, : len(self.pivots)]
+        return state, np.asarray(~solved[:, len(self.pivots) :].any(axis=1))
+
+    def open_elements(self) -> Element:
+        """Return up to `LISTED` + 1 elements that the symbols seen cannot tell from 0."""
+        prime, degree = self.sequence.ring.prime, self.sequence.ring.degree
+        free = [k for k in range(degree) if k not in self.pivots]
+        basis = np.zeros((len(free), degree))
+        for row, k in zip(basis, free, strict=True):
+            row[k] = 1
+            row[self.pivots] = -self._reduced[: len(self.pivots), k] % prime
+        scales = islice(product(range(prime), repeat=len(free)), LISTED + 1)
+        return self.elements.of_digits(np.array(list(scales), dtype=np.float64) @ basis % prime)
+
+    def nonzero(self, states: Element) -> NDArray[np.bool_]:
+        """Return which elements are a place: every one but 0."""
+        return np.asarray(self.elements.keys(states) != 0)
+
+
+def eliminated(equations: Digits, prime: int) -> tuple[Digits, Digits, list[int]]:
+    """Return (E, R, pivots): E @ equations = R modulo p, R in reduced row echelon form."""
+    number, degree = equations.shape
+    whole = np.concatenate([equations, np.eye(number)], axis=1).astype(np.int64)
+    pivots: list[int] = []
+    for column in range(degree):
+        top = len(pivots)
+        below = np.flatnonzero(whole[top:, column])
+        if below.size == 0:
+            continue
+        whole[[top, top + below[0]]] = whole[[top + below[0], top]]
+        whole[top] = whole[top] * pow(int(whole[top, column]), -1, prime) % prime
+        factors = whole[:, column].copy()
+        factors[top] = 0
+        rows = np.flatnonzero(factors)
+        whole[rows] = (whole[rows] - factors[rows, None] * whole[top]) % prime
+        pivots.append(column)
+        if len(pivots) == number:
+            break
+    result = whole.astype(np.float64)
+    return result[:, degree:], result[:, :degree], pivots

@@ -1,0 +1,80 @@
+"""The fast Walsh-Hadamard transform, for every characteristic, in batches.
+
+All q^n values of a character sum at once. A place is a pair (high, low) of halves of its
+digits, and a character of it is the product of two. So the sum runs over the low halves
+first, for the few frequencies that occur, and then over the high ones: a matrix product with
+a table of characters, radix sqrt(q^n), faster here than radix 2 in passes over memory.
+Characters are +1 and -1 for p = 2; for odd p real and imaginary parts stand side by side,
+so that all of it is real.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from decoder.element import Shifts, elements_of
+from decoder.score import Scores
+from decoder.spectrum import Spectrum
+from generator.array.sequence import Sequence
+
+LARGEST_TRANSFORM = 1 << 18  #: places; a window then takes 1 MB
+
+
+class Transform:
+    """Scores of all places of a sequence for symbols seen at given offsets."""
+
+    def __init__(self, sequence: Sequence, offsets: list[int]) -> None:
+        self.sequence = sequence
+        self.spectrum = Spectrum(sequence, offsets)
+        prime, degree = sequence.ring.prime, sequence.ring.degree
+        half = degree // 2
+        weights = prime ** np.arange(degree - half)
+        frequencies = self.spectrum.frequencies.astype(np.int64)
+        high = frequencies[:, half:] @ weights
+        self._order = np.argsort(high, kind="stable")
+        occurring, self._starts = high[self._order], np.arange(high.size)
+        if high.size > prime ** (degree - half):  # so many that sums of equal ones pay
+            occurring, self._starts = np.unique(occurring, return_index=True)
+        low = frequencies[self._order, :half] @ weights[:half]
+        self._low = _characters(prime, half, low)  # (U, R_low)
+        high_table = _characters(prime, degree - half, occurring).T  # (R_high, H)
+        if prime > 2:
+            high_table = np.concatenate([high_table.real, -high_table.imag], axis=1)
+        self._high = np.ascontiguousarray(high_table)
+
+    @cached_property
+    def index_of_key(self) -> NDArray[np.int32]:
+        """(q^n,) index of each field element by its key; entry 0 has no meaning."""
+        elements = elements_of(self.sequence.ring)
+        forward = Shifts(elements, self.sequence.ring.powers_of_x[1])
+        keys = elements.keys(forward.run(elements.one[0], self.sequence.period))
+        index = np.zeros(self.sequence.period + 1, dtype=np.int32)
+        index[keys.astype(np.intp)] = np.arange(self.sequence.period)
+        return index
+
+    def values(self, scores: Scores) -> NDArray[np.float32]:
+        """Return (N, q^n) log-likelihoods by key; key 0, no place, has -inf."""
+        constant, coefficients = self.spectrum.of(scores)
+        partial = coefficients[:, self._order, None] * self._low
+        if len(self._starts) < len(self._order):
+            partial = np.add.reduceat(partial, self._starts, axis=1)
+        if partial.dtype.kind == "c":
+            partial = np.concatenate([partial.real, partial.imag], axis=1)
+        values = np.matmul(self._high, partial).reshape(len(scores), -1)
+        values += constant[:, None].astype(np.float32)
+        values[:, 0] = -np.inf
+        return np.asarray(values)
+
+
+def _characters(prime: int, digits: int, frequencies: NDArray[np.int64]) -> NDArray[Any]:
+    """Return (F, p^d) characters w^(f . x) of frequencies given by their keys."""
+    weights = prime ** np.arange(digits)
+    places = np.arange(prime**digits)[:, None] // weights % prime
+    inner = (frequencies[:, None] // weights % prime) @ places.T % prime
+    if prime == 2:
+        return np.asarray(1 - 2 * inner, dtype=np.float32)
+    return np.asarray(np.exp(2j * np.pi / prime * inner), dtype=np.complex64)

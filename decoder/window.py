@@ -1,0 +1,92 @@
+"""Windows as arrays and as text, checked.
+
+A batch is (N, rows, columns) labels, -1 where a symbol is not seen, or (N, rows, columns, q)
+scores: the log-likelihood of every symbol at every cell, in nats, all 0 where none is seen.
+Text: rows apart by spaces, `?` for an erased symbol: "01 11 0? 01 00 01".
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from decoder.errors import WindowError
+from generator.array.contract import Labels
+
+ERASED = -1  #: label of a symbol that is not seen
+LARGEST_SCORE = 1e6  #: nats; beyond it single precision loses single cells
+
+
+def parsed(text: str, order: int) -> Labels:
+    """Return the (rows, columns) labels of a window written as text.
+
+    Labels above 9 are written apart by commas: "10,3 0,?".
+
+    Raises
+    ------
+    WindowError
+        If a symbol is unknown or the rows differ in length; the error shows the row.
+    """
+    rows = []
+    for number, row in enumerate(text.split(), 1):
+        cells = row.split(",") if "," in row else list(row)
+        for cell in cells:
+            if cell != "?" and not (cell.isascii() and cell.isdigit() and int(cell) < order):
+                raise WindowError(
+                    f"row {number} '{row}': '{cell}' is no symbol of this array, which has 0 to "
+                    f"{order - 1}, or ? for one that is not seen",
+                    fix="write one digit per symbol, rows apart by spaces, as '01 11 0?'",
+                )
+        rows.append([ERASED if cell == "?" else int(cell) for cell in cells])
+    if not rows:
+        raise WindowError("the window is empty", fix="write rows apart by spaces, as '01 11'")
+    if len({len(row) for row in rows}) > 1:
+        lengths = ", ".join(str(len(row)) for row in rows)
+        raise WindowError(
+            f"the rows of a window must be equally long; these have {lengths} symbols",
+            fix="write ? for symbols that are not seen",
+        )
+    return np.array(rows, dtype=np.int64)
+
+
+def checked_labels(windows: ArrayLike, order: int) -> Labels:
+    """Return (N, rows, columns) labels; a single window gets N = 1."""
+    given: NDArray[Any] = np.asarray(windows)
+    if given.dtype.kind not in "iub" or given.ndim not in (2, 3) or 0 in given.shape[-2:]:
+        raise WindowError(
+            f"a window is (rows, columns) labels, a batch (N, rows, columns), not {given.shape} "
+            f"of {given.dtype}",
+            fix="give integers, -1 where a symbol is not seen",
+        )
+    labels = given.astype(np.int64, copy=False)
+    labels = labels[None] if labels.ndim == 2 else labels
+    if labels.size and (labels.min() < ERASED or labels.max() >= order):
+        raise WindowError(
+            f"labels from {labels.min()} to {labels.max()} were given; this array has 0 to "
+            f"{order - 1}, and -1 for a symbol that is not seen",
+            fix="check which array the window belongs to",
+        )
+    return labels
+
+
+def checked_scores(scores: ArrayLike, order: int) -> NDArray[np.float32]:
+    """Return (N, rows, columns, q) scores; a single window gets N = 1."""
+    given: NDArray[Any] = np.asarray(scores)
+    if given.dtype.kind != "f" or given.ndim not in (3, 4) or given.shape[-1] != order:
+        raise WindowError(
+            f"scores are (rows, columns, {order}) log-likelihoods, or a batch of these, not "
+            f"{given.shape} of {given.dtype}",
+            fix=f"give one number for each of the {order} symbols at each cell",
+        )
+    given = given[None] if given.ndim == 3 else given
+    if 0 in given.shape[1:]:
+        raise WindowError("a window has at least one cell", fix="give one row and one column")
+    if not np.isfinite(given).all() or (given.size and np.abs(given).max() > LARGEST_SCORE):
+        raise WindowError(
+            f"scores must be finite log-likelihoods, at most {LARGEST_SCORE:g} nats apart; "
+            f"{np.count_nonzero(~np.isfinite(given))} are NaN or infinite",
+            fix="write a symbol that cannot be as -50, and a cell that is not seen as zeros",
+        )
+    return np.asarray(given - given.max(axis=-1, keepdims=True), dtype=np.float32)

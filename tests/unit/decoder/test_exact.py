@@ -1,0 +1,202 @@
+"""Exact conversion at every size and field, and at its edges."""
+
+import numpy as np
+import pytest
+
+from decoder import MethodError, WindowError, decode_exact
+from decoder.convert import conversion
+from generator.array import PROFILES, array_from
+from generator.array.primitive import search_primitive
+
+METHODS = ("table", "serial", "milestones", "logarithm")
+
+
+def every_window(array, shape):
+    rows, columns = np.indices((array.rows, array.columns)).reshape(2, -1)
+    return rows, columns, windows_at(array, rows, columns, shape)
+
+
+def windows_at(array, rows, columns, shape):
+    rows = [[[(int(r) + i) % array.rows for i in range(shape[0])]] for r in rows]
+    columns = [[[(int(c) + j) % array.columns for j in range(shape[1])]] for c in columns]
+    return array.symbols(
+        np.array(rows, np.uint64).reshape(-1, shape[0], 1),
+        np.array(columns, np.uint64).reshape(-1, 1, shape[1]),
+    )
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", ["thesis", "one-touch", "product"])
+def test_every_window_of_a_profile_decodes_to_itself(name, method):
+    array = PROFILES[name].array()
+    rows, columns, windows = every_window(array, array.window)
+    found = decode_exact(array, windows, method)
+    assert found.answered.all()
+    np.testing.assert_array_equal(found.rows, rows)
+    np.testing.assert_array_equal(found.columns, columns)
+
+
+@pytest.mark.parametrize("method", ["table", "milestones", "logarithm"])
+def test_every_window_of_the_large_profile(method):
+    array = PROFILES["large"].array()
+    rows, columns, windows = every_window(array, array.window)
+    found = decode_exact(array, windows, method)
+    np.testing.assert_array_equal(found.rows[found.answered], rows)
+    np.testing.assert_array_equal(found.columns, columns)
+
+
+SIZES = [
+    (2, 32), (2, 53), (2, 63), (2, 64), (4, 32), (8, 21), (16, 16), (3, 1), (3, 40), (9, 20),
+    (5, 27), (7, 20), (11, 18), (25, 12), (27, 12), (251, 3), (1021, 2),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("order", "degree"), SIZES)
+def test_logarithm_up_to_2_to_the_64(order, degree):
+    family = "prba" if order == 2 else "prmvs" if degree == 1 else "prmva"
+    values = {"family": family, "order": order, "degree": degree}
+    if order > 250:
+        values["polynomial"] = list(search_primitive(order, degree))
+    array = array_from(values)
+    period = order**degree - 1
+    places = [0, 1, period - 1, period // 2, period // 3, 2**52 % period, (2**63 + 5) % period]
+    cells = [array.cell(t) for t in places]
+    windows = windows_at(array, [r for r, _ in cells], [c for _, c in cells], array.window)
+    found = decode_exact(array, windows, "logarithm")
+    assert [d.t for d in found] == places
+    assert [(d.row, d.column) for d in found] == cells
+
+
+def test_windows_that_wrap_the_torus_and_arrays_with_one_row():
+    array = PROFILES["thesis"].array()
+    window = windows_at(array, [62], [64], (6, 2))
+    assert [(d.row, d.column) for d in decode_exact(array, window)] == [(62, 64)]
+    line = array_from({"family": "prbs", "order": 2, "degree": 10})
+    assert line.rows == 1
+    for method in METHODS:
+        window = windows_at(line, [0, 0], [1020, 5], (1, 10))
+        assert [(d.row, d.column) for d in decode_exact(line, window, method)] == [
+            (0, 1020),
+            (0, 5),
+        ]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_all_zero_window_is_no_place(method):
+    for name in ("thesis", "one-touch"):
+        array = PROFILES[name].array()
+        found = decode_exact(array, np.zeros((2, *array.window), int), method)
+        assert [d.reason for d in found] == ["not an encoded surface"] * 2
+        assert not found.answered.any()
+
+
+def test_contradicting_cells_are_refused():
+    array = PROFILES["thesis"].array()
+    window = windows_at(array, [3], [4], (6, 6))[0]
+    assert decode_exact(array, window)[0]
+    window[1, 5] ^= 1
+    assert decode_exact(array, window)[0].reason == "not an encoded surface"
+    product = PROFILES["product"].array()
+    window = windows_at(product, [3], [4], (4, 4))[0]
+    window[1, 2] = (window[1, 2] + 4) % 8  # another row term than its neighbours'
+    assert decode_exact(product, window)[0].reason == "not an encoded surface"
+
+
+def test_too_few_cells_list_the_places_that_they_allow():
+    array = PROFILES["thesis"].array()
+    window = windows_at(array, [7], [9], (6, 2))[0]
+    window[0, 0] = window[3, 1] = -1
+    found = decode_exact(array, window)[0]
+    assert found.reason == "too few symbols"
+    assert found.row is None
+    assert (7, 9) in {(c.row, c.column) for c in found.candidates}
+    assert len(found.candidates) == 4
+    seen = window >= 0
+    for place in found.candidates:
+        there = windows_at(array, [place.row], [place.column], (6, 2))[0]
+        assert (there == window)[seen].all()
+    nothing = np.full((6, 2), -1)
+    assert decode_exact(array, nothing)[0].reason == "too few symbols"
+
+
+def test_too_few_cells_of_a_product_array():
+    array = PROFILES["product"].array()
+    window = windows_at(array, [5], [7], (4, 2))[0]
+    window[2] = -1
+    found = decode_exact(array, window)[0]
+    assert found.reason == "too few symbols"
+    assert {(c.row, c.column) for c in found.candidates} >= {(5, 7)}
+    assert {c.column for c in found.candidates} == {7}
+
+
+def test_odd_field_lists_candidates_too():
+    array = array_from({"family": "prmva", "order": 3, "degree": 8})
+    window = windows_at(array, [5], [7], array.window)[0]
+    window[0, 0] = -1
+    found = decode_exact(array, window)[0]
+    assert found.reason == "too few symbols"
+    assert (5, 7) in {(c.row, c.column) for c in found.candidates}
+    assert len(found.candidates) == 3
+
+
+def test_methods_refuse_sizes_that_would_not_end():
+    array = array_from({"family": "prba", "order": 2, "degree": 48})
+    window = np.ones(array.window, int)
+    for method in ("table", "serial", "milestones"):
+        with pytest.raises(MethodError, match="at most"):
+            decode_exact(array, window, method)
+    with pytest.raises(MethodError, match="unknown method"):
+        decode_exact(array, window, "guess")
+
+
+@pytest.mark.parametrize(
+    "window",
+    [[[0, 2]], [[0, -2]], [0, 1], [[0.0, 1.0]], np.zeros((0, 0), int), [[[[1]]]]],
+)
+def test_windows_of_other_symbols_are_refused(window):
+    with pytest.raises(WindowError) as refused:
+        decode_exact(PROFILES["thesis"].array(), window)
+    assert refused.value.fix
+
+
+def test_a_batch_may_be_empty():
+    found = decode_exact(PROFILES["thesis"].array(), np.zeros((0, 6, 2), int))
+    assert len(found) == 0
+    assert list(found) == []
+    with pytest.raises(IndexError):
+        found[0]
+
+
+def test_tables_are_made_once():
+    sequence = PROFILES["thesis"].array().sequence
+    assert conversion(sequence, "table") is conversion(sequence, "table")
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"family": "prba", "polynomial": "0x1099", "rows": 63, "columns": 65},
+        {"family": "prba", "order": 2, "degree": 64},
+        {"family": "prmva", "order": 4, "degree": 6},
+        {"family": "prmva", "order": 3, "degree": 8},
+        {"family": "prmva", "order": 9, "degree": 4},
+    ],
+)
+def test_windows_that_each_miss_other_symbols_decode_as_one_by_one(values):
+    array = array_from(values)
+    side = 10 if array.rows > 10**6 else 6
+    rng = np.random.default_rng(2)
+    places = [
+        (int(r) % array.rows, int(c) % array.columns) for r, c in rng.integers(0, 2**62, (60, 2))
+    ]
+    windows = windows_at(array, *zip(*places, strict=True), (side, side))
+    windows = np.where(rng.random(windows.shape) < rng.uniform(0, 0.9, (60, 1, 1)), -1, windows)
+    windows[3] = 0
+    windows[4, 0, 0] = (array.symbols(*np.uint64(places[4])) + 1) % array.order
+    together = decode_exact(array, windows)
+    assert [d.reason for d in together].count("too few symbols") > 2
+    for window, found, place in zip(windows, together, places, strict=True):
+        alone = decode_exact(array, window)[0]
+        assert (found.row, found.column, found.reason) == (alone.row, alone.column, alone.reason)
+        assert found.candidates == alone.candidates
+        assert not found or (found.row, found.column) == place

@@ -1,0 +1,293 @@
+"""Maximum likelihood against plain comparison with every place, and at its edges."""
+
+import numpy as np
+import pytest
+
+from decoder import Likelihood, MethodError, WindowError, decode_good_tuple, decode_likelihood
+from decoder.ordered import Ordered
+from decoder.ranked import best_of
+from decoder.ranking import AllPlaces
+from decoder.score import hard_scores
+from generator.array import PROFILES, array_from
+
+ROBUST = array_from({"family": "prba", "polynomial": "0x1655", "rows": 63, "columns": 65})
+ARRAYS = {
+    "thesis": PROFILES["thesis"].array(),
+    "GF(4)": PROFILES["one-touch"].array(),
+    "GF(8)": array_from({"family": "prmva", "order": 8, "degree": 4}),
+    "GF(3)": array_from({"family": "prmva", "order": 3, "degree": 6}),
+    "GF(9)": array_from({"family": "prmva", "order": 9, "degree": 3}),
+    "GF(5)": array_from({"family": "prmva", "order": 5, "degree": 4}),
+    "product": PROFILES["product"].array(),
+    "one row": array_from({"family": "prbs", "order": 2, "degree": 8}),
+}
+
+
+def every_window(array, shape):
+    rows, columns = np.indices((array.rows, array.columns)).reshape(2, -1)
+    a, b = np.indices(shape)
+    return rows, columns, array.symbols(rows[:, None, None] + a, columns[:, None, None] + b)
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_soft_scores_are_ranked_as_by_comparison_with_every_place(name):
+    array = ARRAYS[name]
+    shape = {"one row": (1, 14), "thesis": (5, 5)}.get(name, (4, 4))
+    rng = np.random.default_rng(3)
+    scores = rng.normal(size=(6, *shape, array.order)).astype(np.float32)
+    scores[:, 0, 1] = 0  # a cell that is not seen
+    rows, columns, windows = every_window(array, shape)
+    high = scores - scores.max(axis=-1, keepdims=True)
+    every = np.take_along_axis(
+        high[:, None], windows[None, ..., None], axis=-1
+    )[..., 0].sum(axis=(2, 3), dtype=np.float64)  # fmt: skip
+    best = every.argmax(axis=1)
+    likelihoods = np.exp(every)
+    nothing = 0.01 / 0.99 * rows.size * np.exp(high).mean(-1, dtype=float).prod(axis=(1, 2))
+    total = likelihoods.sum(axis=1) + nothing
+    found = Likelihood(array, doubt=1.0).decode(scores)
+    np.testing.assert_array_equal(found.rows, rows[best])
+    np.testing.assert_array_equal(found.columns, columns[best])
+    ordered = np.sort(every, axis=1)
+    np.testing.assert_allclose(found.margins, ordered[:, -1] - ordered[:, -2], atol=2e-4)
+    doubts = 1 - likelihoods[np.arange(6), best] / total
+    np.testing.assert_allclose(found.doubts, doubts, rtol=1e-3)
+    listed = Likelihood(array).decode(scores, top=5)
+    for i in range(6):
+        places = np.argsort(-every[i], kind="stable")[:5]
+        assert [(c.row, c.column) for c in listed.candidates[i]] == list(
+            zip(rows[places], columns[places], strict=True)
+        )
+
+
+@pytest.mark.parametrize("name", ["thesis", "GF(4)", "GF(3)", "GF(9)"])
+def test_ordered_statistics_agree_with_the_transform_at_few_errors(name):
+    array = ARRAYS[name]
+    shape = (6, 6) if array.order == 2 else (5, 5)
+    rng = np.random.default_rng(4)
+    rows, _, windows = every_window(array, shape)
+    chosen = rng.choice(rows.size, 200, replace=False)
+    read = windows[chosen]
+    read = np.where(rng.random(read.shape) < 0.05, (read + 1) % array.order, read)
+    scores = hard_scores(read, array.order).reshape(200, -1, array.order)
+    whole = AllPlaces(array, shape).rank(scores, 2)
+    near = AllPlaces(array, shape)
+    near._method = Ordered(array.sequence, array.offsets(*np.indices(shape)))
+    found = near.rank(scores, 2)
+    clear = whole.values[:, 0] - whole.values[:, 1] > 1e-3
+    same = (found.rows[:, 0] == whole.rows[:, 0]) & (found.columns[:, 0] == whole.columns[:, 0])
+    assert same[clear].mean() > 0.97
+    np.testing.assert_allclose(found.values[same, 0], whole.values[same, 0], atol=1e-3)
+    assert (found.values[:, 0] <= whole.values[:, 0] + 1e-3).all()
+
+
+def test_every_window_of_a_profile_by_likelihood():
+    for name in ("thesis", "one-touch", "product"):
+        array = PROFILES[name].array()
+        rows, columns, windows = every_window(array, array.window)
+        found = decode_likelihood(array, windows, error=1e-6, blank=0)
+        assert found.answered.all()
+        np.testing.assert_array_equal(found.rows, rows)
+        np.testing.assert_array_equal(found.columns, columns)
+
+
+def test_views_that_correct_two_errors_do():
+    rng = np.random.default_rng(5)
+    rows, columns, windows = every_window(ROBUST, (5, 5))
+    assert ROBUST.minimum_distance(*np.indices((5, 5))) == 5
+    read = windows.reshape(-1, 25).copy()
+    for window in read:
+        window[rng.choice(25, 2, replace=False)] ^= 1
+    found = Likelihood(ROBUST, doubt=1.0).decode(read.reshape(-1, 5, 5))
+    np.testing.assert_array_equal(found.rows, rows)
+    np.testing.assert_array_equal(found.columns, columns)
+
+
+def test_floor_of_success_rates():
+    """Hard decisions, likeliest place if single; `encoding.md`: 96 and 75, 99.9 and 95 %."""
+    rng = np.random.default_rng(6)
+    for side, floors in ((5, (95.0, 72.5)), (6, (99.5, 94.0))):
+        rows, columns, windows = every_window(ROBUST, (side, side))
+        for error, floor in zip((0.05, 0.10), floors, strict=True):
+            read = windows ^ (rng.random(windows.shape) < error)
+            found = Likelihood(ROBUST, doubt=1.0).decode(read)
+            right = (found.rows == rows) & (found.columns == columns) & (found.margins > 1e-3)
+            assert 100 * right.mean() > floor
+
+
+def test_default_threshold_gives_no_wrong_answer_and_no_window_is_lost():
+    rng = np.random.default_rng(7)
+    rows, columns, windows = every_window(ROBUST, (6, 6))
+    read = windows ^ (rng.random(windows.shape) < 0.05)
+    found = Likelihood(ROBUST).decode(read)
+    wrong = found.answered & ((found.rows != rows) | (found.columns != columns))
+    assert not wrong.any()
+    assert found.answered.mean() > 0.9
+    for i in np.flatnonzero(~found.answered)[:50]:
+        refused = found[int(i)]
+        assert refused.row is None
+        assert refused.reason in ("ambiguous", "not an encoded surface")
+        assert bool(refused.candidates) == (refused.reason == "ambiguous")
+
+
+def test_prior_and_rotations():
+    rng = np.random.default_rng(8)
+    rows, columns, windows = every_window(ROBUST, (6, 6))
+    registered = rng.choice(rows.size, 400, replace=False)
+    prior = np.stack([rows, columns], axis=1)[registered]
+    turns = rng.integers(0, 4, 400)
+    read = np.array([np.rot90(w, -k) for w, k in zip(windows[registered], turns, strict=True)])
+    found = Likelihood(ROBUST, prior=prior, rotations=(0, 1, 2, 3)).decode(read)
+    assert found.answered.mean() > 0.95
+    right = found.answered
+    np.testing.assert_array_equal(found.rows[right], prior[right, 0])
+    np.testing.assert_array_equal(found.rotations[right], turns[right])
+    without = Likelihood(ROBUST, rotations=(0, 1, 2, 3)).decode(read)
+    assert without.answered.mean() < found.answered.mean()
+
+
+def test_a_window_that_is_not_square_turned_by_a_right_angle():
+    array = ARRAYS["GF(4)"]
+    window = array.symbols(*np.indices((4, 6)))
+    found = decode_likelihood(array, np.rot90(window, -1), rotations=(0, 1))[0]
+    assert (found.row, found.column, found.rotation) == (0, 0, 1)
+
+
+def test_prior_at_any_size():
+    array = array_from({"family": "prba", "order": 2, "degree": 64})
+    rng = np.random.default_rng(9)
+    prior = np.stack([rng.integers(0, array.rows, 300, np.uint64),
+                      rng.integers(0, array.columns, 300, np.uint64)], axis=1)  # fmt: skip
+    prior[0] = array.rows - 1, array.columns - 1  # wraps
+    a, b = np.indices((6, 6)).astype(np.uint64)
+    rows = (prior[:, 0, None, None] + a) % np.uint64(array.rows)
+    columns = (prior[:, 1, None, None] + b) % np.uint64(array.columns)
+    read = array.symbols(rows, columns) ^ (rng.random((300, 6, 6)) < 0.02)
+    found = Likelihood(array, prior=prior).decode(read)
+    assert found.answered.mean() > 0.97
+    np.testing.assert_array_equal(found.rows[found.answered], prior[found.answered, 0])
+    assert found[0].t == array.sequence.period - 1 if found.answered[0] else True
+
+
+@pytest.mark.parametrize(("order", "degree"), [(2, 64), (4, 32), (2, 40), (3, 20)])
+def test_ordered_statistics_on_large_arrays(order, degree):
+    family = "prba" if order == 2 else "prmva"
+    array = array_from({"family": family, "order": order, "degree": degree})
+    side = 12 if degree * order > 100 else 10
+    if not array.identifies(*np.indices((side, side))):
+        pytest.skip("the view does not identify")
+    rng = np.random.default_rng(10)
+    window = array.symbols(*np.indices((side, side)))
+    read = np.where(rng.random(window.shape) < 0.02, (window + 1) % order, window)
+    read[0, :3] = -1
+    found = decode_likelihood(array, read)[0]
+    assert (found.row, found.column, found.t) == (0, 0, 0)
+
+
+@pytest.mark.parametrize("name", ["thesis", "GF(3)"])
+def test_rank_deficient_views_are_never_answered(name):
+    array = ARRAYS[name]
+    window = array.symbols(*np.indices((6, 6)))
+    window[1:] = -1
+    window[0, 4:] = -1
+    assert not array.identifies(*np.nonzero(window >= 0))
+    for method in (None, Ordered):
+        decoder = Likelihood(array, doubt=0.4)
+        if method is not None:
+            near = AllPlaces(array, (6, 6))
+            near._method = Ordered(array.sequence, array.offsets(*np.indices((6, 6))))
+            decoder._places[6, 6] = near
+            decoder._prior = np.zeros((1, 2))  # so that the ranking above is taken
+        found = decoder.decode(window)[0]
+        assert found.reason == "too few symbols"
+        assert found.row is None
+        assert found.doubt > 0.4
+
+
+def test_a_batch_may_be_empty():
+    for array in ARRAYS.values():
+        assert len(decode_likelihood(array, np.zeros((0, 4, 4), int), rotations=(0, 1))) == 0
+    assert len(decode_good_tuple(ROBUST, np.zeros((0, 6, 6), int))) == 0
+
+
+def test_nothing_seen_and_all_zero():
+    for name in ("thesis", "GF(9)", "product"):
+        array = ARRAYS[name]
+        nothing = np.full((3, 4, 4), -1)
+        assert {d.reason for d in decode_likelihood(array, nothing)} == {"too few symbols"}
+    zero = decode_likelihood(ROBUST, np.zeros((6, 6), int))[0]
+    assert zero.row is None
+
+
+def test_a_surface_without_code_is_told_apart():
+    rng = np.random.default_rng(11)
+    noise = rng.integers(0, 2, (2000, 8, 8))
+    found = Likelihood(ROBUST).decode(noise)
+    assert found.answered.mean() < 1e-3
+    reasons = [d.reason for d in found]
+    assert reasons.count("not an encoded surface") > 1900
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e30])
+def test_scores_that_are_not_finite_are_refused(bad):
+    scores = np.zeros((6, 6, 2))
+    scores[1, 1, 1] = bad
+    with pytest.raises(WindowError, match="finite"):
+        decode_likelihood(ROBUST, scores)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"error": 0.5}, {"error": 0.0}, {"doubt": 0.0}, {"blank": 1.0}, {"rotations": ()},
+     {"rotations": (4,)}, {"prior": [1, 2]}, {"prior": np.zeros((0, 2), int)}],
+)  # fmt: skip
+def test_options_out_of_range_are_refused(options):
+    with pytest.raises(WindowError) as refused:
+        decode_likelihood(ROBUST, np.zeros((6, 6), int), **options)
+    assert refused.value.fix
+
+
+def test_large_product_arrays_are_searched_exactly():
+    array = array_from({"family": "prmvpa", "factors": {
+        "rows": {"order": 2, "degree": 10}, "columns": {"order": 4, "degree": 5}}})  # fmt: skip
+    rng = np.random.default_rng(12)
+    places = np.stack([rng.integers(0, 1023, 6), rng.integers(0, 1023, 6)], axis=1)
+    a, b = np.indices((12, 8))
+    read = array.symbols(places[:, 0, None, None] + a, places[:, 1, None, None] + b)
+    read = np.where(rng.random(read.shape) < 0.1, (read + 3) % 8, read)
+    found = decode_likelihood(array, read)
+    np.testing.assert_array_equal(found.rows[found.answered], places[found.answered, 0])
+    assert found.answered.sum() >= 4
+    with pytest.raises(MethodError, match="prior"):
+        decode_likelihood(array_from({"family": "prpa", "factors": {
+            "rows": {"order": 2, "degree": 20}, "columns": {"order": 2, "degree": 10}}}),
+            np.zeros((20, 10), int))  # fmt: skip
+
+
+def test_good_tuple_is_the_weaker_way():
+    rng = np.random.default_rng(13)
+    rows, columns, windows = every_window(ROBUST, (6, 6))
+    clean = decode_good_tuple(ROBUST, windows)
+    np.testing.assert_array_equal(clean.rows, rows)
+    read = windows ^ (rng.random(windows.shape) < 0.05)
+    found = decode_good_tuple(ROBUST, read)
+    right = found.answered & (found.rows == rows) & (found.columns == columns)
+    best = Likelihood(ROBUST, doubt=1.0).decode(read)
+    assert 0.4 < right.mean() < ((best.rows == rows) & (best.columns == columns)).mean()
+    with pytest.raises(MethodError):
+        decode_good_tuple(ROBUST, np.zeros((2, 2), int))
+    with pytest.raises(MethodError):
+        decode_good_tuple(ARRAYS["product"], np.zeros((6, 6), int))
+
+
+def test_best_of_many_and_few():
+    rng = np.random.default_rng(14)
+    for places in (1, 2, 3, 17, 1023, 4096, 5000):
+        values = rng.normal(size=(4, places)).astype(np.float32)
+        for number in (2, 5, 16):
+            found, chosen, rest = best_of(values.copy(), number)
+            truth = -np.sort(-values, axis=1)[:, : found.shape[1]]
+            kept = min(number, places)
+            np.testing.assert_allclose(chosen[:, :kept], truth[:, :kept])
+            others = np.exp(values - values.max(axis=1, keepdims=True)).sum(axis=1) - 1
+            np.testing.assert_allclose(rest, others, rtol=1e-3, atol=1e-6)
