@@ -1,0 +1,369 @@
+"""Embossing a cube: this project against the booleans of CAD kernels, side by side.
+
+    python tests/bench/embossing.py --symbols 24,150,600,2400 --limit 120
+    python tests/bench/embossing.py --symbols 600 --large 20000
+
+A cube carries 6 k^2 symbols of the alphabet dense-4, at 7 mm. Each way makes the same solid
+from the same outlines, writes STEP, meshes it and writes STL: CPU seconds of all threads
+without imports, and the peak of memory with them, in a process of its own. The sides of
+symbols are vertical, because not every kernel function can taper an outline exactly; a
+last line shows this project with the draft of 10 degrees that prints. Every way's volume
+is compared with the closed form. A way that takes longer than the limit (CPU seconds) is
+ended and not tried on more symbols. Exit code 1 when a volume is wrong.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from generator.alphabet.outline import Tiers
+    from generator.layout.placement import Layout
+    from generator.polyhedron.winged import Polyhedron
+
+PITCH_MM = 7.0
+OURS = "this"
+DRAFTED = "this, draft 10 deg"
+REPEATS = 3  #: of this project, whose runs are short; the median counts
+VOLUME_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The cube and the symbols on it."""
+
+    side_mm: float
+    polyhedron: Polyhedron
+    layout: Layout
+    tiers: tuple[Tiers, ...]
+
+    @property
+    def symbols(self) -> Iterator[tuple[Any, float, float, int]]:
+        """T_object_face (4, 4), centre x and y (face frame, mm), and label of each symbol."""
+        from generator.polyhedron import face_frame
+
+        for face in self.layout.faces:
+            T = face_frame(self.polyhedron, face.face)
+            for (x, y), label in zip(face.centres_mm.tolist(), face.labels.tolist(), strict=True):
+                yield T, x, y, label
+
+
+def scene(symbols: int, draft_rad: float) -> Scene:
+    """Return a cube with 6 k^2 symbols, k the root of a sixth of what is asked, rounded up."""
+    import numpy as np
+
+    from generator.alphabet.known import alphabet_named
+    from generator.alphabet.outline import SymbolStyle, outlines
+    from generator.array.profiles import PROFILES
+    from generator.layout.placement import FaceLayout, Layout, Placement
+    from generator.polyhedron.shapes import cube
+
+    k = math.isqrt(math.ceil(symbols / 6) - 1) + 1
+    array = PROFILES["large"].array()
+    r, c = (index.ravel() for index in np.indices((k, k)))
+    centres = np.stack([(c + 0.75) * PITCH_MM, (k - r - 0.25) * PITCH_MM], axis=1)
+    faces = [
+        FaceLayout(
+            face, Placement(0, face * k, 0.0, 0.0, 0.0), r, c + face * k,
+            array.symbols(r, c + face * k), centres, 0,
+        )
+        for face in range(6)
+    ]  # fmt: skip
+    side = (k + 0.5) * PITCH_MM
+    tiers = outlines(alphabet_named("dense-4"), SymbolStyle(PITCH_MM, draft_rad=draft_rad))
+    return Scene(side, cube(side), Layout("faces", PITCH_MM, tuple(faces)), tiers)
+
+
+def closed_form_mm3(made: Scene) -> float:
+    """Return the volume: the cube and, for each symbol, a prismatoid between its outlines."""
+    from generator.polyhedron.polygon import signed_area
+
+    def volume(tiers: Tiers) -> float:
+        total = 0.0
+        steps = zip(tiers.z_mm, tiers.z_mm[1:], tiers.rings, tiers.rings[1:], strict=False)
+        for z0, z1, below, above in steps:
+            for a, b in zip(below, above, strict=True):
+                areas = (signed_area(a), 4 * signed_area((a + b) / 2), signed_area(b))
+                total += (z1 - z0) * sum(areas) / 6
+        return total
+
+    each = [volume(tiers) for tiers in made.tiers]
+    return made.side_mm**3 + math.fsum(each[label] for *_, label in made.symbols)
+
+
+# Each way takes the scene and a folder, and returns a function that tells, after the clock
+# has stopped, the volume and the number of solids that it made.
+Made = Callable[[], tuple[float, int]]
+
+
+def cadquery_union(made: Scene, folder: Path) -> Made:
+    """One symbol after another, as a script's loop does."""
+    import cadquery as cq
+
+    body = cq.Workplane(_cadquery_body(made))
+    for tool in _cadquery_tools(made):
+        body = body.union(cq.Workplane(tool), clean=False)
+    return _cadquery_files(body.val(), folder)
+
+
+def cadquery_fuse(made: Scene, folder: Path) -> Made:
+    """All symbols in one call."""
+    return _cadquery_files(_cadquery_body(made).fuse(*_cadquery_tools(made)), folder)
+
+
+def _cadquery_body(made: Scene) -> Any:
+    import cadquery as cq
+
+    corner = made.polyhedron.vertices.min(axis=0).tolist()
+    return cq.Solid.makeBox(*3 * [made.side_mm], pnt=cq.Vector(*corner))
+
+
+def _cadquery_tools(made: Scene) -> list[Any]:
+    import cadquery as cq
+
+    def prism(tiers: Tiers) -> Any:
+        outer, *holes = (
+            cq.Wire.makePolygon([cq.Vector(x, y, 0) for x, y in ring.tolist()], close=True)
+            for ring in tiers.rings[0]
+        )
+        return cq.Solid.extrudeLinear(outer, holes, cq.Vector(0, 0, tiers.z_mm[-1]))
+
+    prisms = [prism(tiers) for tiers in made.tiers]
+    tools = []
+    for T, x, y, label in made.symbols:
+        origin = (T @ [x, y, 0, 1])[:3].tolist()
+        plane = cq.Plane(tuple(origin), xDir=tuple(T[:3, 0]), normal=tuple(T[:3, 2]))
+        tools.append(prisms[label].moved(cq.Location(plane)))
+    return tools
+
+
+def _cadquery_files(shape: Any, folder: Path) -> Made:
+    import cadquery as cq
+
+    cq.exporters.export(cq.Workplane(shape), str(folder / "cube.step"))
+    cq.exporters.export(cq.Workplane(shape), str(folder / "cube.stl"))
+    return lambda: (shape.Volume(), len(shape.Solids()))
+
+
+def build123d_extrude(made: Scene, folder: Path) -> Made:
+    """A sketch of all symbols on each face, extruded."""
+    import build123d as bd
+
+    glyphs = []
+    for tiers in made.tiers:
+        outer, *holes = (bd.Wire.make_polygon(ring.tolist(), close=True) for ring in tiers.rings[0])
+        glyphs.append(bd.Face(outer, holes))
+    with bd.BuildPart() as part:
+        centre = (made.polyhedron.vertices.min(axis=0) + made.side_mm / 2).tolist()
+        with bd.Locations(tuple(centre)):
+            bd.Box(*3 * [made.side_mm])
+        for face, T in zip(made.layout.faces, _frames(made), strict=True):
+            plane = bd.Plane(tuple(T[:3, 3]), x_dir=tuple(T[:3, 0]), z_dir=tuple(T[:3, 2]))
+            with bd.BuildSketch(plane):
+                for label, glyph in enumerate(glyphs):
+                    places = face.centres_mm[face.labels == label].tolist()
+                    if places:
+                        with bd.Locations(*map(tuple, places)):
+                            bd.insert(glyph)
+        bd.extrude(amount=made.tiers[0].z_mm[-1])
+    bd.export_step(part.part, str(folder / "cube.step"))
+    bd.export_stl(part.part, str(folder / "cube.stl"))
+    return lambda: (part.part.volume, len(part.part.solids()))
+
+
+def _frames(made: Scene) -> list[Any]:
+    from generator.polyhedron import face_frame
+
+    return [face_frame(made.polyhedron, face.face) for face in made.layout.faces]
+
+
+def this_project(made: Scene, folder: Path) -> Made:
+    """Faces with loops, proved closed, written without a kernel."""
+    from generator.export.step import step_chunks
+    from generator.export.stl import stl_bytes
+    from generator.solid import prove_closed, triangles, whole
+
+    part = whole(made.polyhedron, made.layout, made.tiers, "cube")
+    prove_closed(part)
+    with (folder / "cube.step").open("wb") as file:
+        file.writelines(step_chunks(part))
+    mesh = triangles(part)
+    (folder / "cube.stl").write_bytes(stl_bytes(mesh))
+
+    def measured() -> tuple[float, int]:
+        import numpy as np
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
+        volume = math.fsum((np.einsum("ij,ij->i", a, np.cross(b, c)) / 6).tolist())
+        i, j = mesh.triangles[:, [0, 1]].ravel(), mesh.triangles[:, [1, 2]].ravel()
+        count = len(mesh.vertices)
+        solids, _ = connected_components(coo_array((np.ones(len(i)), (i, j)), (count, count)))
+        return volume, int(solids)
+
+    return measured
+
+
+WAYS: dict[str, Callable[[Scene, Path], Made]] = {
+    "cadquery union one by one": cadquery_union,
+    "cadquery fuse(*tools)": cadquery_fuse,
+    "build123d sketch + extrude": build123d_extrude,
+    OURS: this_project,
+    DRAFTED: this_project,
+}
+
+
+@dataclass(frozen=True)
+class Run:
+    """What one way cost on one number of symbols."""
+
+    cpu_s: float
+    peak_mb: float
+    volume_error: float
+    solids: int
+    step_mb: float
+
+
+def measure(way: str, symbols: int) -> None:
+    """Run one way in this process; print one line of JSON."""
+    _import_for(way)
+    made = scene(symbols, math.radians(10) if way == DRAFTED else 0.0)
+    with tempfile.TemporaryDirectory() as folder:
+        start = time.process_time()
+        ask = WAYS[way](made, Path(folder))
+        cpu_s = time.process_time() - start
+        peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        step_mb = (Path(folder) / "cube.step").stat().st_size / 1e6
+    volume, solids = ask()
+    error = abs(volume / closed_form_mm3(made) - 1)
+    print(json.dumps([cpu_s, peak_mb, error, solids, step_mb]))
+
+
+def _import_for(way: str) -> None:
+    """Import before the clock starts."""
+    if way.startswith("cadquery"):
+        import cadquery  # noqa: F401
+    elif way.startswith("build123d"):
+        import build123d  # noqa: F401
+    else:
+        import generator.export.step
+        import generator.export.stl
+        import generator.solid  # noqa: F401
+
+
+def run(way: str, symbols: int, limit_s: float) -> Run | None:
+    """Run one way in a process of its own; None where it takes longer than the limit."""
+    command = [sys.executable, __file__, "--measure", way, "--symbols", str(symbols)]
+    limit = math.ceil(limit_s + 10)  # imports of a kernel are not the limit's business
+
+    def limited() -> None:
+        resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
+
+    done = subprocess.run(command, capture_output=True, text=True, preexec_fn=limited)
+    if done.returncode < 0:  # ended by the signal of the limit
+        return None
+    if done.returncode:
+        raise RuntimeError(f"{way} on {symbols} symbols failed:\n{done.stderr}")
+    made = Run(*json.loads(done.stdout.splitlines()[-1]))
+    return made if made.cpu_s <= limit_s else None
+
+
+def median_run(way: str, symbols: int, limit_s: float) -> Run | None:
+    """Run this project several times, others once; the run of median time."""
+    runs = [run(way, symbols, limit_s) for _ in range(REPEATS if way in (OURS, DRAFTED) else 1)]
+    finished = [one for one in runs if one is not None]
+    middle = statistics.median_low([one.cpu_s for one in finished]) if finished else None
+    return next((one for one in finished if one.cpu_s == middle), None)
+
+
+def actual(symbols: int) -> int:
+    """Return the number of symbols of the scene."""
+    return 6 * (math.isqrt(math.ceil(symbols / 6) - 1) + 1) ** 2
+
+
+def table(ways: list[str], counts: list[int], limit_s: float) -> bool:
+    """Print CPU, memory and volume of every way on every count; whether all volumes agree."""
+    results: dict[tuple[str, int], Run] = {}
+    print(f"{'CPU s | peak MB | volume error':28}", *(f"{actual(n):>24} symbols" for n in counts))
+    for way in ways:
+        beyond = False
+        line = []
+        for count in counts:
+            made = None if beyond else median_run(way, count, limit_s)
+            if made is None:
+                line.append(f"{'-' if beyond else f'over {limit_s:g} s':>32}")
+                beyond = True
+            else:
+                results[way, count] = made
+                solids = "" if made.solids == 1 else f" {made.solids} solids!"
+                figures = (
+                    f"{made.cpu_s:9.3f} | {made.peak_mb:5.0f} | {made.volume_error:.0e}{solids}"
+                )
+                line.append(f"{figures:>32}")
+        print(f"{way:28}", *line, flush=True)
+    rivals = [way for way in ways if way not in (OURS, DRAFTED)]
+    if OURS in ways and rivals:
+        line = []
+        for count in counts:
+            times = [results[w, count].cpu_s for w in rivals if (w, count) in results]
+            ours = results.get((OURS, count))
+            ratio = f"{min(times) / ours.cpu_s:.0f} x" if times and ours else "-"
+            line.append(f"{ratio:>32}")
+        print(f"{'fastest of them / this':28}", *line)
+    return all(one.volume_error <= VOLUME_TOLERANCE and one.solids == 1 for one in results.values())
+
+
+def growth(small: int, large: int) -> bool:
+    """Print what many symbols cost this project, and the exponent of growth between two counts."""
+    pair = [median_run(DRAFTED, count, 600.0) for count in (small, large)]
+    for count, made in zip((small, large), pair, strict=True):
+        if made is None:
+            print(f"{actual(count)} symbols: over 600 s")
+            return False
+        print(
+            f"{DRAFTED}, {actual(count)} symbols: {made.cpu_s:.2f} s CPU, {made.peak_mb:.0f} MB, "
+            f"STEP {made.step_mb:.0f} MB, volume error {made.volume_error:.0e}"
+        )
+    few, many = (made for made in pair if made is not None)
+    exponent = math.log(many.cpu_s / few.cpu_s) / math.log(actual(large) / actual(small))
+    print(f"exponent of growth {actual(small)} -> {actual(large)}: {exponent:.2f}")
+    return max(few.volume_error, many.volume_error) <= VOLUME_TOLERANCE
+
+
+def main() -> int:
+    """Read the arguments, run, print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--symbols", default="24,150,600,2400", help="numbers, with commas")
+    parser.add_argument("--limit", type=float, default=120.0, help="CPU seconds for one way")
+    parser.add_argument("--ways", default="", help=f"of {', '.join(WAYS)}; with ';'")
+    parser.add_argument("--large", type=int, default=0, help="symbols for the growth")
+    parser.add_argument("--measure", default="", help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    counts = [int(count) for count in arguments.symbols.split(",")]
+    if arguments.measure:
+        measure(arguments.measure, counts[0])
+        return 0
+    ways = arguments.ways.split(";") if arguments.ways else list(WAYS)
+    print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
+    agree = table(ways, counts, arguments.limit)
+    if arguments.large:
+        agree &= growth(600, arguments.large)
+    return 0 if agree else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

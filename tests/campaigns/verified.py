@@ -1,0 +1,145 @@
+"""Read back, by independent programs, what is made of fixtures and random polyhedra.
+
+    python tests/campaigns/verified.py --convex 300 --other 50 --seed 1 -j 2
+
+Random shapes are made as panels and as whole bodies in turn. Every part is written as STEP
+and STL and read back: STEP by the CAD kernel (one valid solid, volume against the closed
+form), STL by pymeshlab (closed, two-manifold, no triangle cuts another). Shapes that the
+tool refuses (too small for the wall, say) are counted with their reason. Exit code 1 when a
+written part fails.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from generator.errors import GeneratorError
+from generator.export.check import verify
+from generator.export.step import step_chunks
+from generator.export.stl import stl_bytes
+from generator.pipeline.encode import NO_CELLS, laid_out
+from generator.pipeline.files import parts_of
+from generator.pipeline.plan import planned
+from generator.polyhedron import Polyhedron
+from generator.polyhedron.random_shapes import random_convex, random_nonconvex
+from generator.solid import prove_closed, triangles, volume
+from generator.spec import Located, read_specs
+
+FIXTURES = Path(__file__).parents[2] / "fixtures"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one shape, as one kind of parts."""
+
+    name: str
+    parts: int
+    symbols: int
+    step_error: float  #: largest relative volume error of a part, by the kernel
+    mesh_error: float
+    refused: str
+    failed: str
+
+
+def random_spec(kind: str, seed: int, number: int, folder: Path) -> Path:
+    """Write the spec of one random shape: even ones as panels, odd ones as a whole body."""
+    rng = np.random.default_rng([seed, number, kind == "convex"])
+    shape = random_convex(rng) if kind == "convex" else random_nonconvex(rng)
+    parts = "whole" if number % 2 else "panels"
+    path = folder / f"{kind}-{number:03d}-{parts}.yaml"
+    path.write_text(spec_text(path.stem, shape, parts))
+    return path
+
+
+def spec_text(name: str, shape: Polyhedron, parts: str) -> str:
+    vertices = [[float(x) for x in vertex] for vertex in shape.vertices]
+    faces = [[list(loop) for loop in face.loops] for face in shape.faces]
+    faces = [loops[0] if len(loops) == 1 else loops for loops in faces]
+    return (
+        f"name: {name}\nprofile: large\nprint: {{parts: {parts}}}\n"
+        f"shape:\n  polyhedron:\n    vertices: {vertices}\n    faces: {faces}\n"
+    )
+
+
+def checked(path: Path) -> list[Outcome]:
+    """Make and read back every object of a spec file."""
+    try:
+        return [outcome(located) for located in read_specs([path])]
+    except GeneratorError as error:
+        return [Outcome(path.stem, 0, 0, 0.0, 0.0, error.cause, "")]
+
+
+def outcome(located: Located) -> Outcome:
+    name = located.spec.name
+    try:
+        plan = planned(located)
+        layout = laid_out(plan, NO_CELLS)
+        parts, _ = parts_of(plan, layout)
+    except GeneratorError as error:
+        return Outcome(name, 0, 0, 0.0, 0.0, error.cause, "")
+    symbols = sum(len(face.labels) for face in layout.faces)
+    step_error = mesh_error = 0.0
+    with tempfile.TemporaryDirectory() as folder:
+        step, stl = Path(folder) / "part.step", Path(folder) / "part.stl"
+        for part in parts:
+            try:
+                prove_closed(part)
+                step.write_bytes(b"".join(step_chunks(part)))
+                stl.write_bytes(stl_bytes(triangles(part)))
+                report = verify(part.name, volume(part), step=step, stl=stl)
+            except GeneratorError as error:
+                return Outcome(name, len(parts), symbols, step_error, mesh_error, "", str(error))
+            assert report.step is not None
+            assert report.stl is not None
+            step_error = max(step_error, abs(report.step.volume_error))
+            mesh_error = max(mesh_error, abs(report.stl.volume_error))
+    return Outcome(name, len(parts), symbols, step_error, mesh_error, "", "")
+
+
+def main() -> int:
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--convex", type=int, default=300)
+    options.add_argument("--other", type=int, default=50)
+    options.add_argument("--seed", type=int, default=1)
+    options.add_argument("-j", type=int, default=2)
+    options.add_argument("--no-fixtures", action="store_true")
+    chosen = options.parse_args()
+    began = time.monotonic()
+    with tempfile.TemporaryDirectory() as name, ProcessPoolExecutor(chosen.j) as pool:
+        folder = Path(name)
+        paths = [] if chosen.no_fixtures else sorted((FIXTURES / "specs").glob("*.yaml"))
+        for kind, count in (("convex", chosen.convex), ("other", chosen.other)):
+            for number in range(count):
+                paths.append(random_spec(kind, chosen.seed, number, folder))
+        outcomes: list[Outcome] = []
+        for done, some in enumerate(pool.map(checked, paths), 1):
+            outcomes += some
+            if sys.stderr.isatty() or done % 50 == 0:
+                print(f"{done}/{len(paths)} {time.monotonic() - began:.0f} s", file=sys.stderr)
+    made = [o for o in outcomes if o.parts and not o.failed]
+    failed = [o for o in outcomes if o.failed]
+    refused = Counter(" ".join(o.refused.split()[:7]) for o in outcomes if o.refused)
+    print(f"{len(outcomes)} objects: {len(made)} made and verified "
+          f"({sum(o.parts for o in made)} parts, {sum(o.symbols for o in made)} symbols), "
+          f"{len(failed)} failed, {sum(refused.values())} refused")  # fmt: skip
+    step = max((o.step_error for o in made), default=0.0)
+    mesh = max((o.mesh_error for o in made), default=0.0)
+    print(f"largest relative volume error: STEP {step:.1e}, STL {mesh:.1e}")
+    for reason, count in refused.most_common():
+        print(f"  refused {count}: {reason} ...")
+    for o in failed:
+        print(f"  FAILED {o.name}: {o.failed}")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
