@@ -1,7 +1,7 @@
 """How full the array gets with mixed faces at full load, and how long placing takes.
 
-`pytest tests/bench/test_density.py --benchmark-enable` prints the figures; the small array is
-checked in the default run too (tests/unit/generator/test_layout_density.py).
+`pytest tests/bench/test_density.py -s` prints the figures; the small array is
+checked by the default tests too (tests/unit/generator/test_layout_density.py).
 """
 
 import random

@@ -1,4 +1,4 @@
-"""What embossing costs: whole cubes of 600 symbols (`pytest --benchmark-only`), and the campaign.
+"""What embossing costs: whole cubes of 600 symbols (`pytest tests/bench`), and the campaign.
 
 `embossing.py` beside this file races the kernels; here it runs on this project alone.
 """

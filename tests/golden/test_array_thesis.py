@@ -283,7 +283,7 @@ def test_general_folds_have_tight_windows(q, n, rows, columns, windows):
     ("name", "size", "window", "alphabet", "pitch_mm", "distance_of_window"),
     [
         ("thesis", (63, 65, 2), (6, 2), "thesis-2", 12.0, 1),
-        ("product", (15, 15, 8), (4, 2), "dense-8", 8.0, 2),
+        ("product", (15, 15, 8), (4, 2), "dense-8", 12.0, 2),
         ("one-touch", (63, 65, 4), (3, 2), "dense-4", 7.0, 1),
         ("large", (255, 257, 4), (4, 2), "dense-4", 7.0, 1),
         ("fine", (255, 257, 4), (4, 2), "dense-4", 4.5, 1),
