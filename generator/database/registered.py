@@ -48,7 +48,7 @@ class RegisteredPart:
 
     name: str
     format: str  #: step, stl, 3mf, glb
-    file: str  #: as the person who made it named it
+    file: str  #: from the folder of the database file; absolute on a server
     sha256: str  #: of the file's bytes
     T_object_part: NDArray[np.float64]  #: (4, 4), mm: the file has a local origin
 

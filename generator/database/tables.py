@@ -276,7 +276,7 @@ parts = Table(
     Column("position", Integer, nullable=False),  #: order in which they were written
     Column("name", Text, nullable=False),
     Column("format", String(16), nullable=False),  #: step, stl, 3mf, glb
-    Column("file", Text, nullable=False),
+    Column("file", Text, nullable=False),  #: from the database's folder; absolute on a server
     Column("sha256", String(64), nullable=False),
     Column("T_object_part", Text, nullable=False),  #: JSON, 4 rows of 4, mm
     PrimaryKeyConstraint("object_id", "name", "format"),

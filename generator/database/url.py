@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from sqlalchemy import URL, make_url
@@ -44,3 +45,14 @@ def normal_url(url: str) -> URL:
         f"cannot keep objects in '{parsed.drivername}'; allowed are sqlite and postgresql",
         fix="write sqlite:///lab.db or postgresql://user@host:5432/name",
     )
+
+
+def part_file(url: URL, file: str) -> str:
+    """Return how a database names a part's file: from its own folder, absolute on a server.
+
+    A folder that holds a SQLite database and its parts can so be moved and copied.
+    """
+    path = Path(file).absolute()
+    if url.get_backend_name() != "sqlite":
+        return str(path)
+    return Path(os.path.relpath(path, Path(url.database or "").absolute().parent)).as_posix()

@@ -9,6 +9,7 @@ finds the cells in the database and makes the same bytes again.
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,6 +25,7 @@ from generator.database.open import database_exists, open_database
 from generator.database.read import find_object, read_layout
 from generator.database.register import Registration, register, require_same_spec
 from generator.database.transaction import reading, writing
+from generator.database.url import part_file
 from generator.export.atomic import Staging
 from generator.layout.layout import lay_out
 from generator.layout.placement import Layout
@@ -171,7 +173,10 @@ def _make(
                 style=plan.spec.style,
                 spec=plan.spec.meaning,
                 tool_version=version("encoded-objects"),
-                parts=files.registered,
+                parts=tuple(
+                    dataclasses.replace(part, file=part_file(engine.url, part.file))
+                    for part in files.registered
+                ),
             )
             register(connection, registration, replace=replace and not placed.reused)
         written = staging.commit()

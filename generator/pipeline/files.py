@@ -123,7 +123,7 @@ def parts_of(plan: Plan, layout: Layout) -> tuple[tuple[Part, ...], tuple[str, .
 
 
 def _registered(part: Part, kind: str, written: Written) -> RegisteredPart:
-    return RegisteredPart(part.name, kind, written.path.name, written.sha256, part.T_object_part)
+    return RegisteredPart(part.name, kind, str(written.path), written.sha256, part.T_object_part)
 
 
 def _array_picture(plan: Plan, layout: Layout) -> str:
