@@ -136,7 +136,12 @@ def read_stl(path: Path) -> MeshReport:
     meshes: Any = pymeshlab.MeshSet(verbose=False)
     try:
         meshes.load_new_mesh(str(path))
-    except pymeshlab.PyMeshLabException:
+    except pymeshlab.PyMeshLabException as error:
+        if "Unknown format" in str(error):  # its plugins need a system library
+            raise GeneratorError(
+                f"--verify needs all of the mesh library, which did not load ({error})",
+                fix="run: apt-get install libopengl0",
+            ) from error
         return MeshReport(0, 0, 0, 0, 0, 0, math.nan, math.nan)
     meshes.meshing_remove_duplicate_vertices()
     topology = meshes.get_topological_measures()

@@ -41,6 +41,7 @@ _FACING = 0.12  # least cosine at which a face gets its name
 _BACK = -0.999  # greatest cosine to the face at which a facet is the back of its panel
 _OPEN = 0.2  # least cosine that a good view has on every face
 _LINE = (51, 65, 85)
+_BLOCK = 131_072  # triangles shaded at once: bounds the memory
 _PAPER = ((250, 251, 253), (224, 230, 238))  # top and bottom
 
 
@@ -76,7 +77,8 @@ def preview_png(
     fade = np.rint((1 - rows) * np.array(_PAPER[0]) + rows * np.array(_PAPER[1]))
     picture = np.repeat(_packed(fade)[:, None], WIDTH * _SAMPLES, axis=1)
     apart = len(parts) > 1
-    scenes = (_scene(parts, meshes, 0.0), _scene(parts, meshes, _APART if apart else 0.0))
+    closed = _scene(parts, meshes, 0.0)
+    scenes = (closed, _scene(parts, meshes, _APART) if apart else closed)
     eye = _best_eye(scenes[0].normals)
     cameras = (_axes(eye), _axes(-eye))
     room = (WIDTH // 2 - 2 * MARGIN, HEIGHT - _TOP - _BOTTOM - MARGIN)
@@ -230,15 +232,21 @@ def _drawn(
 
 def _shaded(scene: _Scene, flat: Points) -> Colours:
     """Return the colour of each triangle under the light; `flat` in screen axes."""
-    a, b, c = (flat[scene.triangles[:, i]].T for i in range(3))
-    (ux, uy, uz), (vx, vy, vz) = b - a, c - a
-    normals = np.array([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx])
-    lengths = np.sqrt((normals * normals).sum(axis=0))
-    cosine = (_LIGHT / np.linalg.norm(_LIGHT)) @ normals / np.where(lengths > 0, lengths, 1.0)
-    # Half of the way round the object still gets some light, so that no face is black.
-    shade = _AMBIENT + (1.0 - _AMBIENT) * (0.5 + 0.5 * cosine)
-    tints = np.array([BODY_RGB, SYMBOL_RGB], np.float64)[scene.symbols.astype(np.int64)]
-    return _packed(np.minimum(np.rint(1.06 * tints * shade[:, None]), 255.0))
+    light = _LIGHT / np.linalg.norm(_LIGHT)
+    tints = np.array([BODY_RGB, SYMBOL_RGB], np.float64)
+    colours = np.empty(len(scene.triangles), np.uint32)
+    for start in range(0, len(colours), _BLOCK):
+        some = slice(start, start + _BLOCK)
+        a, b, c = (flat[scene.triangles[some, i]].T for i in range(3))
+        (ux, uy, uz), (vx, vy, vz) = b - a, c - a
+        normals = np.array([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx])
+        lengths = np.sqrt((normals * normals).sum(axis=0))
+        cosine = light @ normals / np.where(lengths > 0, lengths, 1.0)
+        # Half of the way round the object still gets some light, so that no face is black.
+        shade = _AMBIENT + (1.0 - _AMBIENT) * (0.5 + 0.5 * cosine)
+        tint = tints[scene.symbols[some].astype(np.int64)]
+        colours[some] = _packed(np.minimum(np.rint(1.06 * tint * shade[:, None]), 255.0))
+    return colours
 
 
 def _packed(rgb: Points) -> Colours:

@@ -21,6 +21,7 @@ _NUMBER_BITS = 26  # up to 67 million triangles
 # Fresh memory is what costs most, so pixels are treated in blocks that stay in the cache.
 _BLOCK = 4096  # spans
 _ROWS = 32  # of the picture
+_TRIANGLES = 131_072  # drawn at once: bounds the memory
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +72,24 @@ def visible(points: Floats, triangles: Index, screen: Index) -> Visible:
     columns = points.T.copy()
     low = float(columns[2].min(initial=0.0))
     step = max(float(columns[2].max(initial=0.0)) - low, 1e-300) / _DEPTH_STEPS
+    for start in range(0, len(triangles), _TRIANGLES):
+        _draw(
+            buffer, height, width, columns, triangles[start : start + _TRIANGLES], start, low, step
+        )
+    return Visible(screen, low, step)
+
+
+def _draw(
+    buffer: Index,
+    height: int,
+    width: int,
+    columns: Floats,
+    triangles: Index,
+    first: int,
+    low: float,
+    step: float,
+) -> None:
+    """Raise `buffer` where a block of triangles, numbered from `first`, is nearest."""
     x, y = columns[0][triangles.T], columns[1][triangles.T]
     # With y downwards a triangle that faces the eye has a negative area.
     area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])
@@ -87,10 +106,9 @@ def visible(points: Floats, triangles: Index, screen: Index) -> Visible:
     left, length = _spans(x, y, rows, owner, width)
     depth = at_origin[owner] + slope_x[owner] * left + slope_y[owner] * rows
     keys = depth.clip(0.0, 2.0 * _DEPTH_STEPS).astype(np.int64) << _NUMBER_BITS
-    keys += facing[owner]
+    keys += (facing + first)[owner]
     steps = slope_x.astype(np.int64)[owner] << _NUMBER_BITS
     _fill(buffer, rows * width + left, length, keys, steps)
-    return Visible(screen, low, step)
 
 
 def _rows(y: Floats, height: int) -> tuple[Index, Index]:

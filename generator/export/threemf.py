@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import io
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
 
@@ -29,6 +29,7 @@ from generator.export.colours import BODY_RGB, SYMBOL_RGB, hexadecimal
 from generator.solid.part import Part
 from generator.solid.triangulate import Mesh, body_mesh, symbol_meshes
 
+_MODEL, _CONFIG = "3D/3dmodel.model", "Metadata/Slic3r_PE_model.config"
 _DATE = (1980, 1, 1, 0, 0, 0)  # the earliest a zip can hold
 _LEVEL = 4  # of compression: 6 takes twice as long for a few percent
 _BLOCK = 20_000  # vertices or triangles formatted at once
@@ -107,8 +108,10 @@ def print_files(
     return tuple(
         PrintFile(
             plate,
-            _package(_components(title, printed, plate)),
-            _package(_volumes(title, printed, plate)),
+            _package({_MODEL: _components(title, printed, plate)}),
+            _package(
+                {_MODEL: _volumes(title, printed, plate), _CONFIG: _volume_settings(printed, plate)}
+            ),
         )
         for plate in arranged([part.size for part in printed], bed_mm, gap_mm)
     )
@@ -137,19 +140,19 @@ def _joined(meshes: Sequence[Mesh]) -> _Shape:
     return _Shape(np.concatenate(vertices), np.concatenate(triangles))
 
 
-def _components(title: str, printed: Sequence[_Printed], plate: Plate) -> dict[str, str]:
-    """Return the model of a plate, an object of two components for each part."""
-    text = [_opening(title)]
+def _components(title: str, printed: Sequence[_Printed], plate: Plate) -> Iterator[str]:
+    """Yield the model of a plate, an object of two components for each part."""
+    yield _opening(title)
     items = []
     number = 2
     for place in plate.places:
         part = printed[place.part]
         components = []
         for name, material, shape in part.shapes():
-            text += _mesh_object(number, name, material, [(material, shape)])
+            yield from _mesh_object(number, name, material, [(material, shape)])
             components.append(f'<component objectid="{number}"/>')
             number += 1
-        text.append(
+        yield (
             f'<object id="{number}" type="model" name={quoteattr(part.name)}>'
             f"<components>{''.join(components)}</components></object>\n"
         )
@@ -157,18 +160,17 @@ def _components(title: str, printed: Sequence[_Printed], plate: Plate) -> dict[s
         matrix = " ".join(f"{value:.9g}" for value in (*turn.T.ravel().tolist(), *shift.tolist()))
         items.append(f'<item objectid="{number}" transform="{matrix}"/>\n')
         number += 1
-    return {"3D/3dmodel.model": "".join([*text, _closing(items)])}
+    yield _closing(items)
 
 
-def _volumes(title: str, printed: Sequence[_Printed], plate: Plate) -> dict[str, str]:
-    """Return the model of a plate, one mesh for each part, and the ranges of its triangles.
+def _volumes(title: str, printed: Sequence[_Printed], plate: Plate) -> Iterator[str]:
+    """Yield the model of a plate, one mesh for each part.
 
     The vertices are written where they lie on the bed: PrusaSlicer applies the transform of
     a build item to the first volume alone.
     """
-    text = [_opening(title)]
+    yield _opening(title)
     items = []
-    settings = [_XML, "<config>\n"]
     for number, place in enumerate(plate.places, 2):
         part = printed[place.part]
         turn, shift = _motion(place, part)
@@ -176,27 +178,32 @@ def _volumes(title: str, printed: Sequence[_Printed], plate: Plate) -> dict[str,
             (material, _Shape(shape.vertices @ turn.T + shift, shape.triangles))
             for _, material, shape in part.shapes()
         ]
-        text += _mesh_object(number, part.name, 0, moved)
+        yield from _mesh_object(number, part.name, 0, moved)
         items.append(f'<item objectid="{number}"/>\n')
-        settings.append(
+    yield _closing(items)
+
+
+def _volume_settings(printed: Sequence[_Printed], plate: Plate) -> Iterator[str]:
+    """Yield PrusaSlicer's settings of a plate: the ranges of triangles that are volumes."""
+    yield f"{_XML}<config>\n"
+    for number, place in enumerate(plate.places, 2):
+        part = printed[place.part]
+        yield (
             f'<object id="{number}" instances_count="1">\n'
             f'<metadata type="object" key="name" value={quoteattr(part.name)}/>\n'
         )
         first = 0
         for name, material, shape in part.shapes():
             last = first + len(shape.triangles) - 1
-            settings.append(
+            yield (
                 f'<volume firstid="{first}" lastid="{last}">\n'
                 f'<metadata type="volume" key="name" value={quoteattr(name)}/>\n'
                 '<metadata type="volume" key="volume_type" value="ModelPart"/>\n'
                 f'<metadata type="volume" key="extruder" value="{material + 1}"/>\n</volume>\n'
             )
             first = last + 1
-        settings.append("</object>\n")
-    return {
-        "3D/3dmodel.model": "".join([*text, _closing(items)]),
-        "Metadata/Slic3r_PE_model.config": "".join([*settings, "</config>\n"]),
-    }
+        yield "</object>\n"
+    yield "</config>\n"
 
 
 def _opening(title: str) -> str:
@@ -255,14 +262,17 @@ def _motion(place: BedPlace, part: _Printed) -> tuple[NDArray[np.float64], NDArr
     return turn, np.round(shift, 6) + 0.0
 
 
-def _package(entries: dict[str, str]) -> bytes:
+def _package(entries: dict[str, Iterable[str]]) -> bytes:
     """Return the zip with the two files that every 3MF has and the given ones."""
     buffer = io.BytesIO()
-    fixed = {"[Content_Types].xml": _CONTENT_TYPES, "_rels/.rels": _RELATIONSHIPS}
+    fixed = {"[Content_Types].xml": [_CONTENT_TYPES], "_rels/.rels": [_RELATIONSHIPS]}
     with zipfile.ZipFile(buffer, "w") as package:
-        for name, content in (fixed | entries).items():
+        for name, pieces in (fixed | entries).items():
             entry = zipfile.ZipInfo(name, _DATE)
             entry.create_system = 3  # Unix, wherever the file is made
             entry.external_attr = 0o644 << 16
-            package.writestr(entry, content, zipfile.ZIP_DEFLATED, _LEVEL)
+            content = io.BytesIO()
+            for piece in pieces:  # the text of a large model is held once
+                content.write(piece.encode())
+            package.writestr(entry, content.getbuffer(), zipfile.ZIP_DEFLATED, _LEVEL)
     return buffer.getvalue()

@@ -18,7 +18,7 @@ from generator.export.atomic import Staging, Written
 from generator.export.glb import glb_bytes
 from generator.export.preview import preview_png
 from generator.export.step import step_chunks
-from generator.export.stl import stl_bytes
+from generator.export.stl import stl_chunks
 from generator.export.threemf import print_files
 from generator.layout.placement import Layout
 from generator.pipeline.plan import Plan, blaming
@@ -77,7 +77,7 @@ def stage(
             step = staging.write(f"{part.name}.step", step_chunks(part))
             registered.append(_registered(part, "step", step))
         if "stl" in formats:
-            stl = staging.write(f"{part.name}.stl", stl_bytes(mesh))
+            stl = staging.write(f"{part.name}.stl", stl_chunks(mesh))
             registered.append(_registered(part, "stl", stl))
         if verify and (step or stl):
             progress(f"verifying {part.name}", 0.1 + 0.6 * (number + 0.5) / len(parts))

@@ -193,7 +193,7 @@ def _frames(made: Scene) -> list[Any]:
 def this_project(made: Scene, folder: Path) -> Made:
     """Faces with loops, proved closed, written without a kernel."""
     from generator.export.step import step_chunks
-    from generator.export.stl import stl_bytes
+    from generator.export.stl import stl_chunks
     from generator.solid import prove_closed, triangles, whole
 
     part = whole(made.polyhedron, made.layout, made.tiers, "cube")
@@ -201,7 +201,7 @@ def this_project(made: Scene, folder: Path) -> Made:
     with (folder / "cube.step").open("wb") as file:
         file.writelines(step_chunks(part))
     mesh = triangles(part)
-    (folder / "cube.stl").write_bytes(stl_bytes(mesh))
+    (folder / "cube.stl").write_bytes(b"".join(stl_chunks(mesh)))
 
     def measured() -> tuple[float, int]:
         import numpy as np

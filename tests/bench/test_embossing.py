@@ -16,7 +16,7 @@ from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
 from generator.array.profiles import PROFILES
 from generator.export.step import step_chunks
-from generator.export.stl import stl_bytes
+from generator.export.stl import stl_chunks
 from generator.layout.placement import FaceLayout, Layout, Placement
 from generator.polyhedron.shapes import cube
 from generator.solid import prove_closed, triangles, whole
@@ -54,7 +54,7 @@ def test_mesh_600(benchmark, part):
 
 def test_stl_600(benchmark, part):
     mesh = triangles(part)
-    assert len(benchmark(stl_bytes, mesh)) == 84 + 50 * len(mesh.triangles)
+    assert len(benchmark(stl_chunks, mesh)) == 84 + 50 * len(mesh.triangles)
 
 
 def test_the_campaign_agrees_with_the_closed_form():

@@ -25,7 +25,7 @@ import numpy as np
 from generator.errors import GeneratorError
 from generator.export.check import verify
 from generator.export.step import step_chunks
-from generator.export.stl import stl_bytes
+from generator.export.stl import stl_chunks
 from generator.pipeline.encode import NO_CELLS, laid_out
 from generator.pipeline.files import parts_of
 from generator.pipeline.plan import planned
@@ -94,7 +94,7 @@ def outcome(located: Located) -> Outcome:
             try:
                 prove_closed(part)
                 step.write_bytes(b"".join(step_chunks(part)))
-                stl.write_bytes(stl_bytes(triangles(part)))
+                stl.write_bytes(b"".join(stl_chunks(triangles(part))))
                 report = verify(part.name, volume(part), step=step, stl=stl)
             except GeneratorError as error:
                 return Outcome(name, len(parts), symbols, step_error, mesh_error, "", str(error))

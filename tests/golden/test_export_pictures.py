@@ -132,7 +132,7 @@ from generator.export.array_svg import FaceOnArray, array_svg
 from generator.export.glb import glb_bytes
 from generator.export.preview import preview_png
 from generator.export.step import step_chunks
-from generator.export.stl import stl_bytes
+from generator.export.stl import stl_chunks
 from generator.export.threemf import print_files
 from generator.layout.layout import lay_out
 from generator.polyhedron.frame import face_polygon
@@ -152,7 +152,7 @@ meshes = [triangles(part) for part in parts]
 faces = [FaceOnArray(body.faces[f.face].name, f, face_polygon(body, f.face)) for f in layout.faces]
 files = {
     "step": b"".join(step_chunks(parts[0])),
-    "stl": stl_bytes(meshes[0]),
+    "stl": b"".join(stl_chunks(meshes[0])),
     "3mf": print_files("Cube", parts, (250.0, 210.0))[0].content,
     "3mf volumes": print_files("Cube", parts, (250.0, 210.0))[0].prusaslicer,
     "glb": glb_bytes("Cube", parts, meshes),

@@ -20,7 +20,7 @@ from generator.export.check import STEP_VOLUME, verify
 from generator.export.colours import SYMBOL_RGB
 from generator.export.glb import glb_bytes
 from generator.export.step import step_chunks
-from generator.export.stl import stl_bytes
+from generator.export.stl import stl_chunks
 from generator.export.threemf import print_files
 from generator.layout.layout import lay_out
 from generator.polyhedron.shapes import cube, octahedron
@@ -88,7 +88,7 @@ def engraved(part: Part) -> Part:
 def written(part: Part, folder: Path) -> tuple[Path, Path]:
     step, stl = folder / "part.step", folder / "part.stl"
     step.write_bytes(b"".join(step_chunks(part)))
-    stl.write_bytes(stl_bytes(triangles(part)))
+    stl.write_bytes(b"".join(stl_chunks(triangles(part))))
     return step, stl
 
 

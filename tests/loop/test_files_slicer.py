@@ -16,7 +16,7 @@ import pytest
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
 from generator.array.profiles import profile
-from generator.export.stl import stl_bytes
+from generator.export.stl import stl_chunks
 from generator.export.threemf import print_files
 from generator.layout.layout import lay_out
 from generator.polyhedron.shapes import cube
@@ -63,7 +63,7 @@ def test_stl_is_manifold_and_needs_no_repair(
 ) -> None:
     for part in parts:
         path = tmp_path / f"{part.name}.stl"
-        path.write_bytes(stl_bytes(triangles(part)))
+        path.write_bytes(b"".join(stl_chunks(triangles(part))))
         (found,) = info(run(slicer, "--info", str(path)))
         assert found["manifold"] == "yes"
         assert found["number_of_parts"] == "1"
