@@ -96,10 +96,11 @@ def stage(
             suffix = f"-plate-{number}" if len(plates) > 1 else ""
             staging.write(f"{spec.name}{suffix}.3mf", plate.content)
             staging.write(f"{spec.name}{suffix}-prusaslicer.3mf", plate.prusaslicer)
-            if not plate.plate.fits:
-                dx, dy = plate.plate.overhang_mm
-                bed = f"the bed of {plan.printer.name} by {dx:.0f} x {dy:.0f} mm"
-                warnings += (f"plate {number} exceeds {bed}: print it elsewhere",)
+        large = [str(n) for n, plate in enumerate(plates, 1) if not plate.plate.fits]
+        if large:
+            width, depth = plan.printer.bed_mm
+            bed = f"the bed of {plan.printer.name}, {width:g} x {depth:g} mm"
+            warnings += (f"plate {', '.join(large)}: larger than {bed}; print it elsewhere",)
     if "glb" in formats:
         progress("writing the model", 0.8)
         staging.write(f"{spec.name}.glb", glb_bytes(spec.name, parts, meshes))
