@@ -127,12 +127,20 @@ def _trees(polyhedron: Polyhedron, surface: _Surface, seed: int) -> Iterator[tup
     for root in roots[:_BREADTH_ROOTS]:
         yield root, lambda _edge, depth: float(depth)
     for direction in _directions():
-        cuts = _steepest(polyhedron, direction)
-        yield roots[0], lambda edge, depth, cuts=cuts: float(cuts[edge] * 1e6 + depth)  # type: ignore[misc]
+        yield roots[0], _uncut_first(_steepest(polyhedron, direction))
     random = np.random.default_rng(seed)
     for _ in range(_RANDOM_TREES):
-        order = random.permutation(len(polyhedron.edges))
-        yield roots[0], lambda edge, _depth, order=order: float(order[edge])  # type: ignore[misc]
+        yield roots[0], _ranked(random.permutation(len(polyhedron.edges)))
+
+
+def _uncut_first(cuts: NDArray[np.bool_]) -> Priority:
+    """Fold along edges that are not cut first, near the root first."""
+    return lambda edge, depth: float(cuts[edge] * 1e6 + depth)
+
+
+def _ranked(order: NDArray[np.int64]) -> Priority:
+    """Fold along edges in a given order."""
+    return lambda edge, _depth: float(order[edge])
 
 
 def _directions() -> Points:

@@ -174,8 +174,7 @@ def test_ordered_statistics_on_large_arrays(order, degree):
     family = "prba" if order == 2 else "prmva"
     array = array_from({"family": family, "order": order, "degree": degree})
     side = 12 if degree * order > 100 else 10
-    if not array.identifies(*np.indices((side, side))):
-        pytest.skip("the view does not identify")
+    assert array.identifies(*np.indices((side, side)))
     rng = np.random.default_rng(10)
     window = array.symbols(*np.indices((side, side)))
     read = np.where(rng.random(window.shape) < 0.02, (window + 1) % order, window)
