@@ -1,0 +1,1 @@
+"""Counts -> newtons: bias, bad tactels, the force law of each tactel."""

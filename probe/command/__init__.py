@@ -1,0 +1,1 @@
+"""`probe-sensor`: list, info, calibrate, record, replay, export, simulate, live."""

@@ -1,0 +1,1 @@
+"""Forward models: surface, overlay, force, wrist -> force on each tactel (Thesis 4.2)."""

@@ -1,0 +1,65 @@
+"""What a contact model takes and gives. Thesis 4.2.
+
+The plate that carries the sensor is rigid. Over the surface its tips' plane stands at
+
+    zeta(x, y) = z + tilt_x * y - tilt_y * x        (x, y in the sensor frame, small tilts)
+
+and presses the overlay by h(x, y) - zeta(x, y) where that is positive; h is the height of
+the surface under the sensor's point. `Touch` says where the sensor stands and how it is
+loaded, `Contact` what every tactel feels. mm, N, rad.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class WristStiffness:
+    """How the wrist holds the plate. Zero tilt stiffness leaves the plate free to turn."""
+
+    tilt_x_nmm_rad: float = 3000.0  #: moment about x per turn about x, N mm / rad
+    tilt_y_nmm_rad: float = 3000.0
+
+
+@dataclass(frozen=True, slots=True)
+class Touch:
+    """Where the sensor stands over a surface, and how it is pressed on.
+
+    A point (x, y) of the sensor lies over the surface's point
+
+        (x_mm + x cos theta - y sin theta, y_mm + x sin theta + y cos theta),
+
+    that is, theta turns the surface's x axis into the sensor's. `tilt_*_rad` is how the
+    unloaded wrist (the arm) stands against the surface, turns about the sensor's x and y.
+    """
+
+    x_mm: float
+    y_mm: float
+    theta_rad: float
+    force_n: float
+    tilt_x_rad: float = 0.0
+    tilt_y_rad: float = 0.0
+    wrist: WristStiffness = field(default_factory=WristStiffness)
+
+    def on_surface(self, points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Take points (..., 2) of the sensor frame to the surface frame."""
+        c, s = math.cos(self.theta_rad), math.sin(self.theta_rad)
+        x, y = points_mm[..., 0], points_mm[..., 1]
+        return np.stack([self.x_mm + c * x - s * y, self.y_mm + s * x + c * y], axis=-1)
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """What the sensor feels, and where the plate came to rest."""
+
+    forces_n: NDArray[np.float64]  #: (rows, columns) on each tactel
+    z_mm: float  #: height of the centre of the tips' plane over the surface frame; inf: no contact
+    tilt_x_rad: float
+    tilt_y_rad: float
+    level: str  #: footprint, tabs, layer, elements
+    iterations: int

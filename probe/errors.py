@@ -1,0 +1,78 @@
+"""What can be wrong with a probe, its data, or a simulated scene.
+
+::
+
+    ProbeError            exit code 2
+    ├── FrameError        an image that is not 16x16 readings
+    ├── PortError         exit code 3: no such device, busy, gone, or not our probe
+    ├── RecordingError    a file that is no recording, damaged, or of a newer format
+    ├── CalibrationError  too few loads, loads that do not determine the law
+    ├── SurfaceError      a mesh or a face that gives no height map
+    ├── ContactError      a scene without an equilibrium, or out of a model's range
+    ├── CircuitError      a network that cannot be read or inverted as asked
+    └── PoseError         wrist or arm outside its range, or near a singularity
+
+Every error says what was given, what is allowed, and the way out (`fix`).
+"""
+
+from __future__ import annotations
+
+
+class ProbeError(Exception):
+    """Base of all errors of `probe`.
+
+    Parameters
+    ----------
+    cause
+        What is wrong, with the value that was given and what is allowed.
+    fix
+        The way out, as an instruction ("close the other programme").
+    place
+        Where: a port URL, a file, or a part of the scene.
+    """
+
+    exit_code = 2
+
+    def __init__(self, cause: str, *, fix: str = "", place: str = "") -> None:
+        super().__init__(cause)
+        self.cause = cause
+        self.fix = fix
+        self.place = place
+
+    def __str__(self) -> str:
+        head = f"{self.place}: {self.cause}" if self.place else self.cause
+        return f"{head}; {self.fix}" if self.fix else head
+
+
+class FrameError(ProbeError):
+    """An image that is not 16x16 readings of the ADC's range."""
+
+
+class PortError(ProbeError):
+    """A device that is not there, is used by another, went away, or is no probe."""
+
+    exit_code = 3
+
+
+class RecordingError(ProbeError):
+    """A file that is no recording, is damaged, or is of a newer format."""
+
+
+class CalibrationError(ProbeError):
+    """Loads that are too few or do not determine the force law, or another sensor's file."""
+
+
+class SurfaceError(ProbeError):
+    """A mesh, a face or an array that gives no height map."""
+
+
+class ContactError(ProbeError):
+    """A scene without an equilibrium, or outside the range of the model."""
+
+
+class CircuitError(ProbeError):
+    """A network that cannot be read or inverted as asked."""
+
+
+class PoseError(ProbeError):
+    """A wrist or an arm outside its range, or too near a singularity to tell its pose."""

@@ -1,0 +1,94 @@
+"""One tactile image as the probe sends it. Thesis 4.2.
+
+Counts are ADC readings and rise with force; row 0 is the top row of the sensor seen
+through its back. A frame is a value: its arrays are read-only copies.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from probe.errors import FrameError
+
+ROWS, COLUMNS = 16, 16
+WRIST = 4  #: transducers of the wrist
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """A 16x16 image with its time, number, wrist readings and, where known, its pose."""
+
+    counts: NDArray[np.uint16]  #: (16, 16) ADC counts
+    t_ns: int  #: ns; of the device since it started, unwrapped
+    seq: int  #: number of the frame, unwrapped; a gap means lost frames
+    wrist: NDArray[np.uint16]  #: (4,) ADC counts of the wrist's transducers
+    pose: NDArray[np.float64] | None = None  #: (4, 4) T_base_sensor, mm; None if not known
+
+
+def frame_from(
+    counts: ArrayLike,
+    *,
+    t_ns: int,
+    seq: int,
+    wrist: ArrayLike | None = None,
+    pose: ArrayLike | None = None,
+) -> Frame:
+    """Return a checked frame.
+
+    Parameters
+    ----------
+    counts
+        (16, 16) whole numbers 0 ... 65535.
+    t_ns, seq
+        Time (ns) and number, both unwrapped.
+    wrist
+        (4,) whole numbers; zeros if not given.
+    pose
+        (4, 4) rigid transform T_base_sensor, mm.
+
+    Raises
+    ------
+    FrameError
+        When a shape is wrong, or a value is no count.
+    """
+    image = _counts(counts, (ROWS, COLUMNS), "image")
+    given = _counts(np.zeros(WRIST, np.uint16) if wrist is None else wrist, (WRIST,), "wrist")
+    return Frame(image, int(t_ns), int(seq), given, None if pose is None else _pose(pose))
+
+
+def _counts(values: ArrayLike, shape: tuple[int, ...], name: str) -> NDArray[np.uint16]:
+    array = np.asarray(values)
+    if array.shape != shape:
+        raise FrameError(
+            f"the {name} has shape {array.shape}, it must be {shape}",
+            fix="give one reading per tactel, rows from the top",
+        )
+    if not np.issubdtype(array.dtype, np.number) or not np.isfinite(array).all():
+        raise FrameError(f"the {name} holds values that are no numbers", fix="give ADC counts")
+    if (array < 0).any() or (array > 65535).any() or (array != np.floor(array)).any():
+        raise FrameError(
+            f"the {name} holds {array.min():g} ... {array.max():g}, counts are whole numbers "
+            "0 ... 65535",
+            fix="give raw ADC counts, not newtons",
+        )
+    return _frozen(array, np.uint16)
+
+
+def _pose(values: ArrayLike) -> NDArray[np.float64]:
+    pose = np.asarray(values, dtype=np.float64)
+    rotation = pose[:3, :3] if pose.shape == (4, 4) else np.zeros((3, 3))
+    if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6) or not np.isfinite(pose).all():
+        raise FrameError(
+            "the pose is no rigid transform", fix="give a 4x4 matrix T_base_sensor, mm"
+        )
+    return _frozen(pose, np.float64)
+
+
+def _frozen(values: ArrayLike, dtype: type[np.generic]) -> NDArray[Any]:
+    array = np.array(values, dtype=dtype, order="C")
+    array.setflags(write=False)
+    return array

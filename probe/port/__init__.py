@@ -1,0 +1,1 @@
+"""Where bytes come from: a serial line, a simulated probe, a recording."""

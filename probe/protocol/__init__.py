@@ -1,0 +1,1 @@
+"""Packets on the wire: COBS, CRC16-CCITT, frames, ident, statistics."""

@@ -1,0 +1,1 @@
+"""Recordings: HDF5 files of frames, safe against a crash."""

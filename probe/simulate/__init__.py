@@ -1,0 +1,1 @@
+"""Simulated touches of registered faces and of written parts."""

@@ -1,0 +1,1 @@
+"""What is touched, as heights: from a mesh, from symbols on a face, from an array."""

@@ -1,0 +1,38 @@
+"""What is touched: a height over a plane, asked only where somebody wants to know.
+
+Surface frame: a plane near the touched material, z out of it; for a part's face it is the
+face frame (origin at the face's first vertex, x along its first edge). The sensor looks
+along -z, so at each (x, y) only the highest matter counts: neighbouring faces beyond an edge
+are lower parts of the same surface, and where there is nothing the height is -inf.
+mm throughout.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Surface(Protocol):
+    """A height field. Asking costs what is asked: n points, not the whole face."""
+
+    @property
+    def top_mm(self) -> float:
+        """An upper bound of all heights (tops of the symbols)."""
+        ...
+
+    def heights_mm(self, points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the height at each point.
+
+        Parameters
+        ----------
+        points_mm
+            (n, 2) x and y, surface frame.
+
+        Returns
+        -------
+        (n,) z of the highest matter at (x, y); -inf where there is none.
+        """
+        ...
