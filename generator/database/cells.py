@@ -54,6 +54,20 @@ def occupied(
     return flat[0::2].copy(), flat[1::2].copy()
 
 
+def held_cells(connection: Connection, array_id: int) -> NDArray[np.int64]:
+    """Return every registered cell of an array, (n, 5): row, column, object, face, label.
+
+    Sorted by row and column.
+    """
+    cells = tables.cells.c
+    rows = connection.execute(
+        select(cells.row, cells.column, cells.object_id, cells.face_id, cells.label)
+        .where(cells.array_id == array_id)
+        .order_by(cells.row, cells.column)
+    )
+    return np.fromiter(chain.from_iterable(rows), dtype=np.int64).reshape(-1, 5)
+
+
 def faces_at(
     connection: Connection, array_id: int, rows: ArrayLike, columns: ArrayLike
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

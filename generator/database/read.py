@@ -24,6 +24,7 @@ from generator.database.registered import (
     RegisteredFace,
     RegisteredObject,
     RegisteredPart,
+    RegisteredStyle,
 )
 from generator.database.transaction import place_of
 from generator.errors import DatabaseError
@@ -39,6 +40,7 @@ __all__ = [
     "read_layout",
     "read_object",
     "read_parts",
+    "read_styles",
 ]
 
 
@@ -129,6 +131,31 @@ def read_layout(connection: Connection, name: str) -> Layout:
         faces=tuple(faces),
         blank_faces=tuple(sorted(blank)),
         warnings=tuple(json.loads(known.layout_warnings)),
+    )
+
+
+def read_styles(connection: Connection) -> tuple[RegisteredStyle, ...]:
+    """Return on which array and in which style every object is embossed, by its number."""
+    objects = tables.objects.c
+    query = (
+        select(
+            objects.object_id,
+            objects.name,
+            objects.array_id,
+            tables.alphabets.c.definition,
+            objects.pitch_mm,
+            objects.height_mm,
+            objects.stroke_mm,
+            objects.draft_rad,
+            objects.chamfer_mm,
+        )
+        .select_from(tables.objects)
+        .join(tables.alphabets)
+        .order_by(objects.object_id)
+    )
+    return tuple(
+        RegisteredStyle(number, name, array, alphabet, SymbolStyle(*style))
+        for number, name, array, alphabet, *style in connection.execute(query)
     )
 
 

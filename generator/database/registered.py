@@ -43,6 +43,17 @@ class ObjectEntry:
 
 
 @dataclass(frozen=True, slots=True)
+class RegisteredStyle:
+    """How the symbols of an object are embossed, and of which array they are."""
+
+    object_id: int
+    name: str
+    array_id: int
+    alphabet: str  #: canonical JSON of the alphabet's definition
+    style: SymbolStyle
+
+
+@dataclass(frozen=True, slots=True)
 class RegisteredPart:
     """A printable part in one file."""
 

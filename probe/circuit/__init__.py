@@ -1,1 +1,39 @@
-"""Force on a tactel -> conductance -> voltage -> ADC counts, and back (Thesis 3.3, 4.2)."""
+"""Force on a tactel -> conductance -> voltage -> ADC counts, and back. Thesis 3.3, 4.2.
+
+fsr          the law of every tactel, with hysteresis and creep
+spread       how tactels differ; sensors drawn
+network      what a pair of terminals sees of the whole matrix
+electronics  readout, multiplexer, ADC, noise
+readout      conductances -> voltages
+reading      forces -> counts
+floating     resistances between terminals -> conductances
+inverse      counts -> conductances, and what is lost
+"""
+
+from probe.circuit.electronics import QUIET, Electronics, Noise, Readout
+from probe.circuit.fsr import Fsr, State, conductances, fsr_of
+from probe.circuit.inverse import Inverted, inverted
+from probe.circuit.network import effective_resistances, transconductances
+from probe.circuit.reading import read_counts, read_sequence
+from probe.circuit.spread import DATASHEET, MEASURED, Spread, drawn
+
+__all__ = [
+    "DATASHEET",
+    "MEASURED",
+    "QUIET",
+    "Electronics",
+    "Fsr",
+    "Inverted",
+    "Noise",
+    "Readout",
+    "Spread",
+    "State",
+    "conductances",
+    "drawn",
+    "effective_resistances",
+    "fsr_of",
+    "inverted",
+    "read_counts",
+    "read_sequence",
+    "transconductances",
+]

@@ -1,0 +1,125 @@
+"""Forces on the tactels -> counts, as a board with its noise gives them. Thesis 4.2.
+
+`read_counts` makes one frame (or independent ones side by side), `read_sequence` frames one
+after another. Randomness is drawn from the generator that is passed in; with `QUIET`
+electronics nothing is drawn. The multiplexer's ring of samples takes the scene as steady
+over two frames.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from probe.circuit.electronics import Electronics
+from probe.circuit.fsr import Fsr, Image, State, checked_forces, conductances
+from probe.circuit.readout import scanned, shares
+from probe.errors import CircuitError
+
+Counts = NDArray[np.uint16]
+
+
+def read_counts(
+    forces_n: ArrayLike,
+    electronics: Electronics,
+    fsr: Fsr,
+    state: State | None,
+    rng: np.random.Generator,
+    elapsed_s: float | None = None,
+) -> tuple[Counts, State]:
+    """Read a frame.
+
+    Parameters
+    ----------
+    forces_n
+        (rows, columns) N on each tactel; or (N, rows, columns) for independent touches.
+    electronics, fsr
+        The board and the sensor.
+    state
+        What the frame before returned; None for a sensor that was not loaded yet.
+    rng
+        Source of the noise.
+    elapsed_s
+        Time since the frame before, s; the board's frame time by default.
+
+    Returns
+    -------
+    Counts, u16 of the forces' shape, and the new state.
+
+    Raises
+    ------
+    CircuitError
+        If a force is negative or no number, or a shape is wrong.
+
+    Examples
+    --------
+    >>> from probe.circuit import Electronics, fsr_of
+    >>> forces = np.zeros((16, 16))
+    >>> forces[3, 4] = 1.0
+    >>> counts, state = read_counts(forces, Electronics(), fsr_of(), None, np.random.default_rng(1))
+    >>> np.unravel_index(counts.argmax(), counts.shape) == (3, 4)
+    True
+    """
+    passed = electronics.frame_s if elapsed_s is None else elapsed_s
+    fresh = state is None
+    conductance, now = conductances(fsr, forces_n, state, passed)
+    flutter = _fluttered(now.flutter, electronics, fresh, passed, rng)
+    offered = scanned(shares(conductance, electronics), electronics) * electronics.full
+    counts = _sampled(offered, flutter, electronics, rng)
+    return counts, State(now.effective_n, now.age_s, flutter)
+
+
+def read_sequence(
+    forces_n: ArrayLike,
+    electronics: Electronics,
+    fsr: Fsr,
+    state: State | None,
+    rng: np.random.Generator,
+) -> tuple[Counts, State]:
+    """Read frames that follow each other at the board's frame time; see `read_counts`.
+
+    Parameters
+    ----------
+    forces_n
+        (N, rows, columns) N, N >= 1.
+    """
+    forces = checked_forces(fsr, forces_n)
+    if forces.ndim != 3 or not len(forces):
+        raise CircuitError(
+            f"a sequence of shape {forces.shape}", fix="give (N, rows, columns), one frame or more"
+        )
+    counts = np.empty(forces.shape, dtype=np.uint16)
+    for i, force in enumerate(forces):
+        counts[i], state = read_counts(force, electronics, fsr, state, rng)
+    assert state is not None
+    return counts, state
+
+
+def _fluttered(
+    before: Image, electronics: Electronics, fresh: bool, passed_s: float, rng: np.random.Generator
+) -> Image:
+    """Return the contact's noise of this frame: unit variance, exponential correlation."""
+    noise = electronics.noise
+    if noise.contact_lsb == 0:
+        return before
+    kept = 0.0 if fresh or noise.contact_s == 0 else math.exp(-passed_s / noise.contact_s)
+    return kept * before + math.sqrt(1.0 - kept * kept) * rng.standard_normal(before.shape)
+
+
+def _sampled(
+    offered: Image, flutter: Image, electronics: Electronics, rng: np.random.Generator
+) -> Counts:
+    """Return the ADC's counts of offered voltages, in counts."""
+    noise, lsb = electronics.noise, electronics.lsb
+    value = offered + electronics.bias_lsb * lsb
+    if noise.contact_lsb > 0:
+        value += flutter * np.sqrt(noise.contact_lsb * lsb * np.maximum(offered, 0.0))
+    if noise.idle_lsb > 0:
+        value += noise.idle_lsb * lsb * rng.standard_normal(value.shape)
+    if noise.spike_rate > 0:
+        hit = np.flatnonzero(rng.random(value.shape) < noise.spike_rate)
+        height = noise.spike_lsb * (1.0 + rng.exponential(size=hit.size))
+        value.flat[hit] += rng.choice((-1.0, 1.0), hit.size) * height * lsb
+    return np.clip(np.rint(value), 0, electronics.full).astype(np.uint16)

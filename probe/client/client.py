@@ -1,0 +1,293 @@
+"""Read a probe: a thread takes the bytes, the consumer takes trusted frames.
+
+The thread starts the stream, starts it again after silence or a reboot, and opens the port
+again after it went away. The buffer between the two is bounded: when the consumer is slow,
+the oldest frame is dropped and counted; with `buffer=1` the newest wins. A recording waits
+for its consumer instead, for it can. A frame reaches the consumer one frame later than it
+came, when its neighbour has confirmed it (`probe.client.order`).
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Iterator
+from contextlib import suppress
+from types import TracebackType
+from typing import Self
+
+from probe.client.diagnosis import no_probe
+from probe.client.receiver import Receiver
+from probe.client.statistics import ClientStatistics
+from probe.errors import PortError, ProbeError
+from probe.frame import Frame
+from probe.port.contract import Port
+from probe.port.url import open_port
+from probe.protocol import (
+    Command,
+    IdentPacket,
+    StatisticsPacket,
+    bits_command,
+    sensor_command,
+)
+
+BUFFER = 2048  #: frames, about 2 MB and 20 s
+SILENCE_S = 0.5  #: after so long without a packet the stream is started again
+ANSWER_S = 5.0  #: a probe that has a boot loader answers within that
+_SLICE_S = 0.05  #: longest wait for bytes; a frame without successor is held so long
+_GATHER_S = 0.006  #: pause after few bytes, so that each byte does not wake the thread
+_FEW = 4096
+_NOTICES = 256
+
+
+class Client:
+    """A conversation with a probe. Use it with `with`, and iterate over `frames()`.
+
+    Parameters
+    ----------
+    url
+        Of a port, see `probe.port.url`. It is opened at once.
+    sensor, bits
+        The sensor to select (0 ... 7) and the readings' width (8 or 10); as the device has
+        them if not given. Both are told again after a reboot.
+    buffer
+        Frames that wait for the consumer at most; 1: always the newest.
+    reopen_s
+        How long a port that went away is tried again before `frames` raises.
+    answer_s
+        How long the first packet may take.
+
+    Raises
+    ------
+    PortError
+        When the port cannot be opened.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        *,
+        sensor: int | None = None,
+        bits: int | None = None,
+        buffer: int = BUFFER,
+        reopen_s: float = 30.0,
+        answer_s: float = ANSWER_S,
+    ) -> None:
+        if buffer < 1:
+            raise PortError(f"a buffer of {buffer} frames, it holds at least 1", fix="take 1")
+        self._sensor = b"" if sensor is None else sensor_command(sensor)
+        self._bits = b"" if bits is None else bits_command(bits)
+        self._buffer, self._reopen_s, self._answer_s = buffer, reopen_s, answer_s
+        self._waits = url.startswith("file:")
+        self._ready = threading.Condition()
+        self._frames: deque[Frame] = deque()
+        self._notices: deque[str] = deque(maxlen=_NOTICES)
+        self._receiver = Receiver()
+        self._reopenings = self._overruns = 0
+        self._outbox = b""
+        self._stop = threading.Event()
+        self._ended = False
+        self._failure: ProbeError | None = ProbeError("reading ended by a fault of the programme")
+        self._port: Port = open_port(url)
+        self._thread = threading.Thread(target=self._run, name=f"client of {url}", daemon=True)
+        self._thread.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def frames(self, timeout_s: float | None = None) -> Iterator[Frame]:
+        """Yield trusted frames until the client is closed, or a recording ends.
+
+        Parameters
+        ----------
+        timeout_s
+            End when no frame came for so long; None waits for ever.
+
+        Raises
+        ------
+        PortError
+            When nothing answers, or the port went away for good.
+        """
+        while True:
+            with self._ready:
+                self._ready.wait_for(lambda: self._frames or self._ended, timeout_s)
+                if not self._frames:
+                    if self._failure is not None:
+                        raise self._failure
+                    return
+                frame = self._frames.popleft()
+                if self._waits:
+                    self._ready.notify_all()
+            yield frame
+
+    def notices(self) -> list[str]:
+        """Return what happened since the last call, in words: reboots, reopenings, silence."""
+        with self._ready:
+            notices = list(self._notices)
+            self._notices.clear()
+        return notices
+
+    def statistics(self) -> ClientStatistics:
+        """Return a snapshot of the counts."""
+        with self._ready:
+            return self._receiver.statistics(reopenings=self._reopenings, overruns=self._overruns)
+
+    @property
+    def ident(self) -> IdentPacket | None:
+        """What the device said it is; None before it did."""
+        return self._receiver.ident
+
+    @property
+    def device(self) -> StatisticsPacket | None:
+        """What the device counted, after `ask_device`; None before it answered."""
+        return self._receiver.device
+
+    def ask_device(self) -> None:
+        """Ask the device for its statistics; the answer comes to `device`."""
+        self._send(Command.STATISTICS)
+
+    def select_sensor(self, sensor: int) -> None:
+        """Read another sensor, 0 ... 7, from one of the next frames on."""
+        self._sensor = sensor_command(sensor)
+        self._send(self._sensor + Command.IDENT)
+
+    def select_bits(self, bits: int) -> None:
+        """Read with 8 or 10 bits from one of the next frames on."""
+        self._bits = bits_command(bits)
+        self._send(self._bits + Command.IDENT)
+
+    def close(self) -> None:
+        """Stop the stream and let go of the port; may be called twice."""
+        self._stop.set()
+        with self._ready:
+            self._ready.notify_all()
+        self._thread.join()
+
+    # What follows runs in the thread, all but `_send`.
+
+    def _send(self, commands: bytes) -> None:
+        with self._ready:
+            self._outbox += commands
+
+    def _run(self) -> None:
+        try:
+            with suppress(EOFError):
+                self._converse()
+            self._hand_on(self._receiver.settle(time.monotonic_ns()))
+            self._failure = None
+        except ProbeError as failure:
+            self._failure = failure
+        finally:
+            self._leave()
+            with self._ready:
+                self._ended = True
+                self._ready.notify_all()
+
+    def _converse(self) -> None:
+        self._send(self._greeting())
+        heard_s = asked_s = began_s = time.monotonic()
+        while not self._stop.is_set():
+            try:
+                data = self._exchange()
+            except PortError as gone:
+                self._reopen(gone)
+                heard_s = asked_s = time.monotonic()
+                continue
+            now_s, now_ns = time.monotonic(), time.monotonic_ns()
+            if not data:
+                self._hand_on(self._receiver.settle(now_ns))
+            elif self._take(data, now_ns):
+                heard_s = now_s
+            if now_s - max(heard_s, asked_s) > SILENCE_S:
+                if heard_s > asked_s:
+                    self._tell(f"nothing came for {SILENCE_S:g} s; the stream is started again")
+                self._send(self._greeting())
+                asked_s = now_s
+            if not self._receiver.packets and now_s - began_s > self._answer_s:
+                raise no_probe(self._receiver.damages, self._answer_s, self._port.url)
+            if 0 < len(data) < _FEW:
+                time.sleep(_GATHER_S)
+
+    def _exchange(self) -> bytes:
+        """Send what waits to be sent; return what came."""
+        if self._outbox:
+            with self._ready:
+                outbox, self._outbox = self._outbox, b""
+            self._port.write(outbox)
+        return self._port.read(_SLICE_S)
+
+    def _take(self, data: bytes, now_ns: int) -> bool:
+        """Take bytes; tell whether a packet was among them."""
+        receiver = self._receiver
+        packets, reboots, known = receiver.packets, receiver.reboots, receiver.ident is not None
+        with self._ready:
+            frames = receiver.feed(data, now_ns)
+        if frames:
+            self._hand_on(frames)
+        if receiver.reboots > reboots:
+            self._tell("the probe started anew")
+        if receiver.reboots > reboots or (receiver.ident is not None and not known):
+            self._send(self._sensor + self._bits + Command.START)
+        return receiver.packets > packets
+
+    def _hand_on(self, frames: list[Frame]) -> None:
+        with self._ready:
+            for frame in frames:
+                if self._waits:
+                    self._ready.wait_for(
+                        lambda: len(self._frames) < self._buffer or self._stop.is_set()
+                    )
+                elif len(self._frames) >= self._buffer:
+                    self._frames.popleft()
+                    self._overruns += 1
+                self._frames.append(frame)
+                self._ready.notify_all()
+
+    def _reopen(self, gone: PortError) -> None:
+        """Try the port again until it opens; the last refusal is the failure."""
+        began_s = time.monotonic()
+        self._hand_on(self._receiver.settle(time.monotonic_ns()))
+        url = self._port.url
+        self._port.close()
+        self._tell(f"{gone.cause}; it is tried again for {self._reopen_s:g} s")
+        pause_s = 0.05
+        while not self._stop.wait(pause_s):
+            try:
+                self._port = open_port(url)
+            except PortError as refused:
+                if time.monotonic() - began_s > self._reopen_s:
+                    raise PortError(
+                        f"the probe went away and did not come back in {self._reopen_s:g} s: "
+                        f"{refused.cause}",
+                        fix=refused.fix,
+                        place=url,
+                    ) from refused
+                pause_s = min(1.5 * pause_s, 0.5)
+                continue
+            self._reopenings += 1
+            with self._ready:
+                self._receiver.reopened()
+            self._send(self._greeting())
+            self._tell(f"the port is open again after {time.monotonic() - began_s:.1f} s")
+            return
+
+    def _leave(self) -> None:
+        with suppress(PortError):  # when it is gone there is nothing to stop
+            self._port.write(Command.STOP)
+        self._port.close()
+
+    def _greeting(self) -> bytes:
+        return Command.IDENT + self._sensor + self._bits + Command.START
+
+    def _tell(self, notice: str) -> None:
+        with self._ready:
+            self._notices.append(notice)

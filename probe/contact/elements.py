@@ -1,0 +1,208 @@
+"""Level "elements": the one-piece pad by finite elements in space, its edge included. Thesis 4.2.
+
+The independent check of level "layer", and the level for what a layer without end cannot tell:
+the pad's free sides. Small strain; the surface is rigid and without friction. A pad is
+condensed once (`elements_pad`), kept in memory, and serves every further touch.
+
+Heights are asked at the nodes of the top, half an element apart: where a surface has walls,
+give their places as `walls_mm`, so that lines of the mesh lie there; otherwise an edge counts
+as if it stood at the next node.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from probe.contact.contract import Contact, Touch
+from probe.contact.elements_line import Array
+from probe.contact.elements_pad import CondensedPad, PadLines, condensed
+from probe.contact.elements_unilateral import rest, tips
+from probe.errors import ContactError
+from probe.sensor import Sensor
+from probe.surface.contract import Surface
+
+STEEPEST_RAD = 0.35  #: tilts beyond are not small
+KEPT = 2  #: condensed pads
+GROWTH = 1.5  #: from element to element of the margin
+NEAR = 0.4  #: of an element: lines so near a wall move there
+
+
+def elements(
+    surface: Surface,
+    sensor: Sensor,
+    touch: Touch,
+    *,
+    per_tactel: int = 2,
+    layers: int = 2,
+    margin_mm: float = 0.0,
+    walls_mm: tuple[ArrayLike, ArrayLike] = ((), ()),
+    memory_gb: float = 4.0,
+) -> Contact:
+    """Press a one-piece pad on a surface.
+
+    Parameters
+    ----------
+    surface
+        Heights in the surface frame.
+    sensor
+        Its overlay must be a pad.
+    touch
+        Pose, force and wrist.
+    per_tactel, layers
+        Quadratic elements along a tactel, and through the pad.
+    margin_mm
+        How far the pad reaches beyond the matrix, on each side; 0: the sides are free there.
+    walls_mm
+        Places |x| and |y|, sensor frame, where more lines of the mesh are wanted.
+    memory_gb
+        What condensing the pad may take at most.
+
+    Returns
+    -------
+    Contact
+        Force on each tactel: the stress at the pad's base over the tactel's square.
+
+    Raises
+    ------
+    ContactError
+        For an overlay that is no pad, a mesh that is too large, a force that is negative or no
+        number, nothing under the pad, a plate that tips, a tilt that is not small, or a surface
+        that would go through the pad.
+    """
+    _checked(sensor, touch)
+    pad = condensed_pad(sensor, per_tactel, layers, margin_mm, walls_mm, memory_gb)
+    nodes = pad.nodes_mm
+    heights = np.asarray(surface.heights_mm(touch.on_surface(nodes)), dtype=np.float64)
+    if heights.shape != (nodes.shape[0],) or np.isnan(heights).any() or (heights == np.inf).any():
+        raise ContactError(
+            "the surface gives heights that are no numbers",
+            fix="give a finite height at each point, or -inf where there is no matter",
+        )
+    if touch.force_n == 0:
+        empty = np.zeros((sensor.rows, sensor.columns))
+        return Contact(empty, np.inf, touch.tilt_x_rad, touch.tilt_y_rad, "elements", 0)
+    height = sensor.overlay.height_mm
+    found = rest(nodes, heights, pad.between, pad.displaced, touch, height / 50)
+    z, tilt_x, tilt_y = (float(v) for v in found.plate)
+    if max(abs(tilt_x), abs(tilt_y)) > STEEPEST_RAD:
+        raise tips()
+    deepest = float(pad.displaced(found.forces).max())
+    if deepest >= height:
+        raise ContactError(
+            f"{touch.force_n:g} N press the surface {deepest:.3g} mm into a pad of {height:g} mm",
+            fix="press with less force, or on more of the surface",
+        )
+    return Contact(pad.felt(found.forces), z, tilt_x, tilt_y, "elements", found.iterations)
+
+
+def condensed_pad(
+    sensor: Sensor,
+    per_tactel: int = 2,
+    layers: int = 2,
+    margin_mm: float = 0.0,
+    walls_mm: tuple[ArrayLike, ArrayLike] = ((), ()),
+    memory_gb: float = 4.0,
+) -> CondensedPad:
+    """Return the pad of a sensor, from memory if it has been there; parameters as `elements`."""
+    walls = tuple(tuple(np.unique(np.abs(np.asarray(w, float))).tolist()) for w in walls_mm)
+    return _condensed(sensor, per_tactel, layers, float(margin_mm), walls[0], walls[1], memory_gb)
+
+
+@lru_cache(maxsize=KEPT)
+def _condensed(
+    sensor: Sensor,
+    per_tactel: int,
+    layers: int,
+    margin_mm: float,
+    walls_x: tuple[float, ...],
+    walls_y: tuple[float, ...],
+    memory_gb: float,
+) -> CondensedPad:
+    if per_tactel < 1 or layers < 1 or not 0 <= margin_mm < np.inf:
+        raise ContactError(
+            f"{per_tactel} elements on a tactel, {layers} layers, margin {margin_mm:g} mm; at "
+            "least one element both ways, and a margin of 0 mm or more",
+            fix="take per_tactel=2, layers=2, margin_mm=0",
+        )
+    overlay, pitch = sensor.overlay, sensor.pitch_mm
+    lines = PadLines(
+        _along(sensor.columns, pitch, per_tactel, margin_mm, walls_x),
+        _along(sensor.rows, pitch, per_tactel, margin_mm, walls_y),
+        np.linspace(0, overlay.height_mm, layers + 1),
+    )
+    tactels = ((sensor.rows + 1) // 2) * ((sensor.columns + 1) // 2)
+    needed = lines.bytes_needed(tactels) / 1e9
+    if needed > memory_gb:
+        raise ContactError(
+            f"the pad would take {needed:.3g} GB ({lines.unknowns} unknowns on a quarter, "
+            f"{lines.top_nodes} nodes on its top), allowed are {memory_gb:g} GB",
+            fix="take fewer elements per tactel or layers, or raise memory_gb",
+        )
+    edges = _edges(sensor.columns, pitch), _edges(sensor.rows, pitch)
+    return condensed(lines, overlay.young_mpa, overlay.poisson, edges)
+
+
+def _edges(tactels: int, pitch: float) -> Array:
+    return np.asarray((np.arange(tactels + 1) - tactels / 2) * pitch, dtype=np.float64)
+
+
+def _along(
+    tactels: int, pitch: float, per_tactel: int, margin: float, walls: tuple[float, ...]
+) -> Array:
+    """Return element boundaries from 0 to the pad's edge: tactels divided, margin, walls."""
+    edges = _edges(tactels, pitch)
+    firm = np.unique(np.append(edges[edges >= 0], 0.0))
+    parts = np.ceil(np.diff(firm) / pitch * per_tactel - 1e-9).astype(int)
+    lines: Array = np.interp(
+        np.arange(parts.sum() + 1), np.concatenate([[0], np.cumsum(parts)]), firm
+    )
+    size = pitch / per_tactel
+    if margin > 0:
+        count = max(1, math.ceil(math.log1p(margin / size * (GROWTH - 1)) / math.log(GROWTH)))
+        steps = np.cumsum(GROWTH ** np.arange(count))
+        lines = np.concatenate([lines, lines[-1] + margin * steps / steps[-1]])
+    for wall in walls:
+        if not 0 < wall < lines[-1] or np.abs(firm - wall).min() < size * 1e-6:
+            continue
+        firm = np.append(firm, wall)
+        near = np.abs(lines - wall) < NEAR * size
+        yields = near & (np.abs(lines[:, None] - firm).min(axis=1) > 0) & (lines < lines[-1])
+        lines = np.sort(np.append(lines[~yields], wall))
+    return lines
+
+
+def _checked(sensor: Sensor, touch: Touch) -> None:
+    overlay = sensor.overlay
+    if overlay.kind != "pad":
+        raise ContactError(
+            f"level elements presses a one-piece pad, the overlay is of kind {overlay.kind!r}",
+            fix="take level tabs, or an overlay of kind 'pad'",
+        )
+    if not (
+        0 < overlay.height_mm < math.inf
+        and 0 < overlay.young_mpa < math.inf
+        and 0 <= overlay.poisson <= 0.5
+    ):
+        raise ContactError(
+            f"a pad of {overlay.height_mm:g} mm, E = {overlay.young_mpa:g} MPa, "
+            f"nu = {overlay.poisson:g}; height and E must be above 0, nu in 0 ... 0.5",
+            fix="correct the overlay",
+        )
+    wrist = touch.wrist
+    numbers = (touch.x_mm, touch.y_mm, touch.theta_rad, touch.tilt_x_rad, touch.tilt_y_rad)
+    if not all(math.isfinite(v) for v in numbers):
+        raise ContactError("the pose of the touch is no number", fix="give finite mm and rad")
+    for name, value in (
+        ("force", touch.force_n),
+        ("tilt stiffness about x", wrist.tilt_x_nmm_rad),
+        ("tilt stiffness about y", wrist.tilt_y_nmm_rad),
+    ):
+        if not 0 <= value < math.inf:
+            raise ContactError(
+                f"the {name} is {value:g}, it must be 0 or more, and finite",
+                fix="correct the touch",
+            )

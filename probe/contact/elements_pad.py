@@ -1,0 +1,266 @@
+"""A one-piece pad as finite elements, condensed to what a touch needs. Thesis 4.2.
+
+Quadratic bricks with a linear pressure of their own in each of them (Q2-P1: no locking), bonded
+at the base, free at the sides, loaded by normal forces on the nodes of the top. The mesh is a
+product of three lines, so each matrix is a sum of Kronecker products of matrices along a line.
+
+The pad is symmetric about x = 0 and y = 0: a quarter of it serves, in the four parities
+(even, odd) x (even, odd). One sweep of block Cholesky along x gives, for each of them, the
+displacement of the top and the force on each tactel per force on the top.
+
+mm, N, MPa; x, y in the sensor frame, w = displacement of the top into the pad.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from probe.contact.elements_line import Array, Quadratic, mirrored, per_tactel, quadratic
+
+PARITIES = ((1, 1), (1, -1), (-1, 1), (-1, -1))  #: of w under x -> -x, and under y -> -y
+COMPRESSIBLE = 1e-7  #: 1 - 2 nu counts as at least this; bulk over shear modulus 1e7
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PadLines:
+    """The mesh of a quarter of a pad: element boundaries along x, y, and z from the base up."""
+
+    x: Array  #: (nx + 1,) 0 ... half the width, mm
+    y: Array  #: (ny + 1,)
+    z: Array  #: (nz + 1,) 0 ... thickness
+
+    @property
+    def unknowns(self) -> int:
+        """Displacements of the quarter."""
+        return 6 * self.top_nodes * (self.z.size - 1)
+
+    @property
+    def top_nodes(self) -> int:
+        """Nodes on the top of the quarter."""
+        return (2 * self.x.size - 1) * (2 * self.y.size - 1)
+
+    def bytes_needed(self, tactels: int) -> int:
+        """Return what `condensed` holds at its peak, for so many tactels on the quarter."""
+        right = self.top_nodes + tactels
+        block = 12 * (2 * self.y.size - 1) * (self.z.size - 1)
+        sweep = 5 * block * block + 3 * block * right + 2 * right * right
+        sparse = 1.5 * 3 * 250 * self.unknowns
+        return int(8 * (len(PARITIES) * self.top_nodes * right + sweep + sparse))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CondensedPad:
+    """What the top of a pad does under forces on its nodes: counted x slow, y fast, ascending."""
+
+    x: Array  #: (mx,) coordinates of the nodes, mm, symmetric about 0
+    y: Array  #: (my,)
+    compliance: tuple[Array, ...]  #: per parity (q, q), mm/N; q nodes of the quarter
+    tactels: tuple[Array, ...]  #: per parity (ceil(rows / 2), ceil(columns / 2), q), N/N
+    rows: int
+    columns: int
+    unknowns: int  #: of the quarter
+
+    @property
+    def nodes_mm(self) -> Array:
+        """The nodes of the top, (mx my, 2), sensor frame."""
+        grid = np.meshgrid(self.x, self.y, indexing="ij")
+        return np.stack([g.ravel() for g in grid], axis=-1)
+
+    def displaced(self, forces: Array) -> Array:
+        """Return w at each node (n,), mm, under forces (n,), N."""
+        w = np.zeros((self.x.size, self.y.size))
+        for parity, matrix in zip(PARITIES, self.compliance, strict=True):
+            part = self._folded(forces, parity)
+            w += _unfolded((matrix @ part.ravel()).reshape(part.shape), parity)
+        return w.ravel()
+
+    def between(self, nodes: NDArray[np.intp]) -> Array:
+        """Return the compliance (k, k) between k nodes, mm/N."""
+        i, j = (
+            index - size // 2
+            for index, size in zip(
+                np.divmod(nodes, self.y.size), (self.x.size, self.y.size), strict=True
+            )
+        )
+        quarter = np.abs(i) * (self.y.size // 2 + 1) + np.abs(j)
+        found = np.zeros((nodes.size, nodes.size))
+        for (px, py), matrix in zip(PARITIES, self.compliance, strict=True):
+            sign = np.where(i < 0, px, 1) * np.where(j < 0, py, 1)
+            found += sign[:, None] * matrix[quarter[:, None], quarter] * sign
+        return found
+
+    def felt(self, forces: Array) -> Array:
+        """Return the force on each tactel (rows, columns), N: the base stress over its square."""
+        total = np.zeros((self.rows, self.columns))
+        for (px, py), matrix in zip(PARITIES, self.tactels, strict=True):
+            corner = matrix @ self._folded(forces, (px, py)).ravel()
+            total += _completed(_completed(corner, self.columns, px).T, self.rows, py).T
+        return total[::-1]  # row 0 is at the top, y grows upwards
+
+    def _folded(self, forces: Array, parity: tuple[int, int]) -> Array:
+        grid = forces.reshape(self.x.size, self.y.size)
+        for sign in parity:
+            half = grid.shape[0] // 2
+            folded = grid[half:].copy()
+            folded[1:] += sign * grid[half - 1 :: -1]
+            grid = folded.T
+        return grid
+
+
+def condensed(
+    lines: PadLines,
+    young: float,
+    poisson: float,
+    tactel_edges: tuple[Array, Array],
+) -> CondensedPad:
+    """Condense a pad to the nodes of its top and to the tactels.
+
+    Parameters
+    ----------
+    lines
+        Mesh of the quarter x, y >= 0.
+    young, poisson
+        MPa, and 0 ... .5; above (1 - 1e-7)/2 it counts as that.
+    tactel_edges
+        Boundaries of the tactels along x, and along y, ascending, mm; all on lines of the mesh.
+    """
+    along = [quadratic(part) for part in (lines.x, lines.y, lines.z)]
+    shape = tuple(part.nodes.size for part in along)
+    stiffness = _stiffness(along, young, poisson)
+    place = np.unravel_index(np.arange(stiffness.shape[0]), (3, *shape))
+    to_tactels = [
+        {p: per_tactel(part, edges, p) for p in (1, -1)}
+        for part, edges in zip((lines.x, lines.y), tactel_edges, strict=True)
+    ]
+    columns, rows = (edges.size - 1 for edges in tactel_edges)
+    compliance, tactels = [], []
+    for px, py in PARITIES:
+        take = sp.kron(to_tactels[0][px], to_tactels[1][py])
+        load_response, felt = _parity(stiffness, place, shape, (px, py), take)
+        compliance.append(load_response / 4)
+        felt = felt.reshape(to_tactels[0][px].shape[0], to_tactels[1][py].shape[0], -1)
+        tactels.append(np.ascontiguousarray(felt.transpose(1, 0, 2)) / 4)
+    whole = [mirrored(part.nodes) for part in along[:2]]
+    return CondensedPad(
+        whole[0], whole[1], tuple(compliance), tuple(tactels), rows, columns, lines.unknowns
+    )
+
+
+def _stiffness(along: list[Quadratic], young: float, poisson: float) -> sp.csr_matrix:
+    """Return the stiffness of all displacements (component, x, y, z), pressures eliminated."""
+    shear = young / (2 * (1 + poisson))
+    lame = 2 * shear * poisson / max(1 - 2 * poisson, COMPRESSIBLE)
+
+    def product(factors: list[sp.csr_matrix]) -> sp.csr_matrix:
+        return sp.kron(sp.kron(factors[0], factors[1]), factors[2], format="csr")
+
+    def derived(a: int, b: int) -> sp.csr_matrix:
+        """Integrate d_a f_i d_b f_j."""
+        if a == b:
+            return product([p.stiffness if k == a else p.mass for k, p in enumerate(along)])
+        return product(
+            [p.mixed if k == a else p.mixed.T if k == b else p.mass for k, p in enumerate(along)]
+        )
+
+    laplace = sum(derived(a, a) for a in range(3))
+    blocks = [[derived(b, a) + (laplace if a == b else 0) for b in range(3)] for a in range(3)]
+    total = shear * sp.bmat(blocks, format="csr")
+    volume = np.kron(np.kron(along[0].lengths, along[1].lengths), along[2].lengths)
+    for mode in (None, 0, 1, 2):  # pressure 1, x - middle, y - middle, z - middle
+        divergence = sp.hstack(
+            [
+                product(
+                    [(p.slope if k == a else p.average)[k == mode] for k, p in enumerate(along)]
+                )
+                for a in range(3)
+            ],
+            format="csr",
+        )
+        if mode is None:
+            mass = volume
+        else:
+            ones = [np.ones(p.lengths.size) for p in along]
+            ones[mode] = along[mode].lengths ** 2 / 12
+            mass = volume * np.kron(np.kron(ones[0], ones[1]), ones[2])
+        total = total + lame * (divergence.T @ sp.diags(1 / mass) @ divergence)
+    return total.tocsr()
+
+
+def _parity(
+    stiffness: sp.csr_matrix,
+    place: tuple[NDArray[np.intp], ...],
+    shape: tuple[int, ...],
+    parity: tuple[int, int],
+    take: sp.csr_matrix,
+) -> tuple[Array, Array]:
+    """Return displacements of the quarter's top (q, q) and tactels' forces (t, q) of a parity."""
+    component, ix, iy, iz = place
+    fixed = iz == 0
+    for axis, (index, sign) in enumerate(zip((ix, iy), parity, strict=True)):
+        normal = component == axis
+        fixed |= (index == 0) & (normal if sign > 0 else ~normal)
+    free = np.flatnonzero(~fixed)
+    slab = (ix[free] + 1) // 2  # planes {0}, {1, 2}, {3, 4} ... couple to their neighbours alone
+    order = np.argsort(slab, kind="stable")
+    free, slab = free[order], slab[order]
+    starts = np.searchsorted(slab, np.arange(slab[-1] + 2))
+    base = np.flatnonzero((component == 2) & (iz == 0))
+    rows = stiffness[free]
+    sense = -(rows[:, base] @ take.T).toarray()  # against: the load presses, the base bears
+    top = np.flatnonzero((component[free] == 2) & (iz[free] == shape[2] - 1))
+    node = ix[free][top] * shape[1] + iy[free][top]
+    gram = _swept(rows[:, free].tocsr(), starts, sense, top, node, shape[0] * shape[1])
+    t = sense.shape[1]
+    return gram[t:, t:], gram[:t, t:]
+
+
+def _swept(
+    stiffness: sp.csr_matrix,
+    starts: NDArray[np.intp],
+    sense: Array,
+    top: NDArray[np.intp],
+    node: NDArray[np.intp],
+    nodes: int,
+) -> Array:
+    """Return R' K^-1 R of the columns R = (sense, unit loads on the top's nodes).
+
+    K is block tridiagonal in slabs, K = L L'; with Y = L^-1 R the answer is Y'Y, summed slab by
+    slab. A load enters Y at its own slab, so earlier slabs have no column for it.
+    """
+    t = sense.shape[1]
+    gram = np.zeros((t + nodes, t + nodes))
+    coupling, carried = np.zeros((0, 0)), np.zeros((0, 0))
+    for i, (a, b) in enumerate(pairwise(starts)):
+        here = (top >= a) & (top < b)
+        width = max(carried.shape[1], t + int(node[here].max(initial=-1)) + 1)
+        block = stiffness[a:b, a:b].toarray()
+        right = np.zeros((b - a, width))
+        right[:, :t] = sense[a:b]
+        right[top[here] - a, t + node[here]] = 1.0
+        if i:
+            block -= coupling.T @ coupling
+            right[:, : carried.shape[1]] -= coupling.T @ carried
+        factor = la.cholesky(block, lower=True, overwrite_a=True, check_finite=False)
+        carried = la.solve_triangular(factor, right, lower=True, check_finite=False)
+        gram[:width, :width] += carried.T @ carried
+        if i + 2 < starts.size:
+            ahead = stiffness[a:b, b : starts[i + 2]].toarray()
+            coupling = la.solve_triangular(factor, ahead, lower=True, check_finite=False)
+    return gram
+
+
+def _unfolded(part: Array, parity: tuple[int, int]) -> Array:
+    for sign in parity:
+        part = np.concatenate([sign * part[:0:-1], part]).T
+    return part
+
+
+def _completed(half: Array, size: int, sign: int) -> Array:
+    """Take the upper half (..., ceil(size / 2)) of an even or odd row to the whole of it."""
+    return np.concatenate([sign * half[..., ::-1][..., : size // 2], half], axis=-1)

@@ -1,0 +1,153 @@
+"""A round indenter pressed on a round pad: the reference for every other level. Thesis 4.2.
+
+Small strain, frictionless, unilateral: an active set over the nodes of the top, each step a
+solution of the section (`elements_axisymmetric`). The stress at the base, recovered from the
+reactions there by the consistent mass matrix, is integrated over the tactels' squares.
+The washer of 15/7 mm on a pad larger than the sensor is the thesis's figure 4.10.
+mm, N, MPa; z = 0 is the indenter's highest point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as sla
+from numpy.typing import NDArray
+
+from probe.contact.elements_axisymmetric import Kind, Section, section
+from probe.contact.elements_line import Array
+from probe.errors import ContactError
+from probe.sensor import Sensor
+
+STEPS = 60
+EVEN = 24  #: Gauss points along a tactel
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Indented:
+    """A pressed pad."""
+
+    depth_mm: float  #: of the indenter's highest point below the undeformed top
+    force_n: float
+    active: NDArray[np.bool_]  #: (m,) nodes of the top in touch
+    top_n: Array  #: (m,) forces on the top's nodes (rings)
+    base_mpa: Array  #: (m,) pressure at the base's nodes
+    section: Section
+    iterations: int
+
+    def stress_mpa(self, r_mm: Array) -> Array:
+        """Return the pressure at the base at radii (n,); 0 beyond the pad."""
+        inside = r_mm <= self.section.r[-1]
+        field = np.zeros(self.base_mpa.size)
+        field[self.section.across.order] = self.base_mpa
+        probes = self.section.across.basis.probes(r_mm[inside][None])
+        stress = np.zeros(r_mm.size)
+        stress[inside] = probes @ field
+        return stress
+
+    def tactels_n(self, sensor: Sensor, at_mm: tuple[float, float] = (0.0, 0.0)) -> Array:
+        """Return the force on each tactel (rows, columns) with the axis at `at_mm`."""
+        points, weights = np.polynomial.legendre.leggauss(EVEN)
+        step = points * sensor.pitch_mm / 2
+        x, y = np.moveaxis(sensor.centres_mm(), -1, 0)
+        r = np.hypot(
+            x[..., None, None] - at_mm[0] + step, y[..., None, None] - at_mm[1] + step[:, None]
+        )
+        stress = self.stress_mpa(r.ravel()).reshape(r.shape)
+        return np.asarray(stress @ weights @ weights) * sensor.pitch_mm**2 / 4
+
+
+def indented(pad: Section, height_mm: Callable[[Array], Array], force_n: float) -> Indented:
+    """Press an indenter on a pad with a given force.
+
+    Parameters
+    ----------
+    pad
+        Bonded at its base; its outer side is held in r if the pad goes on (`wide_pad`).
+    height_mm
+        Of the indenter at radii (m,), at most 0; -inf where there is nothing.
+    force_n
+        Above 0.
+
+    Raises
+    ------
+    ContactError
+        When the force is not above 0, nothing lies under the pad, or no set of nodes is found.
+    """
+    heights = height_mm(pad.r)
+    matter = np.isfinite(heights)
+    if not 0 < force_n < np.inf or not matter.any():
+        raise ContactError(
+            f"{force_n:g} N on {int(matter.sum())} nodes; the force must be above 0, and the "
+            "indenter under the pad",
+            fix="correct the force or the indenter",
+        )
+    every, last = slice(None), slice(pad.z.size - 1, None)
+    top = pad.axial(every, last)
+    active = matter & (heights >= heights[matter].max() - (pad.z[-1] / 50))
+    for step in range(1, STEPS + 1):
+        held = np.union1d(pad.base, top[active])
+        # u_z = z - height of the touched nodes: one column for the heights, one for z.
+        values = np.zeros((pad.unknowns, 2))
+        values[top[active], 0] = -heights[active]
+        values[top[active], 1] = 1.0
+        found = pad.solved(held, values[held])
+        press = -(pad.matrix[top] @ found)
+        z = (force_n - press[:, 0].sum()) / press[:, 1].sum()
+        moved, forces = found @ [1.0, z], np.where(active, press @ [1.0, z], 0.0)
+        gap = z - heights - moved[top]
+        following = np.where(active, forces > 0, gap < 0) & matter
+        # A quadratic ring on the axis bears nothing: it does what its neighbour does.
+        following[0] = following[1] & matter[0]
+        if (following == active).all():
+            base = pad.axial(every, slice(0, 1))
+            reactions = pad.matrix[base] @ moved
+            pressure = sla.spsolve(sp.csc_matrix(pad.ring), reactions)
+            return Indented(-z, force_n, active, forces, pressure, pad, step)
+        active = following
+    raise ContactError(
+        f"no set of touching nodes after {STEPS} steps", fix="take a finer mesh, or less force"
+    )
+
+
+def washer_pad(
+    inner_mm: float,
+    outer_mm: float,
+    thickness_mm: float,
+    young: float,
+    poisson: float,
+    *,
+    parts: int,
+    radius_mm: float = 25.0,
+    kind: Kind = "q2q1",
+) -> Section:
+    """Return a round pad with a mesh for a washer: fine at both of its edges, and at the top.
+
+    Parameters
+    ----------
+    parts
+        Elements through the thickness; across the hole as many, across the washer 1.3 as many.
+    radius_mm
+        Of the pad, more than three thicknesses beyond the washer.
+    """
+    wide, n = outer_mm + 3 * thickness_mm, parts
+    more = round(1.3 * n)
+    r = np.concatenate(
+        [
+            _both(0, inner_mm, n),
+            _both(inner_mm, outer_mm, more)[1:],
+            outer_mm + (wide - outer_mm) * np.linspace(0, 1, more + 1)[1:] ** 2.2,
+            np.linspace(wide, radius_mm, max(4, n // 3) + 1)[1:],
+        ]
+    )
+    z = thickness_mm * (1 - (1 - np.linspace(0, 1, n + 1)) ** 1.6)
+    return section(r, z, young, poisson, kind)
+
+
+def _both(a: float, b: float, n: int) -> Array:
+    """Divide a ... b into n parts, finer towards both ends."""
+    s = np.linspace(0, 1, n + 1)
+    return a + (b - a) * np.where(s < 0.5, (2 * s) ** 1.6, 2 - (2 - 2 * s) ** 1.6) / 2

@@ -1,0 +1,198 @@
+"""Heights of the surface under the matrix, only where they can matter.
+
+Surface + Influence's grid + place -> Patch. Every cell is looked at in 4 points; a cell whose
+neighbourhood is level needs no more, one that can touch is sampled in full (16 points by
+default), all others never. The points of a cell are a lattice whose columns and rows are all
+different, and neighbouring cells look at different quarters of it, so a stroke along an axis
+is seen down to dx / 16. Thesis 4.2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.contact.contract import Touch
+from probe.contact.layer_influence import Influence
+from probe.errors import ContactError
+from probe.surface.contract import Surface
+
+Array = NDArray[np.float64]
+Cells = NDArray[np.intp]
+
+COARSE = 4  #: points per cell of the first look
+SAMPLES = (16, 64, 256)  #: points per cell of the second, to choose from
+_LEVEL = 1e-9  # mm; heights that differ less are level
+_SEARCH_STEP = 0.01  # mm; along the lines that look for what the first look missed
+_SEARCH_LINES = 16  # across the matrix, each way
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Patch:
+    """What lies under the matrix: cells in flat numbers, row * columns + column, row 0 on top."""
+
+    grid: Influence
+    surface: Surface
+    touch: Touch  #: its x, y and theta; force, tilt and wrist have no meaning here
+    offsets_mm: Array  #: (samples, 2) points of a cell from its centre, sensor frame
+    coarse_mm: Array  #: (all cells, COARSE) heights of the first look
+    level: NDArray[np.bool_]  #: (all cells,) the cell and its neighbours are level
+    cells: Cells  #: (n,) cells sampled in full, ascending
+    heights_mm: Array  #: (n, samples) their heights
+
+    def with_cells(self, cells: Cells) -> Patch:
+        """Return the patch with these cells sampled as well."""
+        new = np.setdiff1d(cells, self.cells, assume_unique=True)
+        if not len(new):
+            return self
+        fine = np.repeat(self.coarse_mm[new, :1], len(self.offsets_mm), axis=1)
+        rough = np.flatnonzero(~self.level[new])
+        points = centres_mm(self.grid)[new[rough], None, :] + self.offsets_mm
+        fine[rough] = _heights(self.surface, self.touch, points)
+        both = np.concatenate([self.cells, new])
+        order = np.argsort(both, kind="stable")
+        heights = np.concatenate([self.heights_mm, fine])[order]
+        return replace(self, cells=both[order], heights_mm=heights)
+
+
+def patch_under(surface: Surface, grid: Influence, touch: Touch, samples: int = 16) -> Patch:
+    """Return the first look at what lies under the matrix; no cell is sampled in full yet.
+
+    Parameters
+    ----------
+    surface
+        What is touched.
+    grid
+        The pad's cells.
+    touch
+        Where the sensor stands.
+    samples
+        Points of a cell that is sampled in full: 16, 64 or 256.
+
+    Raises
+    ------
+    ContactError
+        When the number of samples is another, the surface gives a height that is no number, or
+        carries strokes too thin to be seen.
+    """
+    if samples not in SAMPLES:
+        raise ContactError(
+            f"{samples} samples per cell, allowed are {', '.join(map(str, SAMPLES))}",
+            fix="take 16 for a touch, 64 for a reference",
+        )
+    coarse = _heights(surface, touch, _coarse_points(grid, samples))
+    _refuse_hidden(surface, grid, touch, coarse, samples)
+    shape = (grid.rows, grid.columns)
+    high = _spread(coarse.max(axis=1).reshape(shape), np.maximum)
+    low = _spread(coarse.min(axis=1).reshape(shape), np.minimum)
+    level = (high <= low + _LEVEL).ravel()
+    none = np.zeros(0, dtype=np.intp)
+    empty = np.zeros((0, samples))
+    offsets = _lattice(samples) * grid.dx_mm
+    return Patch(grid, surface, touch, offsets, coarse, level, none, empty)
+
+
+def neighbours(mask: NDArray[np.bool_], grid: Influence) -> NDArray[np.bool_]:
+    """Return the cells of a mask (all cells,) and the eight around each."""
+    return _spread(mask.reshape(grid.rows, grid.columns), np.logical_or).ravel()
+
+
+def centres_mm(grid: Influence) -> Array:
+    """Return the centres (all cells, 2) of the cells, sensor frame."""
+    return _centres(grid.rows, grid.columns, grid.dx_mm)
+
+
+def _heights(surface: Surface, touch: Touch, points: Array) -> Array:
+    """Return heights (...) at points (..., 2) of the sensor frame."""
+    asked = touch.on_surface(points.reshape(-1, 2))
+    heights = np.asarray(surface.heights_mm(asked), np.float64).reshape(points.shape[:-1])
+    if not (heights < np.inf).all():
+        raise ContactError(
+            "the surface gives heights that are infinite or no numbers",
+            fix="a height is a number, or -inf where there is no matter",
+        )
+    return heights
+
+
+def _refuse_hidden(
+    surface: Surface, grid: Influence, touch: Touch, coarse: Array, samples: int
+) -> None:
+    """Refuse a surface whose top is under the matrix and was seen by no point.
+
+    Asked only when the surface has a top that the first look did not meet: a blank place, or
+    strokes thinner than the points are apart.
+    """
+    seen = float(coarse.max(initial=-np.inf))
+    if surface.top_mm <= seen + _LEVEL:
+        return
+    width, height = grid.sensor.half_mm
+    lines = _search_lines(width, height)
+    found = float(_heights(surface, touch, lines).max())
+    below = surface.top_mm - max(seen, surface.top_mm - grid.sensor.overlay.height_mm)
+    if found > seen + 0.5 * below:
+        finest = grid.dx_mm / samples
+        raise ContactError(
+            f"strokes that rise to {found:g} mm lie between the points sampled every "
+            f"{finest:g} mm (the highest point seen is {seen:g} mm)",
+            fix="take more cells per tactel or more samples per cell, or a wider stroke",
+        )
+
+
+@lru_cache(maxsize=8)
+def _search_lines(half_width: float, half_height: float) -> Array:
+    """Return points (n, 2) along lines across the matrix, both ways."""
+    both = []
+    for along, across in ((half_width, half_height), (half_height, half_width)):
+        n = int(np.ceil(2 * along / _SEARCH_STEP))
+        a = ((np.arange(n) + 0.5) / n * 2 - 1) * along
+        b = ((np.arange(_SEARCH_LINES) + 0.5) / _SEARCH_LINES * 2 - 1) * across
+        both.append(np.stack(np.meshgrid(a, b), axis=-1).reshape(-1, 2))
+    both[1] = both[1][:, ::-1]
+    return np.concatenate(both)
+
+
+@lru_cache(maxsize=8)
+def _centres(rows: int, columns: int, dx: float) -> Array:
+    x = (np.arange(columns) - (columns - 1) / 2) * dx
+    y = ((rows - 1) / 2 - np.arange(rows)) * dx
+    centres = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    centres.setflags(write=False)
+    return centres
+
+
+@lru_cache(maxsize=8)
+def _coarse_points(grid: Influence, samples: int) -> Array:
+    """Return (all cells, COARSE, 2): of every cell another quarter of its lattice."""
+    quarters = samples // COARSE
+    row, column = np.divmod(np.arange(grid.rows * grid.columns), grid.columns)
+    which = (row * 3 + column * 5 + row // quarters + column // quarters) % quarters
+    offsets = _lattice(samples).reshape(COARSE, quarters, 2).swapaxes(0, 1) * grid.dx_mm
+    return centres_mm(grid)[:, None, :] + offsets[which]
+
+
+@lru_cache(maxsize=4)
+def _lattice(samples: int) -> Array:
+    """Return points (samples, 2) of a unit cell about 0: the lattice with the widest gaps."""
+    i = np.arange(samples)
+    best, widest = i, -1
+    for step in range(1, samples, 2):
+        across = i * step % samples
+        dx, dy = np.minimum(i, samples - i)[1:], np.minimum(across, samples - across)[1:]
+        shortest = int((dx**2 + dy**2).min())
+        if shortest > widest:
+            best, widest = across, shortest
+    return (np.stack([i, best], axis=-1) + 0.5) / samples - 0.5
+
+
+def _spread(image: NDArray[np.generic], join: np.ufunc) -> NDArray[np.generic]:
+    """Return an image in which each cell joins the eight around it."""
+    spread = image.copy()
+    spread[1:] = join(spread[1:], image[:-1])
+    spread[:-1] = join(spread[:-1], image[1:])
+    result = spread.copy()
+    result[:, 1:] = join(result[:, 1:], spread[:, :-1])
+    result[:, :-1] = join(result[:, :-1], spread[:, 1:])
+    return result

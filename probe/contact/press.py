@@ -1,0 +1,160 @@
+"""One function over the ladder of contact models: the cheapest level that holds an error.
+
+Levels, from cheap to dear:
+
+    tab overlay    footprint < tabs-7 < tabs-19 < tabs-61
+    pad overlay    footprint < layer-2 < layer-4 < layer-8 < layer-16 < elements
+
+What each level errs by and costs is measured by `tests/bench/contact_precision.py` on
+several indenters against finer references, and kept in `precision.json`. The error of an
+image is the norm of its deviation over the norm of the reference. Thesis 4.2.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from importlib import resources
+
+from probe.contact.contract import Contact, Touch
+from probe.errors import ContactError
+from probe.sensor import Sensor
+from probe.surface.contract import Surface
+
+#: "auto", the name of a level, or the largest error of an image.
+Accuracy = str | float
+
+AUTO = 0.01  #: the error that "auto" holds
+LEVELS: dict[str, tuple[str, ...]] = {
+    "tab": ("footprint", "tabs-7", "tabs-19", "tabs-61"),
+    "pad": ("footprint", "layer-2", "layer-4", "layer-8", "layer-16", "elements"),
+}
+DEFAULTS = {"tabs": "tabs-19", "layer": "layer-4"}  #: a name without its fineness
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """A line of the table."""
+
+    level: str
+    error: float  #: largest over the indenters
+    ms: float  #: median time of a touch
+
+
+def press(
+    surface: Surface, sensor: Sensor, touch: Touch, *, accuracy: Accuracy = "auto"
+) -> Contact:
+    """Press the sensor on a surface.
+
+    Parameters
+    ----------
+    surface, sensor, touch
+        What is touched, with what, where and how.
+    accuracy
+        "auto" holds `AUTO`; a number is the error to hold (0.003: 0.3 %); a name takes that
+        level: footprint, tabs, tabs-7, tabs-19, tabs-61, layer, layer-2 ... layer-16, elements.
+
+    Returns
+    -------
+    Contact
+        Force on each tactel and the plate at rest.
+
+    Raises
+    ------
+    ContactError
+        When the level is none of the overlay's, no level holds the error, or the touch has no
+        equilibrium.
+    """
+    level = level_for(sensor, accuracy)
+    return _MODELS[level](surface, sensor, touch)
+
+
+def level_for(sensor: Sensor, accuracy: Accuracy = "auto") -> str:
+    """Return the name of the level that `press` takes.
+
+    Raises
+    ------
+    ContactError
+        See `press`.
+    """
+    kind = sensor.overlay.kind
+    if isinstance(accuracy, str) and accuracy != "auto":
+        level = DEFAULTS.get(accuracy, accuracy)
+        if level not in LEVELS[kind]:
+            raise ContactError(
+                f"a {kind} overlay has no level '{accuracy}'",
+                fix=f"take auto, an error such as 0.01, or {', '.join(LEVELS[kind])}",
+            )
+        return level
+    error = AUTO if accuracy == "auto" else float(accuracy)
+    known = [line for line in table()[kind] if line.error <= error]
+    if not known:
+        best = min(table()[kind], key=lambda line: line.error)
+        raise ContactError(
+            f"no level holds an error of {error:g} for a {kind} overlay",
+            fix=f"ask for {best.error:.1g} or more ({best.level})",
+        )
+    return min(known, key=lambda line: line.ms).level
+
+
+def accuracy_of(text: str) -> Accuracy:
+    """Read an accuracy from text: a number is an error, everything else a name.
+
+    Raises
+    ------
+    ContactError
+        For a number that is no error.
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        return text
+    if not 0 < value < math.inf:
+        raise ContactError(f"an error of {text}", fix="give a number above 0, such as 0.01")
+    return value
+
+
+@lru_cache(maxsize=1)
+def table() -> dict[str, tuple[Measured, ...]]:
+    """Return the measured errors and times of every level, per kind of overlay."""
+    text = resources.files("probe.contact").joinpath("precision.json").read_text("utf-8")
+    return {
+        kind: tuple(Measured(line["level"], line["error"], line["ms"]) for line in lines)
+        for kind, lines in json.loads(text)["levels"].items()
+    }
+
+
+def _footprint(surface: Surface, sensor: Sensor, touch: Touch) -> Contact:
+    from probe.contact.footprint import footprint
+
+    return footprint(surface, sensor, touch)
+
+
+def _tabs(points: int, surface: Surface, sensor: Sensor, touch: Touch) -> Contact:
+    from probe.contact.tabs import tabs
+    from probe.contact.tips import Tips
+
+    return tabs(surface, sensor, touch, Tips(points))
+
+
+def _layer(cells: int, surface: Surface, sensor: Sensor, touch: Touch) -> Contact:
+    from probe.contact.layer import layer
+
+    return layer(surface, sensor, touch, cells_per_tactel=cells)
+
+
+def _elements(surface: Surface, sensor: Sensor, touch: Touch) -> Contact:
+    from probe.contact.elements import elements
+
+    return elements(surface, sensor, touch)
+
+
+_MODELS: dict[str, Callable[[Surface, Sensor, Touch], Contact]] = {
+    "footprint": _footprint,
+    **{f"tabs-{points}": partial(_tabs, points) for points in (7, 19, 61)},
+    **{f"layer-{cells}": partial(_layer, cells) for cells in (2, 4, 8, 16)},
+    "elements": _elements,
+}

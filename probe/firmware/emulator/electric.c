@@ -1,0 +1,192 @@
+#include "electric.h"
+
+#include <math.h>
+#include <string.h>
+
+#include <simavr/avr_adc.h>
+#include <simavr/avr_ioport.h>
+
+#include "chance.h"
+
+#define REFERENCE_MV 5000
+#define ADCSRA 0x7A /* data address, the same in both parts */
+#define CHANNELS 8
+
+static const wiring_t wirings[] = {
+    {"uno",
+     "atmega328p",
+     {{'B', 0}, {'B', 1}, {'B', 2}, {'B', 3}},
+     {{'D', 4}, {'D', 5}, {'D', 6}, {'D', 7}},
+     {{'D', 2}, {'D', 3}, {'B', 4}}},
+    {"mega",
+     "atmega2560",
+     {{'A', 0}, {'A', 1}, {'A', 2}, {'A', 3}},
+     {{'A', 4}, {'A', 5}, {'A', 6}, {'A', 7}},
+     {{'C', 0}, {'C', 1}, {'C', 2}}},
+};
+
+static avr_t *avr;
+static avr_irq_t *inputs; /* of the ADC, by channel */
+static const wiring_t *wiring;
+static images_t *shared, image; /* the file, and what is felt in this scan */
+static FILE *trace;
+static chance_t chance;
+static double tau_cycles, noise_mv;
+
+static uint8_t ports['Z' + 1]; /* output levels by letter */
+static unsigned row, column, sensor;
+
+/* the voltage at the ADC's tactel input: `from_mv` at `since`, running towards the tactel's */
+static double from_mv;
+static avr_cycle_count_t since;
+
+/* the conversion under way */
+static unsigned channel;
+static avr_cycle_count_t held; /* when its voltage is held */
+static double noise;
+
+static double tactel_mv(void)
+{
+    return image.tactels_mv[sensor][16 * row + column];
+}
+
+static double voltage_mv(avr_cycle_count_t cycle)
+{
+    double target = tactel_mv();
+
+    if (tau_cycles <= 0)
+        return target;
+    return target + (from_mv - target) * exp(-(double)(cycle - since) / tau_cycles);
+}
+
+/* Give the ADC the voltage of a conversion. It counts (mv * 1023) / 5000 in whole numbers, the
+ * real one mv * 1024 / 5000: find the count first, then millivolts that give it. It also looks
+ * at the channel when the result is read, the real one when the conversion starts: all channels
+ * get the same.
+ */
+static void inject(void)
+{
+    double mv = noise + (channel ? image.wrist_mv[channel - 1] : voltage_mv(held));
+    double count = floor(mv * 1024 / REFERENCE_MV);
+
+    if (!(count > 0))
+        count = 0;
+    if (count > 1023)
+        count = 1023;
+    for (int i = 0; i < CHANNELS; i++)
+        avr_raise_irq(inputs + i, (uint32_t)ceil(count * REFERENCE_MV / 1023));
+}
+
+static unsigned address(const pin_t *pins, int count)
+{
+    unsigned value = 0;
+
+    for (int i = 0; i < count; i++)
+        value |= ((unsigned)ports[(int)pins[i].port] >> pins[i].bit & 1u) << i;
+    return value;
+}
+
+static void port_changed(avr_irq_t *irq, uint32_t value, void *parameter)
+{
+    char letter = *(const char *)parameter;
+    unsigned new_row, new_column, new_sensor;
+
+    (void)irq;
+    if (ports[(int)letter] == (uint8_t)value)
+        return;
+    ports[(int)letter] = (uint8_t)value;
+    if (trace)
+        fprintf(trace, "%llu port %c %u\n", (unsigned long long)avr->cycle, letter, value & 0xFF);
+    new_row = address(wiring->row, 4);
+    new_column = address(wiring->column, 4);
+    new_sensor = address(wiring->sensor, 3);
+    if (new_row == row && new_column == column && new_sensor == sensor)
+        return;
+    from_mv = voltage_mv(avr->cycle);
+    since = avr->cycle;
+    row = new_row;
+    column = new_column;
+    sensor = new_sensor;
+    if (avr->cycle < held && channel == 0)
+        inject(); /* switched before the voltage was held */
+}
+
+/* A conversion starts: it holds its voltage 1.5 ADC clocks after the next edge of that clock. */
+static void conversion_starts(avr_irq_t *irq, uint32_t value, void *parameter)
+{
+    union {
+        uint32_t value;
+        avr_adc_mux_t mux;
+    } input = {value};
+    unsigned power = avr->data[ADCSRA] & 7;
+    avr_cycle_count_t clock = 1u << (power ? power : 1);
+
+    (void)irq;
+    (void)parameter;
+    channel = input.mux.src;
+    if (channel > WRIST)
+        channel = 0;
+    held = (avr->cycle + clock - 1) / clock * clock + clock + clock / 2;
+    if (channel == 0 && row == 0 && column == 0) {
+        images_take(shared, &image);
+        shared->felt[shared->scans % REMEMBERED] = image.number;
+        __atomic_store_n(&shared->scans, shared->scans + 1, __ATOMIC_RELEASE);
+    }
+    if (trace)
+        fprintf(trace, "%llu convert %u\n", (unsigned long long)avr->cycle, channel);
+    noise = noise_mv > 0 ? noise_mv * chance_normal(&chance) : 0;
+    inject();
+}
+
+const wiring_t *electric_wiring(const char *board)
+{
+    for (size_t i = 0; i < sizeof wirings / sizeof *wirings; i++)
+        if (!strcmp(wirings[i].name, board))
+            return &wirings[i];
+    return 0;
+}
+
+void electric_connect(avr_t *processor, const wiring_t *wires, images_t *images, uint64_t seed,
+                      FILE *file)
+{
+    static const char letters[] = "ABCD";
+
+    avr = processor;
+    wiring = wires;
+    shared = images;
+    trace = file;
+    chance = chance_from(seed);
+    inputs = avr_io_getirq(avr, AVR_IOCTL_ADC_GETIRQ, ADC_IRQ_ADC0);
+    image.lock = 1; /* no lock of a whole image */
+    images_take(shared, &image);
+    for (const char *letter = letters; *letter; letter++) {
+        avr_irq_t *irq =
+            avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ((unsigned)*letter), IOPORT_IRQ_PIN_ALL);
+        if (irq)
+            avr_irq_register_notify(irq, port_changed, (void *)letter);
+    }
+    avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_ADC_GETIRQ, ADC_IRQ_OUT_TRIGGER),
+                            conversion_starts, 0);
+}
+
+void electric_reset(void)
+{
+    memset(ports, 0, sizeof ports);
+    row = column = sensor = 0;
+    from_mv = 0;
+    since = held = 0;
+    shared->scans = 0;
+    shared->boots++;
+}
+
+void electric_set_tau(double microseconds)
+{
+    from_mv = voltage_mv(avr->cycle);
+    since = avr->cycle;
+    tau_cycles = microseconds * 16;
+}
+
+void electric_set_noise(double millivolts)
+{
+    noise_mv = millivolts;
+}

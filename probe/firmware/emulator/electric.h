@@ -1,0 +1,41 @@
+/* The circuit around the processor: multiplexers, tactels, wrist. Thesis 4.2, figure 4.5.
+ *
+ * Follows the address pins and gives the ADC the voltage of the tactel that they select. After a
+ * switch the voltage runs towards its new value with one time constant; the ADC takes it at the
+ * moment of its sample and hold, so that an address that changes too early is seen.
+ */
+#ifndef ELECTRIC_H
+#define ELECTRIC_H
+
+#include <stdint.h>
+#include <stdio.h>
+
+#include <simavr/sim_avr.h>
+
+#include "images.h"
+
+typedef struct {
+    char port; /* 'A' ... */
+    uint8_t bit;
+} pin_t;
+
+typedef struct {
+    const char *name; /* of the board */
+    const char *mcu;
+    pin_t row[4], column[4], sensor[3]; /* lowest bit first */
+} wiring_t;
+
+/* The wiring of a board, or 0. */
+const wiring_t *electric_wiring(const char *board);
+
+/* `trace`, if not 0, gets a line for every switch and every conversion. */
+void electric_connect(avr_t *avr, const wiring_t *wiring, images_t *images, uint64_t seed,
+                      FILE *trace);
+
+/* To be called before the processor is reset. */
+void electric_reset(void);
+
+void electric_set_tau(double microseconds);
+void electric_set_noise(double millivolts);
+
+#endif

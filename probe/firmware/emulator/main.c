@@ -1,0 +1,264 @@
+/* Runs the probe's firmware on an emulated AVR, with its circuit, serial line and faults.
+ *
+ *   emulator --board uno --firmware probe.elf --images FILE --link PATH
+ *            [--tau US] [--noise MV] [--seed N] [--trace FILE] [--free]
+ *
+ * Says "ready" on standard output, then obeys the lines of control.h. Paced at 16 MHz of real
+ * time, with --free as fast as it goes. Ends with its standard input.
+ */
+#include <getopt.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include <simavr/avr_extint.h>
+#include <simavr/sim_avr.h>
+#include <simavr/sim_elf.h>
+
+#include "control.h"
+#include "electric.h"
+#include "images.h"
+#include "line.h"
+
+#define HERTZ 16000000
+#define SLICE (HERTZ / 1000) /* cycles between two looks at the world: 1 ms */
+#define RUN_LIMIT 2000       /* cycles that the emulator runs at a time */
+#define SLIP_S 0.25          /* further behind than this, time is given up as lost */
+
+static struct {
+    const char *board, *firmware, *images, *link, *trace;
+    double tau_us, noise_mv;
+    uint64_t seed;
+    bool free;
+} options = {.board = "uno", .tau_us = 1};
+
+static volatile sig_atomic_t terminated;
+
+static avr_t *avr;
+static double origin_s;           /* wall time at which `emulated_s` was 0 */
+static double emulated_s;         /* time of the processor, without the time off power */
+static avr_cycle_count_t counted; /* cycles that are in it */
+static double worst_lag_s, slipped_s;
+static unsigned resets;
+
+static void fail(const char *format, ...)
+{
+    va_list arguments;
+
+    va_start(arguments, format);
+    fputs("emulator: ", stderr);
+    vfprintf(stderr, format, arguments);
+    fputc('\n', stderr);
+    va_end(arguments);
+    exit(2);
+}
+
+static void terminate(int signal)
+{
+    (void)signal;
+    terminated = 1;
+}
+
+/* The emulator's own messages: standard output is for answers. */
+static void log_message(avr_t *processor, const int level, const char *format, va_list arguments)
+{
+    if (level <= (processor ? processor->log : LOG_ERROR))
+        vfprintf(stderr, format, arguments);
+}
+
+static double wall_s(void)
+{
+    struct timespec now;
+
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+static void pause_s(double seconds)
+{
+    struct timespec span = {(time_t)seconds, (long)(1e9 * (seconds - (double)(time_t)seconds))};
+
+    nanosleep(&span, 0);
+}
+
+static void read_options(int count, char **values)
+{
+    static const struct option names[] = {
+        {"board", 1, 0, 'b'}, {"firmware", 1, 0, 'f'}, {"images", 1, 0, 'i'},
+        {"link", 1, 0, 'l'},  {"trace", 1, 0, 'c'},    {"tau", 1, 0, 't'},
+        {"noise", 1, 0, 'n'}, {"seed", 1, 0, 's'},     {"free", 0, 0, 'r'},
+        {0, 0, 0, 0}};
+    int letter;
+
+    while ((letter = getopt_long(count, values, "", names, 0)) != -1) {
+        switch (letter) {
+        case 'b': options.board = optarg; break;
+        case 'f': options.firmware = optarg; break;
+        case 'i': options.images = optarg; break;
+        case 'l': options.link = optarg; break;
+        case 'c': options.trace = optarg; break;
+        case 't': options.tau_us = atof(optarg); break;
+        case 'n': options.noise_mv = atof(optarg); break;
+        case 's': options.seed = strtoull(optarg, 0, 0); break;
+        case 'r': options.free = true; break;
+        default: exit(2);
+        }
+    }
+    if (optind < count)
+        fail("'%s' is no option", values[optind]);
+    if (!options.firmware || !options.images || !options.link)
+        fail("--firmware, --images and --link are needed");
+}
+
+static void reset(void)
+{
+    electric_reset();
+    avr_reset(avr);
+    avr->run_cycle_limit = RUN_LIMIT;
+    /* else the emulator looks at a low INT pin in every cycle, even with its interrupt off */
+    for (uint8_t pin = 0; pin < 8; pin++)
+        avr_extint_set_strict_lvl_trig(avr, pin, 0);
+    counted = avr->cycle;
+    line_reset();
+    resets++;
+}
+
+static void make_processor(const wiring_t *wiring)
+{
+    elf_firmware_t firmware = {0};
+
+    avr_global_logger_set(log_message);
+    if (elf_read_firmware(options.firmware, &firmware))
+        fail("cannot read the firmware %s", options.firmware);
+    snprintf(firmware.mmcu, sizeof firmware.mmcu, "%s", wiring->mcu);
+    firmware.frequency = HERTZ;
+    avr = avr_make_mcu_by_name(firmware.mmcu);
+    if (!avr)
+        fail("the emulator knows no %s", firmware.mmcu);
+    avr_init(avr);
+    avr->log = LOG_ERROR;
+    avr_load_firmware(avr, &firmware);
+    avr->vcc = avr->avcc = avr->aref = 5000;
+}
+
+static void run_slice(void)
+{
+    avr_cycle_count_t end = avr->cycle + SLICE;
+
+    while (avr->cycle < end) {
+        int state = avr_run(avr);
+        if (state == cpu_Done || state == cpu_Crashed)
+            fail("the processor stopped at 0x%x", avr->pc);
+    }
+    emulated_s += (double)(avr->cycle - counted) / HERTZ;
+    counted = avr->cycle;
+}
+
+/* Wait for real time, or note how far behind it we are. */
+static void keep_pace(void)
+{
+    double ahead_s = origin_s + emulated_s - wall_s();
+
+    if (options.free)
+        return;
+    if (ahead_s > 0) {
+        pause_s(ahead_s);
+        return;
+    }
+    if (-ahead_s > worst_lag_s)
+        worst_lag_s = -ahead_s;
+    if (-ahead_s > SLIP_S) {
+        slipped_s -= ahead_s;
+        origin_s -= ahead_s;
+    }
+}
+
+static void answer_statistics(double started_s)
+{
+    const line_counts_t *line = &line_counts;
+
+    control_answer("{\"emulated_s\": %.6f, \"wall_s\": %.6f, \"worst_lag_s\": %.6f, "
+                   "\"slipped_s\": %.6f, \"resets\": %u, \"sent\": %llu, \"delivered\": %llu, "
+                   "\"unheard\": %llu, \"overrun\": %llu, \"dropped\": %llu, \"flipped\": %llu, "
+                   "\"garbage\": %llu, \"garbled\": %llu, \"received\": %llu}",
+                   emulated_s, wall_s() - started_s, worst_lag_s, slipped_s, resets,
+                   (unsigned long long)line->sent, (unsigned long long)line->delivered,
+                   (unsigned long long)line->unheard, (unsigned long long)line->overrun,
+                   (unsigned long long)line->dropped, (unsigned long long)line->flipped,
+                   (unsigned long long)line->garbage, (unsigned long long)line->garbled,
+                   (unsigned long long)line->received);
+}
+
+static void plug(void)
+{
+    int error = line_plug();
+
+    if (error)
+        fail("cannot make the port %s: %s", options.link, strerror(error));
+}
+
+int main(int count, char **values)
+{
+    const wiring_t *wiring;
+    const char *why = "";
+    images_t *images;
+    FILE *trace = 0;
+    wishes_t wishes = {0};
+    double back_s = 0, started_s = wall_s(); /* back_s: when power comes back; 0: it is there */
+
+    read_options(count, values);
+    if (!(wiring = electric_wiring(options.board)))
+        fail("the board '%s' is not known: take uno or mega", options.board);
+    if (!(images = images_open(options.images, &why)))
+        fail("%s %s", options.images, why);
+    if (options.trace && !(trace = fopen(options.trace, "w")))
+        fail("cannot write %s", options.trace);
+    signal(SIGTERM, terminate);
+    signal(SIGINT, terminate);
+    signal(SIGPIPE, SIG_IGN);
+
+    make_processor(wiring);
+    electric_connect(avr, wiring, images, options.seed, trace);
+    electric_set_tau(options.tau_us);
+    electric_set_noise(options.noise_mv);
+    line_connect(avr, options.link, ~options.seed);
+    reset();
+    run_slice(); /* lets the firmware set its line rate, which the port takes on */
+    plug();
+    control_answer("ready");
+
+    origin_s = wall_s() - emulated_s;
+    while (!wishes.quit && !terminated) {
+        if (back_s > 0 && wall_s() >= back_s) {
+            back_s = 0;
+            reset();
+            plug();
+            origin_s = wall_s() - emulated_s;
+        }
+        if (back_s > 0) {
+            pause_s(0.001);
+        } else {
+            run_slice();
+            line_carry();
+            keep_pace();
+        }
+        control_read(&wishes);
+        if (wishes.statistics)
+            answer_statistics(started_s);
+        if (wishes.unplug_s > 0) {
+            line_unplug();
+            back_s = wall_s() + wishes.unplug_s;
+        }
+        if (wishes.reset && back_s == 0)
+            reset();
+        wishes = (wishes_t){.quit = wishes.quit};
+    }
+    line_unplug();
+    if (trace)
+        fclose(trace);
+    return 0;
+}

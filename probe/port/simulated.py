@@ -1,0 +1,121 @@
+"""A probe that is not there: a moving pattern or touches of a part, in software or as an AVR.
+
+With `firmware=avr` the images are voltages at the pins of an emulated ATmega328P that runs
+the probe's own firmware, and come back through its serial line.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from probe.errors import PortError, ProbeError
+from probe.frame import Frame
+from probe.port.contract import Port
+from probe.port.pattern import moving_pattern
+from probe.port.software import SoftwareProbe
+from probe.port.url import Address, number, refuse_unknown
+from probe.protocol import IdentPacket
+
+if TYPE_CHECKING:
+    from probe.port.emulated import EmulatedProbe
+
+RATE = 100.0
+FULL_MV, FULL_COUNTS = 5000.0, 1023
+
+
+def open_simulation(address: Address) -> Port:
+    """Open a simulated probe.
+
+    Raises
+    ------
+    PortError
+        When an option is unknown, or the emulator is not there.
+    """
+    rate = number(address, "rate", RATE, least=0.1)
+    firmware = address.options.get("firmware", "")
+    if firmware not in ("", "avr"):
+        raise PortError(
+            f"there is no firmware {firmware!r} to emulate", fix="write firmware=avr",
+            place=address.url,
+        )  # fmt: skip
+    frames = _frames(address, rate)
+    if firmware:
+        return EmulatedPort(address.url, frames, rate)
+    ident = IdentPacket(seq=0, t_us=0, settling_us=0.0, baud=0, name="sim")
+    return SoftwareProbe(address.url, frames, ident)
+
+
+def _frames(address: Address, rate: float) -> Iterator[Frame]:
+    if not address.target:
+        refuse_unknown(address, ("rate", "firmware"))
+        return moving_pattern(rate)
+    from probe.simulate.source import frames_of
+
+    options = {k: v for k, v in address.options.items() if k not in ("rate", "firmware")}
+    return _paced(frames_of(address.target, options), rate)
+
+
+def _paced(frames: Iterator[Frame], rate: float) -> Iterator[Frame]:
+    for seq, frame in enumerate(frames):
+        yield replace(frame, seq=seq, t_ns=round(seq * 1e9 / rate))
+
+
+class EmulatedPort:
+    """The serial line of an emulated AVR, and a thread that shows it the images."""
+
+    def __init__(self, url: str, frames: Iterator[Frame], rate: float) -> None:
+        from probe.port.emulated import emulated_probe
+        from probe.port.serial_line import open_serial
+        from probe.port.url import address_of
+
+        self._url = url
+        self._emulator: AbstractContextManager[EmulatedProbe] = emulated_probe()
+        probe = self._emulator.__enter__()
+        try:
+            self._line = open_serial(address_of(probe.url))
+        except PortError:
+            self._emulator.__exit__(None, None, None)
+            raise
+        self._closed = threading.Event()
+        self._ended: EOFError | ProbeError | None = None
+        self._shower = threading.Thread(
+            target=self._show, args=(probe, frames, 1 / rate), name="images", daemon=True
+        )
+        self._shower.start()
+
+    @property
+    def url(self) -> str:
+        """The URL that opens this port again."""
+        return self._url
+
+    def read(self, timeout_s: float) -> bytes:
+        """Return what the firmware sent; EOFError after the last image."""
+        if self._ended is not None:
+            raise self._ended
+        return self._line.read(timeout_s)
+
+    def write(self, data: bytes) -> None:
+        """Send all of `data` to the firmware."""
+        self._line.write(data)
+
+    def close(self) -> None:
+        """End the emulation."""
+        if not self._closed.is_set():
+            self._closed.set()
+            self._shower.join()
+            self._line.close()
+            self._emulator.__exit__(None, None, None)
+
+    def _show(self, probe: EmulatedProbe, frames: Iterator[Frame], period_s: float) -> None:
+        try:
+            for frame in frames:
+                probe.show(frame.counts * (FULL_MV / FULL_COUNTS))
+                if self._closed.wait(period_s):
+                    return
+            self._ended = EOFError()
+        except ProbeError as failure:  # of the simulation: the reader shall know
+            self._ended = failure

@@ -1,0 +1,214 @@
+"""Packets as values, to the wire and back.
+
+Little endian: type u8, version u8, seq u16, t_us u32, body, CRC u16 over all before it;
+COBS over that, then one zero byte. The CRC is CRC-16-CCITT with initial value 0xFFFF (check
+value of "123456789": 0x29B1).
+
+====  ==========  ====================================================================  =====
+type  packet      body                                                                  bytes
+====  ==========  ====================================================================  =====
+F     frame       256 x u16 counts, row 0 first; 4 x u16 wrist                            530
+B     frame       256 x u8 counts; 4 x u16 wrist                                          274
+I     ident       u8: rows, columns, bits, sensors, sensor, firmware (2), settling/0.25 us;
+                  u16: kbaud, boot; name, 8 characters                                     30
+S     statistics  frames u32, transmit waits u32, receive errors u16, uptime ms u32        24
+====  ==========  ====================================================================  =====
+
+A block that is no whole packet is no error but a `Damage`: on a real line it is expected.
+The packet after Cheshire and Baker, "Consistent overhead byte stuffing", 1999.
+"""
+
+from __future__ import annotations
+
+import struct
+from binascii import crc_hqx
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from cobs import cobs
+from numpy.typing import NDArray
+
+from probe.errors import FrameError
+from probe.frame import COLUMNS, ROWS, WRIST
+
+VERSION = 1
+WRIST_BITS = 10  #: the wrist is read with at least so many bits, whatever the tactels are
+TACTELS = ROWS * COLUMNS
+FRAME_BYTES, BYTE_FRAME_BYTES = 534, 277  #: of frames on the wire, at most
+
+_HEADER = struct.Struct("<BBHI")
+_CRC = struct.Struct("<H")
+_IDENT = struct.Struct("<8B2H8s")
+_STATISTICS = struct.Struct("<IIHI")
+_FRAME, _BYTES, _IDENT_TYPE, _STATISTICS_TYPE = b"FBIS"
+_BODY = {
+    _FRAME: 2 * TACTELS + 2 * WRIST,
+    _BYTES: TACTELS + 2 * WRIST,
+    _IDENT_TYPE: _IDENT.size,
+    _STATISTICS_TYPE: _STATISTICS.size,
+}
+
+
+class Damage(Enum):
+    """Why a block is no packet."""
+
+    STUFFING = "the block is no COBS"
+    CHECK = "the check sum is wrong"
+    VERSION = "the packet is of another version of the protocol"
+    TYPE = "the packet is of an unknown type"
+    LENGTH = "the length does not fit the type"
+    VALUE = "a value is outside its range"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FramePacket:
+    """One image as it crosses the wire."""
+
+    seq: int  #: 0 ... 65535, wraps
+    t_us: int  #: us, device time, wraps at 2^32
+    counts: NDArray[np.uint16]  #: (16, 16) row 0 first
+    wrist: NDArray[np.uint16]  #: (4,)
+    byte_wide: bool = False  #: sent with 8 bits a tactel
+
+
+@dataclass(frozen=True, slots=True)
+class IdentPacket:
+    """What the device is. It comes at boot and when it is asked for."""
+
+    seq: int  #: number of the next frame
+    t_us: int
+    bits: int = 10  #: of a reading
+    sensor: int = 0  #: the selected one
+    sensors: int = 8
+    firmware: tuple[int, int] = (1, 0)  #: major, minor
+    settling_us: float = 10.0  #: wait between addressing a tactel and reading it
+    baud: int = 1_000_000
+    boot: int = 0  #: counts the device's starts
+    name: str = "probe"  #: at most 8 characters of ASCII
+    rows: int = ROWS
+    columns: int = COLUMNS
+
+
+@dataclass(frozen=True, slots=True)
+class StatisticsPacket:
+    """What the device counted since it started."""
+
+    seq: int  #: number of the next frame
+    t_us: int
+    frames: int  #: sent
+    transmit_waits: int  #: times a scan had to wait for the line
+    receive_errors: int  #: bytes that are no command
+    uptime_ms: int
+
+
+Packet = FramePacket | IdentPacket | StatisticsPacket
+
+
+def encode(packet: Packet) -> bytes:
+    """Return the bytes of a packet on the wire, with its delimiter.
+
+    Raises
+    ------
+    FrameError
+        When a number does not fit its field.
+    """
+    try:
+        kind, body = _body(packet)
+        payload = _HEADER.pack(kind, VERSION, packet.seq, packet.t_us) + body
+    except (struct.error, UnicodeEncodeError) as bad:
+        raise FrameError(f"a value does not fit its field of the packet: {bad}") from bad
+    stuffed: bytes = cobs.encode(payload + _CRC.pack(crc_hqx(payload, 0xFFFF)))
+    return stuffed + b"\0"
+
+
+def decode(block: bytes, bits: int = 10) -> Packet | Damage:
+    """Return the packet of a block between two delimiters, or what is wrong with it.
+
+    Parameters
+    ----------
+    block
+        Bytes without the delimiter.
+    bits
+        Of the readings of two bytes: larger ones are refused.
+    """
+    try:
+        payload: bytes = cobs.decode(block)
+    except cobs.DecodeError:
+        return Damage.STUFFING
+    if len(payload) < _HEADER.size + _CRC.size:
+        return Damage.LENGTH
+    if crc_hqx(payload[:-2], 0xFFFF) != payload[-2] + (payload[-1] << 8):
+        return Damage.CHECK
+    kind, version, seq, t_us = _HEADER.unpack_from(payload)
+    if version != VERSION:
+        return Damage.VERSION
+    if kind not in _BODY:
+        return Damage.TYPE
+    if len(payload) != _HEADER.size + _BODY[kind] + _CRC.size:
+        return Damage.LENGTH
+    if kind == _FRAME:
+        return _frame(seq, t_us, payload, bits)
+    if kind == _BYTES:
+        return _byte_frame(seq, t_us, payload, bits)
+    if kind == _IDENT_TYPE:
+        return _ident(seq, t_us, payload)
+    return StatisticsPacket(seq, t_us, *_STATISTICS.unpack_from(payload, _HEADER.size))
+
+
+def _body(packet: Packet) -> tuple[int, bytes]:
+    if isinstance(packet, FramePacket):
+        wrist = packet.wrist.astype("<u2").tobytes()
+        if not packet.byte_wide:
+            return _FRAME, packet.counts.astype("<u2").tobytes() + wrist
+        if (packet.counts > 255).any():
+            raise FrameError(
+                f"a reading of {packet.counts.max()} does not fit 8 bits", fix="send 10 bits"
+            )
+        return _BYTES, packet.counts.astype(np.uint8).tobytes() + wrist
+    if isinstance(packet, IdentPacket):
+        fields = (packet.rows, packet.columns, packet.bits, packet.sensors, packet.sensor)
+        settling, kbaud = round(packet.settling_us * 4), packet.baud // 1000
+        name = packet.name.encode("ascii").ljust(8)[:8]
+        return _IDENT_TYPE, _IDENT.pack(
+            *fields, *packet.firmware, settling, kbaud, packet.boot, name
+        )
+    counted = (packet.frames, packet.transmit_waits, packet.receive_errors, packet.uptime_ms)
+    return _STATISTICS_TYPE, _STATISTICS.pack(*counted)
+
+
+def _frame(seq: int, t_us: int, payload: bytes, bits: int) -> FramePacket | Damage:
+    # Views of immutable bytes: read-only, and nothing is copied.
+    readings = np.frombuffer(payload, "<u2", TACTELS + WRIST, _HEADER.size)
+    if int(readings.max()) >> max(bits, WRIST_BITS):
+        return Damage.VALUE
+    return FramePacket(seq, t_us, readings[:TACTELS].reshape(ROWS, COLUMNS), readings[TACTELS:])
+
+
+def _byte_frame(seq: int, t_us: int, payload: bytes, bits: int) -> FramePacket | Damage:
+    counts = np.frombuffer(payload, np.uint8, TACTELS, _HEADER.size).astype(np.uint16)
+    wrist = np.frombuffer(payload, "<u2", WRIST, _HEADER.size + TACTELS)
+    if int(wrist.max()) >> max(bits, WRIST_BITS):
+        return Damage.VALUE
+    counts.setflags(write=False)
+    return FramePacket(seq, t_us, counts.reshape(ROWS, COLUMNS), wrist, byte_wide=True)
+
+
+def _ident(seq: int, t_us: int, payload: bytes) -> IdentPacket | Damage:
+    fields = _IDENT.unpack_from(payload, _HEADER.size)
+    rows, columns, bits, sensors, sensor, major, minor, settling, kbaud, boot, name = fields
+    sane = (rows, columns) == (ROWS, COLUMNS) and 8 <= bits <= 16 and sensor < sensors
+    if not sane or not name.isascii() or not name.decode("ascii").isprintable():
+        return Damage.VALUE
+    return IdentPacket(
+        seq,
+        t_us,
+        bits=bits,
+        sensor=sensor,
+        sensors=sensors,
+        firmware=(major, minor),
+        settling_us=settling / 4,
+        baud=kbaud * 1000,
+        boot=boot,
+        name=name.decode("ascii").rstrip(),
+    )

@@ -1,0 +1,151 @@
+"""Others' images -> a recording of counts.
+
+Whole numbers 0 ... 65535 are taken as they are. Anything else (forces, voltages, values with
+the bias removed) is scaled: value = scale_offset + scale * count, with the largest value at
+65535, and zero at zero unless there are negative values. Both numbers stand in the attributes,
+and `units` says "scaled".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.errors import RecordingError
+from probe.frame import WRIST
+from probe.recording.arrays import Found, arrays_of
+from probe.recording.layout import NOMINAL_HZ, Block, Origin
+from probe.recording.names import check_name, final_name, part_of, unless_it_fails
+from probe.recording.read import Recording, read_recording
+from probe.recording.write import FileWriter
+
+_AT_ONCE: Final = 1024  #: images read at a time
+_FULL: Final = 65535
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """How values become counts: value = offset + scale * count."""
+
+    offset: float
+    scale: float
+
+
+def import_array(
+    path: Path | str,
+    out: Path | str,
+    *,
+    dataset: str | None = None,
+    rate_hz: float = NOMINAL_HZ,
+    sensor: str = "",
+    calibration: str = "",
+    replace: bool = False,
+) -> Recording:
+    """Make a recording from an array of images.
+
+    Parameters
+    ----------
+    path
+        A .npy, .npz, .mat or HDF5 file with an array (N, 16, 16), (16, 16, N) or (16, 16);
+        if N is 16, the first axis is taken for time.
+    out
+        The recording to be made.
+    dataset
+        Which array, when there are several.
+    rate_hz
+        Frames per second; the array does not tell.
+    sensor, calibration
+        What the recording shall say about its origin.
+    replace
+        Let it take the place of an older recording of that name.
+
+    Raises
+    ------
+    RecordingError
+        No such file or array, several arrays, values that are no numbers, a name that is
+        taken, a full disk.
+    """
+    path, out = Path(path), Path(out)
+    check_name(out, replace=replace)
+    if not (np.isfinite(rate_hz) and rate_hz > 0):
+        raise RecordingError(f"a rate of {rate_hz:g} Hz", fix="give frames per second above 0")
+    with arrays_of(path) as arrays:
+        found = _chosen(path, arrays, dataset)
+        scale = _scale(path, found)
+        more: dict[str, Any] = {"imported_from": path.name, "imported_array": found.name}
+        if scale:
+            more |= {"scale": scale.scale, "scale_offset": scale.offset}
+        units = "scaled" if scale else "counts"
+        origin = Origin(sensor, calibration, units, MappingProxyType(more))
+        with unless_it_fails(part_of(out)) as part, FileWriter(part, origin) as writer:
+            for first, images in _images(found):
+                writer.write(_block(images, first, scale, 1e9 / rate_hz))
+    final_name(part, out, [], last=True, replace=replace)
+    return read_recording(out)
+
+
+def _chosen(path: Path, arrays: list[Found], name: str | None) -> Found:
+    """Return the array that was asked for, or the only one that may be meant."""
+    images = [found for found in arrays if found.frames is not None]
+    named = [found for found in images if found.name == (name or "frames").strip("/")]
+    if named or (name is None and len(images) == 1):
+        return (named or images)[0]
+    here = ", ".join(f"{found.name} {found.shape}" for found in (images or arrays)) or "nothing"
+    if not images:
+        cause, fix = f"no array of images (N, 16, 16) in it, but {here}", "reshape it first"
+    elif name is None:
+        cause, fix = f"several arrays of images in it: {here}", "say which by --dataset NAME"
+    else:
+        cause, fix = f"no array of images '{name}' in it, but {here}", "take one of these"
+    raise RecordingError(cause, fix=fix, place=str(path))
+
+
+def _images(found: Found) -> Iterator[tuple[int, NDArray[Any]]]:
+    frames = found.frames or 0
+    for first in range(0, frames, _AT_ONCE):
+        yield first, found.images(first, min(first + _AT_ONCE, frames))
+
+
+def _scale(path: Path, found: Found) -> Scale | None:
+    """Return how the values become counts; None if they are counts."""
+    least, most, whole = 0.0, 0.0, True
+    for first, images in _images(found):
+        bad = ~np.isfinite(images)
+        if bad.any():
+            raise RecordingError(
+                f"{found.name} holds values that are no numbers, "
+                f"the first in image {first + int(np.argwhere(bad)[0, 0])}",
+                fix="replace them, or leave those images out",
+                place=str(path),
+            )
+        least, most = min(least, float(images.min())), max(most, float(images.max()))
+        whole = whole and (images.dtype.kind != "f" or bool((images == np.floor(images)).all()))
+    if whole and least >= 0 and most <= _FULL:
+        return None
+    scale = most / _FULL - least / _FULL
+    if scale < np.finfo(np.float64).tiny:
+        raise RecordingError(
+            f"{found.name} holds nothing above {most:g}",
+            fix="multiply the values by a power of ten",
+            place=str(path),
+        )
+    return Scale(least, scale)
+
+
+def _block(images: NDArray[Any], first: int, scale: Scale | None, period_ns: float) -> Block:
+    if scale:
+        images = np.rint(images / scale.scale - scale.offset / scale.scale).clip(0, _FULL)
+    number = np.arange(first, first + len(images))
+    return Block(
+        images.astype(np.uint16),
+        np.rint(number * period_ns).astype(np.int64),
+        number,
+        np.zeros((len(images), WRIST), np.uint16),
+        None,
+    )

@@ -1,0 +1,99 @@
+"""What stands in a recording: datasets, attributes, version.
+
+::
+
+    /frames  u16 (N, 16, 16)   ADC counts, row 0 on top
+    /t_ns    i64 (N,)          device time, unwrapped, ns
+    /seq     i64 (N,)          number of the frame, unwrapped
+    /wrist   u16 (N, 4)        ADC counts of the wrist's transducers
+    /pose    f64 (N, 4, 4)     T_base_sensor, mm; NaN where not known (dataset optional)
+
+    attributes: format, format_version, tool_version, sensor, calibration (hash; empty: none),
+    units, piece (number in a series, from 1), and what the writer adds
+
+Only /frames is needed to be read: any HDF5 file with counts (N, 16, 16) there is a recording.
+Without /seq frames are numbered from 0, without /t_ns they come at 220 frames a second.
+All datasets are chunked and compressed by shuffle and deflate, which every HDF5 library
+reads, in the file format of HDF5 1.10, the first one that can be read while written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.frame import COLUMNS, ROWS, WRIST, Frame
+
+FORMAT: Final = "tactile recording"
+FORMAT_VERSION: Final = 1
+NOMINAL_HZ: Final = 220.0  #: of the frames of a file that tells no time
+CHUNK: Final = 64  #: frames that are compressed together, and written at a time when they come fast
+
+#: name: shape of one entry, type in the file
+DATASETS: Final[Mapping[str, tuple[tuple[int, ...], np.dtype[Any]]]] = MappingProxyType(
+    {
+        "frames": ((ROWS, COLUMNS), np.dtype("<u2")),
+        "t_ns": ((), np.dtype("<i8")),
+        "seq": ((), np.dtype("<i8")),
+        "wrist": ((WRIST,), np.dtype("<u2")),
+        "pose": ((4, 4), np.dtype("<f8")),
+    }
+)
+OPTIONAL: Final = ("pose",)
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where the frames of a recording come from."""
+
+    sensor: str = ""  #: ident of the probe, or what was simulated
+    calibration: str = ""  #: hash of the calibration file; empty: none
+    units: str = "counts"
+    more: MappingProxyType[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Block:
+    """Consecutive frames of a recording; arrays are read-only."""
+
+    counts: NDArray[np.uint16]  #: (n, 16, 16)
+    t_ns: NDArray[np.int64]  #: (n,)
+    seq: NDArray[np.int64]  #: (n,)
+    wrist: NDArray[np.uint16]  #: (n, 4)
+    pose: NDArray[np.float64] | None  #: (n, 4, 4) T_base_sensor, mm; NaN where not known
+
+    def __len__(self) -> int:
+        return len(self.counts)
+
+    @classmethod
+    def empty(cls) -> Block:
+        """Return a block without frames."""
+        images, readings = np.empty((0, ROWS, COLUMNS), np.uint16), np.empty((0, WRIST), np.uint16)
+        return cls(images, np.empty(0, np.int64), np.empty(0, np.int64), readings, None)
+
+    def datasets(self) -> dict[str, NDArray[Any] | None]:
+        """Return the arrays under the names that they have in a file."""
+        return {
+            "frames": self.counts,
+            "t_ns": self.t_ns,
+            "seq": self.seq,
+            "wrist": self.wrist,
+            "pose": self.pose,
+        }
+
+    def frozen(self) -> Block:
+        """Make the arrays read-only, and return the block."""
+        for array in self.datasets().values():
+            if array is not None:
+                array.setflags(write=False)
+        return self
+
+    def frame(self, i: int) -> Frame:
+        """Return frame `i` of the block, a view on its arrays."""
+        pose = None if self.pose is None or np.isnan(self.pose[i, 0, 0]) else self.pose[i]
+        return Frame(self.counts[i], int(self.t_ns[i]), int(self.seq[i]), self.wrist[i], pose)

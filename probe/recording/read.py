@@ -1,0 +1,144 @@
+"""A recording, or any HDF5 file with /frames (N, 16, 16), -> frames, a block at a time.
+
+Nothing is held open between two calls, and no more than a block is in memory: a recording
+of an hour is read in the memory of a second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from probe.frame import Frame
+from probe.recording.checked import look, read_block
+from probe.recording.layout import Block, Origin
+from probe.recording.names import part_of, series_of
+from probe.recording.opened import is_blank, opened
+
+_AT_ONCE: Final = 256  #: frames read at a time
+
+
+@dataclass(frozen=True, slots=True)
+class File:
+    """One file of a recording."""
+
+    path: Path
+    frames: int
+    poses: bool  #: whether frames in it may have a pose
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """A recording that is read when asked; what is said about it is from its first file."""
+
+    files: tuple[File, ...]
+    origin: Origin
+    tool_version: str  #: of the programme that wrote it; empty: not this one
+    live: bool  #: read although it may not be closed
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return sum(file.frames for file in self.files)
+
+    def blocks(
+        self, start: int = 0, stop: int | None = None, size: int = _AT_ONCE
+    ) -> Iterator[Block]:
+        """Yield frames `start` ... `stop` - 1 as blocks of at most `size` frames.
+
+        Raises
+        ------
+        RecordingError
+            A value that is no count, a pose that is none, a damaged part of the file.
+        """
+        stop = len(self) if stop is None else min(stop, len(self))
+        for file in self.files:
+            if start < min(stop, file.frames):
+                with opened(file.path, live=self.live) as source:
+                    for first in range(start, min(stop, file.frames), size):
+                        end = min(first + size, stop, file.frames)
+                        yield read_block(source, file.path, first, end)
+            start, stop = max(0, start - file.frames), stop - file.frames
+
+    def block(self, start: int = 0, stop: int | None = None) -> Block:
+        """Return frames `start` ... `stop` - 1 at once."""
+        return _joined(list(self.blocks(start, stop)))
+
+    def frames(self, start: int = 0, stop: int | None = None) -> Iterator[Frame]:
+        """Yield frames `start` ... `stop` - 1."""
+        for block in self.blocks(start, stop):
+            for i in range(len(block)):
+                yield block.frame(i)
+
+
+def read_recording(path: Path | str, *, live: bool = False) -> Recording:
+    """Look at a recording without reading its frames.
+
+    Parameters
+    ----------
+    path
+        A file; or the name that was given to the recorder, when the recording rolled over.
+    live
+        Also what was flushed of a recording that is still being written, or was left open.
+
+    Raises
+    ------
+    RecordingError
+        No such file, no HDF5 file, no /frames of the right shape, a newer format, truncated,
+        damaged, or not closed (and not `live`).
+    """
+    looks = [(name, look(name, live=live)) for name in _files_of(Path(path), live)]
+    _, first = looks[0]
+    files = tuple(File(name, seen.frames, seen.poses) for name, seen in looks)
+    return Recording(files, first.origin, first.tool_version, live)
+
+
+def read_frames(path: Path | str, *, live: bool = False) -> Iterator[Frame]:
+    """Return an iterator over the frames of a recording; see `read_recording`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from probe.frame import frame_from
+    >>> from probe.recording.record import Recorder
+    >>> path = Path(tempfile.mkdtemp()) / "touch.h5"
+    >>> with Recorder(path) as recorder:
+    ...     recorder.append(frame_from(np.full((16, 16), 7), t_ns=5, seq=0))
+    >>> [int(frame.counts[0, 0]) for frame in read_frames(path)]
+    [7]
+    """
+    return read_recording(path, live=live).frames()
+
+
+def _files_of(path: Path, live: bool) -> list[Path]:
+    """Return the files of a recording, in order; `path` itself if there are none."""
+    if path.exists():
+        return [path]
+    series = [file for _, file in series_of(path)]
+    part = part_of(path)
+    if part.exists() and not (live and series and is_blank(part)):
+        series.append(part)
+    return series or [path]
+
+
+def _joined(blocks: list[Block]) -> Block:
+    if len(blocks) < 2:
+        return blocks[0] if blocks else Block.empty()
+    pose = None
+    if any(block.pose is not None for block in blocks):
+        pose = np.concatenate(
+            [
+                np.full((len(block), 4, 4), np.nan) if block.pose is None else block.pose
+                for block in blocks
+            ]
+        )
+    return Block(
+        np.concatenate([block.counts for block in blocks]),
+        np.concatenate([block.t_ns for block in blocks]),
+        np.concatenate([block.seq for block in blocks]),
+        np.concatenate([block.wrist for block in blocks]),
+        pose,
+    ).frozen()

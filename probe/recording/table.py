@@ -1,0 +1,75 @@
+"""A recording -> a table (CSV): a row a frame.
+
+Columns: seq, t_ns, r0c0 ... r15c15 (row 0 on top), wrist0 ... wrist3, and where a pose is
+known in any frame p00 ... p33, T_base_sensor by rows (mm), empty in the frames without.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+
+from probe.frame import COLUMNS, ROWS, WRIST
+from probe.recording.layout import Block
+from probe.recording.opened import explained
+from probe.recording.read import Recording, read_recording
+
+
+def export_csv(path: Path | str, out: Path | str, *, live: bool = False) -> int:
+    """Write a recording as a table, and return the number of rows.
+
+    Parameters
+    ----------
+    path
+        A recording.
+    out
+        The table; it appears when it is complete, and replaces a file of that name.
+    live
+        Also one that is not closed.
+
+    Raises
+    ------
+    RecordingError
+        The recording cannot be read, or the table not be written.
+    """
+    recording, out = read_recording(path, live=live), Path(out)
+    draft = out.with_name(f".{out.name}.{os.getpid()}")
+    try:
+        with explained(out, "write"):
+            with open(draft, "x", encoding="ascii", newline="") as stream:
+                write_csv(recording, stream)
+            os.replace(draft, out)
+    finally:
+        draft.unlink(missing_ok=True)
+    return len(recording)
+
+
+def write_csv(recording: Recording, stream: TextIO) -> None:
+    """Write the table of a recording to a stream."""
+    poses = any(file.poses for file in recording.files)
+    stream.write(",".join(_header(poses)) + "\n")
+    for block in recording.blocks():
+        stream.write("".join(line + "\n" for line in _lines(block, poses)))
+
+
+def _header(poses: bool) -> list[str]:
+    images = [f"r{r}c{c}" for r in range(ROWS) for c in range(COLUMNS)]
+    wrist = [f"wrist{i}" for i in range(WRIST)]
+    pose = [f"p{r}{c}" for r in range(4) for c in range(4)] if poses else []
+    return ["seq", "t_ns", *images, *wrist, *pose]
+
+
+def _lines(block: Block, poses: bool) -> list[str]:
+    n = len(block)
+    numbers = np.hstack(
+        [block.seq[:, None], block.t_ns[:, None], block.counts.reshape(n, -1), block.wrist]
+    )
+    lines = [",".join(map(str, row)) for row in numbers.tolist()]
+    if not poses:
+        return lines
+    pose = np.full((n, 16), np.nan) if block.pose is None else block.pose.reshape(n, 16)
+    known = ["," * 15 if np.isnan(row[0]) else ",".join(map(repr, row)) for row in pose.tolist()]
+    return [f"{line},{rest}" for line, rest in zip(lines, known, strict=True)]

@@ -1,0 +1,183 @@
+"""One file of a recording while it is written: blocks of frames in, safe on the disk.
+
+After `write` returns, its frames outlive this process however it ends: HDF5 keeps the file
+readable at every moment (SWMR), and the lock on it tells whether its writer lives. The HDF5
+library crashes on a full disk, so space is reserved ahead: when there is no more, the block
+at hand is still written, and the file can be closed. What was reserved and is not needed is
+cut off at the end.
+"""
+
+from __future__ import annotations
+
+import os
+from importlib.metadata import version
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from probe.errors import RecordingError
+from probe.recording.layout import (
+    CHUNK,
+    DATASETS,
+    FORMAT,
+    FORMAT_VERSION,
+    OPTIONAL,
+    Block,
+    Origin,
+)
+from probe.recording.lock import is_locked, take_lock
+from probe.recording.opened import explained
+from probe.recording.superblock import superblock_of
+
+if TYPE_CHECKING:
+    import h5py
+
+_SPARE: Final = 512 * 1024  #: bytes for the next small block, HDF5's own tables, and closing
+_STEP: Final = 1024 * 1024  #: bytes that are reserved at a time
+_FILE_FORMAT: Final = ("v110", "v110")
+
+
+class FileWriter:
+    """A recording file that is being written.
+
+    Parameters
+    ----------
+    path
+        A name that is free.
+    origin
+        What the attributes say.
+    piece
+        Number in a series, from 1.
+
+    Raises
+    ------
+    RecordingError
+        The name is taken, the folder cannot be written, the disk is full.
+    """
+
+    def __init__(self, path: Path, origin: Origin, piece: int = 1) -> None:
+        import h5py
+
+        self.path = path
+        self.frames = 0  #: that are safe
+        self.poses = False  #: whether the file has a place for poses; decided by the first block
+        self._sets: dict[str, h5py.Dataset] = {}
+        self._reserved = 0
+        self._descriptor = _made(path)
+        try:
+            with explained(path, "write"):
+                self._reserve(0)
+                self._file = h5py.File(path, "w", libver=_FILE_FORMAT, rdcc_nbytes=4 * _STEP)
+                self._reserved = 0  # the library emptied the file
+                self._reserve(0)
+            self._file.attrs.update(_attributes(origin, piece))
+        except BaseException:
+            os.close(self._descriptor)
+            path.unlink(missing_ok=True)
+            raise
+
+    def write(self, block: Block) -> None:
+        """Append frames; when this returns, they are safe.
+
+        Raises
+        ------
+        RecordingError
+            There is no space for these frames; those before are safe.
+        """
+        first, end = self.frames, self.frames + len(block)
+        if not self._sets:
+            self._start(block.pose is not None)
+        with explained(self.path, "write"):
+            if len(block) > CHUNK:
+                self._reserve(len(block) * 1024)
+            values = block.datasets()
+            for name, dataset in self._sets.items():
+                dataset.resize(end, axis=0)
+                dataset[first:end] = np.nan if values[name] is None else values[name]
+            self._file.flush()
+        self.frames = end
+        with explained(self.path, "write"):
+            self._reserve(0)
+
+    def close(self) -> None:
+        """Close the file: it is whole and on the disk."""
+        if self._descriptor < 0:
+            return
+        if not self._sets:
+            self._start(poses=False)
+        with explained(self.path, "close"):
+            self._file.close()
+            head = superblock_of(self.path)
+            if head is not None:
+                os.ftruncate(self._descriptor, head.end)
+            os.fsync(self._descriptor)
+        os.close(self._descriptor)
+        self._descriptor = -1
+
+    def __enter__(self) -> FileWriter:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _start(self, poses: bool) -> None:
+        """Make the datasets, and the file readable from now on."""
+        self.poses = poses
+        for name, (shape, dtype) in DATASETS.items():
+            if poses or name not in OPTIONAL:
+                self._sets[name] = self._file.create_dataset(
+                    name,
+                    shape=(0, *shape),
+                    maxshape=(None, *shape),
+                    chunks=(CHUNK, *shape),
+                    dtype=dtype,
+                    shuffle=True,
+                    compression="gzip",
+                    compression_opts=1,
+                )
+        self._file.swmr_mode = True
+
+    def _reserve(self, needed: int) -> None:
+        """Make sure of space for `needed` bytes of data, and to close afterwards."""
+        end = self._file.id.get_filesize() if self._sets else 0
+        if end + needed + _SPARE > self._reserved:
+            self._reserved = end + needed + _SPARE + _STEP
+            os.posix_fallocate(self._descriptor, 0, self._reserved)
+
+
+def _made(path: Path) -> int:
+    """Make the file, lock it, and return its descriptor."""
+    try:
+        with explained(path, "make"):
+            descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
+    except RecordingError as error:
+        if not isinstance(error.__cause__, FileExistsError):
+            raise
+        if is_locked(path):
+            cause, fix = "another process is writing it", "choose another name"
+        else:
+            cause = "a recording that was interrupted stands there"
+            fix = f"run `repair` on {path.name}, or delete it"
+        raise RecordingError(cause, fix=fix, place=str(path)) from error
+    take_lock(descriptor)
+    return descriptor
+
+
+def _attributes(origin: Origin, piece: int) -> dict[str, Any]:
+    return {
+        **origin.more,
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "tool_version": version("encoded-objects"),
+        "sensor": origin.sensor,
+        "calibration": origin.calibration,
+        "units": origin.units,
+        "piece": piece,
+    }

@@ -1,0 +1,214 @@
+"""Faces of registered objects as surfaces. Thesis 6.3.
+
+Database + object + face -> Scene in the face frame: the face with its symbols, and what lies
+around it: the other faces that can be seen from above, with their symbols. Panels are taken
+as assembled, without the gap along their edges.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import Connection
+
+from generator.database.open import open_database
+from generator.database.read import list_objects, read_object
+from generator.database.registered import RegisteredFace, RegisteredObject
+from generator.database.transaction import reading
+from generator.errors import DatabaseError
+from probe.errors import SurfaceError
+from probe.simulate.scene import Scene
+from probe.surface.face import Face
+from probe.surface.lattice import Lattice, listed
+from probe.surface.mesh import Mesh, mesh
+from probe.surface.polygon import polygon
+from probe.surface.solids import filled, symbol_triangles
+from probe.surface.symbols import Relief, Symbols, embossed
+from probe.surface.template import template
+
+Array = NDArray[np.float64]
+
+DEEPEST_MM = 8.0  #: symbols of other faces that stay farther below are left out
+BESIDE_MM = 40.0  #: and those farther beside the face's box
+UP = 0.999  #: cosine from which a face lies up
+_FLAT = 1e-9  # share of the size that is rounding
+
+
+class DatabaseUnreadableError(SurfaceError):
+    """A database that is not there, is no database, or is newer than this tool."""
+
+    exit_code = 4
+
+
+def registered_surface(database: str, object_name: str, face: str = "") -> Scene:
+    """Return a face of a registered object.
+
+    Parameters
+    ----------
+    database
+        `lab.db`, `sqlite:///lab.db` or `postgresql://host/name`.
+    object_name
+        As registered.
+    face
+        Name of the face; empty for the first one that bears symbols.
+
+    Raises
+    ------
+    SurfaceError
+        When the database cannot be read, or holds no such object or face; the message lists
+        those that it holds.
+    """
+    held = registered_object(database, object_name)
+    found = face_of(held, face)
+    return Scene(
+        surface=_surface(held, found),
+        region=polygon(found.polygon_mm),
+        name=f"{held.entry.name}/{found.name}",
+        object_name=held.entry.name,
+        face=found.name,
+        T_object_surface=found.T_object_face,
+    )
+
+
+def registered_object(database: str, name: str) -> RegisteredObject:
+    """Return a registered object; the only one if the name is empty.
+
+    Raises
+    ------
+    SurfaceError
+        As `registered_surface`.
+    """
+    with _opened(database) as connection:
+        known = [entry.name for entry in list_objects(connection)]
+        if not name and len(known) == 1:
+            name = known[0]
+        if name in known:
+            return read_object(connection, name)
+    shown = ", ".join(known[:12]) + (", ..." if len(known) > 12 else "")
+    raise SurfaceError(
+        f"no object is called '{name}'" if name else f"{len(known)} objects, none is named",
+        fix=f"registered objects: {shown or 'none yet'}",
+        place=database,
+    )
+
+
+def registered_objects(database: str) -> list[str]:
+    """Return the names of all registered objects, in order."""
+    with _opened(database) as connection:
+        return [entry.name for entry in list_objects(connection)]
+
+
+@contextmanager
+def _opened(database: str) -> Iterator[Connection]:
+    try:
+        with reading(open_database(database, writable=False)) as connection:
+            yield connection
+    except DatabaseError as error:
+        place = error.place or database
+        raise DatabaseUnreadableError(error.cause, fix=error.fix, place=place) from error
+
+
+def face_of(held: RegisteredObject, name: str = "") -> RegisteredFace:
+    """Return a face by its name; the first one that bears symbols if the name is empty.
+
+    Raises
+    ------
+    SurfaceError
+        Listing the object's faces.
+    """
+    for face in held.faces:
+        if face.name == name or (not name and face.placement is not None):
+            return face
+    shown = ", ".join(face.name for face in held.faces[:12])
+    raise SurfaceError(
+        f"no face is called '{name}'" if name else "no face bears symbols",
+        fix=f"faces: {shown}" + (", ..." if len(held.faces) > 12 else ""),
+        place=held.entry.name,
+    )
+
+
+def _surface(held: RegisteredObject, face: RegisteredFace) -> Face:
+    symbols = _symbols(held)
+    lattice = None
+    cells = held.layout.faces[face.face_id]
+    if face.placement is not None and len(cells.labels):
+        place, pitch = face.placement, held.style.pitch_mm
+        c, s = math.cos(place.rotation_rad), math.sin(place.rotation_rad)
+        at = cells.centres_mm @ np.array([[c, s], [-s, c]]) + (place.x_mm, place.y_mm)
+        columns, rows = np.rint(at / (pitch, -pitch) - 0.5).T
+        lattice = Lattice(
+            template(symbols, pitch),
+            listed(rows, columns, cells.labels),
+            place.rotation_rad,
+            place.x_mm,
+            place.y_mm,
+        )
+    return Face(lattice, polygon(face.polygon_mm), _around(held, face, symbols))
+
+
+def _symbols(held: RegisteredObject) -> Symbols:
+    """Return the symbols of an object's alphabet in its relief."""
+    style = held.style
+    relief = Relief(style.height_mm, style.stroke_mm, style.draft_rad, style.chamfer_mm)
+    definition: dict[str, Any] = held.alphabet
+    glyphs = tuple(
+        tuple((tuple(a), tuple(b)) for a, b in glyph["strokes"]) for glyph in definition["glyphs"]
+    )
+    return embossed(glyphs, definition["reach"] * style.pitch_mm, relief)
+
+
+def _around(held: RegisteredObject, face: RegisteredFace, symbols: Symbols) -> Mesh | None:
+    """Return all other faces that are seen from above, with symbols near this face."""
+    T_face_object = np.linalg.inv(face.T_object_face)
+    eps = _FLAT * float(np.ptp(held.polyhedron.vertices, axis=0).max())
+    low, high = polygon(face.polygon_mm).box_mm
+    found: list[Array] = []
+    for other in held.faces:
+        if other.face_id == face.face_id:
+            continue
+        T = T_face_object @ other.T_object_face
+        if T[2, 2] > _FLAT:
+            # Corners come from the object, so that neighbours share them to the last bit.
+            loops = held.polyhedron.faces[other.face_id].loops
+            corners = _moved(held.polyhedron.vertices, T_face_object)
+            numbers = np.concatenate([np.array(loop) for loop in loops])
+            found.append(corners[numbers[filled(other.polygon_mm)]])
+        if other.placement is None or T[2, 2] < -0.5:
+            continue
+        cells = held.layout.faces[other.face_id]
+        at = _moved(np.c_[cells.centres_mm, np.zeros(len(cells.labels))], T)
+        reach = math.hypot(symbols.foot_half_mm * math.sqrt(2), symbols.relief.height_mm)
+        near = (at[:, 2] + reach > -DEEPEST_MM) & (
+            (at[:, :2] > low - BESIDE_MM) & (at[:, :2] < high + BESIDE_MM)
+        ).all(axis=1)
+        turn = _turn(-other.placement.rotation_rad)
+        for label in np.unique(cells.labels[near]):
+            solid = _moved(symbol_triangles(symbols, int(label)), T[:3, :3] @ turn)
+            here = at[near & (cells.labels == label)]
+            found.append((here[:, None, None] + solid).reshape(-1, 3, 3))
+    if not found:
+        return None
+    corners = np.concatenate(found)
+    corners[..., 2][np.abs(corners[..., 2]) < eps] = 0.0
+    flat = corners[:, :, :2]
+    ab, ac = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
+    seen = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0] > 0
+    return mesh(corners[seen], place=held.entry.name) if seen.any() else None
+
+
+def _moved(points: NDArray[Any], T: NDArray[Any]) -> Array:
+    """Return points (..., 3) turned by T (3, 3), or moved by T (4, 4); the same bits anywhere."""
+    x, y, z = np.moveaxis(points, -1, 0)
+    shift = T[:3, 3] if T.shape == (4, 4) else np.zeros(3)
+    rows = [T[i, 0] * x + T[i, 1] * y + T[i, 2] * z + shift[i] for i in range(3)]
+    return np.stack(rows, axis=-1)
+
+
+def _turn(angle_rad: float) -> Array:
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

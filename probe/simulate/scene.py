@@ -1,0 +1,47 @@
+"""What a simulated touch meets: a surface, where on it a sensor may stand, and whose it is.
+
+The surface frame of a registered face is its face frame (origin at the first vertex, x along
+the first edge, z outward); of a part alone it is the frame of its file.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.surface.contract import Surface
+from probe.surface.polygon import Polygon
+
+_GRID = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """A surface with its region and its name."""
+
+    surface: Surface
+    region: Polygon  #: where touches may have their centre, surface frame
+    name: str  #: as messages and recordings name it
+    object_name: str = ""  #: empty: not known
+    face: str = ""  #: empty: not known
+    T_object_surface: NDArray[np.float64] | None = None  #: (4, 4) mm; None: not known
+
+    def centre_mm(self) -> NDArray[np.float64]:
+        """Return the region's middle (2,): the mean of its area, or its inmost point."""
+        x0, x1 = self.region.starts[:, 0], self.region.ends[:, 0]
+        y0, y1 = self.region.starts[:, 1], self.region.ends[:, 1]
+        low, high = self.region.box_mm
+        at = (low + high) / 2
+        x0, x1, y0, y1 = x0 - at[0], x1 - at[0], y0 - at[1], y1 - at[1]
+        area = x0 * y1 - x1 * y0
+        mean = np.array([((x0 + x1) * area).sum(), ((y0 + y1) * area).sum()]) / (3 * area.sum())
+        if self.region.contains((at + mean)[None])[0]:
+            middle: NDArray[np.float64] = at + mean
+            return middle
+        x, y = (low + (high - low) * np.linspace(0, 1, _GRID)[:, None]).T
+        points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        points = points[self.region.contains(points)]
+        inmost: NDArray[np.float64] = points[np.argmax(self.region.distance_mm(points))]
+        return inmost

@@ -1,0 +1,193 @@
+"""Frames of a probe that keeps touching a surface: what stands behind `sim:` ports.
+
+Target + options -> frames without end. The sensor comes down, holds, and lifts, again and
+again; the film remembers (hysteresis, creep). Without a place it wanders from touch to touch
+by a step in a random direction. Options, all optional:
+
+    x, y        mm, surface frame: stay at this place
+    theta       degrees; any without it
+    force       N, 80
+    tilt        degrees, largest tilt of a touch: 0
+    step        mm from touch to touch while wandering, 5
+    period      s from touch to touch, 2
+    rate        frames per second, 100
+    overlay     tab or pad: tab
+    accuracy    auto, a level, or the largest error of an image: auto
+    noise       typical or quiet: typical
+    seed        whole number, 0
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.circuit import QUIET, Electronics, Noise, fsr_of, read_counts
+from probe.contact.contract import Touch
+from probe.contact.press import Accuracy, accuracy_of, level_for, press
+from probe.errors import ContactError, SurfaceError
+from probe.frame import Frame, frame_from
+from probe.sensor import Overlay, Sensor
+from probe.simulate.scene import Scene
+from probe.simulate.target import surface_of
+
+Image = NDArray[np.float64]
+
+DOWN, HELD, UP = 0.15, 0.65, 0.80  #: shares of a period: full force, begin to lift, off
+LEVELS = 16  #: of the force while it rises and falls: each is one contact
+_TURNS = 64  # directions tried for the next step, places tried that hold no sensor
+_DEFAULTS = {"force": 80.0, "tilt": 0.0, "step": 5.0, "period": 2.0, "rate": 100.0, "seed": 0.0}
+_CHOICES = {"overlay": ("tab", "pad"), "noise": ("typical", "quiet")}
+NAMES = ("x", "y", "theta", *_DEFAULTS, *_CHOICES, "accuracy")
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """How a simulated probe moves and what it is; the table above."""
+
+    numbers: dict[str, float]  #: x, y and theta only where given
+    sensor: Sensor
+    electronics: Electronics
+    accuracy: Accuracy
+
+
+def frames_of(target: str, options: Mapping[str, str] | None = None) -> Iterator[Frame]:
+    """Yield frames of a probe over a surface, numbered and timed from 0.
+
+    Parameters
+    ----------
+    target
+        See `probe.simulate.target`.
+    options
+        See above; text, as it stands in a port's URL. Read before the first frame.
+
+    Raises
+    ------
+    SurfaceError
+        When the target or an option cannot be read.
+    ContactError
+        When the accuracy is no level, or no touch has an equilibrium.
+    """
+    given = options_of(options or {}, place=target)
+    return _frames(surface_of(target), given)
+
+
+def options_of(values: Mapping[str, str], *, place: str = "") -> Options:
+    """Read options from text.
+
+    Raises
+    ------
+    SurfaceError
+        Naming what is unknown or no number, and what is allowed.
+    ContactError
+        When the accuracy is none of the overlay's levels.
+    """
+    numbers = dict(_DEFAULTS)
+    for name, text in values.items():
+        if name not in NAMES:
+            raise SurfaceError(
+                f"a simulated probe has no option '{name}'",
+                fix=f"its options are {', '.join(NAMES)}",
+                place=place,
+            )
+        if name in _CHOICES and text not in _CHOICES[name]:
+            raise SurfaceError(
+                f"{name}={text!r}", fix=f"write {' or '.join(_CHOICES[name])}", place=place
+            )
+        if name not in _CHOICES and name != "accuracy":
+            numbers[name] = _number(name, text, place)
+    sensor = Sensor(overlay=Overlay(kind="pad" if values.get("overlay") == "pad" else "tab"))
+    noise = QUIET if values.get("noise") == "quiet" else Noise()
+    electronics = Electronics(noise=noise, frame_s=1 / numbers["rate"])
+    accuracy = accuracy_of(values.get("accuracy", "auto"))
+    level_for(sensor, accuracy)
+    return Options(numbers, sensor, electronics, accuracy)
+
+
+def _number(name: str, text: str, place: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    signed, zero = name in ("x", "y", "theta"), name in ("force", "tilt", "step", "seed")
+    if not math.isfinite(value) or not (signed or value > 0 or (zero and value == 0)):
+        allowed = "a number" if signed else "0 or more" if zero else "a number above 0"
+        raise SurfaceError(f"{name}={text!r}", fix=f"write {allowed}", place=place)
+    return value
+
+
+def _frames(scene: Scene, options: Options) -> Iterator[Frame]:
+    numbers = options.numbers
+    rng = np.random.default_rng(int(numbers["seed"]))
+    fsr, state = fsr_of(options.sensor.rows, options.sensor.columns), None
+    beats = max(1, round(numbers["period"] * numbers["rate"]))
+    seq = 0
+    for touch in _wandering(scene, options, rng):
+        images: dict[float, Image] = {}
+        for beat in range(beats):
+            share = round(load(beat / beats) * LEVELS) / LEVELS
+            if share not in images:
+                images[share] = _pressed(scene, options, touch, share)
+            counts, state = read_counts(images[share], options.electronics, fsr, state, rng)
+            yield frame_from(counts, t_ns=round(seq * 1e9 / numbers["rate"]), seq=seq)
+            seq += 1
+
+
+def load(share: float) -> float:
+    """Return the force at a share of the period, over the full force: down, hold, up, off."""
+    if share < DOWN:
+        return (1 - math.cos(math.pi * share / DOWN)) / 2
+    if share < HELD:
+        return 1.0
+    if share < UP:
+        return (1 + math.cos(math.pi * (share - HELD) / (UP - HELD))) / 2
+    return 0.0
+
+
+def _pressed(scene: Scene, options: Options, touch: Touch, share: float) -> Image:
+    pressed = replace(touch, force_n=touch.force_n * share)
+    return press(scene.surface, options.sensor, pressed, accuracy=options.accuracy).forces_n
+
+
+def _wandering(scene: Scene, options: Options, rng: np.random.Generator) -> Iterator[Touch]:
+    """Yield touches that have an equilibrium: at the place asked for, or step after step."""
+    numbers = options.numbers
+    fixed = "x" in numbers or "y" in numbers
+    middle = scene.centre_mm()
+    at = np.array([numbers.get("x", middle[0]), numbers.get("y", middle[1])])
+    refused = 0
+    while True:
+        towards, theta = rng.uniform(-math.pi, math.pi, 2)
+        tilt = math.radians(numbers["tilt"]) * math.sqrt(rng.random())
+        touch = Touch(
+            x_mm=float(at[0]),
+            y_mm=float(at[1]),
+            theta_rad=math.radians(numbers["theta"]) if "theta" in numbers else float(theta),
+            force_n=numbers["force"],
+            tilt_x_rad=tilt * math.cos(towards),
+            tilt_y_rad=tilt * math.sin(towards),
+        )
+        try:
+            _pressed(scene, options, touch, 1.0)
+        except ContactError:
+            refused += 1
+            if fixed or refused > _TURNS:
+                raise
+        else:
+            refused = 0
+            yield touch
+        if not fixed:
+            at = _stepped(scene, at, numbers["step"], rng)
+
+
+def _stepped(scene: Scene, at: Image, step_mm: float, rng: np.random.Generator) -> Image:
+    """Return a place one step further inside the region; the middle where there is none."""
+    for angle in rng.uniform(-math.pi, math.pi, _TURNS):
+        onward = at + step_mm * np.array([math.cos(angle), math.sin(angle)])
+        if scene.region.contains(onward[None])[0]:
+            return onward
+    return scene.centre_mm()

@@ -1,0 +1,118 @@
+"""Symbols looked up by place: exact heights at the price of a table.
+
+One cell of the lattice is cut into fine square bins. A bin that no edge of the symbol
+crosses lies under one planar piece; the table names that piece, and the height is its
+plane's, exact. The few bins that an edge crosses ask `Symbols`. No interpolation anywhere.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.errors import SurfaceError
+from probe.surface.symbols import Symbols
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+BINS = 192  #: along a side of a cell
+_CROSSED = -1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Template:
+    """All symbols of an alphabet on cells of one pitch. Label -1 is a cell without a symbol."""
+
+    symbols: Symbols
+    pitch_mm: float
+    table: NDArray[np.int16]  #: [label, bin down, bin right] -> line of `planes`, -1: crossed
+    planes: Array  #: (n, 3) z = a + b x + c y, symbol's axes
+
+    def heights_mm(self, labels: Index, right: Array, down: Array) -> Array:
+        """Return the height over the face at a place each.
+
+        Parameters
+        ----------
+        labels
+            (n,) labels of the cells, -1 for none.
+        right, down
+            (n,) place in the cell from its upper left corner, shares of the pitch in [0, 1).
+        """
+        cell = (down * BINS).astype(np.int64)
+        cell += labels * BINS
+        cell *= BINS
+        cell += (right * BINS).astype(np.int64)
+        piece = self.table.ravel().take(cell, mode="wrap")
+        x, y = (right - 0.5) * self.pitch_mm, (0.5 - down) * self.pitch_mm
+        a, b, c = self.planes.T
+        z: Array = a.take(piece, mode="clip")
+        sloped = np.flatnonzero(piece > 1)
+        some = piece[sloped]
+        z[sloped] += b[some] * x[sloped] + c[some] * y[sloped]
+        asked = np.flatnonzero(piece == _CROSSED)
+        z[asked] = self.symbols.heights_mm(labels[asked], x[asked], y[asked])
+        return z
+
+
+@lru_cache(maxsize=32)
+def template(symbols: Symbols, pitch_mm: float) -> Template:
+    """Return the table of an alphabet's symbols.
+
+    Raises
+    ------
+    SurfaceError
+        When symbols reach beyond their cells.
+    """
+    if not symbols.foot_half_mm <= pitch_mm / 2:
+        raise SurfaceError(
+            f"symbols with a foot of {2 * symbols.foot_half_mm:.3g} mm overlap at a pitch of "
+            f"{pitch_mm:g} mm",
+            fix="take a larger pitch, or thinner strokes",
+        )
+    count = len(symbols.rings)
+    table = np.zeros((count + 1, BINS, BINS), dtype=np.int16)  # the last one is label -1
+    planes = [symbols.planes(0)[:2]]
+    middle = (np.arange(BINS) + 0.5) / BINS - 0.5
+    x, y = (pitch_mm * grid.ravel() for grid in np.meshgrid(middle, -middle))
+    for label in range(count):
+        crossed = _crossed(symbols, label, pitch_mm)
+        first = sum(map(len, planes)) - 2
+        planes.append(symbols.planes(label)[2:])
+        near = np.maximum(np.abs(x), np.abs(y)) <= symbols.foot_half_mm + pitch_mm / BINS
+        ask = np.flatnonzero(near & ~crossed.ravel())
+        piece, _ = symbols.pieces(np.full(len(ask), label), x[ask], y[ask])
+        table[label].ravel()[ask] = np.where(piece > 1, piece + first, piece)
+        table[label][crossed] = _CROSSED
+    table.setflags(write=False)
+    return Template(symbols, pitch_mm, table, np.concatenate(planes))
+
+
+def _crossed(symbols: Symbols, label: int, pitch_mm: float) -> NDArray[np.bool_]:
+    """Return which bins of a cell an edge between two pieces may cross."""
+    away = symbols.relief.profile()[0]
+    found = np.zeros((BINS, BINS), dtype=bool)
+    half = pitch_mm / BINS / 2
+    middle = (np.arange(BINS) + 0.5) / BINS - 0.5
+    for ring in symbols.rings[label]:
+        levels = [ring.moved(float(d)) for d in away]
+        lines = [(a, b) for tier in levels for a, b in zip(tier, np.roll(tier, -1, 0), strict=True)]
+        lines += list(zip(levels[0], levels[-1], strict=True))
+        for a, b in lines:
+            low, high = np.minimum(a, b), np.maximum(a, b)
+            columns, rows = (
+                slice(
+                    max(0, int((p / pitch_mm + 0.5) * BINS) - 1),
+                    int((q / pitch_mm + 0.5) * BINS) + 2,
+                )
+                for p, q in ((low[0], high[0]), (-high[1], -low[1]))
+            )
+            normal = np.array([a[1] - b[1], b[0] - a[0]])
+            dx = pitch_mm * middle[columns] - a[0]
+            dy = -pitch_mm * middle[rows] - a[1]
+            away_from = np.abs(normal[0] * dx + normal[1] * dy[:, None])
+            found[rows, columns] |= away_from <= 1.001 * half * np.abs(normal).sum()
+    return found

@@ -1,0 +1,202 @@
+"""Frame -> Recognition: the stages of reading, one after another. Thesis 6.
+
+    signal     forces and trust
+    symbols    a few lattices with the scores of all cells
+    locate     the places of the database that they can be
+    verify     the best of them again, with the symbols that the database says are there
+    pose       where the sensor stands on the face and on the object
+
+The answer is given only if no other place explains the image nearly as well, if it explains
+the image better than a surface with symbols of no registered place, and if the sensor's
+centre lies on the face.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.sensor import Sensor
+from recognizer.lab import Encoding, Lab
+from recognizer.locate import Place, place_scores, places
+from recognizer.pose import face_covariance, face_pose, inside_mm
+from recognizer.recognition import (
+    AMBIGUOUS,
+    NO_CONTACT,
+    NOT_ENCODED,
+    OUTSIDE,
+    TOO_FEW,
+    Recognition,
+    RunnerUp,
+    refused,
+)
+from recognizer.signal import Signal
+from recognizer.symbols.fit import Fit, Settings, fits, scored
+from recognizer.symbols.refine import Image, image_of, refined, started
+from recognizer.symbols.search import Bank, bank_of
+from recognizer.symbols.template import Template, template_of
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Thresholds:
+    """When an answer is given."""
+
+    margin: float = 15.0  #: nats over the best other place
+    surprise: float = 6.0  #: nats over symbols of no registered place
+    noise: float = 0.4  #: standard deviation of psi that may stay unexplained
+    rim_mm: float = 2.0  #: how far the sensor's centre may lie beyond the face
+    places: int = 4  #: of every lattice that are verified
+    verify_steps: int = 4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reader:
+    """Everything that is prepared once for a lab and a sensor."""
+
+    lab: Lab
+    sensor: Sensor
+    settings: Settings = field(default_factory=Settings)
+    thresholds: Thresholds = field(default_factory=Thresholds)
+    prepared: tuple[tuple[Encoding, Template, Bank], ...] = ()
+
+
+def reader_for(
+    lab: Lab,
+    sensor: Sensor,
+    settings: Settings | None = None,
+    thresholds: Thresholds | None = None,
+) -> Reader:
+    """Return a reader with the templates of all encodings of a lab."""
+    prepared = []
+    for encoding in lab.encodings:
+        template = template_of(encoding.alphabet, encoding.style, sensor)
+        prepared.append((encoding, template, bank_of(template, sensor)))
+    return Reader(lab, sensor, settings or Settings(), thresholds or Thresholds(), tuple(prepared))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reading:
+    """A place that was verified."""
+
+    encoding: Encoding
+    place: Place
+    fit: Fit
+    score: float  #: log-likelihood of the image, nats
+
+
+def recognise(reader: Reader, signal: Signal, seq: int = 0) -> Recognition:
+    """Return what one touch says."""
+    if not signal.contact:
+        return refused(seq, NO_CONTACT)
+    image = image_of(reader.sensor, signal.forces, signal.trust)
+    readings: list[Reading] = []
+    for encoding, template, bank in reader.prepared:
+        found = fits(image, template, bank, reader.settings)
+        readings += _verified(reader, image, encoding, template, found)
+    if not readings:
+        return refused(seq, TOO_FEW)
+    readings.sort(key=lambda reading: -reading.score)
+    nothing = max(unplaced(reading.encoding, reading.fit) for reading in readings)
+    return _answer(reader, readings, nothing, seq)
+
+
+def unplaced(encoding: Encoding, fit: Fit) -> float:
+    """Return the log-likelihood of an image that shows symbols of no registered place.
+
+    Every cell shows any symbol, or none, with the same probability; the prior of a place is
+    one over their number.
+    """
+    options = encoding.array.order + 1
+    each = np.log(np.exp(fit.scores).sum(axis=1)) - math.log(options)
+    return float(each.sum()) + fit.value + math.log(len(encoding.keys))
+
+
+def _verified(
+    reader: Reader, image: Image, encoding: Encoding, template: Template, found: tuple[Fit, ...]
+) -> list[Reading]:
+    """Return the likeliest places with pose and gain fitted to what the database holds there."""
+    candidates = places(encoding, found, reader.thresholds.places)[: reader.thresholds.places]
+    if not candidates:
+        return []
+    starts = [found[place.fit] for place in candidates]
+    lattices = started(
+        np.array([[fit.x_mm, fit.y_mm, fit.theta_rad, fit.spread] for fit in starts]),
+        np.array([fit.gain for fit in starts]),
+    )
+
+    def shown(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+        labels = np.empty(cells.shape[:2], np.int64)
+        for b, place in enumerate(candidates):
+            held_by, label = encoding.at(
+                (place.row - cells[b, :, 1]) % encoding.array.rows,
+                (place.column + cells[b, :, 0]) % encoding.array.columns,
+            )
+            labels[b] = np.where(held_by == place.face, label, -1)
+        return labels
+
+    fitted = refined(
+        image,
+        template,
+        lattices,
+        steps=reader.thresholds.verify_steps,
+        shown=shown,
+    )
+    again = scored(image, template, fitted, reader.settings)
+    return [
+        Reading(encoding, place, fit, place_scores(encoding, fit, place))
+        for place, fit in zip(candidates, again, strict=True)
+    ]
+
+
+def _answer(reader: Reader, readings: list[Reading], nothing: float, seq: int) -> Recognition:
+    best = readings[0]
+    index = _index(best)
+    other = next((r for r in readings[1:] if not _same(best, r)), None)
+    margin = math.inf if other is None else best.score - other.score
+    runner_up = None
+    if other is not None:
+        face = other.encoding.face(other.place.face)
+        runner_up = RunnerUp(face.object, face.face, _index(other))
+    limits = reader.thresholds
+    if best.score - nothing < limits.surprise or best.fit.noise > limits.noise:
+        return refused(seq, NOT_ENCODED, margin=margin, runner_up=runner_up)
+    if margin < limits.margin:
+        return refused(seq, AMBIGUOUS, margin=margin, runner_up=runner_up)
+    face = best.encoding.face(best.place.face)
+    pose = face_pose(best.encoding, face, best.place, best.fit)
+    if inside_mm(face, float(pose[0, 3]), float(pose[1, 3])) < -limits.rim_mm:
+        return refused(seq, OUTSIDE, margin=margin, runner_up=runner_up)
+    return Recognition(
+        seq=seq,
+        object=face.object,
+        face=face.face,
+        index=index,
+        T_face_probe=pose,
+        T_object_probe=face.T_object_face @ pose,
+        covariance=face_covariance(face, best.fit.covariance),
+        margin=margin,
+        runner_up=runner_up,
+        reason="",
+        noise=best.fit.noise,
+    )
+
+
+def _index(reading: Reading) -> tuple[int, int]:
+    """Return the array cell under the sensor's centre."""
+    pitch, array = reading.encoding.style.pitch_mm, reading.encoding.array
+    i, j = math.floor(reading.fit.x_mm / pitch), math.floor(reading.fit.y_mm / pitch)
+    return (reading.place.row - j) % array.rows, (reading.place.column + i) % array.columns
+
+
+def _same(a: Reading, b: Reading) -> bool:
+    """Whether two readings say the same place, up to a cell's rounding."""
+    if a.encoding is not b.encoding or a.place.face != b.place.face:
+        return False
+    (ra, ca), (rb, cb) = _index(a), _index(b)
+    array = a.encoding.array
+    return (ra - rb + 1) % array.rows <= 2 and (ca - cb + 1) % array.columns <= 2

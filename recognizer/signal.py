@@ -1,0 +1,74 @@
+"""Frame -> forces that can be fitted, and how far each tactel is trusted. Thesis 4.3.
+
+With a calibration: newtons, and bad tactels are masked. Without: counts over the lowest
+reading, as any roughly proportional response. Tactels that stand alone above all their
+neighbours (spikes) and dead rows or columns are told from the image itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+CONTACT = 8.0  #: counts over the background by which the strongest tactels must rise
+_FEW = 6  # tactels that must feel something
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Signal:
+    """What of a frame is worth fitting."""
+
+    forces: Array  #: (rows, columns) newtons, or counts over the background
+    trust: Array  #: (rows, columns) 0 ... 1
+    contact: bool  #: whether anything is touched
+
+
+def signal_of(
+    readings: Array,
+    *,
+    trust: Array | None = None,
+    floor: float | None = None,
+    least: float = CONTACT,
+) -> Signal:
+    """Return the signal of one image.
+
+    Parameters
+    ----------
+    readings
+        (rows, columns) newtons or counts.
+    trust
+        (rows, columns) of a calibration: 0 for bad tactels; 1 everywhere if not given.
+    floor
+        Reading without force; by default what the lowest twentieth of the tactels read.
+    least
+        How far the strongest tactels must rise above the floor for a contact.
+    """
+    known = np.ones(readings.shape) if trust is None else trust.astype(np.float64)
+    good = readings[known > 0]
+    if good.size == 0:
+        return Signal(np.zeros(readings.shape), known, contact=False)
+    level = float(np.quantile(good, 0.05)) if floor is None else floor
+    forces = np.maximum(readings - level, 0.0)
+    strongest = np.sort(forces[known > 0])[-_FEW:]
+    return Signal(forces, known * _alive(forces, known), bool(strongest[0] > least))
+
+
+def _alive(forces: Array, known: Array) -> Array:
+    """Return 0 for whole rows and columns that read nothing between ones that do."""
+    alive = np.ones(forces.shape)
+    for axis in (0, 1):
+        total = (forces * known).sum(axis=1 - axis)
+        middle = np.median(total)
+        dead = total < 0.02 * middle
+        dead[0] = dead[-1] = False  # at the rim: rather the edge of a face
+        neighbours = np.minimum(np.roll(total, 1), np.roll(total, -1)) > 0.3 * middle
+        where = np.flatnonzero(dead & neighbours)
+        if axis == 0:
+            alive[where] = 0
+        else:
+            alive[:, where] = 0
+    return alive

@@ -1,0 +1,151 @@
+"""The joint fit: image -> a few lattices, each with the scores of every cell in view.
+
+Forces (newtons, or counts that rise with force) -> Fit: pose of the sensor on the lattice of
+symbols, gain, and for every cell of the lattice under the sensor the log-likelihood of each
+symbol and of none. Whole and partial symbols count alike: each with what it shows.
+Lattice frame: mm; cell (i, j) is the i-th column and the j-th row upwards, its symbol's
+axes are the frame's. A sensor point s lies at R(theta) s + (x, y). Thesis 6.2.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recognizer.symbols.noise import Felt, log_likelihoods, spread
+from recognizer.symbols.refine import (
+    NOISE,
+    Image,
+    Lattices,
+    cells_and_offsets,
+    chosen,
+    felt_under,
+    first_gain,
+    refined,
+    started,
+    tables_at,
+)
+from recognizer.symbols.search import Bank, search
+from recognizer.symbols.template import Floats, Template
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How much work the fit spends."""
+
+    candidates: int = 4  #: lattices taken from the coarse search
+    steps: int = 4  #: Gauss-Newton steps of all of them
+    finalists: int = 2  #: lattices that are refined to the end
+    final_steps: int = 6
+    least_noise: float = 0.06  #: below it a fit is not believed
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """One way to see symbols in an image."""
+
+    x_mm: float
+    y_mm: float
+    theta_rad: float
+    spread: float  #: how blurred the sensor sees, `template`
+    gain: Array  #: (3,) plane: at the centre, and its slopes per half width and half height
+    cells: NDArray[np.int64]  #: (m, 2) column and upward row of the cells in view
+    scores: Array  #: (m, q + 1) log-likelihoods, nats, 0 for the best; the last one: no symbol
+    seen: Array  #: (m,) tactels that look at the cell, by how hard they press
+    noise: float  #: standard deviation of psi with which the scores were made
+    value: float  #: log-likelihood of the image with every cell at its best, nats
+    covariance: Array  #: (3, 3) of x, y (mm) and theta (rad)
+
+
+def fits(image: Image, template: Template, bank: Bank, settings: Settings) -> tuple[Fit, ...]:
+    """Return the likeliest lattices of an image, best first; none if nothing is pressed."""
+    gain = first_gain(image, template.ink)
+    if not (np.isfinite(gain).all() and gain[0] > 0):
+        return ()
+    felt = felt_under(image, gain[None])
+    weights = felt.press**2 * felt.trust
+    start = search(
+        bank,
+        felt.psi.reshape(bank.shape).astype(np.float32),
+        weights.reshape(bank.shape).astype(np.float32),
+        template.order,
+        settings.candidates,
+    )
+    if len(start) == 0:
+        return ()
+    lattices = started(start, np.repeat(gain[None], len(start), axis=0))
+    lattices = refined(image, template, lattices, steps=settings.steps)
+    best = np.argsort(-lattices.value, kind="stable")[: settings.finalists]
+    lattices = started(lattices.pose[best], lattices.gain[best])
+    lattices = refined(image, template, lattices, steps=settings.final_steps)
+    found = scored(image, template, lattices, settings)
+    return tuple(sorted(found, key=lambda fit: -fit.value))
+
+
+def scored(
+    image: Image,
+    template: Template,
+    lattices: Lattices,
+    settings: Settings,
+    noise: float | None = None,
+) -> tuple[Fit, ...]:
+    """Return the fits of lattices with the scores of all their cells, in their order.
+
+    Parameters
+    ----------
+    noise
+        With which scores are made; by default what the likeliest lattice leaves.
+    """
+    felt = felt_under(image, lattices.gain)
+    cells, offsets = cells_and_offsets(image, lattices.pose, template.pitch_mm)
+    tables = tables_at(template, offsets, lattices.pose[:, 3], felt.contact)
+    if noise is None:
+        best = int(np.argmax(lattices.value))
+        noise = max(settings.least_noise, _left(felt, tables, cells, best))
+    each = log_likelihoods(felt, tables, np.full(len(cells), noise))
+    level = felt.measure + (felt.trust * np.log(felt.press)).sum(axis=1)
+    scale = (noise / NOISE) ** 2
+    found = []
+    for b in range(len(cells)):
+        names, dense = np.unique(cells[b], axis=0, return_inverse=True)
+        dense = dense.reshape(-1)
+        scores = np.stack([np.bincount(dense, column, len(names)) for column in each[b].T], axis=1)
+        most = scores.max(axis=1)
+        found.append(
+            Fit(
+                x_mm=float(lattices.pose[b, 0]),
+                y_mm=float(lattices.pose[b, 1]),
+                theta_rad=math.remainder(float(lattices.pose[b, 2]), 2 * math.pi),
+                spread=float(lattices.pose[b, 3]),
+                gain=lattices.gain[b],
+                cells=names,
+                scores=scores - most[:, None],
+                seen=np.bincount(dense, felt.press[b] * felt.trust, len(names)).astype(np.float64),
+                noise=noise,
+                value=float(most.sum() + level[b]),
+                covariance=scale * np.linalg.pinv(lattices.normal[b])[:3, :3],
+            )
+        )
+    return tuple(found)
+
+
+def _left(felt: Felt, tables: Floats, cells: NDArray[np.int64], best: int) -> float:
+    """Return the standard deviation of psi, on a covered tactel, that a lattice leaves."""
+    one = Felt(
+        felt.psi[best : best + 1],
+        felt.press[best : best + 1],
+        felt.contact[best : best + 1],
+        felt.trust,
+        felt.measure[best : best + 1],
+    )
+    table = tables[best : best + 1]
+    scores = log_likelihoods(one, table, np.array([NOISE]))
+    values = chosen(cells[best : best + 1], table, scores)
+    away = (one.psi - values[..., 0]) * one.press / spread(values[:, :, None])[..., 0]
+    away = np.minimum(np.abs(away), 4 * NOISE)
+    return math.sqrt(float((felt.trust * away**2).sum() / felt.trust.sum()))

@@ -1,0 +1,59 @@
+"""How far readings lie from what a symbol would give, and the log-likelihood of that.
+
+psi of a reading spreads in proportion to what is felt (gain, height and force law differ from
+tactel to tactel), to the slope of the template (tactels are not quite where they should be),
+and little where nothing is felt. Where a tilted sensor presses less, heights count for more.
+Losses are bounded per tactel, so that a dead one or a spike costs a known amount.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recognizer.symbols.template import Floats
+
+Array = NDArray[np.float64]
+
+QUIET = 0.25  #: spread where nothing is felt, against a tactel that a plateau covers
+DISPLACED_MM = 0.5  #: slopes count by this much, in the same measure
+MOST = 8.0  #: nats that one tactel can cost
+
+
+@dataclass(frozen=True, slots=True)
+class Felt:
+    """An image under gain planes: b planes, n tactels."""
+
+    psi: Array  #: (b, n) of the forces over the gain
+    press: Array  #: (b, n) 0 ... 1, how hard the plane presses; 1 where it does as in the middle
+    contact: Array  #: (b, n) 1, falling to 0 where the sensor hangs in the air
+    trust: Array  #: (n,)
+    measure: Array  #: (b,) sum of log |d psi / d force|: makes planes of other gain comparable
+
+
+def spread(tables: Floats | Array) -> Floats:
+    """Return the spread (b, n, q) of psi around templates (b, n, q, 4), in units of the noise."""
+    value, x, y = tables[..., 0], tables[..., 1], tables[..., 2]
+    square = QUIET**2 + value * value + DISPLACED_MM**2 * (x * x + y * y)
+    return np.asarray(np.sqrt(square), np.float32)
+
+
+def log_likelihoods(felt: Felt, tables: Floats, noise: Array) -> Array:
+    """Return log-likelihoods (b, n, q + 1) of each symbol at each tactel; the last is no symbol.
+
+    Parameters
+    ----------
+    tables
+        (b, n, q, 4) templates under each tactel.
+    noise
+        (b,) standard deviation of psi on a covered tactel.
+    """
+    unit = noise[:, None] / np.maximum(felt.press, 1e-3)
+    none = np.full((*felt.psi.shape, 1), QUIET)
+    widths = np.concatenate([spread(tables), none], axis=-1)
+    values = np.concatenate([tables[..., 0], np.zeros_like(none)], axis=-1)
+    away = (felt.psi[..., None] - values) / (unit[..., None] * widths)
+    each = -np.minimum(0.5 * away * away, MOST) - np.log(widths)
+    return np.asarray(felt.trust[:, None] * each)

@@ -1,0 +1,168 @@
+"""What the sensor feels of each symbol, through the overlay that is fitted.
+
+Alphabet + style + sensor -> Template: the response of a tactel whose centre lies at an
+offset from the centre of a symbol, 0 over the bare face, 1 over a wide plateau. Offsets in
+the symbol's axes (x along the array's columns, y against its rows), mm.
+
+A tab feels the share of its tip that the plateau covers, and a little more than that share
+because a partly covered tip bulges into the open side; the pad passes on only what is
+coarser than its thickness (numerics of `probe.contact`). Responses are kept as
+psi(y) = log(1 + 3 y) / log 4, in which gain errors and noise have about one size. How sharp
+the sensor sees is fitted with the rest: the spread runs from -1/2, the overlay alone, to
+1/2, strokes printed too wide and seen through cross-talk.
+Thesis 4.2, 6.2.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.alphabet import Alphabet, SymbolStyle
+from probe.sensor import Sensor
+
+Floats = NDArray[np.float32]
+
+STEP_MM = 0.05  #: grid of the tables
+_BULGE = 0.59  #: F(c)/F(1) = c (1 + bulge (1 - c)) for a tip covered by the share c
+_PENETRATION_MM = 0.4  #: of the plateau into the overlay, for the part of a wall that is felt
+_PSI = 3.0
+WIDER_MM = 0.1  #: how much wider strokes are at the far end of the spread
+CROSS_TALK = 0.4  #: tactels, standard deviation, at the far end of the spread
+
+
+def psi(response: NDArray[np.float64] | Floats) -> NDArray[np.float64]:
+    """Return log(1 + 3 y) / log 4 of responses y >= 0 (negative ones count as 0)."""
+    return np.log1p(_PSI * np.maximum(response, 0.0)) / math.log1p(_PSI)
+
+
+@dataclass(frozen=True, slots=True)
+class Template:
+    """Responses of all symbols of an alphabet on a fine grid of offsets."""
+
+    pitch_mm: float
+    order: int  #: number of symbols
+    half_mm: float  #: the grid covers offsets -half ... half in x and y
+    values: Floats  #: (n, n, order, 4) psi of the response, its slopes per mm and per spread
+    ink: float  #: mean response over a cell
+
+    @property
+    def size(self) -> int:
+        """Number of grid points along one side."""
+        return int(self.values.shape[0])
+
+    def at(self, offsets_mm: NDArray[np.float64]) -> Floats:
+        """Return psi and slopes (..., order, 4) at offsets (..., 2); 0 outside the grid."""
+        index = np.rint((offsets_mm + self.half_mm) / STEP_MM).astype(np.intp)
+        inside = np.all((index >= 0) & (index < self.size), axis=-1)
+        index[np.logical_not(inside)] = 0
+        return np.where(
+            np.asarray(inside)[..., None, None],
+            self.values[index[..., 1], index[..., 0]],
+            np.float32(0),
+        )
+
+
+@lru_cache(maxsize=16)
+def template_of(alphabet: Alphabet, style: SymbolStyle, sensor: Sensor) -> Template:
+    """Return the template of an alphabet, as embossed and as felt by a sensor."""
+    reach = alphabet.reach * style.pitch_mm
+    extent = reach + style.stroke_mm / 2 + style.draft_mm + _blur_mm(sensor)
+    steps = math.ceil(extent / STEP_MM) + 1
+    axis = (np.arange(2 * steps + 1) - steps) * STEP_MM
+    x, y = np.meshgrid(axis, axis)
+    values = np.zeros((len(axis), len(axis), alphabet.order, 4), np.float32)
+    ink = []
+    for label, glyph in enumerate(alphabet.glyphs):
+        strokes = np.array(glyph.strokes, dtype=np.float64) * reach
+        presence = _presence(_distance(strokes, x, y), style)
+        wide = _presence(
+            _distance(strokes, x, y), replace(style, stroke_mm=style.stroke_mm + WIDER_MM)
+        )
+        felt = _felt(presence, sensor)
+        sharp, smeared = psi(felt), psi(_smeared(_felt(wide, sensor), sensor))
+        middle = (sharp + smeared) / 2
+        ink.append(felt.sum() * STEP_MM**2 / style.pitch_mm**2)
+        values[..., label, 0] = middle
+        values[..., label, 1] = np.gradient(middle, STEP_MM, axis=1)
+        values[..., label, 2] = np.gradient(middle, STEP_MM, axis=0)
+        values[..., label, 3] = smeared - sharp
+    values.setflags(write=False)
+    return Template(style.pitch_mm, alphabet.order, steps * STEP_MM, values, float(np.mean(ink)))
+
+
+def _smeared(felt: NDArray[np.float64], sensor: Sensor) -> NDArray[np.float64]:
+    """Return responses as a sensor with cross-talk between its tactels gives them."""
+    from scipy.ndimage import gaussian_filter
+
+    return np.asarray(gaussian_filter(felt, CROSS_TALK * sensor.pitch_mm / STEP_MM))
+
+
+def _distance(
+    strokes: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the distance to the nearest stroke's centre line, mm."""
+    best = np.full(x.shape, np.inf)
+    for (x0, y0), (x1, y1) in strokes:
+        dx, dy = x1 - x0, y1 - y0
+        length = max(dx * dx + dy * dy, 1e-12)
+        t = np.clip(((x - x0) * dx + (y - y0) * dy) / length, 0, 1)
+        best = np.minimum(best, np.hypot(x - x0 - t * dx, y - y0 - t * dy))
+    return best
+
+
+def _presence(distance: NDArray[np.float64], style: SymbolStyle) -> NDArray[np.float64]:
+    """Return how much of the plateau's pressure is felt at a point: 1 on it, falling on a wall."""
+    top = style.stroke_mm / 2 - style.chamfer_mm
+    slope = math.tan(max(style.draft_rad, 0.02))
+    wall = min(_PENETRATION_MM, style.height_mm) * slope + style.chamfer_mm
+    return np.clip(1 - (distance - top) / max(wall, STEP_MM), 0, 1)
+
+
+def _blur_mm(sensor: Sensor) -> float:
+    if sensor.overlay.kind == "tab":
+        return sensor.overlay.tab_diameter_mm / 2 + 2 * CROSS_TALK * sensor.pitch_mm
+    return sensor.pitch_mm / 2 + 1.5 * sensor.overlay.height_mm
+
+
+def _felt(presence: NDArray[np.float64], sensor: Sensor) -> NDArray[np.float64]:
+    from scipy.signal import fftconvolve
+
+    if sensor.overlay.kind == "tab":
+        cover = fftconvolve(presence, _disc(sensor.overlay.tab_diameter_mm / 2), mode="same")
+        cover = np.clip(cover, 0, 1)
+        return np.asarray(cover * (1 + _BULGE * (1 - cover)))
+    cell = _box(sensor.pitch_mm)
+    spread = fftconvolve(presence, _pad_kernel(sensor.overlay.height_mm), mode="same")
+    return np.asarray(np.clip(fftconvolve(spread, cell, mode="same"), 0, None))
+
+
+def _disc(radius: float) -> NDArray[np.float64]:
+    steps = math.ceil(radius / STEP_MM)
+    axis = np.arange(-steps, steps + 1) * STEP_MM
+    x, y = np.meshgrid(axis, axis)
+    disc = np.clip((radius - np.hypot(x, y)) / STEP_MM + 0.5, 0, 1)
+    return np.asarray(disc / disc.sum())
+
+
+def _box(width: float) -> NDArray[np.float64]:
+    steps = math.ceil(width / 2 / STEP_MM)
+    axis = np.clip(
+        (width / 2 - np.abs(np.arange(-steps, steps + 1) * STEP_MM)) / STEP_MM + 0.5, 0, 1
+    )
+    box = np.outer(axis, axis)
+    return np.asarray(box / box.sum())
+
+
+def _pad_kernel(thickness: float) -> NDArray[np.float64]:
+    """Return how a point load spreads on its way to the base of a bonded incompressible layer."""
+    spread = 0.55 * thickness
+    steps = math.ceil(3 * spread / STEP_MM)
+    axis = np.arange(-steps, steps + 1) * STEP_MM
+    x, y = np.meshgrid(axis, axis)
+    kernel = np.exp(-(x * x + y * y) / (2 * spread * spread))
+    return np.asarray(kernel / kernel.sum())

@@ -1,0 +1,425 @@
+"""The firmware itself, on an emulated AVR, read through its serial port.
+
+Counts are compared with the images that were felt, frame by frame. Free-running emulations
+where time does not matter: they take an eighth of the time.
+"""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from probe.errors import PortError
+from probe.firmware.build import SOURCES
+from probe.port import open_port
+from probe.port.emulated import emulated_probe
+from probe.protocol import Damage, FramePacket, IdentPacket, Splitter, StatisticsPacket, decode
+
+HERTZ = 16_000_000
+ADC_CLOCK = 16  # cycles
+WRIST_MV = np.array([500.0, 1500.0, 2500.0, 3500.0])
+
+
+class Line:
+    """Packets of an open port, good and bad."""
+
+    def __init__(self, url):
+        self.port = open_port(url)
+        self.splitter = Splitter()
+        self.waiting = []
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.port.close()
+
+    def send(self, commands):
+        self.port.write(commands)
+
+    def packets(self, seconds=10.0):
+        """Yield packets and damages until nothing was received for so long."""
+        while True:
+            while self.waiting:
+                yield decode(self.waiting.pop(0))
+            data = self.port.read(seconds)
+            if not data:
+                return
+            self.waiting += self.splitter.feed(data)
+
+    def next(self, kind, seconds=10.0):
+        for packet in self.packets(seconds):
+            if isinstance(packet, kind):
+                return packet
+        raise AssertionError(f"no {kind.__name__} in {seconds} s")
+
+    def take(self, count, kind=FramePacket):
+        return [self.next(kind) for _ in range(count)]
+
+    def quiet(self):
+        """Stop it; commands are obeyed in their order, so nothing comes after the ident."""
+        for _ in range(5):
+            self.send(b"xi")
+            if any(isinstance(packet, IdentPacket) for packet in self.packets(1.0)):
+                return
+        raise AssertionError("no ident")
+
+    def ask(self, command, kind):
+        self.send(command)
+        return self.next(kind)
+
+
+def images(count, seed=1):
+    return np.random.default_rng(seed).uniform(0, 5000, (count, 16, 16))
+
+
+def counts_of(millivolts):
+    return np.minimum(
+        np.floor(np.asarray(millivolts, np.float32).astype(float) * 1024 / 5000), 1023
+    )
+
+
+def rms(packets, image):
+    errors = [packet.counts - image * 1024 / 5000 for packet in packets]
+    return np.sqrt(np.mean(np.square(errors)))
+
+
+@pytest.fixture(scope="module")
+def probe():
+    with emulated_probe(tau_us=0, paced=False) as running:
+        yield running
+
+
+@pytest.fixture
+def line(probe):
+    with Line(probe.url) as opened:
+        opened.send(b"a0")
+        opened.quiet()
+        yield opened
+        opened.send(b"x")
+
+
+def test_ident_says_what_it_is(line):
+    ident = line.ask(b"b5i", IdentPacket)
+    assert (ident.rows, ident.columns, ident.sensors) == (16, 16, 8)
+    assert (ident.bits, ident.sensor) == (8, 5)
+    assert (ident.baud, ident.settling_us) == (1_000_000, 10.0)
+    assert (ident.firmware, ident.name) == ((1, 0), "FSR-uno")
+
+
+def test_every_frame_is_the_image_that_was_felt_whole(probe, line):
+    shown, seen = {}, set()
+    line.send(b"s")
+    for i, image in enumerate(images(400)):  # faster than scans begin
+        wrist = image[0, :4]
+        shown[probe.show(image, wrist)] = image
+        if i % 4 == 3:
+            packet = line.next(FramePacket)
+            number = probe.felt(packet.seq)
+            if number in shown:  # the first ones were felt before
+                seen.add(number)
+                assert (packet.counts == counts_of(shown[number])).all()
+                assert (packet.wrist == counts_of(shown[number][0, :4])).all()
+    assert len(seen) > 20
+
+
+def test_sensors_are_told_apart(probe, line):
+    stack = images(8, seed=2)
+    probe.show(stack, WRIST_MV)
+    for sensor in (0, 7, 3, 4, 1, 6, 2, 5):
+        packet = line.ask(b"%dg" % sensor, FramePacket)
+        assert (packet.counts == counts_of(stack[sensor])).all()
+
+
+def test_eight_bits_are_the_upper_ones(probe, line):
+    image = images(1, seed=3)[0]
+    probe.show(image, WRIST_MV)
+    packet = line.ask(b"bg", FramePacket)
+    assert packet.byte_wide
+    assert (packet.counts == counts_of(image) // 4).all()
+    assert (packet.wrist == counts_of(WRIST_MV)).all()
+    again = line.ask(b"ag", FramePacket)
+    assert not again.byte_wide
+    assert (again.counts == counts_of(image)).all()
+
+
+def test_extremes_and_zero_bytes_pass(probe, line):
+    for level in (-100.0, 0.0, 5.0, 1250.0, 2500.0, 4999.0, 6000.0):
+        probe.show(np.full((16, 16), level), np.full(4, level))
+        packet = line.ask(b"g", FramePacket)
+        assert (packet.counts == np.clip(counts_of(level), 0, 1023)).all()
+        assert (packet.wrist == packet.counts[0, 0]).all()
+
+
+def test_one_frame_at_a_time_and_no_more(line):
+    first = line.ask(b"g", FramePacket)
+    assert not list(line.packets(0.2))
+    assert line.ask(b"g", FramePacket).seq == (first.seq + 1) % 65536
+
+
+def test_statistics_count_frames_waits_and_wrong_commands(line):
+    before = line.ask(b"t", StatisticsPacket)
+    line.send(b"s")
+    line.take(20)
+    line.quiet()
+    after = line.ask(b"?\0\xfft", StatisticsPacket)
+    assert after.receive_errors - before.receive_errors == 3
+    frames = after.frames - before.frames
+    assert frames >= 20
+    assert (after.seq - before.seq) % 65536 == frames
+    assert frames - 3 <= after.transmit_waits - before.transmit_waits <= frames  # line-bound
+    assert abs(after.uptime_ms - after.t_us // 1000) <= 2
+
+
+def test_device_time_counts_microseconds(line):
+    line.send(b"s")
+    packets = line.take(200)
+    steps = np.diff([packet.t_us for packet in packets]) % 2**32
+    # 534 bytes of 10 bits at 1 Mbaud; COBS needs a byte less when no block of 254 is full
+    assert np.median(steps) == pytest.approx(5340, abs=20)
+
+
+def test_a_reset_is_seen_by_the_boot_counter_and_the_ident(probe, line):
+    boots, counted = line.ask(b"i", IdentPacket).boot, probe.boots
+    line.ask(b"g", FramePacket)
+    probe.fault("reset")
+    ident = line.next(IdentPacket)
+    assert (ident.boot, probe.boots) == (boots + 1, counted + 1)
+    assert ident.seq == 0
+    assert ident.t_us < 10_000
+    assert line.ask(b"g", FramePacket).seq == 0
+
+
+def test_no_frame_of_a_damaged_stream_is_wrong(probe, line):
+    image = images(1, seed=4)[0]
+    probe.show(image, WRIST_MV)
+    before = probe.statistics()
+    damages = good = 0
+    probe.fault("flip 300")
+    probe.fault("drop 300")
+    line.send(b"s")
+    for i, packet in enumerate(line.packets()):
+        if i % 100 == 50:
+            probe.fault("garbage 700")
+        if isinstance(packet, FramePacket) and i > 1:
+            good += 1
+            assert (packet.counts == counts_of(image)).all()
+        damages += isinstance(packet, Damage)
+        if i == 1000:
+            break
+    probe.fault("flip 0")
+    probe.fault("drop 0")
+    after = probe.statistics()
+    assert after.flipped > before.flipped
+    assert after.dropped > before.dropped
+    assert after.garbage - before.garbage == 7000
+    assert damages > 100
+    assert good > 500
+    line.quiet()
+    assert isinstance(line.ask(b"g", FramePacket), FramePacket)
+
+
+def test_unplugged_is_gone_and_comes_back_started_anew(probe):
+    with Line(probe.url) as line:
+        line.send(b"s")
+        line.take(3)
+        boots = probe.boots
+        probe.fault("unplug 0.3")
+        unplugged = time.monotonic()
+        with pytest.raises(PortError, match="went away"):
+            list(line.packets(1.0))
+    assert not os.path.lexists(probe.device)
+    while not os.path.lexists(probe.device):
+        assert time.monotonic() - unplugged < 5
+        time.sleep(0.01)
+    assert time.monotonic() - unplugged >= 0.25
+    with Line(probe.url) as line:
+        assert probe.boots == boots + 1
+        assert line.ask(b"g", FramePacket).seq == 0
+
+
+def test_a_listener_who_sleeps_loses_bytes_but_never_gets_a_wrong_frame(probe, line):
+    image = images(1, seed=5)[0]
+    probe.show(image, WRIST_MV)
+    line.ask(b"g", FramePacket)
+    before = probe.statistics()
+    line.send(b"s")
+    until = time.monotonic() + 10
+    while probe.statistics().overrun < before.overrun + 10_000:  # the emulation goes on
+        assert time.monotonic() < until
+        time.sleep(0.02)
+    line.send(b"x")
+    for packet in line.packets(0.2):
+        assert isinstance(packet, Damage) or (packet.counts == counts_of(image)).all()
+    assert (line.ask(b"g", FramePacket).counts == counts_of(image)).all()
+
+
+def test_nothing_is_kept_for_who_opens_the_port_later(probe):
+    with Line(probe.url) as line:
+        line.send(b"s")
+        line.take(2)
+    before = probe.statistics()
+    while probe.statistics().sent < before.sent + 50_000:
+        time.sleep(0.02)
+    after, scans = probe.statistics(), probe.scans
+    assert after.unheard - before.unheard == after.sent - before.sent
+    with Line(probe.url) as line:
+        oldest = line.next(FramePacket).seq
+        assert (oldest - scans) % 65536 < 32768 or (scans - oldest) % 65536 <= 3  # in flight
+        line.quiet()
+
+
+def test_another_speed_reads_nothing(probe):
+    with Line(probe.url) as line:
+        line.send(b"s")
+        line.take(1)
+    with Line(probe.url.replace("1000000", "500000")) as line:
+        assert {type(next(line.packets())) for _ in range(20)} == {Damage}
+    assert probe.statistics().garbled > 1000
+    with Line(probe.url) as line:
+        line.quiet()
+
+
+@pytest.mark.parametrize(
+    "command", ["flop 3", "flip", "flip -1", "flip nan", "unplug 0", "", "x" * 300]
+)
+def test_a_fault_that_is_none_is_refused(probe, command):
+    with pytest.raises(PortError, match="error"):
+        probe.fault(command)
+    assert probe.statistics().resets >= 1
+
+
+def pins_of(board):
+    """Return the pin map of the README: signal to pins, for one board."""
+    rows = re.findall(r"^\| (.*) \|$", (SOURCES / "README.md").read_text(), re.MULTILINE)
+    cells = [row.split(" | ") for row in rows]
+    head = next(row for row in cells if row[0] == "signal")
+    column = next(i for i, cell in enumerate(head) if f"`{board}`" in cell)
+    return {
+        row[0].split(" S0")[0].split(" A0")[0]: re.findall(r"\bP([A-L])(\d)\b", row[column])
+        for row in cells[cells.index(head) + 2 :]
+        if len(row) == len(head)
+    }
+
+
+def level(ports, pins):
+    return sum((ports[port] >> int(bit) & 1) << i for i, (port, bit) in enumerate(pins))
+
+
+@pytest.mark.parametrize("board", ["uno", "mega"])
+def test_pins_move_as_documented(board, tmp_path):
+    trace = tmp_path / "trace.txt"
+    with emulated_probe(board=board, paced=False, trace=trace) as probe, Line(probe.url) as line:
+        line.send(b"6")
+        line.ask(b"g", FramePacket)
+    pins = pins_of(board)
+    ports = dict.fromkeys("ABCD", 0)
+    seen, switched, converted, early, settling = [], 0, 0, [], []
+    for entry in trace.read_text().splitlines():
+        cycle, what, *rest = entry.split()
+        if what == "port":
+            ports[rest[0]] = int(rest[1])
+            switched = int(cycle)
+            early.append(int(cycle) - converted)
+        else:
+            address = level(ports, pins["row address"]), level(ports, pins["column address"])
+            seen.append((*address, int(rest[0])))
+            settling.append((int(cycle) - switched, int(rest[0])))
+            converted = int(cycle)
+    scan = [(r, c, 0) for r in range(16) for c in range(16)] + [(0, 0, k) for k in (1, 2, 3, 4)]
+    assert seen[-260:] == scan
+    assert level(ports, pins["sensor select"]) == 6
+    assert min(gap for gap, channel in settling[1:] if channel == 0) >= 10e-6 * HERTZ
+    assert min(early[-255:]) >= 2.5 * ADC_CLOCK
+
+
+@pytest.mark.parametrize("board", ["uno", "mega"])
+@pytest.mark.parametrize(("baud", "least_fps"), [(500_000, 90), (1_000_000, 180), (2_000_000, 200)])
+def test_frame_rate_in_device_time(board, baud, least_fps):
+    with emulated_probe(board=board, baud=baud, paced=False) as probe:
+        probe.show(images(1)[0])
+        with Line(probe.url) as line:
+            line.send(b"s")
+            packets = line.take(30)[5:]
+    seconds = (packets[-1].t_us - packets[0].t_us) * 1e-6
+    assert len(packets) - 1 >= least_fps * seconds
+    assert [packet.seq for packet in packets] == list(range(packets[0].seq, packets[-1].seq + 1))
+
+
+def test_settling_too_short_shows_and_long_enough_cures():
+    image = images(1, seed=6)[0]
+    error = {}
+    for settle_us in (10.0, 40.0):
+        with emulated_probe(settle_us=settle_us, paced=False) as probe:
+            probe.show(image, WRIST_MV)
+            for tau_us in (1.0, 5.0):
+                probe.fault(f"tau {tau_us}")
+                with Line(probe.url) as line:
+                    line.ask(b"g", FramePacket)
+                    error[settle_us, tau_us] = rms([line.ask(b"g", FramePacket)], image)
+    assert error[10.0, 1.0] < 1
+    assert error[10.0, 5.0] > 20
+    assert error[40.0, 5.0] < 1
+
+
+def test_the_same_seed_gives_the_same_noise():
+    def frames(seed):
+        with emulated_probe(noise_mv=20, seed=seed, paced=False) as probe:
+            probe.show(np.full((16, 16), 2500.0), WRIST_MV)
+            with Line(probe.url) as line:
+                line.send(b"s")
+                return {packet.seq: packet.counts for packet in line.take(5)}
+
+    first, again, other = frames(1), frames(1), frames(2)
+    both = set(first) & set(again) & set(other)
+    assert len(both) >= 2
+    assert all((first[seq] == again[seq]).all() for seq in both)
+    assert all((first[seq] != other[seq]).any() for seq in both)
+    spread = np.std([first[seq] for seq in both])
+    assert spread == pytest.approx(20 * 1024 / 5000, rel=0.1)
+
+
+def test_paced_it_is_no_faster_than_real_time():
+    with emulated_probe() as probe:
+        before, started = probe.statistics(), time.monotonic()
+        time.sleep(0.5)
+        after, ended = probe.statistics(), time.monotonic()
+    passed = after.emulated_s - before.emulated_s
+    assert passed <= ended - started + before.worst_lag_s + after.worst_lag_s + 0.01
+    assert passed + after.slipped_s - before.slipped_s >= 0.5 - after.worst_lag_s - 0.01
+
+
+def test_it_does_not_outlive_the_programme_that_started_it():
+    programme = (
+        "import time\nfrom probe.port.emulated import emulated_probe\n"
+        "with emulated_probe() as probe:\n"
+        "    print(probe._host._process.pid, probe.device, flush=True)\n    time.sleep(60)\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", programme], stdout=subprocess.PIPE, text=True
+    ) as parent:
+        pid, device = parent.stdout.readline().split()
+        assert os.path.lexists(device)
+        parent.send_signal(signal.SIGKILL)
+        parent.wait()
+    until = time.monotonic() + 5
+    while Path(f"/proc/{pid}").exists() and time.monotonic() < until:
+        time.sleep(0.02)
+    assert not Path(f"/proc/{pid}").exists()
+    assert not os.path.lexists(device)
+
+
+def test_it_leaves_nothing_behind():
+    with emulated_probe() as probe:
+        device = Path(probe.device)
+        process = probe._host._process
+    assert process.returncode == 0
+    assert not device.parent.exists()
+    with pytest.raises(PortError, match="ended"):
+        probe.fault("reset")

@@ -1,0 +1,125 @@
+"""A recording whose writer is killed, whose disk is full, and one that is read meanwhile."""
+
+from __future__ import annotations
+
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from probe.errors import RecordingError
+from probe.recording.read import read_frames, read_recording
+from probe.recording.record import Recorder
+from probe.recording.repair import repair
+
+# Frame i is made from i alone. After every frame the writer says how many it has handed in,
+# so that what is on the pipe when it dies is what may be expected on the disk.
+WRITER = """
+import os, resource, sys
+import numpy as np
+from probe.errors import RecordingError
+from probe.frame import Frame
+from probe.recording.record import Recorder
+
+path, count, limit = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+roll_over_s = float(sys.argv[4])
+wrist = np.zeros(4, np.uint16)
+if limit:
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
+try:
+    with Recorder(path, roll_over_s=roll_over_s) as recorder:
+        for i in range(count):
+            counts = np.random.default_rng(i).integers(0, 1024, (16, 16)).astype(np.uint16)
+            recorder.append(Frame(counts, i * 4_545_454, i, wrist))
+            os.write(1, b".")
+except RecordingError as error:
+    print("\\n" + str(error))
+"""
+
+
+def counts_of(i):
+    return np.random.default_rng(i).integers(0, 1024, (16, 16))
+
+
+def writer(path, count, *, limit=0, roll_over_s=300.0):
+    arguments = [str(path), str(count), str(limit), str(roll_over_s)]
+    return subprocess.Popen(
+        [sys.executable, "-c", WRITER, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+
+
+def check(frames, least):
+    """Check that these are the first frames of the writer, at least so many."""
+    count = 0
+    for i, frame in enumerate(frames):
+        assert (frame.seq, frame.t_ns) == (i, i * 4_545_454)
+        assert (frame.counts == counts_of(i)).all()
+        count += 1
+    assert count >= least
+    return count
+
+
+@pytest.mark.parametrize("moment", random.Random(9).sample(range(100, 900), 4))
+def test_a_killed_writer_loses_the_frames_since_the_last_flush_at_most(tmp_path, moment):
+    path = tmp_path / "touch.h5"
+    process = writer(path, 1_000_000, roll_over_s=1.4)
+    handed = 0
+    while handed < moment:
+        handed += len(process.stdout.read(1))
+    process.send_signal(signal.SIGKILL)
+    handed += len(process.stdout.read())
+    process.wait()
+    process.stdout.close()
+    process.stderr.close()
+    with pytest.raises(RecordingError, match="ended without closing it; run `repair`"):
+        list(read_frames(tmp_path / "touch.part.h5"))
+    with pytest.raises(RecordingError, match="interrupted stands there; run `repair`"):
+        Recorder(path, replace=True)
+    live = check(read_frames(path, live=True), handed - 64)
+    result = repair(path)
+    assert not (tmp_path / "touch.part.h5").exists()
+    assert result.lost == 0
+    assert check(read_frames(path), handed - 64) == live
+
+
+def test_a_full_disk_ends_the_recording_with_all_its_frames(tmp_path):
+    path = tmp_path / "touch.h5"
+    process = writer(path, 1_000_000, limit=2_500_000)
+    output, errors = process.communicate(timeout=60)
+    assert (process.returncode, errors) == (0, b"")
+    said = output.decode().split("\n")
+    handed = len(said[0])
+    recording = read_recording(path)
+    assert f"File too large; the recording ends after {len(recording)} frames" in said[1]
+    assert len(recording) == handed + 1  # the last one is on the disk, and then it was refused
+    check(recording.frames(), handed + 1)
+
+
+def test_a_disk_that_is_full_at_once_is_refused(tmp_path):
+    process = writer(tmp_path / "touch.h5", 10, limit=10_000)
+    output, errors = process.communicate(timeout=60)
+    assert (process.returncode, errors) == (0, b"")
+    assert b"cannot write it: File too large; choose a file system" in output
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_recording_is_read_from_another_process_while_it_is_written(tmp_path):
+    path = tmp_path / "touch.h5"
+    process = writer(path, 1500)
+    seen = []
+    while process.poll() is None:
+        try:
+            seen.append(check(read_frames(path, live=True), 0))
+        except RecordingError:
+            time.sleep(0.01)  # it is being made
+    process.stdout.close()
+    process.stderr.close()
+    assert check(read_frames(path), 1500) == 1500
+    assert len(seen) >= 2
+    assert seen == sorted(seen)

@@ -1,0 +1,256 @@
+"""From a spec to a simulated touch: registered faces are the surfaces of the written parts."""
+
+import itertools
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+
+from generator.pipeline import encode
+from generator.spec import read_specs
+from probe.circuit import QUIET, Electronics, fsr_of
+from probe.contact.contract import Touch
+from probe.contact.press import press
+from probe.errors import SurfaceError
+from probe.sensor import Sensor
+from probe.simulate.part import part_surface
+from probe.simulate.registered import DatabaseUnreadableError, registered_surface
+from probe.simulate.source import frames_of, options_of
+from probe.simulate.target import surface_of
+from probe.simulate.touch import Touches, pose_of, random_touches, simulate
+from probe.surface.mesh import part_mesh
+
+SET = """
+objects:
+- {name: Cube, shape: {cube: 40 mm}}
+- {name: Whole, shape: {cube: 40 mm}, print: {parts: whole}}
+- {name: Ball, shape: {dodecahedron: 30 mm}, print: {parts: whole}}
+- name: Step
+  shape:
+    polyhedron:
+      vertices: [[0,0,0],[60,0,0],[60,40,0],[0,40,0],[0,0,40],[30,0,40],[30,40,40],[0,40,40],
+                 [30,0,60],[60,0,60],[60,40,60],[30,40,60]]
+      faces: [[0,3,2,1],[4,5,6,7],[8,9,10,11],[5,8,11,6],[1,2,10,9],[0,4,7,3],
+              [0,1,9,8,5,4],[2,3,7,6,11,10]]
+  print: {parts: whole}
+"""
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("lab")
+    (folder / "set.yaml").write_text(SET)
+    encode(
+        read_specs([folder / "set.yaml"]),
+        folder=folder / "out",
+        database=f"sqlite:///{folder / 'lab.db'}",
+        formats=("stl",),
+    )
+    return folder
+
+
+def file_of(lab: Path, name: str) -> Path:
+    return next((lab / "out").rglob(f"{name}.stl"))
+
+
+def compared(scene, mesh, low, high, *, away_mm=0.0):
+    """Heights of both at random points that lie 1e-3 mm beside every edge of the mesh."""
+    points = np.random.default_rng(1).uniform(low, high, (6000, 2))
+    if away_mm:
+        inside = scene.region.contains(points) & (scene.region.distance_mm(points) > away_mm)
+        points = points[inside]
+    lines = shapely.STRtree([shapely.LinearRing(t) for t in mesh.corners[:, :, :2]])
+    near = lines.query(shapely.points(points), predicate="dwithin", distance=1e-3)
+    points = np.delete(points, near[0], axis=0)
+    return scene.surface.heights_mm(points), mesh.heights_mm(points)
+
+
+def assert_same(ours, written, size_mm):
+    """A file's float32 is good to 1e-6 mm on flats, and on sides to an ulp times their slope."""
+    assert (np.isfinite(ours) == np.isfinite(written)).all()
+    off = np.abs(ours - written)[np.isfinite(ours)]
+    ulp = float(np.spacing(np.float32(size_mm)))
+    flat = (np.abs(ours[np.isfinite(ours)]) < 1e-9) | (ours[np.isfinite(ours)] > 1 - 1e-9)
+    assert off[flat].max() < max(1e-6, ulp)
+    assert off.max() < 8 * ulp
+
+
+@pytest.mark.parametrize("face", ["F1", "F2", "F6"])
+def test_panel_is_the_registered_face(lab, face):
+    scene = registered_surface(str(lab / "lab.db"), "Cube", face)
+    part = part_surface(file_of(lab, f"Cube-{face}"), database=str(lab / "lab.db"))
+    assert part.face == face
+    assert np.array_equal(part.T_object_surface, scene.T_object_surface)
+    low, high = scene.region.box_mm
+    ours, written = compared(scene, part.surface, low, high, away_mm=2.0)
+    assert (ours > 0.5).mean() > 0.1
+    assert_same(ours, written, 40.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "face"),
+    [("Whole", "F1"), ("Whole", "F4"), ("Ball", "F2"), ("Ball", "F9"), ("Step", "F2")],
+)
+def test_whole_part_is_the_registered_face_with_all_that_lies_around_it(lab, name, face):
+    scene = surface_of(f"{lab / 'lab.db'}#{name}/{face}")
+    part = part_surface(file_of(lab, name), database=str(lab / "lab.db"), face=face)
+    low, high = scene.region.box_mm
+    ours, written = compared(scene, part.surface, low - 6.0, high + 6.0)
+    deep = written < -7.0  # symbols of other faces that no touch can reach are left out
+    assert_same(ours[~deep], written[~deep], 100.0)
+    assert (ours[deep] <= written[deep] + 1e-4).all()
+    if name == "Step":  # its reflex edge: the higher part stands over the face's own plane
+        assert scene.surface.top_mm == pytest.approx(21.0)
+        assert (ours > 19.0).any()
+
+
+def test_file_alone_is_touched_as_it_lies(lab):
+    scene = surface_of(str(file_of(lab, "Cube-F1")))
+    assert scene.face == ""
+    assert np.allclose(scene.centre_mm(), 0.0, atol=0.5)
+    assert scene.surface.top_mm == pytest.approx(4.0)
+    framed = surface_of(f"{file_of(lab, 'Cube-F1')}@{lab / 'lab.db'}")
+    assert framed.surface.top_mm == pytest.approx(1.0)
+    assert framed.object_name == "Cube"
+
+
+@pytest.mark.parametrize(
+    ("target", "match"),
+    [
+        ("{db}#Cub/F1", "registered objects: Ball, Cube, Step, Whole"),
+        ("{db}#Cube/top", "faces: F1, F2, F3, F4, F5, F6"),
+        ("{db}#", "4 objects, none is named"),
+        ("{db}", "write part.stl"),
+        ("nothing.stl", "cannot be read"),
+        ("{other}@{db}", "its STL parts"),
+    ],
+)
+def test_unknown_targets_say_what_is_known(lab, target, match):
+    other = lab / "other.stl"
+    other.write_bytes(file_of(lab, "Ball").read_bytes())
+    with pytest.raises(SurfaceError, match=match):
+        surface_of(target.format(db=lab / "lab.db", other=other))
+
+
+def test_databases_that_are_none_exit_as_such(lab):
+    with pytest.raises(DatabaseUnreadableError, match="does not exist") as caught:
+        surface_of(f"{lab / 'none.db'}#Cube")
+    assert caught.value.exit_code == 4
+
+
+def test_object_without_a_face_is_its_first_with_symbols(lab):
+    assert surface_of(f"sqlite:///{lab / 'lab.db'}#Cube").face == "F1"
+
+
+def test_a_touch_of_the_file_is_a_touch_of_the_registered_face(lab):
+    scene = surface_of(f"{lab / 'lab.db'}#Cube/F3")
+    part = part_surface(file_of(lab, "Cube-F3"), database=str(lab / "lab.db"))
+    ranges = Touches(margin_mm=14.0)
+    touches = itertools.islice(random_touches(scene.region, np.random.default_rng(2), ranges), 5)
+    board, film, quiet = Electronics(noise=QUIET), fsr_of(), np.random.default_rng(0)
+    for touch in touches:
+        one, other = (
+            simulate(surface, Sensor(), touch, board, film, quiet, "tabs")
+            for surface in (scene.surface, part.surface)
+        )
+        assert one.counts.max() > 50
+        # A point on an upright step may fall on either side in float32: one of a tab's 19.
+        assert np.abs(one.counts.astype(int) - other.counts.astype(int)).max() <= 12
+        assert (one.counts != other.counts).mean() < 0.05
+
+
+def test_same_generator_gives_the_same_frame_and_the_truth_stays_outside(lab):
+    scene = surface_of(f"{lab / 'lab.db'}#Cube")
+    touch = Touch(20.0, 20.0, 0.3, 60.0)
+    frames = [
+        simulate(scene.surface, Sensor(), touch, Electronics(), fsr_of(),
+                 np.random.default_rng(seed), "tabs")
+        for seed in (1, 1, 2)
+    ]  # fmt: skip
+    assert np.array_equal(frames[0].counts, frames[1].counts)
+    assert not np.array_equal(frames[0].counts, frames[2].counts)
+    assert frames[0].pose is None
+
+
+def test_random_touches_fill_their_region_and_ranges(lab):
+    scene = surface_of(f"{lab / 'lab.db'}#Ball/F1")  # a pentagon
+    ranges = Touches(force_n=(20.0, 30.0), tilt_rad=0.02, margin_mm=5.0)
+    found = list(
+        itertools.islice(random_touches(scene.region, np.random.default_rng(0), ranges), 1000)
+    )
+    at = np.array([(t.x_mm, t.y_mm) for t in found])
+    assert scene.region.contains(at).all()
+    assert scene.region.distance_mm(at).min() >= 5.0
+    inner = shapely.Polygon(scene.region.starts).buffer(-5.0)
+    assert abs(at.mean(axis=0) - np.array(inner.centroid.coords[0])).max() < 0.05 * inner.length
+    assert all(20 <= t.force_n <= 30 for t in found)
+    assert max(math.hypot(t.tilt_x_rad, t.tilt_y_rad) for t in found) <= 0.02
+    assert np.ptp([t.theta_rad for t in found]) > 6.0
+    with pytest.raises(SurfaceError, match="smaller margin"):
+        next(random_touches(scene.region, np.random.default_rng(0), Touches(margin_mm=50.0)))
+
+
+def test_pose_of_a_touch_carries_sensor_points_onto_the_tips_plane(lab):
+    scene = surface_of(f"{lab / 'lab.db'}#Cube")
+    touch = Touch(20.0, 19.0, 0.8, 60.0, 0.02, -0.01)
+    contact = press(scene.surface, Sensor(), touch, accuracy="tabs")
+    T = pose_of(touch, contact)
+    points = np.array([[5.0, -3.0], [0.0, 0.0], [-7.0, 8.0]])
+    here = np.c_[points, np.zeros(3), np.ones(3)] @ T.T
+    assert np.abs(here[:, :2] - touch.on_surface(points)).max() < 0.02
+    zeta = contact.z_mm + contact.tilt_x_rad * points[:, 1] - contact.tilt_y_rad * points[:, 0]
+    assert np.abs(here[:, 2] - zeta).max() < 1e-3
+    assert np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3))
+
+
+def test_stream_comes_down_holds_and_lifts_at_places_inside_the_face(lab):
+    options = {"rate": "20", "period": "1", "noise": "quiet", "accuracy": "tabs", "seed": "4"}
+    frames = list(itertools.islice(frames_of(f"{lab / 'lab.db'}#Cube", options), 60))
+    assert [frame.seq for frame in frames] == list(range(60))
+    assert np.diff([frame.t_ns for frame in frames]).tolist() == [50_000_000] * 59
+    total = np.array([frame.counts.sum() for frame in frames], float).reshape(3, 20)
+    idle = total[:, -4:]
+    assert np.ptp(idle) == 0
+    assert (total[:, 3:13].min(axis=1) > 3 * idle.max()).all()
+    assert not np.array_equal(frames[8].counts, frames[28].counts)  # it moved on
+    again = itertools.islice(frames_of(f"{lab / 'lab.db'}#Cube", options), 60)
+    assert all(np.array_equal(a.counts, b.counts) for a, b in zip(frames, again, strict=True))
+
+
+def test_stream_stays_where_it_is_told(lab):
+    options = {"x": "20", "y": "18", "theta": "30", "force": "50", "rate": "10", "period": "1",
+               "noise": "quiet", "accuracy": "tabs"}  # fmt: skip
+    frames = list(itertools.islice(frames_of(f"{lab / 'lab.db'}#Cube", options), 20))
+    scene = surface_of(f"{lab / 'lab.db'}#Cube")
+    touch = Touch(20.0, 18.0, math.radians(30), 50.0)
+    still = simulate(scene.surface, Sensor(), touch, Electronics(noise=QUIET), fsr_of(),
+                     np.random.default_rng(0), "tabs")  # fmt: skip
+    assert np.abs(frames[4].counts.astype(int) - still.counts).max() < 30  # it has crept a little
+    shape = np.corrcoef(frames[4].counts.ravel(), still.counts.ravel())[0, 1]
+    assert shape > 0.999
+
+
+@pytest.mark.parametrize(
+    ("options", "match"),
+    [
+        ({"spin": "1"}, "no option 'spin'.*accuracy"),
+        ({"force": "-1"}, "0 or more"),
+        ({"rate": "0"}, "above 0"),
+        ({"x": "left"}, "a number"),
+        ({"overlay": "glass"}, "tab or pad"),
+        ({"noise": "loud"}, "typical or quiet"),
+    ],
+)
+def test_options_that_mean_nothing_are_refused(options, match):
+    with pytest.raises(SurfaceError, match=match):
+        options_of(options)
+
+
+def test_part_alone_needs_no_database(tmp_path, lab):
+    copy = tmp_path / "part.stl"
+    copy.write_bytes(file_of(lab, "Cube-F1").read_bytes())
+    frame = next(frames_of(str(copy), {"accuracy": "tabs"}))
+    assert frame.counts.shape == (16, 16)
+    assert np.array_equal(part_mesh(copy).corners, surface_of(str(copy)).surface.corners)

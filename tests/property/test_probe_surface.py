@@ -1,0 +1,143 @@
+"""Random strokes, meshes, faces and lattices: heights that must hold everywhere."""
+
+import math
+
+import numpy as np
+import shapely
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from shapely.geometry import MultiPoint
+
+from probe.errors import SurfaceError
+from probe.surface.lattice import Lattice, listed
+from probe.surface.mesh import mesh
+from probe.surface.outline import outline
+from probe.surface.polygon import polygon
+from probe.surface.solids import symbol_triangles
+from probe.surface.symbols import Relief, embossed
+from probe.surface.template import template
+
+NODE = st.tuples(st.integers(-1, 1), st.integers(-1, 1))
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+@st.composite
+def glyphs(draw):
+    """Strokes between nodes, joined or not, some twice or one along the other."""
+    strokes = draw(st.lists(st.tuples(NODE, NODE), min_size=1, max_size=6))
+    kept = tuple(stroke for stroke in strokes if stroke[0] != stroke[1])
+    assume(kept)
+    return kept
+
+
+def union(glyph, width):
+    turns = (np.arange(8) + 0.5) * math.pi / 4
+    nib = width / 2 / math.cos(math.pi / 8) * np.stack([np.cos(turns), np.sin(turns)], 1)
+    hulls = [MultiPoint(np.concatenate([np.array(a) + nib, np.array(b) + nib])) for a, b in glyph]
+    return shapely.union_all([hull.convex_hull for hull in hulls])
+
+
+@settings(max_examples=60, deadline=None)
+@given(glyphs(), st.floats(0.05, 1.6))
+def test_outline_encloses_what_the_nib_covers(glyph, width):
+    rings = outline(np.array(glyph, float), width)
+    loops = [ring.moved(0.0) for ring in rings]
+    area = sum(
+        shapely.Polygon(loop).area * (1 if counter_clockwise(loop) else -1) for loop in loops
+    )
+    body = union(glyph, width)
+    assert abs(area - body.area) < 1e-7
+    for loop in loops:
+        assert shapely.distance(body.boundary, shapely.points(loop)).max() < 1e-7
+
+
+def counter_clockwise(loop):
+    return shapely.LinearRing(loop).is_ccw
+
+
+@settings(max_examples=60, deadline=None)
+@given(glyphs(), st.floats(0.3, 0.9), st.floats(0.0, 0.5), st.floats(0.0, 0.1), SEEDS)
+def test_symbol_heights_are_those_of_its_triangles(glyph, width, draft, chamfer, seed):
+    relief = Relief(0.5, width, draft, chamfer if chamfer > 0.01 else 0.0)
+    try:
+        symbols = embossed((glyph,), 1.0, relief)
+        corners = symbol_triangles(symbols, 0)
+    except SurfaceError:
+        assume(False)
+    x, y = np.random.default_rng(seed).uniform(-2, 2, (2, 400))
+    points = np.stack([x, y], axis=1)
+    seen = np.maximum(mesh(corners).heights_mm(points), 0.0)
+    ours = symbols.heights_mm(np.zeros(400, int), x, y)
+    # Where rings that grow have met, the sides overlap: the highest one counts in both.
+    edges = shapely.distance(
+        shapely.MultiLineString([[*t, t[0]] for t in corners[:, :, :2]]), shapely.points(points)
+    )
+    off = edges > 1e-6
+    assert np.abs(seen - ours)[off].max(initial=0.0) < 1e-9
+    assert ours.max() <= relief.height_mm
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.lists(glyphs(), min_size=1, max_size=3), st.floats(-7, 7), SEEDS)
+def test_lattice_gives_the_heights_of_every_symbol_by_itself(alphabet, turn, seed):
+    random = np.random.default_rng(seed)
+    try:
+        known = template(embossed(tuple(alphabet), 1.0, Relief(0.5, 0.4, 0.2)), 4.0)
+    except SurfaceError:
+        assume(False)
+    cells = np.unique(random.integers(-3, 3, (12, 2)), axis=0)
+    labels = random.integers(0, len(alphabet), len(cells))
+    shift = random.uniform(-9, 9, 2)
+    lattice = Lattice(known, listed(cells[:, 0], cells[:, 1], labels), turn, *shift)
+    points = random.uniform(-30, 30, (1500, 2))
+    c, s = math.cos(turn), math.sin(turn)
+    at = points @ np.array([[c, s], [-s, c]]) + shift
+    want = np.zeros(len(points))
+    for (row, column), label in zip(cells, labels, strict=True):
+        x, y = (at - ((column + 0.5) * 4.0, -(row + 0.5) * 4.0)).T
+        near = np.flatnonzero(np.maximum(np.abs(x), np.abs(y)) <= 2)
+        want[near] = np.maximum(
+            want[near], known.symbols.heights_mm(np.full(len(near), label), x[near], y[near])
+        )
+    assert np.abs(lattice.heights_mm(points) - want).max() < 1e-9
+
+
+@settings(max_examples=80, deadline=None)
+@given(SEEDS, st.integers(3, 14), st.booleans(), st.floats(1e-3, 1e3))
+def test_stars_hold_the_points_that_shapely_says(seed, corners, holed, size):
+    random = np.random.default_rng(seed)
+    angle = 2 * np.pi * (np.arange(corners) + random.uniform(0.1, 0.9, corners)) / corners
+    radius = size * random.uniform(0.3, 1.0, corners)
+    star = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+    loops = [star, 0.3 * star[::-1]] if holed else [star]
+    shape = shapely.Polygon(loops[0], loops[1:])
+    assume(shape.is_valid)
+    region, points = polygon(loops), random.uniform(-size, size, (500, 2))
+    assert (region.contains(points) == shapely.contains_xy(shape, points)).all()
+    assert region.contains(np.concatenate(loops)).all()
+    share = random.random((len(region.starts), 1))
+    assert region.contains(region.starts + share * (region.ends - region.starts)).all()
+
+
+@settings(max_examples=40, deadline=None)
+@given(SEEDS, st.integers(4, 40), st.floats(0, 7), st.sampled_from([1e-2, 1.0, 1e3]))
+def test_a_triangulated_terrain_has_no_cracks_in_any_frame(seed, count, turn, size):
+    from scipy.spatial import Delaunay
+
+    random = np.random.default_rng(seed)
+    flat = random.uniform(0, size, (count, 2))
+    terrain = np.c_[flat, random.uniform(0, size, count)]
+    c, s = math.cos(turn), math.sin(turn)
+    T = np.array([[c, -s, 0, 3 * size], [s, c, 0, -size], [0, 0, 1, 0], [0, 0, 0, 1]])
+    triangles = Delaunay(flat).simplices
+    part = mesh(terrain[triangles], T)
+    a, b, d = np.moveaxis(part.corners, 1, 0)
+    share = random.random((len(a), 1))
+    for p, q in ((a, b), (b, d), (a, d)):
+        on = p[:, :2] + share * (q - p)[:, :2]
+        inner = shapely.contains_xy(
+            MultiPoint(part.corners[:, :, :2].reshape(-1, 2)).convex_hull.buffer(-1e-9 * size), on
+        )
+        assert np.isfinite(part.heights_mm(on[inner])).all()
+    points = random.uniform(2 * size, 5 * size, (300, 2))
+    assert part.heights_mm(points).max() <= part.top_mm

@@ -1,0 +1,148 @@
+"""The network worked by hand, against many digits, and at its limits."""
+
+import mpmath
+import numpy as np
+import pytest
+
+from probe.circuit import effective_resistances, transconductances
+from probe.circuit.network import eliminated, transfers
+from probe.errors import CircuitError
+
+
+def exact_resistances(g, digits=50):
+    """Return the resistances by a 31x31 inverse in many digits."""
+    rows, columns = g.shape
+    with mpmath.workdps(digits):
+        size = rows + columns
+        laplacian = mpmath.zeros(size)
+        for r, c in np.ndindex(rows, columns):
+            x, b = mpmath.mpf(float(g[r, c])), rows + c
+            laplacian[r, r] += x
+            laplacian[b, b] += x
+            laplacian[r, b] -= x
+            laplacian[b, r] -= x
+        inverse = laplacian[: size - 1, : size - 1] ** -1
+
+        def z(a, b):
+            return inverse[a, b] if max(a, b) < size - 1 else mpmath.mpf(0)
+
+        return np.array(
+            [
+                [float(z(r, r) + z(b, b) - 2 * z(r, b)) for b in range(rows, size)]
+                for r in range(rows)
+            ]
+        )
+
+
+def scenes(decades):
+    rng = np.random.default_rng(decades)
+    x = np.arange(16) - 7.5
+    radius = np.hypot(x, x[:, None])
+    low = 10.0**-decades
+    hidden = np.full((16, 16), low)
+    hidden[[2, 2, 9], [2, 9, 2]] = 1
+    return {
+        "even in decades": 10 ** rng.uniform(-decades, 0, (16, 16)),
+        "washer": np.where((radius > 2.2) & (radius < 4.8), 1.0, low),
+        "hidden corner": hidden,
+    }
+
+
+def test_two_by_two_by_hand():
+    g = np.array([[1.0, 2.0], [4.0, 8.0]])
+    around = 1 / (1 / 2 + 1 / 8 + 1 / 4)  # the way round of (0, 0): 2, 8, 4 in series
+    assert effective_resistances(g)[0, 0] == pytest.approx(1 / (1 + around), rel=1e-15)
+
+
+@pytest.mark.parametrize("name", scenes(6))
+def test_six_decades_of_conductance_against_fifty_digits(name):
+    g = 1e-4 * scenes(6)[name]
+    error = effective_resistances(g) / exact_resistances(g) - 1
+    assert np.abs(error).max() <= 1e-13  # asked: 1.7e-10
+
+
+@pytest.mark.parametrize("decades", [0, 3, 6, 12])
+def test_foster_the_conductances_times_resistances_add_up_to_31(decades):
+    for g in scenes(decades).values():
+        assert (g * effective_resistances(g)).sum() == pytest.approx(31, rel=1e-13)
+
+
+def test_three_pressed_tactels_make_a_ghost_at_the_fourth_corner():
+    g = scenes(4)["hidden corner"]
+    apparent = 1 / effective_resistances(g)
+    assert apparent[9, 9] / apparent[2, 2] == pytest.approx(1 / 3, abs=0.01)
+    assert g[9, 9] / g[2, 2] == pytest.approx(1e-4)
+
+
+def test_the_logarithm_of_the_determinant_has_the_resistances_as_gradient():
+    g = scenes(2)["even in decades"]
+    resistance = effective_resistances(g)
+    for r, c in ((0, 0), (7, 3), (15, 15)):
+        up, down = g.copy(), g.copy()
+        up[r, c] *= 1.001
+        down[r, c] *= 0.999
+        slope = (eliminated(up).logdet - eliminated(down).logdet) / (up - down)[r, c]
+        assert slope == pytest.approx(resistance[r, c], rel=1e-5)
+
+
+def test_a_batch_is_what_its_networks_are_alone():
+    batch = np.stack(list(scenes(4).values()))
+    alone = [effective_resistances(g) for g in batch]
+    np.testing.assert_allclose(effective_resistances(batch), alone, rtol=1e-13)
+    alone = [transconductances(g, 0.1, 0.3) for g in batch]
+    np.testing.assert_allclose(transconductances(batch, 0.1, 0.3), alone, rtol=1e-12)
+
+
+def test_a_divider_by_hand():
+    g = np.array([[1.0, 2.0], [3.0, 4.0]])
+    current = transconductances(g, 0.0, 0.5)
+    np.testing.assert_allclose(current * 0.5, g / (np.array([4.0, 6.0]) + 2.0), rtol=1e-15)
+    np.testing.assert_array_equal(transconductances(g), g)
+
+
+def test_driven_rows_agree_with_the_whole_network():
+    g, row, column = scenes(4)["even in decades"], 0.05, 0.2
+    laplacian = np.zeros((32, 32))
+    laplacian[:16, 16:], laplacian[16:, :16] = -g, -g.T
+    np.fill_diagonal(laplacian, np.r_[g.sum(1) + 1 / row, g.sum(0) + 1 / column])
+    expected = np.linalg.inv(laplacian)[16:, :16].T / row / column
+    np.testing.assert_allclose(transconductances(g, row, column), expected, rtol=1e-11)
+
+
+@pytest.mark.parametrize(("on", "error"), [(1e-4, 0.0016), (1e-2, 0.14), (0.1, 0.63)])
+def test_what_the_multiplexer_costs_a_virtual_ground_on_a_washer(on, error):
+    g = scenes(4)["washer"]
+    read = transconductances(g, on, on)
+    assert np.abs(read / g - 1)[g > 0.5].max() == pytest.approx(error, rel=0.15)
+
+
+def test_slopes_of_driven_rows_agree_with_differences():
+    g = scenes(3)["even in decades"]
+    slopes = transfers(g, 0.1, 0.4)
+    for index in (0, 100, 255):
+        step = np.zeros(256)
+        step[index] = 1e-5
+        step = step.reshape(16, 16)
+        change = transconductances(g + step, 0.1, 0.4) - transconductances(
+            np.maximum(g - step, 0), 0.1, 0.4
+        )
+        width = 2e-5 if g.ravel()[index] > 1e-5 else 1e-5 + g.ravel()[index]
+        np.testing.assert_allclose(
+            change.ravel() / width, slopes[:, index], atol=1e-4 * np.abs(slopes[:, index]).max()
+        )
+
+
+def test_networks_that_fall_apart_or_make_no_sense_are_refused():
+    apart = np.zeros((16, 16))
+    apart[:8, :8] = apart[8:, 8:] = 1
+    with pytest.raises(CircuitError, match="falls into parts"):
+        effective_resistances(apart)
+    empty = np.ones((16, 16))
+    empty[3] = 0
+    with pytest.raises(CircuitError, match="leak"):
+        effective_resistances(empty)
+    for bad in (-np.ones((4, 4)), np.full((4, 4), np.nan), np.ones(16)):
+        with pytest.raises(CircuitError):
+            effective_resistances(bad)
+        with pytest.raises(CircuitError):
+            transconductances(bad)

@@ -1,0 +1,156 @@
+"""What a neighbour confirms, what is lost, and how numbers and times unwrap."""
+
+import numpy as np
+import pytest
+
+from probe.client.order import Order
+from probe.protocol import FramePacket, IdentPacket, StatisticsPacket
+
+STEP_US = 10_000
+IMAGE = np.zeros((16, 16), np.uint16)
+WRIST = np.zeros(4, np.uint16)
+
+
+def packet(seq: int, t_us: int | None = None) -> FramePacket:
+    t_us = seq * STEP_US if t_us is None else t_us
+    return FramePacket(seq % 65536, t_us % 2**32, IMAGE, WRIST)
+
+
+def ident(seq: int, t_us: int, boot: int = 0) -> IdentPacket:
+    return IdentPacket(seq, t_us, boot=boot)
+
+
+def run(order: Order, packets: list, now_ns: int = 0) -> list[tuple[int, int]]:
+    """Return number and time (us) of the frames that come out; a number is a failed block."""
+    out = []
+    for p in packets:
+        if isinstance(p, int):
+            order.fail(p)
+        elif (frame := order.take(p, now_ns)) is not None:
+            out.append((frame.seq, frame.t_ns // 1000))
+    if (frame := order.settle(now_ns)) is not None:
+        out.append((frame.seq, frame.t_ns // 1000))
+    return out
+
+
+def numbers(order: Order, packets: list) -> list[int]:
+    return [seq for seq, _ in run(order, packets)]
+
+
+def test_a_frame_waits_for_its_neighbour():
+    order = Order()
+    assert order.take(packet(0), 0) is None
+    assert order.holds
+    assert order.take(packet(1), 0).seq == 0
+    assert order.settle(0).seq == 1
+    assert not order.holds
+    assert order.settle(0) is None
+
+
+def test_packets_that_are_no_frames_confirm_too():
+    order = Order()
+    assert numbers(order, [packet(0), ident(1, 5000), packet(1), packet(2)]) == [0, 1, 2]
+    order = Order()
+    assert numbers(order, [packet(0), StatisticsPacket(1, 0, 1, 0, 0, 0), packet(7)]) == [0, 7]
+    assert (order.lost, order.doubtful) == (6, 0)
+
+
+def test_failed_blocks_account_for_a_gap():
+    order = Order()
+    assert numbers(order, [packet(0), 20, packet(2), 530, 9, packet(5), 1060, packet(8)]) == [
+        0,
+        2,
+        5,
+        8,
+    ]
+    assert (order.lost, order.doubtful) == (5, 0)
+
+
+def test_bytes_that_vanish_without_a_failed_block_make_the_frame_doubtful():
+    # Head of 1 and tail of 2, with a check sum that is right by chance.
+    order = Order()
+    assert numbers(order, [packet(0), packet(1), packet(3), packet(4)]) == [0, 3, 4]
+    assert (order.lost, order.doubtful) == (2, 1)
+
+
+def test_more_lost_than_failed_makes_the_frame_doubtful():
+    order = Order()
+    assert numbers(order, [packet(0), 530, packet(3), packet(4)]) == [3, 4]
+    assert order.doubtful == 1
+
+
+@pytest.mark.parametrize("wrong", [packet(40_000, 2 * STEP_US), packet(2, 3_000_000_000)])
+def test_a_wrong_number_or_time_is_not_handed_on(wrong):
+    order = Order()
+    seen = numbers(order, [packet(0), packet(1), wrong, packet(3), packet(4)])
+    assert seen == [0, 3, 4]
+    assert order.doubtful == 2
+    assert order.reboots == 0
+
+
+def test_numbers_and_times_unwrap():
+    first = 2**32 // STEP_US - 3  # the clock wraps after three frames, the number later
+    order = Order()
+    seen = run(order, [packet(i, i * STEP_US) for i in range(first, first + 70_000)])
+    assert len(seen) == 70_000
+    assert seen[0] == (first % 65536, first * STEP_US)
+    assert [seq for seq, _ in seen] == list(range(first % 65536, first % 65536 + 70_000))
+    assert [t for _, t in seen] == [i * STEP_US for i in range(first, first + 70_000)]
+    assert order.lost == order.reboots == 0
+
+
+@pytest.mark.parametrize("gap", [1, 300, 40_000, 65_536, 65_537, 200_000])
+def test_gaps_of_any_length_are_counted(gap):
+    order = Order()
+    packets = [packet(i) for i in range(10)]
+    order.lost, out = 0, run(order, packets)
+    out += run(order, [packet(i + gap) for i in range(10, 20)])
+    assert [seq for seq, _ in out] == [*range(10), *range(10 + gap, 20 + gap)]
+    assert order.lost == gap
+    assert order.reboots == 0
+
+
+def test_a_reboot_with_its_ident_starts_the_numbers_anew():
+    order = Order()
+    before = [ident(0, 0, boot=7), *(packet(i) for i in range(1000))]
+    assert len(run(order, before, now_ns=0)) == 1000
+    after = run(order, [ident(0, 50, boot=8), packet(0, 100), packet(1, 100 + STEP_US)],
+                now_ns=2_000_000_000)  # fmt: skip
+    # Two seconds by the host's clock.
+    assert after == [(0, 999 * STEP_US + 2_000_000), (1, 1000 * STEP_US + 2_000_000)]
+    assert (order.reboots, order.lost) == (1, 0)
+
+
+def test_a_reboot_before_the_first_frame_is_counted_once():
+    order = Order()
+    assert numbers(order, [ident(0, 5, boot=1), ident(0, 5, boot=2), packet(0), packet(1)]) == [
+        0,
+        1,
+    ]
+    assert order.reboots == 1
+
+
+@pytest.mark.parametrize("later_ns", [0, 700_000_000])
+def test_a_reboot_without_its_ident_is_told_by_the_clock(later_ns):
+    order = Order()
+    run(order, [packet(i) for i in range(1000)])
+    after = run(order, [packet(0, 300), packet(1, 300 + STEP_US)], now_ns=later_ns)
+    assert [seq for seq, _ in after] == [0, 1]
+    assert after[0][1] > 999 * STEP_US
+    assert after[1][1] == after[0][1] + STEP_US
+    assert (order.reboots, order.lost) == (1, 0)
+
+
+def test_a_number_that_goes_back_while_the_clock_goes_on_is_a_start_too():
+    order = Order()
+    run(order, [packet(i) for i in range(1000)])
+    after = run(order, [packet(i, (1000 + i) * STEP_US) for i in range(3)])
+    assert after == [(i, (1000 + i) * STEP_US) for i in range(3)]
+    assert (order.reboots, order.lost) == (1, 0)
+
+
+def test_one_stray_frame_is_no_reboot():
+    order = Order()
+    seen = numbers(order, [packet(500), packet(501), packet(3, 30), packet(503), packet(504)])
+    assert seen == [500, 503, 504]
+    assert order.reboots == 0

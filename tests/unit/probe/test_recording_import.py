@@ -1,0 +1,162 @@
+"""Others' arrays become recordings: formats, axes, choice, scaling, refusals."""
+
+from __future__ import annotations
+
+import h5py
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from probe.errors import RecordingError
+from probe.recording.imported import import_array
+from probe.recording.read import read_recording
+
+COUNTS = np.random.default_rng(5).integers(0, 1024, (70, 16, 16)).astype(np.uint16)
+
+
+def matlab_73(path, **variables):
+    """Write what MATLAB's `save -v7.3` writes: axes in reverse order, a class on each."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, values in variables.items():
+            file[name] = np.asarray(values).T
+            file[name].attrs["MATLAB_class"] = np.bytes_(b"uint16")
+    with open(path, "r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512))
+    return path
+
+
+def refused(path, match, **options):
+    out = path.parent / "out.h5"
+    with pytest.raises(RecordingError, match=match) as caught:
+        import_array(path, out, **options)
+    assert caught.value.fix
+    assert not list(path.parent.glob("out*"))
+
+
+@pytest.mark.parametrize("axes", ["time first", "time last"])
+@pytest.mark.parametrize("kind", ["npy", "npz", "mat", "mat7.3", "h5"])
+def test_every_format_gives_the_same_frames(tmp_path, kind, axes):
+    array = COUNTS if axes == "time first" else np.moveaxis(COUNTS, 0, 2)
+    path = tmp_path / f"others.{kind[:3]}"
+    if kind == "npy":
+        np.save(path, array)
+    elif kind == "npz":
+        np.savez(path, images=array, rate=220)
+    elif kind == "mat":
+        savemat(path, {"images": array, "note": "washer"})
+    elif kind == "mat7.3":
+        matlab_73(path, images=array, rate=np.array([[220.0]]))
+    else:
+        with h5py.File(path, "w") as file:
+            file["trial/images"] = array
+            file["trial/force"] = np.zeros(70)
+    recording = import_array(path, tmp_path / "out.h5", rate_hz=100, sensor="theirs")
+    block = recording.block()
+    assert (block.counts == COUNTS).all()
+    assert block.seq.tolist() == list(range(70))
+    assert block.t_ns[7] == 70_000_000
+    assert recording.origin.sensor == "theirs"
+    assert recording.origin.units == "counts"
+    assert recording.origin.more["imported_from"] == path.name
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted([path.name, "out.h5"])
+
+
+def test_one_image_is_a_recording_of_one_frame(tmp_path):
+    np.save(tmp_path / "a.npy", COUNTS[3])
+    block = import_array(tmp_path / "a.npy", tmp_path / "out.h5").block()
+    assert (block.counts == COUNTS[3:4]).all()
+
+
+def test_sixteen_images_have_time_first(tmp_path):
+    np.save(tmp_path / "a.npy", COUNTS[:16])
+    assert (
+        import_array(tmp_path / "a.npy", tmp_path / "out.h5").block().counts == COUNTS[:16]
+    ).all()
+
+
+def test_of_several_arrays_one_must_be_named(tmp_path):
+    path = tmp_path / "a.npz"
+    np.savez(path, left=COUNTS, right=COUNTS[:5], time=np.arange(70))
+    refused(path, r"several arrays .* left \(70, 16, 16\), right \(5, 16, 16\); .*--dataset")
+    refused(path, "no array of images 'up' in it, but left", dataset="up")
+    assert len(import_array(path, tmp_path / "out.h5", dataset="right")) == 5
+
+
+def test_an_array_named_frames_is_meant(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["background"] = COUNTS
+        file["frames"] = COUNTS[:7] / 4
+    recording = import_array(tmp_path / "a.h5", tmp_path / "out.h5")
+    assert len(recording) == 7
+    assert recording.origin.more["imported_array"] == "frames"
+
+
+@pytest.mark.parametrize("offset", [0.0, -0.25])
+def test_forces_are_scaled_and_say_so(tmp_path, offset):
+    forces = np.random.default_rng(1).gamma(0.3, 2.0, (200, 16, 16)) + offset
+    np.save(tmp_path / "forces.npy", forces)
+    recording = import_array(tmp_path / "forces.npy", tmp_path / "out.h5")
+    said = recording.origin.more
+    assert recording.origin.units == "scaled"
+    counts = recording.block().counts
+    back = said["scale_offset"] + said["scale"] * counts
+    assert np.abs(back - forces).max() <= 0.5001 * said["scale"]
+    assert counts.max() == 65535
+    assert said["scale_offset"] == min(0.0, forces.min())
+
+
+def test_signed_and_large_whole_numbers_are_scaled_too(tmp_path):
+    for number, values in enumerate((COUNTS.astype(np.int32) - 5, COUNTS.astype(np.int64) * 1000)):
+        np.save(tmp_path / f"{number}.npy", values)
+        recording = import_array(tmp_path / f"{number}.npy", tmp_path / f"{number}.h5")
+        said = recording.origin.more
+        back = said["scale_offset"] + said["scale"] * recording.block().counts
+        assert np.abs(back - values).max() <= 0.5001 * said["scale"]
+
+
+def test_booleans_are_counts(tmp_path):
+    np.save(tmp_path / "a.npy", COUNTS > 500)
+    assert import_array(tmp_path / "a.npy", tmp_path / "out.h5").block().counts.max() == 1
+
+
+def test_values_that_are_no_numbers_are_refused(tmp_path):
+    for bad in (np.nan, np.inf):
+        values = COUNTS.astype(np.float32)
+        values[37, 1, 1] = bad
+        np.save(tmp_path / "a.npy", values)
+        refused(tmp_path / "a.npy", "no numbers, the first in image 37; ")
+    np.save(tmp_path / "b.npy", COUNTS * 5e-324)
+    refused(tmp_path / "b.npy", "nothing above")
+    np.save(tmp_path / "c.npy", np.where(COUNTS > 500, 1e308, -1e308))
+    assert import_array(tmp_path / "c.npy", tmp_path / "c.h5").block().counts.max() == 65535
+
+
+def test_what_holds_no_images_is_refused(tmp_path):
+    np.save(tmp_path / "a.npy", np.zeros((70, 32, 32)))
+    refused(tmp_path / "a.npy", r"no array of images \(N, 16, 16\) in it, but a \(70, 32, 32\)")
+    np.save(tmp_path / "b.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
+    refused(tmp_path / "b.npy", "it holds objects")
+    np.save(tmp_path / "c.npy", COUNTS + 1j)
+    refused(tmp_path / "c.npy", "no array of images")
+    (tmp_path / "d.npy").write_bytes((tmp_path / "a.npy").read_bytes()[:500])
+    refused(tmp_path / "d.npy", "damaged")
+    for name, content in (("e.mat", b"x" * 300), ("f.mat", b""), ("g.bin", b"x" * 300)):
+        (tmp_path / name).write_bytes(content)
+        refused(tmp_path / name, "damaged|no HDF5 file|empty")
+    savemat(tmp_path / "h.mat", {"images": COUNTS})
+    whole = (tmp_path / "h.mat").read_bytes()
+    (tmp_path / "h.mat").write_bytes(whole[: len(whole) // 2])
+    refused(tmp_path / "h.mat", "damaged")
+    refused(tmp_path / "none.npy", "no such recording")
+
+
+def test_rates_and_names_are_checked(tmp_path):
+    np.save(tmp_path / "a.npy", COUNTS)
+    for rate in (0.0, -1.0, np.inf, np.nan):
+        refused(tmp_path / "a.npy", "frames per second above 0", rate_hz=rate)
+    import_array(tmp_path / "a.npy", tmp_path / "b.h5")
+    with pytest.raises(RecordingError, match="exists"):
+        import_array(tmp_path / "a.npy", tmp_path / "b.h5")
+    np.save(tmp_path / "a.npy", COUNTS[:5])
+    assert len(import_array(tmp_path / "a.npy", tmp_path / "b.h5", replace=True)) == 5
+    assert len(read_recording(tmp_path / "b.h5")) == 5

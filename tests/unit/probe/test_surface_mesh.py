@@ -1,0 +1,224 @@
+"""Triangles, polygons, files and rasters as height fields."""
+
+import struct
+
+import numpy as np
+import pytest
+import shapely
+
+from probe.errors import SurfaceError
+from probe.surface.face import Face
+from probe.surface.indenters import Plate, Sphere, TiltedPlane
+from probe.surface.mesh import mesh, part_mesh
+from probe.surface.polygon import polygon
+from probe.surface.raster import Raster
+from probe.surface.solids import filled
+from probe.surface.stl import read_stl
+
+SQUARE = np.array([[0.0, 0], [10, 0], [10, 10], [0, 10]])
+HOLE = np.array([[4.0, 4], [4, 6], [6, 6], [6, 4]])
+HOOK = np.array([[0.0, 0], [10, 0], [10, 10], [7, 10], [7, 3], [0, 3]])
+
+
+def box(low, high):
+    """Twelve triangles of a closed box, counter-clockwise from outside."""
+    x0, y0, z0 = low
+    x1, y1, z1 = high
+    p = np.array([[x, y, z] for z in (z0, z1) for y in (y0, y1) for x in (x0, x1)])
+    quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    return p[[t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]]
+
+
+def binary(triangles, header=b"solid of a lying header"):
+    """Bytes of a binary STL."""
+    body = b"".join(
+        struct.pack("<12fH", 0, 0, 0, *np.asarray(t, float).ravel(), 0) for t in triangles
+    )
+    return header.ljust(80, b" ") + struct.pack("<I", len(triangles)) + body
+
+
+def test_box_has_its_top_inside_and_nothing_beside():
+    part = mesh(box((0, 0, -1), (4, 3, 2)))
+    assert part.top_mm == 2.0
+    assert len(part.corners) == 2  # of a closed mesh, walls and underside are left out
+    points = np.array([[0.0, 0], [4, 3], [2, 1.5], [1, 0], [4.0001, 1], [2, -1e-9], [99, 99]])
+    assert part.heights_mm(points).tolist() == [2, 2, 2, 2, -np.inf, -np.inf, -np.inf]
+    assert part.heights_mm(np.zeros((0, 2))).shape == (0,)
+
+
+def test_the_highest_of_several_bodies_counts_whatever_their_sense():
+    bodies = np.concatenate([box((0, 0, 0), (4, 4, 1)), box((1, 1, 0), (2, 2, 3))[:, ::-1]])
+    part = mesh(bodies)  # one of them inside out: no triangle is left out for its sense
+    assert part.heights_mm(np.array([[0.5, 0.5], [1.5, 1.5]])).tolist() == [1.0, 3.0]
+
+
+def test_frames_move_the_part_under_the_sensor():
+    T = np.array([[0.0, 0, 1, 5], [0, 1, 0, 6], [-1, 0, 0, 7], [0, 0, 0, 1]])
+    part = mesh(box((0, 0, 0), (1, 2, 3)), T)
+    assert part.top_mm == 7.0
+    assert part.heights_mm(np.array([[6.5, 7.0], [4.9, 7.0]])).tolist() == [7.0, -np.inf]
+
+
+def test_slanted_triangles_are_planes_and_random_ones_as_by_brute_force():
+    rng = np.random.default_rng(4)
+    corners = rng.uniform(-5, 5, (300, 1, 3)) + rng.normal(size=(300, 3, 3))
+    part = mesh(corners)
+    points = rng.uniform(-7, 7, (400, 2))
+    best = np.full(400, -np.inf)
+    for a, b, c in corners:
+        weights = np.linalg.solve(np.array([a, b, c]).T * [[1], [1], [0]] + [[0], [0], [1]],
+                                  np.c_[points, np.ones(400)].T)  # fmt: skip
+        z = np.where((weights >= 0).all(axis=0), weights.T @ [a[2], b[2], c[2]], -np.inf)
+        best = np.maximum(best, z)
+    ours = part.heights_mm(points)
+    assert (np.isfinite(ours) == np.isfinite(best)).all()
+    seen = np.isfinite(best)
+    assert seen.sum() > 200
+    assert np.abs(ours[seen] - best[seen]).max() < 1e-9
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3, np.pi / 2])
+def test_no_point_falls_through_the_edges_of_a_grid(turn):
+    n = 12
+    c, s = np.cos(turn), np.sin(turn)
+    nodes = np.random.default_rng(2).uniform(0, 1e-3, (n + 1, n + 1, 3))
+    nodes[..., :2] += np.stack(np.meshgrid(np.arange(n + 1), np.arange(n + 1)), -1)
+    nodes = nodes @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    quads = [nodes[:-1, :-1], nodes[:-1, 1:], nodes[1:, 1:], nodes[1:, :-1]]
+    a, b, d, e = (quad.reshape(-1, 3) for quad in quads)
+    part = mesh(np.concatenate([np.stack([a, b, d], 1), np.stack([a, d, e], 1)]))
+    share = np.random.default_rng(3).random((3000, 1))
+    inner = nodes[1:-1, 1:-1, :2].reshape(-1, 2)
+    ends = np.random.default_rng(5).integers(0, len(a), 3000)
+    on_diagonals = a[ends, :2] + share * (d[ends, :2] - a[ends, :2])
+    for points in (inner, on_diagonals):
+        # Strictly on an edge, or by rounding a hair beside it: never in a gap.
+        inside = shapely.contains_xy(
+            shapely.Polygon(
+                np.r_[nodes[0], nodes[1:, -1], nodes[-1, -2::-1], nodes[-2:0:-1, 0]][:, :2]
+            ),
+            points,
+        )
+        assert inside.sum() > 100
+        assert np.isfinite(part.heights_mm(points[inside])).all()
+
+
+def test_upright_walls_cover_nothing():
+    wall = np.array([[[0.0, 0, 0], [1, 0, 0], [1, 0, 5]]])
+    with pytest.raises(SurfaceError, match="no triangle covers"):
+        mesh(wall)
+    with pytest.raises(SurfaceError, match="NaN"):
+        mesh(np.full((1, 3, 3), np.nan))
+
+
+@pytest.mark.parametrize("loops", [[SQUARE], [SQUARE, HOLE], [HOOK], [HOOK[::-1]], [SQUARE[::-1]]])
+def test_points_in_polygons_as_shapely_says(loops):
+    region = polygon(loops)
+    shape = shapely.Polygon(loops[0], loops[1:])
+    points = np.random.default_rng(0).uniform(-1, 11, (5000, 2))
+    points = np.concatenate([points, np.round(points)])  # corners and edges among them
+    assert (region.contains(points) == shapely.intersects_xy(shape, points)).all()
+    away = shapely.distance(shape.boundary, shapely.points(points))
+    assert np.abs(region.distance_mm(points) - away).max() < 1e-9
+
+
+@pytest.mark.parametrize("loops", [[], [SQUARE[:2]], [SQUARE * 0], [SQUARE * np.nan]])
+def test_what_is_no_polygon_is_refused(loops):
+    with pytest.raises(SurfaceError, match="outline"):
+        polygon(loops)
+
+
+def test_filled_loops_cover_their_area_once():
+    points, triangles = np.concatenate([SQUARE, HOLE]), filled([SQUARE, HOLE])
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    areas = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    assert areas.min() > 0
+    assert areas.sum() / 2 == pytest.approx(96.0)
+    with pytest.raises(SurfaceError, match="cover"):
+        filled([SQUARE[::-1]])
+
+
+def test_face_sees_its_surroundings_beyond_its_edges_and_above_itself():
+    low = Face(None, polygon([SQUARE, HOLE]), TiltedPlane(-0.1, 0.0))
+    at = np.array([[5.0, 1], [5, 5], [20, 0], [-20, 0]])
+    assert low.heights_mm(at).tolist() == [0.0, -0.5, -2.0, 2.0]
+    assert low.top_mm == pytest.approx(10.0)
+    alone = Face(None, polygon([SQUARE]))
+    assert alone.heights_mm(at).tolist() == [0.0, 0.0, -np.inf, -np.inf]
+    over = Face(None, polygon([SQUARE]), Plate(3.0))
+    assert (over.heights_mm(at) == 3.0).all()
+
+
+@pytest.mark.parametrize("kind", ["binary", "ascii"])
+def test_files_are_read_exactly(tmp_path, kind):
+    triangles = np.random.default_rng(0).normal(size=(40, 3, 3)).astype(np.float32)
+    file = tmp_path / "part.stl"
+    if kind == "binary":
+        file.write_bytes(binary(triangles))
+    else:
+        rows = ["solid x"]
+        for t in triangles:
+            rows += ["facet normal 0 0 0", " outer loop"]
+            rows += [f"  vertex {x!r} {y!r} {z!r}" for x, y, z in t.astype(float).tolist()]
+            rows += [" endloop", "endfacet"]
+        file.write_text("\n".join([*rows, "endsolid x"]))
+    assert np.array_equal(read_stl(file), triangles.astype(float))
+    assert part_mesh(file).top_mm == triangles[..., 2].max()
+
+
+@pytest.mark.parametrize(
+    ("content", "match"),
+    [
+        (binary([np.eye(3)])[:-1], "announces 1 triangles"),
+        (binary([np.eye(3)]) + b"x", "announces"),
+        (binary([]), "no triangle"),
+        (binary([np.eye(3) * np.nan]), "NaN"),
+        (b"solid x\nvertex 1 2\nendsolid", "broken corners"),
+        (b"solid x\nendsolid", "no triangle"),
+        (b"solid x\nfacet", "no STL"),
+        (b"\x89PNG", "no STL"),
+        (b"", "no STL"),
+    ],
+)
+def test_what_is_no_stl_is_refused(tmp_path, content, match):
+    file = tmp_path / "bad.stl"
+    file.write_bytes(content)
+    with pytest.raises(SurfaceError, match=match):
+        read_stl(file)
+
+
+def test_missing_files_and_folders_are_refused(tmp_path):
+    for path in (tmp_path / "none.stl", tmp_path):
+        with pytest.raises(SurfaceError, match="cannot be read"):
+            read_stl(path)
+
+
+def test_raster_keeps_what_it_saw_within_its_stated_error():
+    asked = []
+
+    class Counted:
+        top_mm = 0.0
+
+        def heights_mm(self, points):
+            asked.append(len(points))
+            return Sphere(15.0).heights_mm(points)
+
+    raster = Raster(Counted(), 0.05)
+    points = np.random.default_rng(0).uniform(-4, 4, (3000, 2))
+    first = raster.heights_mm(points)
+    steepest = 4 * np.sqrt(2) / np.sqrt(15**2 - 32)
+    exact = Sphere(15.0).heights_mm(points)
+    assert 0 < np.abs(first - exact).max() <= steepest * 0.05 / np.sqrt(2) + 1e-6
+    count = len(asked)
+    assert np.array_equal(raster.heights_mm(points), first)
+    assert len(asked) == count == 4  # tiles of 6.4 mm
+    assert raster.stored_bytes == 4 * 128 * 128 * 4
+
+
+def test_raster_keeps_edges_of_the_world_and_refuses_what_lies_beyond_it():
+    raster = Raster(Sphere(2.0), 0.1)
+    assert raster.heights_mm(np.array([[5.0, 5.0]]))[0] == -np.inf
+    with pytest.raises(SurfaceError, match="larger cells"):
+        raster.heights_mm(np.array([[1e4, 0.0]]))
+    with pytest.raises(SurfaceError, match="cells"):
+        Raster(Sphere(2.0), 0.0)
