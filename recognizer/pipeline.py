@@ -101,8 +101,7 @@ def recognise(reader: Reader, signal: Signal, seq: int = 0) -> Recognition:
     if not readings:
         return refused(seq, TOO_FEW)
     readings.sort(key=lambda reading: -reading.score)
-    nothing = max(unplaced(reading.encoding, reading.fit) for reading in readings)
-    return _answer(reader, readings, nothing, seq)
+    return _answer(reader, readings, seq)
 
 
 def unplaced(encoding: Encoding, fit: Fit) -> float:
@@ -125,7 +124,7 @@ def _verified(
         return []
     starts = [found[place.fit] for place in candidates]
     lattices = started(
-        np.array([[fit.x_mm, fit.y_mm, fit.theta_rad, fit.spread] for fit in starts]),
+        np.array([[fit.x_mm, fit.y_mm, fit.theta_rad, *fit.nuisance] for fit in starts]),
         np.array([fit.gain for fit in starts]),
     )
 
@@ -153,7 +152,7 @@ def _verified(
     ]
 
 
-def _answer(reader: Reader, readings: list[Reading], nothing: float, seq: int) -> Recognition:
+def _answer(reader: Reader, readings: list[Reading], seq: int) -> Recognition:
     best = readings[0]
     index = _index(best)
     other = next((r for r in readings[1:] if not _same(best, r)), None)
@@ -163,7 +162,10 @@ def _answer(reader: Reader, readings: list[Reading], nothing: float, seq: int) -
         face = other.encoding.face(other.place.face)
         runner_up = RunnerUp(face.object, face.face, _index(other))
     limits = reader.thresholds
-    if best.score - nothing < limits.surprise or best.fit.noise > limits.noise:
+    if (
+        best.score - unplaced(best.encoding, best.fit) < limits.surprise
+        or best.fit.noise > limits.noise
+    ):
         return refused(seq, NOT_ENCODED, margin=margin, runner_up=runner_up)
     if margin < limits.margin:
         return refused(seq, AMBIGUOUS, margin=margin, runner_up=runner_up)

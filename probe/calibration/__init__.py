@@ -1,1 +1,38 @@
-"""Counts -> newtons: bias, bad tactels, the force law of each tactel."""
+"""Counts -> newtons: bias, condition and force law of every tactel. Thesis 4.2, appendix 4.
+
+average    frames of one load -> means, noise
+load       known loads
+condition  dead, stuck, hidden, preloaded; whether the loads suffice
+law        the force law and its least squares
+fit        rest and loads -> calibration
+value      the calibration
+file       JSON with a hash
+apply      counts -> newtons, and back
+drift      whether a calibration still holds
+"""
+
+from probe.calibration.apply import Calibrated, calibrated, expected_counts
+from probe.calibration.condition import Thresholds
+from probe.calibration.drift import Drift, drift_of
+from probe.calibration.file import calibration_hash, read_calibration, write_calibration
+from probe.calibration.fit import calibration_from
+from probe.calibration.load import Load, even_load, known_load
+from probe.calibration.value import Calibration, Condition
+
+__all__ = [
+    "Calibrated",
+    "Calibration",
+    "Condition",
+    "Drift",
+    "Load",
+    "Thresholds",
+    "calibrated",
+    "calibration_from",
+    "calibration_hash",
+    "drift_of",
+    "even_load",
+    "expected_counts",
+    "known_load",
+    "read_calibration",
+    "write_calibration",
+]

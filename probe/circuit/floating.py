@@ -23,7 +23,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from probe.circuit.fsr import Image
 from probe.circuit.network import Network, eliminated
@@ -126,6 +125,8 @@ def _bounded(
 
 def _unbounded(hessian: NDArray[np.float64], linear: Vector, free: NDArray[np.bool_]) -> Vector:
     """Minimise with the variables that are not free held at 0."""
+    from scipy.linalg import cho_factor, cho_solve
+
     index = np.flatnonzero(free)
     part = hessian[index[:, None], index]
     weight = 1.0 / np.sqrt(np.diagonal(part))

@@ -207,8 +207,10 @@ class Client:
                 self._hand_on(self._receiver.settle(now_ns))
             elif self._take(data, now_ns):
                 heard_s = now_s
-            if now_s - max(heard_s, asked_s) > SILENCE_S:
-                if heard_s > asked_s:
+            # After a torn packet: a reset, whose ident was joined to what was being sent.
+            anew, torn = heard_s > asked_s, self._receiver.torn
+            if now_s - max(heard_s, asked_s) > (_SLICE_S if anew and torn else SILENCE_S):
+                if anew and not torn:
                     self._tell(f"nothing came for {SILENCE_S:g} s; the stream is started again")
                 self._send(self._greeting())
                 asked_s = now_s

@@ -25,6 +25,7 @@ class Receiver:
         self.device: StatisticsPacket | None = None
         self.damages: dict[Damage, int] = dict.fromkeys(Damage, 0)
         self.packets = 0
+        self.torn = False  #: whether the last block was no packet
         self.frames = 0
         self._order = Order()
         self._times_ns: deque[int] = deque(maxlen=64)
@@ -41,6 +42,7 @@ class Receiver:
         for block in self._splitter.feed(data):
             packet = decode(block, self.ident.bits if self.ident else 10)
             first, self._first = self._first, False
+            self.torn = isinstance(packet, Damage)
             if isinstance(packet, Damage):
                 if not first:
                     self.damages[packet] += 1

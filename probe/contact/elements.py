@@ -28,7 +28,7 @@ from probe.surface.contract import Surface
 STEEPEST_RAD = 0.35  #: tilts beyond are not small
 KEPT = 2  #: condensed pads
 GROWTH = 1.5  #: from element to element of the margin
-NEAR = 0.4  #: of an element: lines so near a wall move there
+NEAR = 0.1  #: of an element: lines so near a wall move there
 
 
 def elements(
@@ -96,7 +96,10 @@ def elements(
             f"{touch.force_n:g} N press the surface {deepest:.3g} mm into a pad of {height:g} mm",
             fix="press with less force, or on more of the surface",
         )
-    return Contact(pad.felt(found.forces), z, tilt_x, tilt_y, "elements", found.iterations)
+    felt = pad.felt(found.forces)
+    pressed = np.maximum(felt, 0.0)  # far from the contact the base pulls a little: nobody feels it
+    pressed *= felt.sum() / pressed.sum()
+    return Contact(pressed, z, tilt_x, tilt_y, "elements", found.iterations)
 
 
 def condensed_pad(

@@ -70,11 +70,6 @@ def footprint(
     unloaded = Pose(0.0, touch.tilt_x_rad, touch.tilt_y_rad)
     level = asked(surface, touch, points) - drop - unloaded.heights_mm(points)
     highest = float(level.max())
-    if highest == -math.inf:
-        raise ContactError(
-            f"there is nothing under the sensor to bear {touch.force_n:g} N",
-            fix="move the sensor over the object",
-        )
     cover = (level >= highest - depth).mean(axis=1)
     forces = touch.force_n * (cover / cover.sum()).reshape(shape)
     return Contact(forces, highest, touch.tilt_x_rad, touch.tilt_y_rad, "footprint", iterations=0)

@@ -12,22 +12,17 @@ touch is refused, as is a plate that turns by more than 20 degrees.
 from __future__ import annotations
 
 import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from probe.contact.contract import Contact, Touch
-from probe.contact.layer_active_set import (
-    Plate,
-    Pressed,
-    equilibrium,
-    levers,
-    plate_of,
-    pressure_image,
-)
+from probe.contact.layer_active_set import Pressed, equilibrium
 from probe.contact.layer_descent import descended
 from probe.contact.layer_influence import influence
 from probe.contact.layer_kernel import layer_compliance
 from probe.contact.layer_patch import Patch, centres_mm, neighbours, patch_under
+from probe.contact.layer_solve import Plate, plate_of, pressure_image
 from probe.contact.neo_hooke import Linear
 from probe.contact.plate import load_of, rest
 from probe.errors import ContactError
@@ -123,7 +118,7 @@ def _foreseen(patch: Patch, touch: Touch) -> tuple[Patch, Array]:
     tactel's width feels.
     """
     grid, pad = patch.grid, patch.grid.sensor.overlay
-    highest = patch.coarse_mm.max(axis=1)
+    highest = patch.highest_mm
     matter = np.flatnonzero(highest > -math.inf)
     wave = np.array(2 / grid.sensor.pitch_mm)
     compliance = layer_compliance(
@@ -150,11 +145,11 @@ def _refuse(pressed: Pressed, plate: Plate) -> None:
             f"beyond {math.degrees(STEEPEST_RAD):.3g}",
             fix="move the sensor, press with less force, or take a stiffer wrist",
         )
-    many = pressed.touching.sum(axis=1)
+    many = pressed.touching.sum(axis=0)
     cells = int((many > 0).sum())
     if cells >= _FEW and many.sum() < THINNEST * cells:
         raise ContactError(
-            f"of {pressed.touching.shape[1]} points in a cell of {patch.grid.dx_mm:.3g} mm only "
+            f"of {len(pressed.touching)} points in a cell of {patch.grid.dx_mm:.3g} mm only "
             f"{many.sum() / cells:.2g} are in touch on the mean: the strokes are too thin to be "
             "felt by their true width",
             fix="take more cells per tactel or more samples per cell, or a wider stroke",

@@ -25,16 +25,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.contact.layer_active_set import (
+from probe.contact.layer_active_set import Pressed, judged
+from probe.contact.layer_patch import Patch
+from probe.contact.layer_solve import (
     Plate,
-    Pressed,
-    gaps_mm,
+    answers,
+    deep_mm,
+    glued,
     levers,
     pressure_image,
-    run_through,
-    symmetric_solve,
+    pseudo_inverse,
 )
-from probe.contact.layer_patch import Patch
 from probe.errors import ContactError
 
 Array = NDArray[np.float64]
@@ -43,13 +44,14 @@ MOST_POSES = 100
 MOST_GRADIENTS = 5000
 HALVINGS = 40
 TOLERANCE = 1e-8  #: of the force, for the plate; of the deepest gap, for the points
+_HESSIAN = 1e-4  # residual of the columns of the plate's matrix
 _PROPORTION = 1.0  # of chopped to free gradient; 1 is the usual choice
 _STEP = 1.9  # over the largest eigenvalue; below 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Springs:
-    """The function f'Af/2 - f'e of the points (cells, S) of a patch."""
+    """The function f'Af/2 - f'e of the points (S, cells) of a patch."""
 
     patch: Patch
     largest: float  # bound of A's eigenvalues
@@ -57,9 +59,9 @@ class _Springs:
     def applied(self, f: Array) -> Array:
         """Return A f."""
         grid = self.patch.grid
-        mean = f.mean(axis=1)
+        mean = f.mean(axis=0)
         image = pressure_image(self.patch, mean / grid.edge_mm_mpa)
-        return f + (grid.sunk_mm(image).ravel()[self.patch.cells] - mean)[:, None]
+        return f + (grid.sunk_mm(image).ravel()[self.patch.cells] - mean)
 
     def least(self, e: Array, f: Array, tolerance: float) -> Array:
         """Return the minimum over f >= 0 from a first guess."""
@@ -94,22 +96,6 @@ class _Springs:
                 p = free = np.where(f > 0, g, 0.0)
         raise _no_rest()
 
-    def answers(self, touching: NDArray[np.bool_], e: Array, tolerance: float) -> Array:
-        """Return f with A f = e on the points in touch and f = 0 elsewhere."""
-        f = np.zeros_like(e)
-        r = np.where(touching, e, 0.0)
-        p, rr = r, float(np.vdot(r, r))
-        enough = tolerance**2 * rr
-        for _ in range(MOST_GRADIENTS):
-            if rr <= enough:
-                return f
-            Ap = np.where(touching, self.applied(p), 0.0)
-            along = rr / np.vdot(p, Ap)
-            f, r = f + along * p, r - along * Ap
-            previous, rr = rr, float(np.vdot(r, r))
-            p = r + (rr / previous) * p
-        raise _no_rest()
-
 
 def descended(begun: Pressed, plate: Plate) -> Pressed:
     """Return the contact in equilibrium, from where the active set gave up.
@@ -125,12 +111,12 @@ def descended(begun: Pressed, plate: Plate) -> Pressed:
     while True:
         b, f, more = _rested(patch, plate, b, f)
         iterations += more
-        pressures = f.mean(axis=1) / patch.grid.edge_mm_mpa
-        bigger = run_through(patch, pressures, b, plate.reach_mm)
+        pressures = f.mean(axis=0) / patch.grid.edge_mm_mpa
+        _, bigger = judged(patch, plate, pressures, b)
         if bigger is patch:
             return Pressed(patch, f > 0, pressures, b, iterations, converged=True)
         wider = np.zeros(bigger.heights_mm.shape)
-        wider[np.searchsorted(bigger.cells, patch.cells)] = f
+        wider[:, np.searchsorted(bigger.cells, patch.cells)] = f
         patch, f = bigger, wider
 
 
@@ -140,17 +126,17 @@ def _rested(patch: Patch, plate: Plate, b: Array, f: Array) -> tuple[Array, Arra
     softest = float(grid.compliance.max()) / grid.edge_mm_mpa
     springs = _Springs(patch, max(1.0, softest))
     at_cell, at_point = levers(patch, plate.reach_mm)
-    weight = grid.dx_mm**2 / (f.shape[1] * grid.edge_mm_mpa)  # N/mm of one point's spring
+    weight = grid.dx_mm**2 / (f.shape[0] * grid.edge_mm_mpa)  # N/mm of one point's spring
     free = plate.free
     K = np.where(np.isfinite(plate.stiffness), plate.stiffness, 0.0)
     b = np.where(np.isfinite(plate.stiffness), b, plate.start)
 
     def moments(f: Array) -> Array:
-        return weight * (f.sum(axis=1) @ at_cell + f.sum(axis=0) @ at_point)
+        return weight * (at_cell @ f.sum(axis=0) + f.sum(axis=1) @ at_point)
 
     def left(b: Array, f: Array) -> tuple[Array, Array]:
         """Return the gradient of the plate's energy, with the points at their minimum."""
-        e = gaps_mm(patch, b, plate.reach_mm)
+        e = deep_mm(patch, b, plate.reach_mm)
         f = springs.least(e, f, TOLERANCE * max(float(e.max()), 1e-300))
         gradient = K * (b - plate.start) - moments(f)
         gradient[0] += plate.force_n
@@ -163,15 +149,14 @@ def _rested(patch: Patch, plate: Plate, b: Array, f: Array) -> tuple[Array, Arra
             return b, f, iteration
         touching = f > 0
         if touching.any():
-            columns = [
-                moments(springs.answers(touching, at_cell[:, i, None] + at_point[:, i], 1e-4))
-                for i in free
-            ]
-            system = np.column_stack(columns)[free] + np.diag(K[free])
-            step = -symmetric_solve((system + system.T) / 2, gradient)
+            system = glued(patch, plate, touching)
+            R = system.levers[free]
+            stiff = grid.dx_mm**2 * (R @ answers(system, R.T, _HESSIAN))
+            stiff += system.turn[np.ix_(free, free)] + np.diag(K[free])
+            step = -pseudo_inverse((stiff + stiff.T) / 2) @ gradient
         else:  # nothing is touched: go down to the highest point and a little deeper
-            step = np.zeros(len(free))
-            step[0] = 1.001 * float(gaps_mm(patch, b, plate.reach_mm).max()) - grid.dx_mm
+            step = np.zeros(int(free.sum()))
+            step[0] = 1.001 * float(deep_mm(patch, b, plate.reach_mm).max()) - grid.dx_mm
         slope = float(gradient @ step)
         for halving in range(HALVINGS):
             there = b.copy()

@@ -1,8 +1,8 @@
-"""Influence of a pressed cell on every other: the pad as one table and two spectra.
+"""Influence of a pressed cell on every other: the pad as two spectra.
 
 Sensor + cells per tactel -> Influence, made once for a sensor and kept. The matrix is cut into
-square cells of side dx; pressure is band-limited on them, so the surface sinks by the cyclic
-convolution of the pressures with a table, C[i, j] = table[|row_i - row_j|, |col_i - col_j|].
+square cells of side dx; pressure is band-limited on them, and the surface sinks by a cyclic
+convolution, two Fourier transforms: the compliance between cells is never a matrix.
 
 The layer has no edges in wave numbers, so the domain is the matrix and a free rim about it,
 `RIM` pad heights in total both ways: what a cell feels of the images of the others has then
@@ -46,19 +46,12 @@ class Influence:
     domain: tuple[int, int]  #: cells of the periodic domain
     compliance: Array  #: (domain rows, domain columns // 2 + 1) of waves, mm/MPa
     base: Array  #: the same shape; share of the pressure that arrives at the base
-    table: Array  #: (2 rows - 1, 2 columns - 1) mm/MPa, at signed offsets, [0, 0] in its middle
-
-    def gathered(self, cells: NDArray[np.intp]) -> Array:
-        """Return the compliance (n, n) between cells (n,), flat numbers row * columns + column."""
-        row, column = np.divmod(cells, self.columns)
-        width = 2 * self.columns - 1
-        place = (row * width + column).astype(np.int32)
-        middle = (self.rows - 1) * width + self.columns - 1
-        return self.table.ravel().take(place[:, None] - (place - middle)[None, :])
+    own_mm_mpa: float  #: compliance of a cell under its own pressure
 
     def sunk_mm(self, pressure: Array) -> Array:
         """Return how far the surface sinks (rows, columns) under pressures of that shape, MPa."""
-        return self._filtered(pressure, self.compliance)[: self.rows, : self.columns]
+        sunk = self._filtered(pressure, self.compliance, self.rows)
+        return sunk[:, : self.columns]
 
     def base_forces_n(self, pressure: Array) -> Array:
         """Return the force (N) that arrives at each tactel under pressures (rows, columns), MPa.
@@ -66,7 +59,7 @@ class Influence:
         The sum is the force on the pad. The slight pull of the base far away from the contact
         (below 1e-3 of the force) is felt by no tactel.
         """
-        stress = self._filtered(pressure, self.base)
+        stress = self._filtered(pressure, self.base, self.domain[0])
         n = self.cells_per_tactel
         rows = _nearest_tactel(self.domain[0], self.rows, n)
         columns = _nearest_tactel(self.domain[1], self.columns, n)
@@ -75,10 +68,13 @@ class Influence:
         total = felt.sum()
         return felt * (pressure.sum() * self.dx_mm**2 / total) if total > 0 else felt
 
-    def _filtered(self, pressure: Array, spectrum: Array) -> Array:
-        waves = scipy.fft.rfft2(pressure, s=self.domain)
+    def _filtered(self, pressure: Array, spectrum: Array, rows: int) -> Array:
+        """Return the first rows of the cyclic convolution; zero rows are not transformed."""
+        waves = scipy.fft.rfft(pressure, self.domain[1], axis=1)
+        waves = scipy.fft.fft(waves, self.domain[0], axis=0)
         waves *= spectrum
-        return np.asarray(scipy.fft.irfft2(waves, s=self.domain, overwrite_x=True))
+        waves = scipy.fft.ifft(waves, axis=0, overwrite_x=True)[:rows]
+        return np.asarray(scipy.fft.irfft(waves, self.domain[1], axis=1))
 
 
 @lru_cache(maxsize=8)
@@ -114,17 +110,14 @@ def influence(sensor: Sensor, cells_per_tactel: int) -> Influence:
     spectrum = layer_compliance(
         q, height_mm=pad.height_mm, young_mpa=pad.young_mpa, poisson=pad.poisson
     )
-    answer = scipy.fft.irfft2(spectrum, s=domain)
-    table = answer[
-        np.ix_(np.abs(np.arange(1 - rows, rows)), np.abs(np.arange(1 - columns, columns)))
-    ]
-    arrays = (spectrum, base_ratio(q * pad.height_mm, pad.poisson), table)
-    for array in arrays:
-        array.setflags(write=False)
+    own = float(scipy.fft.irfft2(spectrum, s=domain)[0, 0])
+    base = base_ratio(q * pad.height_mm, pad.poisson)
+    spectrum.setflags(write=False)
+    base.setflags(write=False)
     edge = edge_compliance(
         dx, height_mm=pad.height_mm, young_mpa=pad.young_mpa, poisson=pad.poisson
     )
-    return Influence(sensor, cells_per_tactel, rows, columns, dx, edge, domain, *arrays)
+    return Influence(sensor, cells_per_tactel, rows, columns, dx, edge, domain, spectrum, base, own)
 
 
 def _domain(cells: int, heights: float) -> int:

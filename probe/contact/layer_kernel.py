@@ -86,9 +86,7 @@ def base_ratio(s: Array, poisson: float) -> Array:
     return 2 * a * e * (a * ch + s * sh) / (4 * e2 * (a * a + s * s) + (3 - 4 * poisson) * sh * sh)
 
 
-def edge_compliance(
-    dx_mm: float, *, height_mm: float, young_mpa: float, poisson: float
-) -> float:
+def edge_compliance(dx_mm: float, *, height_mm: float, young_mpa: float, poisson: float) -> float:
     """Return kappa dx / E*, mm/MPa: what the edges inside a cell of side dx add, see `_KAPPA`."""
     softness = _EDGE * math.exp(_EDGE_POISSON * (poisson - 0.5))
     kappa = _KAPPA / math.sqrt(1 + softness * (dx_mm / height_mm) ** 2)

@@ -38,23 +38,24 @@ class Patch:
     surface: Surface
     touch: Touch  #: its x, y and theta; force, tilt and wrist have no meaning here
     offsets_mm: Array  #: (samples, 2) points of a cell from its centre, sensor frame
-    coarse_mm: Array  #: (all cells, COARSE) heights of the first look
+    coarse_mm: Array  #: (all cells,) height of the first of the points looked at
+    highest_mm: Array  #: (all cells,) of the points looked at
     level: NDArray[np.bool_]  #: (all cells,) the cell and its neighbours are level
     cells: Cells  #: (n,) cells sampled in full, ascending
-    heights_mm: Array  #: (n, samples) their heights
+    heights_mm: Array  #: (samples, n) their heights
 
     def with_cells(self, cells: Cells) -> Patch:
         """Return the patch with these cells sampled as well."""
         new = np.setdiff1d(cells, self.cells, assume_unique=True)
         if not len(new):
             return self
-        fine = np.repeat(self.coarse_mm[new, :1], len(self.offsets_mm), axis=1)
+        fine = np.repeat(self.coarse_mm[None, new], len(self.offsets_mm), axis=0)
         rough = np.flatnonzero(~self.level[new])
-        points = centres_mm(self.grid)[new[rough], None, :] + self.offsets_mm
-        fine[rough] = _heights(self.surface, self.touch, points)
+        points = centres_mm(self.grid)[new[rough]] + self.offsets_mm[:, None, :]
+        fine[:, rough] = _heights(self.surface, self.touch, points)
         both = np.concatenate([self.cells, new])
         order = np.argsort(both, kind="stable")
-        heights = np.concatenate([self.heights_mm, fine])[order]
+        heights = np.concatenate([self.heights_mm, fine], axis=1)[:, order]
         return replace(self, cells=both[order], heights_mm=heights)
 
 
@@ -86,13 +87,14 @@ def patch_under(surface: Surface, grid: Influence, touch: Touch, samples: int = 
     coarse = _heights(surface, touch, _coarse_points(grid, samples))
     _refuse_hidden(surface, grid, touch, coarse, samples)
     shape = (grid.rows, grid.columns)
-    high = _spread(coarse.max(axis=1).reshape(shape), np.maximum)
-    low = _spread(coarse.min(axis=1).reshape(shape), np.minimum)
+    highest = coarse.max(axis=0)
+    high = _spread(highest.reshape(shape), np.maximum)
+    low = _spread(coarse.min(axis=0).reshape(shape), np.minimum)
     level = (high <= low + _LEVEL).ravel()
     none = np.zeros(0, dtype=np.intp)
-    empty = np.zeros((0, samples))
+    empty = np.zeros((samples, 0))
     offsets = _lattice(samples) * grid.dx_mm
-    return Patch(grid, surface, touch, offsets, coarse, level, none, empty)
+    return Patch(grid, surface, touch, offsets, coarse[0], highest, level, none, empty)
 
 
 def neighbours(mask: NDArray[np.bool_], grid: Influence) -> NDArray[np.bool_]:
@@ -165,12 +167,12 @@ def _centres(rows: int, columns: int, dx: float) -> Array:
 
 @lru_cache(maxsize=8)
 def _coarse_points(grid: Influence, samples: int) -> Array:
-    """Return (all cells, COARSE, 2): of every cell another quarter of its lattice."""
+    """Return (COARSE, all cells, 2): of every cell another quarter of its lattice."""
     quarters = samples // COARSE
     row, column = np.divmod(np.arange(grid.rows * grid.columns), grid.columns)
     which = (row * 3 + column * 5 + row // quarters + column // quarters) % quarters
-    offsets = _lattice(samples).reshape(COARSE, quarters, 2).swapaxes(0, 1) * grid.dx_mm
-    return centres_mm(grid)[:, None, :] + offsets[which]
+    offsets = _lattice(samples).reshape(COARSE, quarters, 2) * grid.dx_mm
+    return centres_mm(grid) + offsets[:, which]
 
 
 @lru_cache(maxsize=4)

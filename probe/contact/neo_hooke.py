@@ -26,6 +26,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+_LEAST = 1e-9  # stretch, below which only rounding goes
+
 
 class Law(Protocol):
     """How an elastic body answers to compression."""
@@ -75,14 +77,14 @@ class NeoHooke:
         third = self.stiffness / 3.0
         inverse = compression_mm * (-1.0 / self.length_mm)
         inverse += 1.0
-        np.divide(1.0, inverse, out=inverse)
+        inverse = 1.0 / np.maximum(inverse, _LEAST)
         square = inverse * inverse
         # lambda^-2 - lambda = (1 - lambda) (lambda^-2 + lambda^-1 + 1): nothing cancels.
         force = square + inverse
         force += 1.0
         force *= compression_mm
         force *= third
-        tangent = np.multiply(square, inverse, out=square)
+        tangent = square * inverse
         tangent *= 2.0 * third
         tangent += third
         return force, tangent

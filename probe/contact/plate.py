@@ -12,10 +12,8 @@ is least: convex, with a continuous gradient, for every law whose force rises. P
 stand in groups (the tip of one tab) on a common column: then its compression v takes part,
 psi((R a + h - v)+) + Psi(v), and is eliminated group by group: the system stays 3x3.
 
-Method: semismooth Newton with a line search on the sign of the slope. Where the system is
-singular (one or two tips, no wrist) the plate rolls along the null space until the next tip
-touches. With K = 0 and the centre of pressure outside the hull of all tips there is no rest:
-the plate tips over.
+Method: semismooth Newton with a line search (`plate_newton`). With K = 0 and the centre of
+pressure outside the hull of all tips there is no rest: the plate tips over.
 
 References
 ----------
@@ -32,19 +30,13 @@ from numpy.typing import NDArray
 
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.neo_hooke import Law
+from probe.contact.plate_newton import MOST_STEPS, Columns, Problem, newton
 from probe.errors import ContactError
 
 Array = NDArray[np.float64]
 
-EPS = float(np.finfo(np.float64).eps)
-MOST_STEPS = 100
-_SINGULAR = 1e-14  # eigenvalue of the scaled system, of the largest
-_PIVOT = 1e-6  # of the scaled system, below which its eigenvalues are asked
-_NEAR_LIMIT = 0.95  # share of the way to a law's limit that one step may go
-_WHOLE = 0.5  # of the first slope that a whole step may leave
-_SLOPE = 0.1  # the same of a step that had to be searched
-_SEARCHES = 200
-_NONE = np.zeros(0)
+_FAR_TURNED_RAD = 0.2
+_SLACK = 1e-12  # of the half width, by which a centre of pressure may miss the hull
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,16 +73,6 @@ class Rest:
     pose: Pose
     forces_n: Array  #: (n,) at every point
     iterations: int
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Columns:
-    """Common columns: each bears the points of one group, which follow one another."""
-
-    law: Law
-    starts: NDArray[np.intp]  #: (g,) first point of each group
-    of_point: NDArray[np.intp]  #: (n,) group of each point
-    foreseen_mm: Array  #: (g,) about the compression where the plate is foreseen
 
 
 def load_of(touch: Touch) -> Load:
@@ -136,7 +118,7 @@ def rest(
         tips, or no convergence.
     """
     checked_load(load)
-    if load.force_n == 0 and load.moment_x_nmm == 0 and load.moment_y_nmm == 0:
+    if load.force_n == 0:
         free = Pose(math.inf, load.tilt_x_rad, load.tilt_y_rad)
         return Rest(free, np.zeros(heights_mm.shape), 0)
     if not heights_mm.max(initial=-math.inf) > -math.inf:
@@ -145,9 +127,7 @@ def rest(
             fix="move the sensor over the object",
         )
     problem = _posed(points_mm, heights_mm, law, columns, load)
-    state, iterations = _newton(
-        problem, _first(problem, _unknowns(problem, load, foreseen)), tolerance
-    )
+    state, iterations = newton(problem, _unknowns(problem, load, foreseen), tolerance)
     a = np.zeros(3)
     a[problem.free] = state.a
     half = problem.half_mm
@@ -156,32 +136,22 @@ def rest(
         tilt_x_rad=load.tilt_x_rad - float(a[1]) / half,
         tilt_y_rad=load.tilt_y_rad - float(a[2]) / half,
     )
+    if iterations is None:
+        raise _restless(pose, load)
     return Rest(pose, state.force, iterations)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Problem:
-    rows: Array  # transpose of R, (m, n), m <= 3 free unknowns
-    heights: Array  # (n,), relative to the datum
-    law: Law
-    columns: Columns | None
-    K: Array  # (m,) its diagonal
-    f: Array  # (m,)
-    free: NDArray[np.intp]  # which of the three unknowns are free
-    half_mm: float
-    datum_mm: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _State:
-    a: Array  # (m,)
-    v: Array  # (g,) compression of the columns
-    compression: Array  # (n,) of the tips, negative: not touching
-    force: Array  # (n,)
-    tangent: Array  # (n,)
-    behind: Array  # (g,) tangent of the columns
-    gradient: Array  # (m,) of Phi by a
-    unbalance: Array  # (g,) gradient of Phi by v
+def _restless(pose: Pose, load: Load) -> ContactError:
+    turned = math.hypot(pose.tilt_x_rad - load.tilt_x_rad, pose.tilt_y_rad - load.tilt_y_rad)
+    if turned > _FAR_TURNED_RAD:
+        return ContactError(
+            f"the plate tips: turned by {math.degrees(turned):.3g} degrees it still finds no rest",
+            fix="move the sensor, press with less force, or take a stiffer wrist",
+        )
+    return ContactError(
+        f"no equilibrium within {MOST_STEPS} steps",
+        fix="report the scene; a wrist with some stiffness helps",
+    )
 
 
 def checked_load(load: Load) -> None:
@@ -194,6 +164,11 @@ def checked_load(load: Load) -> None:
             "all must be finite and the force not negative",
             fix="press with a force >= 0",
         )
+    if load.force_n == 0 and (load.moment_x_nmm or load.moment_y_nmm):
+        raise ContactError(
+            f"moments of {load.moment_x_nmm:g} and {load.moment_y_nmm:g} N mm without a force",
+            fix="press with a force, too",
+        )
     stiffness = (load.wrist.tilt_x_nmm_rad, load.wrist.tilt_y_nmm_rad)
     if not min(stiffness) >= 0 or math.isnan(max(stiffness)):
         raise ContactError(
@@ -202,9 +177,7 @@ def checked_load(load: Load) -> None:
         )
 
 
-def _posed(
-    points: Array, heights: Array, law: Law, columns: Columns | None, load: Load
-) -> _Problem:
+def _posed(points: Array, heights: Array, law: Law, columns: Columns | None, load: Load) -> Problem:
     x, y = points.T
     half = float(np.abs(points).max()) or 1.0
     stiffness = np.array([0.0, load.wrist.tilt_x_nmm_rad, load.wrist.tilt_y_nmm_rad])
@@ -218,7 +191,7 @@ def _posed(
     rows[0] = 1.0
     np.divide(y, half, out=rows[1])
     np.divide(x, -half, out=rows[2])
-    return _Problem(
+    return Problem(
         rows=rows if len(free) == 3 else rows[free],
         heights=level - datum,
         law=law,
@@ -233,19 +206,14 @@ def _posed(
 
 def _standing(points: Array, stiffness: Array, f: Array, half: float) -> None:
     """Refuse a load whose centre of pressure no tips can bear, as the wrist does not hold."""
-    if f[0] == 0:
-        at = np.array([math.inf, math.inf])
-        stands = False
+    at = np.array([-f[2], f[1]]) / f[0]  # x and y, of the half width
+    free_x, free_y = stiffness[2] == 0, stiffness[1] == 0  # a turn about y moves it along x
+    if free_x and free_y:
+        stands = _within_hull(points, at, _SLACK)
     else:
-        at = np.array([-f[2], f[1]]) / f[0]  # x and y, of the half width
-        free_x, free_y = stiffness[2] == 0, stiffness[1] == 0  # a turn about y moves it along x
-        slack = 1e-12
-        if free_x and free_y:
-            stands = _within_hull(points, at, slack)
-        else:
-            along = 0 if free_x else 1
-            low, high = points[:, along].min(), points[:, along].max()
-            stands = bool(low - slack <= at[along] <= high + slack)
+        along = 0 if free_x else 1
+        low, high = points[:, along].min(), points[:, along].max()
+        stands = bool(low - _SLACK <= at[along] <= high + _SLACK)
     if not stands:
         low, high = points.min(axis=0) * half, points.max(axis=0) * half
         raise ContactError(
@@ -268,166 +236,10 @@ def _within_hull(points: Array, at: Array, slack: float) -> bool:
     return bool(gaps.max() <= math.pi + 1e-9)
 
 
-def _newton(problem: _Problem, state: _State, tolerance: float) -> tuple[_State, int]:
-    for iteration in range(MOST_STEPS + 1):
-        if _resting(problem, state, tolerance):
-            return state, iteration
-        state = _searched(problem, state, *_step(problem, state))
-    raise ContactError(
-        f"no equilibrium within {MOST_STEPS} steps",
-        fix="report the scene; a wrist with some stiffness helps",
-    )
-
-
-def _unknowns(problem: _Problem, load: Load, pose: Pose | None) -> Array:
+def _unknowns(problem: Problem, load: Load, pose: Pose | None) -> Array:
     """Return the unknowns of a pose, by default first touch."""
     if pose is None:
         return np.zeros(len(problem.f))
     turns = (load.tilt_x_rad - pose.tilt_x_rad, load.tilt_y_rad - pose.tilt_y_rad)
     whole = (problem.datum_mm - pose.z_mm, *(turn * problem.half_mm for turn in turns))
     return np.array(whole)[problem.free]
-
-
-def _first(problem: _Problem, a: Array) -> _State:
-    """Return the state to begin with: the unknowns, withdrawn to within the laws' limits."""
-    columns, limit = problem.columns, problem.law.limit_mm
-    whole = limit if columns is None else limit + columns.law.limit_mm
-    deep = a @ problem.rows + problem.heights
-    # At least a trace of contact, at most nearly the limit.
-    least = 1e-9 * (1.0 if math.isinf(whole) else whole)
-    a[0] += min(max(least - float(deep.max()), 0.0), _NEAR_LIMIT * whole - float(deep.max()))
-    if columns is None:
-        return _at(problem, a, _NONE)
-    deepest = np.maximum.reduceat(a @ problem.rows + problem.heights, columns.starts)
-    v = np.maximum(columns.foreseen_mm, deepest - _NEAR_LIMIT * limit)
-    return _at(problem, a, np.minimum(v, _NEAR_LIMIT * columns.law.limit_mm))
-
-
-def _at(problem: _Problem, a: Array, v: Array) -> _State:
-    """Evaluate forces, tangents and gradient."""
-    columns = problem.columns
-    compression = a @ problem.rows
-    compression += problem.heights
-    if columns is not None:
-        compression -= v[columns.of_point]
-    force, tangent = problem.law(np.maximum(compression, 0.0))
-    tangent = tangent * (compression > 0)
-    gradient = problem.rows @ force + problem.K * a - problem.f
-    if columns is None:
-        return _State(a, v, compression, force, tangent, _NONE, gradient, _NONE)
-    unbalance, behind = columns.law(v)
-    unbalance -= np.add.reduceat(force, columns.starts)
-    return _State(a, v, compression, force, tangent, behind, gradient, unbalance)
-
-
-def _resting(problem: _Problem, state: _State, tolerance: float) -> bool:
-    """Tell whether what is left of the forces is below tolerance or rounding."""
-    turned = problem.K * np.abs(state.a)
-    # No lever is longer than 1, so the sum of forces bounds all three.
-    scale = max(float(state.force.sum()), float(turned.max()), float(np.abs(problem.f).max()))
-    left = np.abs(state.gradient)
-    uneven = np.abs(state.unbalance).max(initial=0.0)
-    if max(float(left.max()), float(uneven)) <= tolerance * scale:
-        return True
-    if (left > 1e-6 * scale).any():
-        return False
-    touching = state.tangent > 0
-    rows = np.abs(problem.rows[:, touching])
-    reach = np.abs(state.a) @ rows + np.abs(problem.heights[touching])
-    steep = state.tangent[touching] * reach
-    floor = 8 * EPS * (rows @ steep + turned)
-    if (left > tolerance * scale + floor).any():
-        return False
-    return bool(uneven <= tolerance * scale + 8 * EPS * steep.sum(initial=0.0))
-
-
-def _step(problem: _Problem, state: _State) -> tuple[Array, Array]:
-    """Return Newton's step, or the way down the null space of a singular system."""
-    columns = problem.columns
-    weighted = problem.rows * state.tangent
-    system = weighted @ problem.rows.T
-    np.fill_diagonal(system, system.diagonal() + problem.K)
-    wanted = -state.gradient
-    if columns is None:
-        return _solved(system, wanted), _NONE
-    sums = np.add.reduceat(weighted, columns.starts, axis=1)
-    # The rows' first is 1, so the first sums are those of the tangents.
-    pivots = 1.0 / (state.behind + sums[0])
-    eliminated = sums * pivots
-    step = _solved(system - eliminated @ sums.T, wanted - eliminated @ state.unbalance)
-    return step, step @ eliminated - pivots * state.unbalance
-
-
-def _solved(system: Array, wanted: Array) -> Array:
-    """Solve the scaled system; where it is singular go down the null space, if that is down."""
-    size = system.diagonal()
-    largest = max(float(size.max()), 1e-300)
-    scale = 1 / np.sqrt(np.where(size > 1e-30 * largest, size, largest))
-    scaled = system * scale * scale[:, None]
-    right = scale * wanted
-    quick = _eliminated(scaled.tolist(), right.tolist())
-    if quick is not None:
-        return scale * np.array(quick)
-    values, vectors = np.linalg.eigh(scaled)
-    regular = values > _SINGULAR * max(float(values[-1]), 1e-300)
-    along = right @ vectors
-    if not regular.all() and np.abs(along[~regular]).max() > 1e-9 * np.abs(along).max():
-        return np.asarray(scale * (vectors[:, ~regular] @ along[~regular]))
-    return np.asarray(scale * (vectors[:, regular] @ (along[regular] / values[regular])))
-
-
-def _eliminated(system: list[list[float]], right: list[float]) -> list[float] | None:
-    """Solve up to three equations of unit diagonal; None where a pivot all but vanishes."""
-    m = len(right)
-    for i in range(m):
-        pivot = system[i][i]
-        if not pivot > _PIVOT:
-            return None
-        for k in range(i + 1, m):
-            factor = system[k][i] / pivot
-            for j in range(i, m):
-                system[k][j] -= factor * system[i][j]
-            right[k] -= factor * right[i]
-    for i in reversed(range(m)):
-        for j in range(i + 1, m):
-            right[i] -= system[i][j] * right[j]
-        right[i] /= system[i][i]
-    return right
-
-
-def _searched(problem: _Problem, state: _State, da: Array, dv: Array) -> _State:
-    """Return the state along a step where the slope has all but vanished."""
-    rate = da @ problem.rows
-    if problem.columns is not None:
-        rate -= dv[problem.columns.of_point]
-    first = float(state.gradient @ da + state.unbalance @ dv)
-    low, high = 0.0, _end(problem, state, rate, dv)
-    t = min(1.0, _NEAR_LIMIT * high)
-    found = state
-    for _ in range(_SEARCHES):
-        found = _at(problem, state.a + t * da, state.v + t * dv)
-        slope = float(found.gradient @ da + found.unbalance @ dv)
-        if abs(slope) <= (_WHOLE if t == 1 else _SLOPE) * abs(first) or not low < t < high:
-            return found
-        if slope < 0:
-            low = t
-        else:
-            high = t
-        curvature = float(
-            (found.tangent * rate) @ rate + (found.behind * dv) @ dv + (problem.K * da) @ da
-        )
-        t = t - slope / curvature if curvature > 0 else math.inf
-        if not low < t < high:
-            t = 4 * low if math.isinf(high) else (low + high) / 2
-    return found
-
-
-def _end(problem: _Problem, state: _State, rate: Array, dv: Array) -> float:
-    """Return how far along a step the laws' limits lie."""
-    fastest = 0.0
-    limit = problem.law.limit_mm
-    if limit < math.inf:
-        fastest = float((rate / (limit - state.compression)).max())
-    if problem.columns is not None and (limit := problem.columns.law.limit_mm) < math.inf:
-        fastest = max(fastest, float((dv / (limit - state.v)).max()))
-    return 1 / fastest if fastest > 0 else math.inf

@@ -3,11 +3,13 @@
 Levels, from cheap to dear:
 
     tab overlay    footprint < tabs-7 < tabs-19 < tabs-61
-    pad overlay    footprint < layer-2 < layer-4 < layer-8 < layer-16 < elements
+    pad overlay    footprint < layer-2 < layer-4 < layer-8 < layer-16; elements by name alone
 
 What each level errs by and costs is measured by `tests/bench/contact_precision.py` on
 several indenters against finer references, and kept in `precision.json`. The error of an
-image is the norm of its deviation over the norm of the reference. Thesis 4.2.
+image is the norm of its deviation over the norm of the reference: what the level's fineness
+costs, not what the model leaves out (tabs are columns, the layer has no free sides: where a
+pad's own edge is pressed, take elements). Thesis 4.2.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ from probe.surface.contract import Surface
 #: "auto", the name of a level, or the largest error of an image.
 Accuracy = str | float
 
-AUTO = 0.01  #: the error that "auto" holds
+AUTO = 0.05  #: the error that "auto" holds: below what the models leave out
 LEVELS: dict[str, tuple[str, ...]] = {
     "tab": ("footprint", "tabs-7", "tabs-19", "tabs-61"),
     "pad": ("footprint", "layer-2", "layer-4", "layer-8", "layer-16", "elements"),
@@ -41,7 +43,7 @@ class Measured:
 
     level: str
     error: float  #: largest over the indenters
-    ms: float  #: median time of a touch
+    ms: float  #: CPU time of a touch, median over the indenters
 
 
 def press(

@@ -21,7 +21,7 @@ from probe.sensor import Sensor
 
 Array = NDArray[np.float64]
 
-HEXAGONS = (7, 19, 37, 61, 91, 127)  #: points of patterns with 1, 2, 3 ... rings
+HEXAGONS = tuple(3 * k * (k + 1) + 1 for k in range(1, 17))  #: 7, 19, 37, 61, 91 ... 817
 _GOLDEN_RAD = math.pi * (3 - math.sqrt(5))
 
 
@@ -35,7 +35,6 @@ class Tips:
     shifts_mm: Array | None = None  #: (rows, columns, 2) how far each stands off its place
 
 
-@lru_cache(maxsize=16)
 def tip_points(sensor: Sensor, tips: Tips) -> tuple[Array, Array]:
     """Return where the tips are asked, and how deep these places lie.
 
@@ -59,26 +58,33 @@ def tip_points(sensor: Sensor, tips: Tips) -> tuple[Array, Array]:
     ContactError
         When the number of points is none of the patterns', or a shape is wrong.
     """
-    tabs = sensor.rows * sensor.columns
-    centres = sensor.centres_mm()
+    points, drop = _drawn(sensor, tips.points, tips.dome_mm)
+    shape = (sensor.rows, sensor.columns)
     if tips.shifts_mm is not None:
-        centres = centres + _shaped(tips.shifts_mm, centres.shape, "shifts")
+        shifts = _shaped(tips.shifts_mm, (*shape, 2), "shifts")
+        points = points + shifts.reshape(-1, 1, 2)
+    if tips.lengths_mm is not None:
+        drop = drop - _shaped(tips.lengths_mm, shape, "lengths").reshape(-1, 1)
+    return points, drop
+
+
+@lru_cache(maxsize=16)
+def _drawn(sensor: Sensor, number: int, dome_mm: float) -> tuple[Array, Array]:
+    """Return points and drops of tips without defects."""
+    tabs = sensor.rows * sensor.columns
     if sensor.overlay.kind == "tab":
-        unit = hexagon(tips.points)
+        unit = hexagon(number)
         angle = _GOLDEN_RAD * np.arange(tabs)
         c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
         turned = np.stack([c * unit[:, 0] - s * unit[:, 1], s * unit[:, 0] + c * unit[:, 1]], -1)
         offsets = turned * (sensor.overlay.tab_diameter_mm / 2)
-        depth = tips.dome_mm * np.einsum("qi,qi->q", unit, unit)
+        depth = dome_mm * np.einsum("qi,qi->q", unit, unit)
     else:
-        unit = square(tips.points)
+        unit = square(number)
         offsets = np.broadcast_to(unit * sensor.pitch_mm, (tabs, len(unit), 2))
         depth = np.zeros(len(unit))
-    points = centres.reshape(tabs, 1, 2) + offsets
-    drop = np.broadcast_to(depth, (tabs, len(unit))).copy()
-    if tips.lengths_mm is not None:
-        lengths = _shaped(tips.lengths_mm, (sensor.rows, sensor.columns), "lengths")
-        drop -= lengths.reshape(tabs, 1)
+    points = sensor.centres_mm().reshape(tabs, 1, 2) + offsets
+    drop = np.tile(depth, (tabs, 1))
     for array in (points, drop):
         array.setflags(write=False)
     return points, drop
@@ -111,7 +117,7 @@ def _shaped(values: Array, shape: tuple[int, ...], name: str) -> Array:
     array = np.asarray(values, dtype=np.float64)
     if array.shape != shape or not np.isfinite(array).all():
         raise ContactError(
-            f"the tips' {name} have shape {array.shape}; finite numbers of shape {shape} are needed",
+            f"the tips' {name} have shape {array.shape}, finite numbers of {shape} are needed",
             fix="give one per tab, rows from the top",
         )
     return array

@@ -9,7 +9,6 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from probe.errors import PortError, ProbeError
@@ -55,13 +54,8 @@ def _frames(address: Address, rate: float) -> Iterator[Frame]:
         return moving_pattern(rate)
     from probe.simulate.source import frames_of
 
-    options = {k: v for k, v in address.options.items() if k not in ("rate", "firmware")}
-    return _paced(frames_of(address.target, options), rate)
-
-
-def _paced(frames: Iterator[Frame], rate: float) -> Iterator[Frame]:
-    for seq, frame in enumerate(frames):
-        yield replace(frame, seq=seq, t_ns=round(seq * 1e9 / rate))
+    options = {k: v for k, v in address.options.items() if k != "firmware"}
+    return frames_of(address.target, options)
 
 
 class EmulatedPort:

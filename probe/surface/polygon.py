@@ -1,8 +1,8 @@
 """Points in a polygon with holes, convex or not, edges included.
 
 Loops (k, 2) mm + points (n, 2) -> (n,) bool. By the parity of the edges that a ray from the
-point crosses; a point within rounding of an edge is inside. (The sum
-of areas of thesis 6.3 is wrong on every non-convex face.)
+point crosses; a point within rounding of an edge is inside. (The sum of areas of thesis 6.3
+is wrong on every non-convex face.)
 """
 
 from __future__ import annotations

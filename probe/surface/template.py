@@ -47,15 +47,20 @@ class Template:
         cell *= BINS
         cell += (right * BINS).astype(np.int64)
         piece = self.table.ravel().take(cell, mode="wrap")
-        x, y = (right - 0.5) * self.pitch_mm, (0.5 - down) * self.pitch_mm
-        a, b, c = self.planes.T
-        z: Array = a.take(piece, mode="clip")
+        z: Array = self.planes[:, 0].take(piece, mode="clip")
         sloped = np.flatnonzero(piece > 1)
-        some = piece[sloped]
-        z[sloped] += b[some] * x[sloped] + c[some] * y[sloped]
+        b, c = self.planes[piece[sloped], 1:].T
+        z[sloped] += b * self._x(right[sloped]) + c * self._y(down[sloped])
         asked = np.flatnonzero(piece == _CROSSED)
-        z[asked] = self.symbols.heights_mm(labels[asked], x[asked], y[asked])
+        x, y = self._x(right[asked]), self._y(down[asked])
+        z[asked] = self.symbols.heights_mm(labels[asked], x, y)
         return z
+
+    def _x(self, right: Array) -> Array:
+        return (right - 0.5) * self.pitch_mm
+
+    def _y(self, down: Array) -> Array:
+        return (0.5 - down) * self.pitch_mm
 
 
 @lru_cache(maxsize=32)

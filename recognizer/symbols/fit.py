@@ -52,8 +52,8 @@ class Fit:
     x_mm: float
     y_mm: float
     theta_rad: float
-    spread: float  #: how blurred the sensor sees, `template`
-    gain: Array  #: (3,) plane: at the centre, and its slopes per half width and half height
+    nuisance: Array  #: (3,) spread, exponent - 1, scale - 1
+    gain: Array  #: (4,) plane: centre, slopes per half width and height; depth of the bare face
     cells: NDArray[np.int64]  #: (m, 2) column and upward row of the cells in view
     scores: Array  #: (m, q + 1) log-likelihoods, nats, 0 for the best; the last one: no symbol
     seen: Array  #: (m,) tactels that look at the cell, by how hard they press
@@ -65,7 +65,7 @@ class Fit:
 def fits(image: Image, template: Template, bank: Bank, settings: Settings) -> tuple[Fit, ...]:
     """Return the likeliest lattices of an image, best first; none if nothing is pressed."""
     gain = first_gain(image, template.ink)
-    if not (np.isfinite(gain).all() and gain[0] > 0):
+    if not (np.isfinite(gain[:3]).all() and gain[0] > 0):
         return ()
     felt = felt_under(image, gain[None])
     weights = felt.press**2 * felt.trust
@@ -103,7 +103,7 @@ def scored(
     """
     felt = felt_under(image, lattices.gain)
     cells, offsets = cells_and_offsets(image, lattices.pose, template.pitch_mm)
-    tables = tables_at(template, offsets, lattices.pose[:, 3], felt.contact)
+    tables = tables_at(template, offsets, lattices.pose, felt)
     if noise is None:
         best = int(np.argmax(lattices.value))
         noise = max(settings.least_noise, _left(felt, tables, cells, best))
@@ -121,7 +121,7 @@ def scored(
                 x_mm=float(lattices.pose[b, 0]),
                 y_mm=float(lattices.pose[b, 1]),
                 theta_rad=math.remainder(float(lattices.pose[b, 2]), 2 * math.pi),
-                spread=float(lattices.pose[b, 3]),
+                nuisance=lattices.pose[b, 3:],
                 gain=lattices.gain[b],
                 cells=names,
                 scores=scores - most[:, None],
@@ -136,16 +136,18 @@ def scored(
 
 def _left(felt: Felt, tables: Floats, cells: NDArray[np.int64], best: int) -> float:
     """Return the standard deviation of psi, on a covered tactel, that a lattice leaves."""
+    cut = slice(best, best + 1)
     one = Felt(
-        felt.psi[best : best + 1],
-        felt.press[best : best + 1],
-        felt.contact[best : best + 1],
+        felt.psi[cut],
+        felt.press[cut],
+        felt.floor[cut],
+        felt.contact[cut],
         felt.trust,
-        felt.measure[best : best + 1],
+        felt.measure[cut],
     )
-    table = tables[best : best + 1]
+    table = tables[cut]
     scores = log_likelihoods(one, table, np.array([NOISE]))
-    values = chosen(cells[best : best + 1], table, scores)
+    values = chosen(cells[cut], table, scores, one)
     away = (one.psi - values[..., 0]) * one.press / spread(values[:, :, None])[..., 0]
     away = np.minimum(np.abs(away), 4 * NOISE)
     return math.sqrt(float((felt.trust * away**2).sum() / felt.trust.sum()))

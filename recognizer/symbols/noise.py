@@ -28,13 +28,14 @@ class Felt:
 
     psi: Array  #: (b, n) of the forces over the gain
     press: Array  #: (b, n) 0 ... 1, how hard the plane presses; 1 where it does as in the middle
+    floor: Array  #: (b, n) psi of a tactel over the bare face, 0 where it does not reach it
     contact: Array  #: (b, n) 1, falling to 0 where the sensor hangs in the air
     trust: Array  #: (n,)
     measure: Array  #: (b,) sum of log |d psi / d force|: makes planes of other gain comparable
 
 
 def spread(tables: Floats | Array) -> Floats:
-    """Return the spread (b, n, q) of psi around templates (b, n, q, 4), in units of the noise."""
+    """Return the spread (b, n, q) of psi around templates (b, n, q, 5), in units of the noise."""
     value, x, y = tables[..., 0], tables[..., 1], tables[..., 2]
     square = QUIET**2 + value * value + DISPLACED_MM**2 * (x * x + y * y)
     return np.asarray(np.sqrt(square), np.float32)
@@ -46,14 +47,18 @@ def log_likelihoods(felt: Felt, tables: Floats, noise: Array) -> Array:
     Parameters
     ----------
     tables
-        (b, n, q, 4) templates under each tactel.
+        (b, n, q, 5) templates under each tactel.
     noise
         (b,) standard deviation of psi on a covered tactel.
     """
     unit = noise[:, None] / np.maximum(felt.press, 1e-3)
-    none = np.full((*felt.psi.shape, 1), QUIET)
-    widths = np.concatenate([spread(tables), none], axis=-1)
-    values = np.concatenate([tables[..., 0], np.zeros_like(none)], axis=-1)
+    symbols = _each(felt, tables[..., 0], spread(tables), unit)
+    bare = np.stack([np.zeros_like(felt.floor), felt.floor], axis=-1)  # beyond the edge, or not
+    nothing = _each(felt, bare, np.hypot(QUIET, bare), unit).max(axis=-1, keepdims=True)
+    return np.concatenate([symbols, nothing], axis=-1)
+
+
+def _each(felt: Felt, values: Array | Floats, widths: Array | Floats, unit: Array) -> Array:
     away = (felt.psi[..., None] - values) / (unit[..., None] * widths)
     each = -np.minimum(0.5 * away * away, MOST) - np.log(widths)
-    return np.asarray(felt.trust[:, None] * each)
+    return np.asarray(felt.trust[:, None] * each, np.float64)

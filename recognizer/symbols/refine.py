@@ -25,10 +25,14 @@ STEEPEST = 1.7  #: slope of a gain plane; over 1 a part of the sensor hangs in t
 LEAST_PRESS = 0.2  #: of a tactel where the plane presses little or not at all
 LEAST_GAIN = 0.12  #: of the largest over the sensor: below it a tactel tells nothing of symbols
 NOISE = 0.15  #: standard deviation of psi on a covered tactel, until it is known better
-SPREADS = -0.5, 0.7  #: of the spread, `template`
+LIMITS = np.array([0.7, 0.4, 0.03])  #: of spread, exponent - 1 and scale - 1, `template`
+_REACHED = 0.15  # psi beside symbols at which the bare face may be pressed
+_REACHING = 8  # such tactels, at least
 _FAR = 4.0  # standard deviations at which a tactel's loss stops growing
-_STEP_MM, _STEP_RAD = 1.0, 0.08  # largest change in one step
-_DAMPING = np.array([1.0, 1.0, 100.0, 3.0])
+_STEP = np.array([1.0, 1.0, 0.08, 0.5, 0.15, 0.01])  # largest change in one step
+_DAMPING = np.array([1.0, 1.0, 100.0, 1.0, 1.0, 100.0])
+_PRIOR = np.array([0.0, 0.0, 0.0, 0.5, 0.2, 0.01])
+_PRIOR = np.where(_PRIOR > 0, 1 / np.maximum(_PRIOR, 1e-9) ** 2, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,10 +53,10 @@ class Image:
 class Lattices:
     """Candidates: sensor point s lies at R(theta) s + (x, y) in the lattice frame."""
 
-    pose: Array  #: (b, 4) x, y (mm), theta (rad), spread (`template`)
-    gain: Array  #: (b, 3) of the plane
+    pose: Array  #: (b, 6) x, y (mm), theta (rad); spread, exponent - 1, scale - 1
+    gain: Array  #: (b, 4) of the plane, and how much less the bare face gets (inf: all of it)
     value: Array  #: (b,) log-likelihood of the image, nats, up to a constant of the image
-    normal: Array  #: (b, 4, 4) inverse covariance of the pose and the spread
+    normal: Array  #: (b, 6, 6) inverse covariance of `pose`
 
 
 def image_of(sensor: Sensor, forces: Array, trust: Array) -> Image:
@@ -66,11 +70,11 @@ def image_of(sensor: Sensor, forces: Array, trust: Array) -> Image:
 
 
 def first_gain(image: Image, ink: float) -> Array:
-    """Return the gain plane (3,) of an image that shows symbols of mean response `ink` all over."""
+    """Return the gain (4,) of an image that shows symbols of mean response `ink` all over."""
     basis = image.plane()
     root = np.sqrt(image.trust)
     gain = np.linalg.lstsq(basis * (root * ink)[:, None], image.forces * root, rcond=None)[0]
-    return np.asarray(bounded_gain(np.asarray(gain, np.float64)[None], 0.9)[0])
+    return np.append(bounded_gain(np.asarray(gain, np.float64)[None], 0.9)[0], np.inf)
 
 
 def bounded_gain(gain: Array, steepest: float = STEEPEST) -> Array:
@@ -82,14 +86,17 @@ def bounded_gain(gain: Array, steepest: float = STEEPEST) -> Array:
 
 
 def felt_under(image: Image, gain: Array) -> Felt:
-    """Return the image as it is under gain planes (b, 3)."""
-    plane = gain @ image.plane().T
-    floor = LEAST_GAIN * plane.max(axis=1, keepdims=True)
-    divisor = np.maximum(plane, floor)
-    measure = -(image.trust * np.log(divisor + 3.0 * image.forces)).sum(axis=1)
-    press = np.clip(plane / (0.5 * gain[:, :1]), LEAST_PRESS, 1.0)
+    """Return the image as it is under gains (b, 4)."""
+    plane = gain[:, :3] @ image.plane().T
+    least = LEAST_GAIN * plane.max(axis=1, keepdims=True)
+    divisor = np.maximum(plane, least)
     return Felt(
-        psi(image.forces / divisor), press, np.clip(plane / floor, 0.0, 1.0), image.trust, measure
+        psi=psi(image.forces / divisor),
+        press=np.clip(plane / (0.5 * gain[:, :1]), LEAST_PRESS, 1.0),
+        floor=psi((plane - gain[:, 3:]) / divisor),
+        contact=np.clip(plane / least, 0.0, 1.0),
+        trust=image.trust,
+        measure=-(image.trust * np.log(divisor + 3.0 * image.forces)).sum(axis=1),
     )
 
 
@@ -97,6 +104,7 @@ def cells_and_offsets(image: Image, pose: Array, pitch: float) -> tuple[NDArray[
     """Return the cell (column, upward row) under each tactel and its offset, both (b, n, 2)."""
     c, s = np.cos(pose[:, 2, None]), np.sin(pose[:, 2, None])
     x, y = image.points_mm.T
+    c, s = c * (1 + pose[:, 5, None]), s * (1 + pose[:, 5, None])
     u = np.stack([pose[:, 0, None] + c * x - s * y, pose[:, 1, None] + s * x + c * y], axis=-1)
     cells = np.floor(u / pitch)
     return cells.astype(np.int64), u - (cells + 0.5) * pitch
@@ -127,17 +135,17 @@ def refined(
     pose, gain = start.pose.copy(), start.gain.copy()
     noises = np.full(len(pose), noise)
     value = start.value
-    normal = np.zeros((len(pose), 4, 4))
+    normal = np.zeros((len(pose), 6, 6))
     for step in range(steps + 1):
         felt = felt_under(image, gain)
         cells, offsets = cells_and_offsets(image, pose, template.pitch_mm)
-        tables = tables_at(template, offsets, pose[:, 3], felt.contact)
+        tables = tables_at(template, offsets, pose, felt)
         scores = log_likelihoods(felt, tables, noises)
         number, dense = _numbered(cells)
         labels = _best(number, dense, scores) if shown is None else shown(cells)
         value = np.take_along_axis(scores, labels[..., None], axis=2)[..., 0].sum(axis=1)
         value += felt.measure + (felt.trust * np.log(felt.press)).sum(axis=1)
-        values = _labelled(tables, labels)
+        values = _labelled(tables, labels, felt)
         width = noise * spread(values[:, :, None])[..., 0] / felt.press
         residual = felt.psi - values[..., 0]
         sure = felt.trust * (np.abs(residual) < _FAR * width) / width**2
@@ -145,27 +153,33 @@ def refined(
         if step == steps:
             break
         pose = pose + _moved(normal, image, pose, values, residual * sure)
-        pose[:, 3] = np.clip(pose[:, 3], *SPREADS)
-        gain = _gain(image, gain, values[..., 0], (sure > 0) * felt.contact * felt.press**2)
+        pose[:, 3:] = np.clip(pose[:, 3:], -LIMITS, LIMITS)
+        gain = _gain(image, felt, gain, values, sure > 0)
     return Lattices(pose, gain, value, normal)
 
 
 def started(pose: Array, gain: Array) -> Lattices:
-    """Return candidates of which nothing is known but pose (b, 4) and gain (b, 3)."""
-    return Lattices(pose, gain, np.zeros(len(pose)), np.zeros((len(pose), 4, 4)))
+    """Return candidates of which nothing is known but pose (b, 6) and gain (b, 4)."""
+    return Lattices(pose, gain, np.zeros(len(pose)), np.zeros((len(pose), 6, 6)))
 
 
-def chosen(cells: NDArray[np.int64], tables: Floats, scores: Array) -> Array:
-    """Return psi and slopes (b, n, 4) of the symbol that fits best in each cell, or of none."""
+def chosen(cells: NDArray[np.int64], tables: Floats, scores: Array, felt: Felt) -> Array:
+    """Return psi and slopes (b, n, 5) of the symbol that fits best in each cell, or of none."""
     number, dense = _numbered(cells)
-    return _labelled(tables, _best(number, dense, scores))
+    return _labelled(tables, _best(number, dense, scores), felt)
 
 
-def tables_at(template: Template, offsets: Array, spreads: Array, contact: Array) -> Floats:
-    """Return templates (b, n, q, 4) at offsets, for the spread and the contact that is fitted."""
+def tables_at(template: Template, offsets: Array, pose: Array, felt: Felt) -> Floats:
+    """Return templates (b, n, q, 5) at offsets, for the spread, exponent and gain fitted."""
     tables = template.at(offsets)
-    tables[..., 0] += tables[..., 3] * spreads[:, None, None].astype(np.float32)
-    tables *= contact[..., None, None].astype(np.float32)
+    by = pose[:, 3:5].astype(np.float32)[:, :, None, None]
+    tables[..., 0] += tables[..., 3] * by[:, 0] + tables[..., 4] * by[:, 1]
+    tables *= felt.contact[..., None, None].astype(np.float32)
+    if felt.floor.any():
+        floor = felt.floor[..., None].astype(np.float32)
+        bare = floor > tables[..., 0]
+        tables[bare] = 0
+        tables[..., 0] = np.maximum(tables[..., 0], floor)
     return tables
 
 
@@ -180,10 +194,16 @@ def _best(number: int, dense: NDArray[np.int64], scores: Array) -> NDArray[np.in
     return np.asarray(best[dense])
 
 
-def _labelled(tables: NDArray[np.float32], labels: NDArray[np.int64]) -> Array:
-    """Return psi and slopes (b, n, 4) of given symbols, 0 where there is none."""
+def _labelled(tables: Floats, labels: NDArray[np.int64], felt: Felt) -> Array:
+    """Return psi and slopes (b, n, 5) of given symbols, and of the bare face where there is none.
+
+    Beyond the edge of a face nothing is felt: a tactel without a symbol shows what is nearer.
+    """
     values = np.take_along_axis(tables, labels.clip(min=0)[..., None, None], axis=2)[:, :, 0]
-    return np.asarray(values * (labels >= 0)[..., None], np.float64)
+    found = np.where((labels >= 0)[..., None], values, 0).astype(np.float64)
+    bare = (labels < 0) & (felt.psi > felt.floor / 2)
+    found[bare, 0] = felt.floor[bare]
+    return found
 
 
 def _numbered(cells: NDArray[np.int64]) -> tuple[int, NDArray[np.int64]]:
@@ -197,39 +217,54 @@ def _numbered(cells: NDArray[np.int64]) -> tuple[int, NDArray[np.int64]]:
 
 
 def _jacobian(image: Image, pose: Array, values: Array) -> Array:
-    """Return the derivatives (b, n, 4) of psi by x, y, theta and spread."""
+    """Return the derivatives (b, n, 6) of psi by the pose and what is fitted with it."""
     c, s = np.cos(pose[:, 2, None]), np.sin(pose[:, 2, None])
     x, y = image.points_mm.T
+    across, up = c * x - s * y, s * x + c * y
     slope_x, slope_y = values[..., 1], values[..., 2]
-    turn = slope_x * (-s * x - c * y) + slope_y * (c * x - s * y)
-    return np.stack([slope_x, slope_y, turn, values[..., 3]], axis=-1)
+    turn, scale = slope_y * across - slope_x * up, slope_x * across + slope_y * up
+    return np.stack([slope_x, slope_y, turn, values[..., 3], values[..., 4], scale], axis=-1)
 
 
 def _normal(image: Image, pose: Array, values: Array, sure: Array) -> Array:
-    """Return the normal matrices (b, 4, 4) of pose and spread."""
+    """Return the normal matrices (b, 6, 6), with what is known of the last three beforehand."""
     jacobian = _jacobian(image, pose, values)
-    return np.asarray((jacobian * sure[..., None]).swapaxes(1, 2) @ jacobian)
+    normal = (jacobian * sure[..., None]).swapaxes(1, 2) @ jacobian
+    return np.asarray(normal + np.diag(_PRIOR))
 
 
 def _moved(normal: Array, image: Image, pose: Array, values: Array, pull: Array) -> Array:
-    """Return the damped Gauss-Newton step (b, 4) of the pose and the spread."""
-    right = _jacobian(image, pose, values).swapaxes(1, 2) @ pull[..., None]
-    step = np.linalg.solve(normal + np.diag(_DAMPING), right)[..., 0]
-    limits = np.array([_STEP_MM, _STEP_MM, _STEP_RAD, 0.5])
-    return np.clip(step, -limits, limits)
+    """Return the damped Gauss-Newton step (b, 6)."""
+    right = (_jacobian(image, pose, values).swapaxes(1, 2) @ pull[..., None])[..., 0]
+    right[:, 3:] -= _PRIOR[3:] * pose[:, 3:]
+    step = np.linalg.solve(normal + np.diag(_DAMPING), right[..., None])[..., 0]
+    return np.clip(step, -_STEP, _STEP)
 
 
-def _gain(image: Image, gain: Array, values: Array, weights: Array) -> Array:
-    """Return the gain planes (b, 3) that explain the forces best, labels and pose held."""
-    response = np.expm1(values * math.log(4.0)) / 3.0
+def _gain(image: Image, felt: Felt, gain: Array, values: Array, near: NDArray[np.bool_]) -> Array:
+    """Return the gains (b, 4) that explain the forces best, labels and pose held.
+
+    Symbols press with the plane g, the bare face with what is left of it after its depth h,
+    g - h: linear in both, once it is known which tactels reach the face.
+    """
     basis = image.plane()
-    sure = weights / (0.03 + 0.10 * response) ** 2
-    design = basis[None] * response[..., None]
+    response = np.expm1(values[..., 0] * math.log(4.0)) / 3.0
+    by_symbol = np.abs(values[..., 1:3]).sum(axis=-1) > 0
+    by_symbol |= response > 0.7
+    flat = ~by_symbol & (felt.psi > _REACHED)
+    reached = flat & (flat.sum(axis=1) >= _REACHING)[:, None]
+    weights = np.where(near & by_symbol, felt.contact * felt.press**2, 0.0) * felt.trust
+    weights = np.where(reached, felt.trust, weights)
+    share = np.where(reached, 1.0, response)
+    sure = weights / (0.03 + 0.10 * share) ** 2
+    design = np.concatenate(
+        [basis[None] * share[..., None], -reached[..., None].astype(np.float64)], axis=-1
+    )
     weighted = design * sure[..., None]
-    normal = np.einsum("bni,bnj->bij", weighted, design)
-    ridge = 1e-2 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.diag([0.0, 1.0, 1.0])
-    ridge += 1e-9 * (1 + np.trace(normal, axis1=1, axis2=2))[:, None, None] * np.eye(3)
-    right = np.einsum("bni,n->bi", weighted, image.forces)
-    found = np.linalg.solve(normal + ridge, right[..., None])[..., 0]
-    usable = found[:, 0] > 0
-    return bounded_gain(np.where(usable[:, None], found, gain))
+    normal = weighted.swapaxes(1, 2) @ design
+    size = np.trace(normal[:, :3, :3], axis1=1, axis2=2)[:, None, None]
+    normal += size * np.diag([0.0, 1e-2, 1e-2, 1e-6]) + 1e-9 * (1 + size) * np.eye(4)
+    found = np.linalg.solve(normal, weighted.swapaxes(1, 2) @ image.forces[:, None])[..., 0]
+    depth = np.where(reached.any(axis=1) & (found[:, 3] > 0), found[:, 3], np.inf)
+    plane = np.where((found[:, :1] > 0), found[:, :3], gain[:, :3])
+    return np.column_stack([bounded_gain(plane), depth])

@@ -9,7 +9,8 @@ because a partly covered tip bulges into the open side; the pad passes on only w
 coarser than its thickness (numerics of `probe.contact`). Responses are kept as
 psi(y) = log(1 + 3 y) / log 4, in which gain errors and noise have about one size. How sharp
 the sensor sees is fitted with the rest: the spread runs from -1/2, the overlay alone, to
-1/2, strokes printed too wide and seen through cross-talk.
+1/2, strokes printed too wide and seen through cross-talk; an exponent stands for a force law
+that is not quite the one that was taken off.
 Thesis 4.2, 6.2.
 """
 
@@ -47,7 +48,7 @@ class Template:
     pitch_mm: float
     order: int  #: number of symbols
     half_mm: float  #: the grid covers offsets -half ... half in x and y
-    values: Floats  #: (n, n, order, 4) psi of the response, its slopes per mm and per spread
+    values: Floats  #: (n, n, order, 5) psi of the response, slopes by x, y (mm), spread, exponent
     ink: float  #: mean response over a cell
 
     @property
@@ -56,7 +57,7 @@ class Template:
         return int(self.values.shape[0])
 
     def at(self, offsets_mm: NDArray[np.float64]) -> Floats:
-        """Return psi and slopes (..., order, 4) at offsets (..., 2); 0 outside the grid."""
+        """Return psi and slopes (..., order, 5) at offsets (..., 2); 0 outside the grid."""
         index = np.rint((offsets_mm + self.half_mm) / STEP_MM).astype(np.intp)
         inside = np.all((index >= 0) & (index < self.size), axis=-1)
         index[np.logical_not(inside)] = 0
@@ -75,7 +76,7 @@ def template_of(alphabet: Alphabet, style: SymbolStyle, sensor: Sensor) -> Templ
     steps = math.ceil(extent / STEP_MM) + 1
     axis = (np.arange(2 * steps + 1) - steps) * STEP_MM
     x, y = np.meshgrid(axis, axis)
-    values = np.zeros((len(axis), len(axis), alphabet.order, 4), np.float32)
+    values = np.zeros((len(axis), len(axis), alphabet.order, 5), np.float32)
     ink = []
     for label, glyph in enumerate(alphabet.glyphs):
         strokes = np.array(glyph.strokes, dtype=np.float64) * reach
@@ -91,8 +92,16 @@ def template_of(alphabet: Alphabet, style: SymbolStyle, sensor: Sensor) -> Templ
         values[..., label, 1] = np.gradient(middle, STEP_MM, axis=1)
         values[..., label, 2] = np.gradient(middle, STEP_MM, axis=0)
         values[..., label, 3] = smeared - sharp
+        values[..., label, 4] = _by_exponent(middle)
     values.setflags(write=False)
     return Template(style.pitch_mm, alphabet.order, steps * STEP_MM, values, float(np.mean(ink)))
+
+
+def _by_exponent(table: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the derivative of psi(y^e) by e at e = 1, of a table of psi(y); 0 where y is 0."""
+    response = np.expm1(table * math.log1p(_PSI)) / _PSI
+    known = np.maximum(response, 1e-12)
+    return _PSI * response * np.log(known) / ((1 + _PSI * response) * math.log1p(_PSI))
 
 
 def _smeared(felt: NDArray[np.float64], sensor: Sensor) -> NDArray[np.float64]:

@@ -39,7 +39,6 @@ class Watch:
     """Shows images, takes frames, and compares them; in two threads."""
 
     probe: EmulatedProbe
-    client: Client
     rng: np.random.Generator
     shown: deque[np.ndarray] = field(default_factory=lambda: deque(maxlen=REMEMBERED))
     arrivals_s: list[float] = field(default_factory=list)
@@ -50,13 +49,15 @@ class Watch:
 
     def show(self) -> None:
         while not self.ended:
-            counts = self.rng.integers(0, 1024, (16, 16))
-            self.shown.append(counts)
-            self.probe.show((counts + 0.5) * 5000 / 1024)
+            self.show_one()
             time.sleep(SHOWN_S)
 
-    def take(self) -> None:
-        for frame in self.client.frames():
+    def show_one(self) -> None:
+        self.shown.append(self.rng.integers(0, 1024, (16, 16)))
+        self.probe.show((self.shown[-1] + 0.5) * 5000 / 1024)
+
+    def take(self, client: Client) -> None:
+        for frame in client.frames():
             self.arrivals_s.append(time.monotonic())
             self.seqs.append(frame.seq)
             self.wrong += not self.right(frame)
@@ -65,7 +66,7 @@ class Watch:
                 time.sleep(pause_s)
 
     def right(self, frame: Frame) -> bool:
-        images = np.array(self.shown)
+        images = np.array(list(self.shown))
         return bool((np.abs(images - frame.counts.astype(int)).max(axis=(1, 2)) <= 1).any())
 
     def back_ms(self, since_s: float, anew: bool = False) -> float:
@@ -151,19 +152,18 @@ def second(watch: Watch) -> list[float]:
 
 
 def run(fault: Fault, seed: int, buffer: int) -> tuple[ClientStatistics, int, float, list[float]]:
-    with emulated_probe(seed=seed) as probe, Client(probe.url, buffer=buffer) as client:
-        watch = Watch(probe, client, np.random.default_rng(seed))
-        shower = threading.Thread(target=watch.show)
-        taker = threading.Thread(target=watch.take)
-        shower.start()
-        while not watch.shown:
-            time.sleep(0.01)
-        taker.start()
-        time.sleep(1.0)
-        back = fault(watch)
-        seen = client.statistics()
-        watch.ended = True
-        client.close()
+    with emulated_probe(seed=seed) as probe:
+        watch = Watch(probe, np.random.default_rng(seed))
+        watch.show_one()  # before the first scan
+        with Client(probe.url, buffer=buffer) as client:
+            shower = threading.Thread(target=watch.show)
+            taker = threading.Thread(target=watch.take, args=(client,))
+            shower.start()
+            taker.start()
+            time.sleep(1.0)
+            back = fault(watch)
+            seen = client.statistics()
+            watch.ended = True
         shower.join()
         taker.join()
     pause_s = float(np.diff(watch.arrivals_s[10:]).max())

@@ -89,6 +89,16 @@ def test_sensor_and_bits_are_selected_and_told_again_after_a_reset(probe):
         until(client, lambda f: client.device is not None)
 
 
+def test_a_reset_within_a_packet_costs_little_time(probe):
+    # The ident of the new start is joined to the packet that was being sent, and fails with it.
+    with Client(probe.url) as client:
+        until(client, lambda f: f.seq > 20)
+        probe.fault("reset")
+        until(client, lambda f: client.statistics().reboots == 1)
+        # Otherwise half a second of silence would have been waited for, and told.
+        assert client.notices() == ["the probe started anew"]
+
+
 def test_unplugging_is_survived_and_told(probe):
     with Client(probe.url) as client:
         before = until(client, lambda f: f.seq > 20)

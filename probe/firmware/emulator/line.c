@@ -15,7 +15,7 @@
 
 #include "chance.h"
 
-#define MEMORY 4096 /* bytes that the adapter keeps for a slow listener */
+#define MEMORY 65536 /* bytes kept for a slow listener, as by a Linux serial driver */
 #define RECEIVED 256
 #define UCSR0A 0xC0 /* data addresses, the same in both parts */
 #define UCSR0B 0xC1

@@ -1,7 +1,8 @@
 /* The serial line as a USB-serial adapter shows it: a pseudo-terminal under a stable name.
  *
  * Bytes that nobody listens to are lost; bytes for a listener who is too slow wait in the
- * adapter's memory until it is full, then they are lost too. The processor never waits.
+ * memory of the adapter and its driver until that is full, then they are lost too. The
+ * processor never waits.
  */
 #ifndef LINE_H
 #define LINE_H

@@ -3,11 +3,14 @@
 import errno
 import os
 import pty
+import subprocess
+import sys
 import tty
 from contextlib import suppress
 
 import pytest
 
+from probe.client import Client
 from probe.errors import PortError
 from probe.port import list_ports, open_port
 from probe.port.serial_line import _refused, open_serial
@@ -120,6 +123,17 @@ def test_ports_are_listed_likely_probes_first():
     entries = list_ports()
     assert all(entry.url == f"serial://{entry.device}" for entry in entries)
     assert [entry.likely for entry in entries] == sorted((e.likely for e in entries), reverse=True)
+
+
+def test_libraries_load_when_a_port_is_opened():
+    code = "import sys, probe.client, probe.port; print({'serial', 'h5py'} & set(sys.modules))"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ran.stdout == "set()\n"
+
+
+def test_a_client_needs_a_buffer():
+    with pytest.raises(PortError, match="a buffer of 0 frames"):
+        Client("sim:", buffer=0)
 
 
 @pytest.fixture

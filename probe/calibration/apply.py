@@ -1,0 +1,140 @@
+"""Counts -> newtons by a calibration, and back.
+
+Without a calibration counts are read as they are: any monotone, roughly proportional
+response.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from probe.calibration.law import law_s
+from probe.calibration.value import Calibration, Condition, Image
+from probe.circuit import Inverted, inverted
+from probe.circuit.readout import scanned, shares
+from probe.errors import CalibrationError
+from probe.frame import Frame
+
+_FELT = 3.0  # sigmas of a conductance from which it is a force
+_LEAK_S = 1e-9  # joins the network of a board with floating rows
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibrated:
+    """An image in newtons, or in counts where there is no calibration."""
+
+    values: Image  #: (..., rows, columns) N, 0 or more; 0 where bad
+    sigma: Image  #: (..., rows, columns) N, standard deviation; inf where bad
+    bad: NDArray[np.bool_]  #: (..., rows, columns) dead, stuck, hidden, or saturated in this image
+    unit: Literal["N", "counts"]
+
+
+def calibrated(image: Frame | ArrayLike, calibration: Calibration | None = None) -> Calibrated:
+    """Return the forces that an image shows.
+
+    Parameters
+    ----------
+    image
+        A frame, or (..., rows, columns) counts.
+    calibration
+        Of the sensor that read it; None reads counts as they are.
+
+    Returns
+    -------
+    Calibrated
+        sigma holds the noise of one frame, the uncertainty of the law, and the share that
+        hysteresis and creep leave open. What is not above three sigma of the noise is 0 N.
+
+    Raises
+    ------
+    CalibrationError
+        If the image has another shape than the calibration.
+    CircuitError
+        If a count is beyond the board's range.
+
+    Examples
+    --------
+    >>> read = calibrated(np.full((16, 16), 7))
+    >>> read.unit, float(read.values[0, 0])
+    ('counts', 7.0)
+    """
+    counts = np.asarray(image.counts if isinstance(image, Frame) else image, dtype=np.float64)
+    if calibration is None:
+        rounding = np.full(counts.shape, 1 / np.sqrt(12.0))
+        return Calibrated(counts, rounding, np.zeros(counts.shape, np.bool_), "counts")
+    c = calibration
+    if counts.shape[-2:] != c.shape:
+        raise CalibrationError(
+            f"an image of {counts.shape}, the calibration of {c.sensor} is for {c.shape}",
+            fix="use the calibration of the sensor that read it",
+        )
+    found = _conductances(counts, c)
+    g, noise = found.conductance_s, found.sigma_s
+    bad = c.bad | np.isnan(g) | (counts >= c.full)
+    felt = ~bad & (g > _FELT * noise)
+    safe = np.where(felt, g, np.where(c.bad, 1.0, np.maximum(_FELT * noise, np.nan_to_num(g))))
+    with np.errstate(invalid="ignore", over="ignore"):
+        over = (safe / c.gain_s) ** (1.0 / c.exponent)
+        variance = (over * noise / (c.exponent * safe)) ** 2
+        variance += _of_the_law(over, c) + (c.repeat * over) ** 2
+        force = np.where(felt, np.maximum(c.break_n + over, 0.0), 0.0)
+        silent = np.maximum(c.break_n, 0.0) + over / _FELT
+        sigma = np.where(bad, np.inf, np.where(felt, np.sqrt(variance), silent))
+    return Calibrated(force, sigma, bad, "N")
+
+
+def expected_counts(forces_n: ArrayLike, calibration: Calibration) -> Image:
+    """Return what the calibrated sensor reads under forces: the inverse of `calibrated`.
+
+    Parameters
+    ----------
+    forces_n
+        (..., rows, columns) N.
+
+    Returns
+    -------
+    (..., rows, columns) counts, not rounded; dead and stuck tactels conduct as at rest.
+    """
+    c = calibration
+    forces = np.asarray(forces_n, dtype=np.float64)
+    if forces.shape[-2:] != c.shape or not np.isfinite(forces).all() or (forces < 0).any():
+        raise CalibrationError(
+            f"forces of shape {forces.shape}, or below 0, for a sensor of {c.shape}",
+            fix="give the force on every tactel, N",
+        )
+    rest = np.nan_to_num(_conductances(c.rest_counts, c).conductance_s)
+    held = np.where(c.condition == Condition.STUCK, rest, 0.0)
+    g = np.where(c.bad, held, law_s(forces, c.gain_s, c.exponent, c.break_n))
+    if c.board is None:
+        read = g + c.bias_counts
+    else:
+        if c.board.readout == "floating":
+            g = g + _LEAK_S
+        read = scanned(shares(g, c.board), c.board) * c.full + c.bias_counts
+    return np.clip(read, 0.0, float(c.full))
+
+
+def _conductances(counts: Image, c: Calibration) -> Inverted:
+    """Return conductances by the board, or counts above the bias where there is none."""
+    if c.board is not None:
+        return inverted(counts, c.board, bias_counts=c.bias_counts)
+    above = counts - c.bias_counts
+    sigma = np.broadcast_to(np.sqrt(c.noise_counts**2 + 1.0 / 12.0), above.shape)
+    lost = above < sigma
+    return Inverted(np.maximum(above, 0.0), sigma, lost, (~lost).sum(axis=(-2, -1)))
+
+
+def _of_the_law(over: Image, c: Calibration) -> Image:
+    """Return the variance (N^2) that the law's own uncertainty gives a force."""
+    by_gain = -over / c.exponent
+    by_exponent = by_gain * np.log(np.maximum(over, 1e-12))
+    v = np.moveaxis(c.covariance, -1, 0)
+    variance: Image = (
+        by_gain**2 * v[0] + by_exponent**2 * v[3] + v[5]
+        + 2.0 * (by_gain * by_exponent * v[1] + by_gain * v[2] + by_exponent * v[4])
+    )  # fmt: skip
+    return np.maximum(variance, 0.0)

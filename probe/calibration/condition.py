@@ -1,0 +1,180 @@
+"""Which tactels are dead, stuck or preloaded: statistics of rest and loads.
+
+A tactel is *preloaded* if it reads well above the common bias at rest, *stuck* if it does and
+no load changes it, *dead* if it feels no load that a sound one feels, *hidden* if a stuck one
+that is shorted takes its column's range, so that no load can tell its law. A tactel that no
+load pressed hard enough cannot be judged, and is an error that names it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.calibration.average import Average
+from probe.calibration.value import Condition
+from probe.errors import CalibrationError
+
+Array = NDArray[np.float64]
+SHOWN = 6  # tactels that a message lists
+
+
+@dataclass(frozen=True, slots=True)
+class Thresholds:
+    """When a tactel is unsound, and what a law needs."""
+
+    felt_n: float = 0.2  #: N, from here every sound tactel responds
+    sigmas: float = 5.0  #: a change is one from so many standard deviations
+    told: float = 3.0  #: a conductance counts as felt from so many standard deviations
+    weak: float = 0.02  #: dead below this share of the median response to the same load
+    raised_counts: float = 5.0  #: counts above the common bias: preloaded or stuck
+    still: float = 0.1  #: stuck if no load changes its conductance by this share
+    levels: int = 3  #: loads of different force that a law needs
+    ratio: float = 3.0  #: of the largest of them to the smallest
+    law: float = 0.02  #: share of a conductance by which loads may miss the law (1 sigma)
+    repeat: float = 0.05  #: share of a force that hysteresis and creep leave open (1 sigma)
+
+
+def common_bias(rest: Average) -> float:
+    """Return what most tactels read at rest, counts."""
+    return float(np.median(rest.mean))
+
+
+def raised(rest: Average, full: int, thresholds: Thresholds) -> NDArray[np.bool_]:
+    """Say which tactels read more than the common bias at rest."""
+    least = np.maximum(thresholds.raised_counts, thresholds.sigmas * rest.sigma)
+    high: NDArray[np.bool_] = (rest.mean - common_bias(rest) > least) | (rest.highest >= full)
+    return high
+
+
+def judged(
+    force_n: Array,
+    read_s: Array,
+    sigma_s: Array,
+    high: NDArray[np.bool_],
+    saturated: NDArray[np.bool_],
+    thresholds: Thresholds,
+) -> NDArray[np.uint8]:
+    """Judge every tactel.
+
+    Parameters
+    ----------
+    force_n, read_s, sigma_s, saturated
+        (L + 1, rows, columns); the first is rest. Conductances nan where contradictory.
+    high
+        (rows, columns) of `raised`.
+
+    Raises
+    ------
+    CalibrationError
+        If tactels were not loaded enough to be judged, or none responds.
+    """
+    t = thresholds
+    unloaded = force_n.max(axis=0) < t.felt_n
+    if unloaded.any():
+        raise CalibrationError(
+            f"{named(unloaded)} carried less than {t.felt_n:g} N in every load, so that nothing "
+            "tells a dead one from one that was not pressed",
+            fix=f"add a load of {t.felt_n:g} N or more on each of them",
+        )
+    rise = read_s[1:] - read_s[0]
+    doubt = np.hypot(sigma_s[1:], sigma_s[0])
+    clear = (rise > t.sigmas * doubt) | saturated[1:]
+    pressed = force_n[1:] >= t.felt_n
+    moved = np.where(clear & pressed & ~saturated[1:], rise, np.nan)
+    with np.errstate(invalid="ignore"):
+        usual = np.array([np.median(m[np.isfinite(m)]) if np.isfinite(m).any() else 0.0
+                          for m in moved])  # fmt: skip
+        feels = pressed & clear & ((rise > t.weak * usual[:, None, None]) | saturated[1:])
+        change = np.abs(rise) > t.still * np.abs(read_s[0])
+    still = high & (saturated[0] | ~(change & clear & ~saturated[1:]).any(axis=0))
+    dead = ~high & ~feels.any(axis=0)
+    if (dead | still).all():
+        raise CalibrationError(
+            "no tactel responds to any load",
+            fix="see that the sensor is connected and that the loads were on it",
+        )
+    condition = np.full(high.shape, Condition.SOUND, dtype=np.uint8)
+    condition[high] = Condition.PRELOADED
+    condition[still] = Condition.STUCK
+    condition[dead] = Condition.DEAD
+    return condition
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Felt:
+    """What loads a tactel felt clearly."""
+
+    levels: NDArray[np.int64]  #: (rows, columns) different forces
+    lowest_n: Array  #: (rows, columns) inf if none
+    highest_n: Array  #: (rows, columns) 0 if none
+
+    def few(self, thresholds: Thresholds) -> NDArray[np.bool_]:
+        """Say where they are too few for a law."""
+        return self.levels < thresholds.levels
+
+    def near(self, thresholds: Thresholds) -> NDArray[np.bool_]:
+        """Say where they lie too near each other."""
+        return ~(self.highest_n >= thresholds.ratio * self.lowest_n)
+
+
+def felt(force_n: Array, firm: NDArray[np.bool_]) -> Felt:
+    """Sum up the loads (L, rows, columns) that are `firm`."""
+    ordered = np.sort(np.where(firm, force_n, np.nan), axis=0)  # nan last
+    steps = ordered[1:] > 1.05 * ordered[:-1]
+    return Felt(
+        steps.sum(axis=0) + firm.any(axis=0),
+        np.where(firm, force_n, np.inf).min(axis=0),
+        np.where(firm, force_n, 0.0).max(axis=0),
+    )
+
+
+def demanded(
+    known: Felt,
+    force_n: Array,
+    saturated: NDArray[np.bool_],
+    live: NDArray[np.bool_],
+    thresholds: Thresholds,
+) -> None:
+    """See that the loads that every live tactel feels determine its law.
+
+    Raises
+    ------
+    CalibrationError
+        Which tactels, what they have, and which load is missing.
+    """
+    t, levels, lowest, highest = thresholds, known.levels, known.lowest_n, known.highest_n
+    full = live & saturated.any(axis=0) & (known.few(t) | known.near(t))
+    if full.any():
+        least = np.where(saturated & (force_n > 0), force_n, np.inf)[:, full].min()
+        raise CalibrationError(
+            f"{named(full)} saturated, and too few loads are left",
+            fix=f"add {max(1, t.levels - int(levels[full].min()))} below {least:.3g} N on each of "
+            "them, or lower the load or feedback resistance of the board",
+        )
+    few = live & known.few(t)
+    if few.any():
+        most = int(levels[few].min())
+        raise CalibrationError(
+            f"{named(few)} felt only {most} different loads clearly, a law needs {t.levels}",
+            fix=f"add {t.levels - most} on them, {t.felt_n:g} N or more, over a ratio of "
+            f"{t.ratio:g}, or record more frames of each",
+        )
+    near = live & known.near(t)
+    if near.any():
+        low, high = lowest[near].min(), highest[near].max()
+        raise CalibrationError(
+            f"{named(near)} felt loads of {low:.3g} ... {high:.3g} N only; they do not span the "
+            f"law, the largest must be {t.ratio:g} times the smallest",
+            fix=f"add a load of {t.ratio * low:.3g} N or more on each of them",
+        )
+
+
+def named(tactels: NDArray[np.bool_]) -> str:
+    """Return tactels in words: how many, and the first few as (row, column)."""
+    places = [f"({r}, {c})" for r, c in np.argwhere(tactels)[:SHOWN]]
+    number = int(tactels.sum())
+    more = ", ..." if number > SHOWN else ""
+    return f"{number} tactel{'' if number == 1 else 's'} [{', '.join(places)}{more}]"

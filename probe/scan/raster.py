@@ -1,0 +1,150 @@
+"""Polygon of a face -> places to press, left to right and top to bottom. Thesis 4.3, figure 4.11.
+
+Neighbours overlap by three quarters of the sensor. The step is 4.25 tactels, not 4: steps of
+whole tactels see every edge at the same place between two tactels, and more touches then tell
+nothing new about it. Places stand on a lattice that may be turned; it is as wide as the face,
+so that its outer touches reach the face's edge or a little beyond. mm, surface frame.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from probe.contact.contract import Touch, WristStiffness
+from probe.errors import SurfaceError
+from probe.sensor import Sensor
+
+STEP_TACTELS: Final = 4.25
+
+
+@dataclass(frozen=True, slots=True)
+class Raster:
+    """Where to press."""
+
+    places_mm: NDArray[np.float64]  #: (n, 2) of the sensor's centre, in the order of scanning
+    cover: NDArray[np.float64]  #: (n,) share of the sensor that lies over the face
+    lines: NDArray[np.int64]  #: (n,) number of the line, from the top
+    theta_rad: float  #: the sensor's x axis from the surface's
+
+    def __len__(self) -> int:
+        return len(self.places_mm)
+
+    def touches(self, force_n: float, wrist: WristStiffness | None = None) -> Iterator[Touch]:
+        """Yield what the contact models take, for a level sensor."""
+        for x, y in self.places_mm.tolist():
+            yield Touch(x, y, self.theta_rad, force_n, wrist=wrist or WristStiffness())
+
+
+def raster(
+    loops: Sequence[ArrayLike],
+    sensor: Sensor | None = None,
+    *,
+    step_tactels: float = STEP_TACTELS,
+    theta_rad: float = 0.0,
+    least_cover: float = 0.1,
+) -> Raster:
+    """Lay a raster of touches over a face.
+
+    Parameters
+    ----------
+    loops
+        (n, 2) corners of the face, and of its holes after it, mm, either way round.
+    sensor
+        The sensor; 16 by 16 if not given.
+    step_tactels
+        Between neighbours, both ways.
+    theta_rad
+        The sensor's x axis, and the lines of the raster, from the surface's x axis.
+    least_cover
+        Places with a smaller share of the sensor over the face are left out.
+
+    Raises
+    ------
+    SurfaceError
+        A loop that is no polygon, or a step that is none.
+    """
+    sensor = sensor or Sensor()
+    if not (0 < step_tactels <= min(sensor.rows, sensor.columns)):
+        raise SurfaceError(
+            f"a step of {step_tactels:g} tactels",
+            fix=f"take more than 0 and at most {min(sensor.rows, sensor.columns)}",
+        )
+    c, s = math.cos(theta_rad), math.sin(theta_rad)
+    turn = np.array([[c, -s], [s, c]])  # from the raster's axes to the surface's
+    polygons = [_polygon(loop) @ turn for loop in loops]
+    if not polygons:
+        raise SurfaceError("a face without a loop", fix="give its corners")
+    half = np.array(sensor.half_mm)
+    low, high = polygons[0].min(axis=0), polygons[0].max(axis=0)
+    xs, ys = (_positions(low[i], high[i], half[i], step_tactels * sensor.pitch_mm) for i in (0, 1))
+    places, cover, lines = [], [], []
+    for line, y in enumerate(ys[::-1]):
+        strips = [_between(p, 1, y - half[1], y + half[1]) for p in polygons]
+        for x in xs:
+            areas = [abs(_area(_between(p, 0, x - half[0], x + half[0]))) for p in strips]
+            share = (areas[0] - sum(areas[1:])) / float(4 * half[0] * half[1])
+            if share > 0 and share >= least_cover:
+                places.append((x, y))
+                cover.append(share)
+                lines.append(line)
+    return Raster(
+        np.array(places).reshape(-1, 2) @ turn.T, np.array(cover), np.array(lines, int), theta_rad
+    )
+
+
+def _positions(low: float, high: float, half: float, step: float) -> NDArray[np.float64]:
+    """Return centres, a step apart, about the middle, that together reach from low to high."""
+    rest = max(0.0, high - low - 2 * half)
+    count = math.ceil(rest / step - 1e-9) + 1
+    numbers = np.arange(count, dtype=np.float64) - (count - 1) / 2
+    return (low + high) / 2 + numbers * step
+
+
+def _polygon(loop: ArrayLike) -> NDArray[np.float64]:
+    corners = np.asarray(loop, np.float64)
+    if corners.ndim != 2 or corners.shape[1:] != (2,) or len(corners) < 3:
+        raise SurfaceError(
+            f"a loop of shape {corners.shape}", fix="give three corners (x, y) or more, mm"
+        )
+    extent = float(np.ptp(corners, axis=0).max())
+    if not np.isfinite(corners).all() or abs(_area(corners - corners[0])) <= 1e-12 * extent**2:
+        raise SurfaceError("a loop without an area", fix="check its corners")
+    return corners
+
+
+def _area(polygon: NDArray[np.float64]) -> float:
+    """Return the signed area of a polygon (n, 2), by corners relative to the first one."""
+    if len(polygon) < 3:
+        return 0.0
+    x, y = (polygon - polygon[0]).T
+    return float(x[:-1] @ y[1:] - x[1:] @ y[:-1]) / 2
+
+
+def _between(
+    polygon: NDArray[np.float64], axis: int, low: float, high: float
+) -> NDArray[np.float64]:
+    """Cut a polygon to low ... high of one coordinate (Sutherland and Hodgman).
+
+    What falls apart stays joined along the cut, which has no area.
+    """
+    for bound, sign in ((low, 1.0), (high, -1.0)):
+        if not len(polygon):
+            break
+        inside = sign * (polygon[:, axis] - bound)
+        following, beyond = np.roll(polygon, -1, axis=0), np.roll(inside, -1)
+        kept = []
+        for a, b, u, v in zip(polygon, following, inside, beyond, strict=True):
+            if u >= 0:
+                kept.append(a)
+            if (u < 0) != (v < 0):
+                cut = a + (b - a) * (u / (u - v))
+                cut[axis] = bound
+                kept.append(cut)
+        polygon = np.array(kept, np.float64).reshape(-1, 2)
+    return polygon

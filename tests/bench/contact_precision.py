@@ -1,0 +1,218 @@
+"""Error against run time of every contact level, and the table that `press` picks from.
+
+    OPENBLAS_NUM_THREADS=1 python tests/bench/contact_precision.py            # the table
+    OPENBLAS_NUM_THREADS=1 python tests/bench/contact_precision.py --write    # and its files
+
+Five indenters at a few places each. The error of an image is the norm of its deviation over
+the norm of the reference, root mean square over the places. References:
+
+    tab   any indenter       127 points on every tip instead of 7, 19, 61
+    pad   washer, sphere     axisymmetric elements, displacement and pressure (Q2-Q1), on a pad
+                             that goes on beyond the matrix; the outermost tactels, to which the
+                             layer gives what it would carry out there, are left out
+          strip, patch, tilt layer with 24 cells to a tactel and 64 points to a cell
+
+Elements are measured on washer and sphere alone: the others' reference is no judge of them.
+Times are CPU medians with the surface, on one thread; what a level makes once (influence
+functions, the condensed pad) is made before. A level that was not measured on every indenter,
+or refuses one, is left out of what `press` picks from by itself.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import math
+import statistics
+import time
+from pathlib import Path
+
+import numpy as np
+
+from probe.contact.contract import Touch, WristStiffness
+from probe.contact.elements_axisymmetric import section
+from probe.contact.elements_round import indented, washer_pad
+from probe.contact.layer import layer
+from probe.contact.press import LEVELS, press
+from probe.contact.tabs import tabs
+from probe.contact.tips import Tips
+from probe.errors import ContactError
+from probe.sensor import Overlay, Sensor
+from probe.surface.face import endless
+from probe.surface.indenters import Sphere, Strip, TiltedPlane, Washer
+
+ROOT = Path(__file__).parents[2]
+TABLE = ROOT / "probe" / "contact" / "precision.json"
+PICTURE = ROOT / "docs" / "contact-precision.png"
+
+L = (((-1, 1), (-1, -1)), ((-1, -1), (1, -1)))
+GLYPHS = (
+    L,
+    (((1, -1), (-1, -1)), ((-1, -1), (-1, 0)), ((-1, 0), (0, 1)), ((0, -1), (0, 0))),
+    (((-1, -1), (0, -1)), ((0, -1), (0, 0)), ((0, 0), (1, 1)), ((0, 0), (-1, 0))),
+    (*L, ((1, -1), (1, 1))),
+)
+STIFF = WristStiffness(1e9, 1e9)  # a level plate, as the axisymmetric references have
+BALL_MM = 30.0
+ROUND = ("washer", "sphere")
+
+
+def cases(rng):
+    """Name -> surface, force on tabs and on a pad (N), wrist."""
+    labels = rng.integers(0, 4, (16, 16))
+    return {
+        "washer": (Washer(), 80.0, 80.0, STIFF),
+        "strip": (Strip(2.0), 40.0, 40.0, STIFF),
+        "sphere": (Sphere(BALL_MM), 40.0, 40.0, STIFF),
+        "patch": (endless(labels, GLYPHS), 80.0, 80.0, STIFF),
+        "tilt": (TiltedPlane(0.02, 0.01), 60.0, 60.0, WristStiffness()),
+    }
+
+
+def places(rng, count, force_n, wrist):
+    """Touches at random within a tactel, at any rotation."""
+    for _ in range(count):
+        x, y = rng.uniform(-0.8, 0.8, 2)
+        yield Touch(float(x), float(y), float(rng.uniform(0, math.pi)), force_n, wrist=wrist)
+
+
+def reference(kind, case, surface, sensor, touch):
+    """Return the forces on the tactels that levels are measured by."""
+    if kind == "tab":
+        return tabs(surface, sensor, touch, Tips(127)).forces_n
+    if case not in ROUND:
+        return layer(surface, sensor, touch, cells_per_tactel=24, samples=64).forces_n
+    pad = sensor.overlay
+    elastic = pad.young_mpa, pad.poisson
+    if case == "washer":
+        part = washer_pad(3.5, 7.5, pad.height_mm, *elastic, parts=28)
+    else:
+        r = np.concatenate([np.linspace(0, 12, 121), np.linspace(12, 30, 31)[1:]])
+        z = pad.height_mm * (1 - (1 - np.linspace(0, 1, 15)) ** 1.6)
+        part = section(r, z, *elastic)
+
+    def heights(r):
+        return surface.heights_mm(np.stack([r, np.zeros_like(r)], axis=1))
+
+    if case == "washer":  # nodes on an edge belong to the washer, whatever the last bit says
+
+        def heights(r):
+            return np.where((r > 3.5 - 1e-9) & (r < 7.5 + 1e-9), 0.0, -np.inf)
+
+    c, s = math.cos(touch.theta_rad), math.sin(touch.theta_rad)
+    axis = (-c * touch.x_mm - s * touch.y_mm, s * touch.x_mm - c * touch.y_mm)
+    return indented(part, heights, touch.force_n).tactels_n(sensor, axis)
+
+
+def measured(kind, case, surface, sensor, touches, repeat):
+    """Return lines (level, error, ms) for one indenter; None where a level refuses it."""
+    wanted = [reference(kind, case, surface, sensor, touch) for touch in touches]
+    round_pad = kind == "pad" and case in ROUND
+    kept = np.s_[1:-1, 1:-1] if round_pad else np.s_[:, :]
+    for level in LEVELS[kind]:
+        if level == "elements" and not round_pad:
+            yield level, math.inf, math.nan
+            continue
+        try:
+            found = [press(surface, sensor, t, accuracy=level).forces_n for t in touches]
+            times = []
+            for touch in itertools.chain(*[touches] * repeat):
+                start = time.process_time()
+                press(surface, sensor, touch, accuracy=level)
+                times.append(time.process_time() - start)
+        except ContactError as refused:
+            print(f"{kind:4}{case:8}{level:12} refused: {refused}")
+            yield level, math.inf, math.nan
+            continue
+        errors = [
+            np.linalg.norm((a - b)[kept]) / np.linalg.norm(b[kept])
+            for a, b in zip(found, wanted, strict=True)
+        ]
+        error = math.sqrt(statistics.fmean(e * e for e in errors))
+        ms = 1e3 * statistics.median(times)
+        print(f"{kind:4}{case:8}{level:12} error {error:9.2e}   {ms:9.2f} ms", flush=True)
+        yield level, error, ms
+
+
+def drawn(lines, path):
+    """Draw error against run time, one panel for each overlay."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, panels = plt.subplots(1, 2, figsize=(10, 4.4), sharey=True)
+    for panel, kind in zip(panels, ("tab", "pad"), strict=True):
+        for number, case in enumerate(dict.fromkeys(line["case"] for line in lines)):
+            here = [p for p in lines if (p["case"], p["overlay"]) == (case, kind) and p["error"]]
+            ladder = [p for p in here if p["level"] != "elements"]
+            alone = [p for p in here if p["level"] == "elements"]
+            for part, style in ((ladder, "o-"), (alone, "s")):
+                panel.loglog([p["ms"] for p in part], [p["error"] for p in part], style, ms=4,
+                             color=f"C{number}", label=case if style == "o-" else None)  # fmt: skip
+            if case == "washer":
+                for p in here:
+                    panel.annotate(p["level"], (p["ms"], p["error"]), fontsize=7,
+                                   xytext=(-3, -9), textcoords="offset points")  # fmt: skip
+        panel.set_title(f"{kind} overlay")
+        panel.set_xlabel("CPU time of a touch [ms]")
+        panel.set_ylim(1e-5, 1)
+        panel.grid(visible=True, which="both", alpha=0.25)
+    panels[0].set_ylabel("error of the image, relative to the reference [-]")
+    panels[0].legend(title="indenter")
+    figure.tight_layout()
+    figure.savefig(path, dpi=150)
+
+
+def main():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--places", type=int, default=3, help="touches on each indenter")
+    parser.add_argument("--repeat", type=int, default=3, help="timings of each touch")
+    parser.add_argument("--case", action="append", help="only these indenters")
+    parser.add_argument("--overlay", choices=("tab", "pad"), help="only this overlay")
+    parser.add_argument("--write", action="store_true", help="write precision.json and the picture")
+    given = parser.parse_args()
+    lines = []
+    for kind in (given.overlay,) if given.overlay else ("tab", "pad"):
+        sensor = Sensor(overlay=Overlay(kind=kind))
+        for case, (surface, on_tabs, on_pad, wrist) in cases(
+            np.random.default_rng(given.seed)
+        ).items():
+            if given.case and case not in given.case:
+                continue
+            force = on_tabs if kind == "tab" else on_pad
+            rng = np.random.default_rng([given.seed, 7])
+            touches = list(places(rng, given.places, force, wrist))
+            for level, error, ms in measured(kind, case, surface, sensor, touches, given.repeat):
+                known = math.isfinite(error)
+                lines.append({"overlay": kind, "case": case, "level": level,
+                              "error": float(f"{error:.3g}") if known else None,
+                              "ms": float(f"{ms:.3g}") if known else None})  # fmt: skip
+    levels = {}
+    for kind, names in LEVELS.items():
+        levels[kind] = []
+        for level in names:
+            here = [p for p in lines if (p["overlay"], p["level"]) == (kind, level)]
+            if here and all(p["error"] is not None for p in here):
+                worst = max(p["error"] for p in here)
+                ms = statistics.median(p["ms"] for p in here)
+                levels[kind].append({"level": level, "error": worst, "ms": ms})
+                print(f"{kind:4}{'worst':8}{level:12} error {worst:9.2e}   {ms:9.2f} ms")
+    if given.write:
+        made = "OPENBLAS_NUM_THREADS=1 python tests/bench/contact_precision.py --write"
+        rows = ",\n".join(f"    {json.dumps(line)}" for line in lines)
+        heads = ",\n".join(
+            f'    "{kind}": [\n' + ",\n".join(f"      {json.dumps(p)}" for p in known) + "\n    ]"
+            for kind, known in levels.items()
+        )
+        head = f'  "made": "{made}",\n  "levels": {{\n{heads}\n  }}'
+        TABLE.write_text(f'{{\n{head},\n  "cases": [\n{rows}\n  ]\n}}\n')
+        drawn(lines, PICTURE)
+
+
+if __name__ == "__main__":
+    main()

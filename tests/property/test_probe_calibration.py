@@ -1,0 +1,134 @@
+"""Any law is found, any calibration survives its file, and what does not suffice is refused."""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from probe.calibration import (
+    Calibration,
+    calibrated,
+    calibration_from,
+    calibration_hash,
+    expected_counts,
+    known_load,
+    read_calibration,
+    write_calibration,
+)
+from probe.calibration.law import fitted, law_s
+from probe.circuit import Electronics
+from probe.errors import CalibrationError
+
+seeds = st.integers(0, 2**32)
+
+
+@st.composite
+def calibrations(draw):
+    """Draw a calibration whose numbers are arbitrary but possible."""
+    rng = np.random.default_rng(draw(seeds))
+    shape = draw(st.tuples(st.integers(2, 6), st.integers(2, 6)))
+    readout = draw(st.sampled_from(["grounded", "virtual", "floating", None]))
+    board = None if readout is None else Electronics(readout=readout, bits=16)
+    scale = 30.0 if board is None else 1e-4
+    root = rng.normal(size=(*shape, 3, 3)) * [0.02, 0.02, 0.002]
+    covariance = np.swapaxes(root, -1, -2) @ root
+    upper = np.triu_indices(3)
+    return Calibration(
+        sensor=draw(st.text(max_size=8)),
+        made="",
+        board=board,
+        full=65535,
+        loads=tuple(draw(st.lists(st.text(max_size=20), max_size=4))),
+        condition=rng.choice(5, shape, p=[0.8, 0.05, 0.05, 0.05, 0.05]),
+        bias_counts=200 + rng.normal(size=shape),
+        rest_counts=250 + rng.normal(size=shape),
+        noise_counts=rng.uniform(0.2, 2, shape),
+        gain_s=scale * np.exp(0.3 * rng.normal(size=shape)),
+        exponent=rng.uniform(0.6, 1.5, shape),
+        break_n=rng.uniform(-0.1, 0.05, shape),
+        covariance=covariance[..., upper[0], upper[1]],
+        most_n=np.full(shape, 3.0),
+        scatter=float(rng.uniform(0.5, 2)),
+        repeat=0.05,
+    )
+
+
+@settings(deadline=None, max_examples=40)
+@given(calibrations())
+def test_a_file_gives_back_what_was_written(calibration):
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "c.json"
+        digest = write_calibration(calibration, path)
+        back = read_calibration(path, sensor=calibration.sensor, shape=calibration.shape)
+        assert calibration_hash(back) == digest
+        assert write_calibration(back, path) == digest
+
+
+@settings(deadline=None, max_examples=40)
+@given(calibrations(), seeds)
+def test_what_is_expected_of_a_force_reads_as_that_force(calibration, seed):
+    forces = np.random.default_rng(seed).uniform(0.3, 1.0, calibration.shape)
+    counts = expected_counts(forces, calibration)
+    read = calibrated(counts, calibration)
+    assert np.isfinite(read.values).all()
+    assert (read.values >= 0).all()
+    assert (read.bad >= calibration.bad).all()
+    told = ~read.bad & (read.values > 0)
+    np.testing.assert_allclose(read.values[told], forces[told], rtol=1e-4)
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    seeds,
+    st.floats(-9, 3),
+    st.floats(0.4, 2.5),
+    st.floats(0, 0.9),
+    st.integers(4, 12),
+)
+def test_a_clean_law_is_found(seed, gain, exponent, broken, number):
+    force = np.sort(np.random.default_rng(seed).uniform(0, 1, number))
+    force = (0.1 * 30 ** ((force - force[0]) / (force[-1] - force[0])))[:, None]
+    read = law_s(force, np.array([10**gain]), np.array([exponent]), np.array([0.1 * broken]))
+    used = np.ones(read.shape, bool)
+    found = fitted(force, read, 0.001 * read, used, np.zeros(1, bool))
+    law = law_s(force, found.gain_s, found.exponent, found.break_n)
+    np.testing.assert_allclose(law, read, rtol=0.003)
+    assert np.isfinite(found.covariance).all()
+
+
+@settings(deadline=None, max_examples=40)
+@given(seeds, st.lists(st.floats(0, 5), max_size=6), st.floats(0, 5))
+def test_loads_either_determine_every_law_or_are_refused(seed, levels, noise):
+    rng = np.random.default_rng(seed)
+
+    def frames(force):
+        return np.clip(np.rint(4 + 200 * force + noise * rng.normal(size=(30, 3, 3))), 0, 1023)
+
+    loads = [known_load(frames(f), np.full((3, 3), f)) for f in levels]
+    try:
+        calibration = calibration_from(frames(0.0), loads, sensor="S")
+    except CalibrationError:
+        return
+    assert len({round(f, 6) for f in levels}) >= 3
+    live = ~calibration.bad
+    assert np.isfinite(calibration.covariance[live]).all()
+    read = calibrated(frames(1.0)[0], calibration)
+    assert np.isfinite(read.values).all()
+    near = live & (calibration.most_n > 1) & ~read.bad
+    assert (np.abs(read.values - 1.0) < 8 * read.sigma + 0.1)[near].all()
+
+
+def test_levels_that_do_suffice_are_taken():
+    """The property above is not met by refusing everything."""
+    rng = np.random.default_rng(1)
+    images = [
+        (f, np.rint(4 + 200 * f + rng.normal(size=(30, 3, 3))).clip(0))
+        for f in (0.0, 0.2, 0.6, 1.8)
+    ]
+    loads = [known_load(counts, np.full((3, 3), f)) for f, counts in images[1:]]
+    calibration = calibration_from(images[0][1], loads, sensor="S")
+    assert not calibration.bad.any()
+    assert calibration.gain_s == pytest.approx(200, rel=0.02)

@@ -1,0 +1,267 @@
+"""The manipulator: link table against the thesis's matrix, branches, singularities, covariance."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from probe.arm.carried import sensor_pose
+from probe.arm.inverse import inverse
+from probe.arm.jacobian import GAIN, LEAST, LENGTH_MM, condition, jacobian, joint_speeds
+from probe.arm.links import Arm, forward, joint_frames
+from probe.errors import PoseError
+from probe.wrist.distances import distances_at, wrist_pose
+from probe.wrist.geometry import Wrist, WristPose
+
+ARM = Arm()
+DEG = math.pi / 180
+DOWN = np.diag([1.0, -1.0, -1.0])
+
+
+def matrix_of_the_thesis(q):
+    """Return the arm matrix of 4.1, with elements (2, 1) and (1, 4) corrected."""
+    q1, q2, q3, q4, q5 = q
+    c1, s1, c5, s5 = math.cos(q1), math.sin(q1), math.cos(q5), math.sin(q5)
+    c2, s2, c23, s23 = math.cos(q2), math.sin(q2), math.cos(q2 + q3), math.sin(q2 + q3)
+    c234, s234 = math.cos(q2 + q3 + q4), math.sin(q2 + q3 + q4)
+    out = 228.6 * c2 + 228.6 * c23 + 9.5 * c234 - 75 * s234
+    down = 228.6 * s2 + 228.6 * s23 + 9.5 * s234 + 75 * c234
+    return [
+        [c1 * c234 * c5 + s1 * s5, -c1 * c234 * s5 + s1 * c5, -c1 * s234, c1 * out],
+        [s1 * c234 * c5 - c1 * s5, -s1 * c234 * s5 - c1 * c5, -s1 * s234, s1 * out],
+        [-s234 * c5, s234 * s5, -c234, 260.4 - down],
+        [0, 0, 0, 1],
+    ]
+
+
+def at(x, y, z, turn=DOWN):
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = turn, (x, y, z)
+    return pose
+
+
+def test_the_link_table_gives_the_corrected_matrix():
+    rng = np.random.default_rng(1)
+    for q in rng.uniform(-math.pi, math.pi, (50, 5)):
+        assert forward(ARM, q) == pytest.approx(np.array(matrix_of_the_thesis(q)), abs=1e-11)
+
+
+def test_the_printed_matrix_is_no_rotation():
+    q = [0.3, 0.4, 0.5, 0.6, 0.7]
+    printed = np.array(matrix_of_the_thesis(q))
+    printed[1, 0] = math.sin(0.3) * math.cos(1.5) * math.cos(0.7) - math.cos(0.3) * math.cos(0.7)
+    turn = printed[:3, :3]
+    assert not np.allclose(turn @ turn.T, np.eye(3), atol=0.1)
+
+
+def test_the_stretched_arm():
+    frames = joint_frames(ARM, np.zeros(5))
+    assert frames[1, :3, 3].tolist() == [0, 0, 260.4]
+    assert frames[3, :3, 3] == pytest.approx([457.2, 0, 260.4])
+    assert frames[5, :3, 3] == pytest.approx([466.7, 0, 185.4])
+    assert frames[5, :3, 2] == pytest.approx([0, 0, -1])  # it points down
+
+
+@pytest.mark.parametrize("bad", [[0, 0, 0, 0], [0, 0, 0, 0, math.nan], "arm"])
+def test_angles_that_are_none(bad):
+    with pytest.raises((PoseError, ValueError)):
+        forward(ARM, bad)
+
+
+def test_four_branches_reach_one_pose():
+    q = np.array([0.4, -0.9, 1.3, 0.2, -0.5])
+    pose = forward(ARM, q)
+    branches = inverse(ARM, pose)
+    assert any(np.allclose(branch, q, atol=1e-12) for branch in branches)
+    assert len(branches) in (2, 4)
+    for branch in branches:
+        assert forward(ARM, branch) == pytest.approx(pose, abs=1e-10)
+    elbows = [branch[2] for branch in branches[:2]]
+    assert elbows == [-elbows[1], -elbows[0]]
+    assert elbows[0] > 0
+
+
+def test_all_four_branches_where_the_arm_may_reach_backwards():
+    branches = inverse(ARM, at(100, 50, 250))
+    assert len(branches) == 4
+    assert len({tuple(branch.round(6)) for branch in branches}) == 4
+    for branch in branches:
+        assert forward(ARM, branch) == pytest.approx(at(100, 50, 250), abs=1e-10)
+
+
+def test_joint_ranges_choose_among_the_branches():
+    narrow = Arm(low_rad=(-1.5, -3, 0, -3, -3), high_rad=(1.5, 3, 3, 3, 3))
+    branches = inverse(narrow, at(100, 50, 250))
+    assert 1 <= len(branches) < 4
+    assert all(narrow.inside(branch) for branch in branches)
+    with pytest.raises(PoseError, match="beyond the range of a joint only, at"):
+        inverse(Arm(low_rad=(2,) * 5, high_rad=(2.1,) * 5), at(100, 50, 250))
+
+
+def test_out_of_reach_says_by_how_much():
+    with pytest.raises(PoseError, match=r"would be (\d+\.?\d*) mm out of reach") as caught:
+        inverse(ARM, at(600, 0, 185.4))
+    assert "133.3 mm" in str(caught.value)  # 600 - 9.5 - 457.2
+    short = Arm(a_mm=(0, 200, 100, 0, 0), d_mm=(0, 0, 0, 0, 0))
+    with pytest.raises(PoseError, match="50 mm out of reach"):
+        inverse(short, at(50, 0, 0))
+
+
+def test_five_axes_cannot_reach_a_sideways_approach():
+    sideways = Rotation.from_euler("x", 20, degrees=True).as_matrix() @ DOWN
+    with pytest.raises(PoseError, match="20 degrees off the vertical plane"):
+        inverse(ARM, at(300, 0, 200, sideways))
+    in_plane = Rotation.from_euler("y", 20, degrees=True).as_matrix() @ DOWN
+    assert inverse(ARM, at(300, 0, 200, in_plane))
+
+
+def test_what_is_no_pose_is_refused():
+    for bad in (np.zeros((4, 4)), np.eye(3), 2 * np.eye(4), np.full((4, 4), np.nan)):
+        with pytest.raises(PoseError, match="no rigid transform"):
+            inverse(ARM, bad)
+    with pytest.raises(PoseError, match="closed form holds"):
+        inverse(Arm(alpha_rad=(0.0,) * 5), at(300, 0, 200))
+
+
+def test_over_the_base_axis():
+    """Shoulder singularity: with a vertical approach the first angle is free."""
+    for pose in (at(0, 0, 600), at(1e-13, -1e-13, 600), at(0, 0, 600, np.eye(3))):
+        for q in inverse(ARM, pose):
+            assert forward(ARM, q) == pytest.approx(pose, abs=1e-9)
+    tilted = Rotation.from_euler("ZY", [40, 30], degrees=True).as_matrix() @ DOWN
+    for radius in (0, 1e-12, 1e-9, 1e-6, 1e-3, 1):
+        pose = at(radius * math.cos(40 * DEG), radius * math.sin(40 * DEG), 600, tilted)
+        for q in inverse(ARM, pose):
+            assert forward(ARM, q) == pytest.approx(pose, abs=1e-9)
+
+
+def test_stretched_and_folded():
+    for bend in (0.0, 1e-12, 1e-9, 1e-6, math.pi - 1e-6, math.pi):
+        pose = forward(ARM, [0.2, -0.6, bend, 0.9, 0.1])
+        branches = inverse(ARM, pose)
+        for q in branches:
+            assert forward(ARM, q) == pytest.approx(pose, abs=1e-6)
+    assert len(inverse(ARM, forward(ARM, [0, 0, 0, 0.5, 0]))) >= 1
+
+
+# --- speeds ------------------------------------------------------------------------------
+
+
+def test_the_jacobian_is_the_derivative():
+    rng = np.random.default_rng(4)
+    for q in rng.uniform(-3, 3, (20, 5)):
+        analytic = jacobian(ARM, q)
+        for i in range(5):
+            step = np.zeros(5)
+            step[i] = 1e-6
+            before, after = forward(ARM, q - step), forward(ARM, q + step)
+            move = (after - before)[:3, 3] / 2e-6
+            turn = Rotation.from_matrix(after[:3, :3] @ before[:3, :3].T).as_rotvec() / 2e-6
+            assert analytic[:, i] == pytest.approx([*move, *turn], abs=1e-4)
+
+
+def test_the_jacobian_of_another_point():
+    q = [0.3, -0.5, 0.8, 0.1, 0.2]
+    offset = np.array([10.0, -20.0, 30.0])
+    tip = jacobian(ARM, q)
+    other = jacobian(ARM, q, forward(ARM, q)[:3, 3] + offset)
+    assert other[3:] == pytest.approx(tip[3:])
+    moved = tip[:3].T + np.cross(tip[3:].T, offset)
+    linear = other[:3].T
+    assert linear == pytest.approx(moved)
+
+
+def test_away_from_singularities_a_twist_is_followed_exactly():
+    q = np.array([0.3, -0.9, 1.4, 0.4, 0.2])
+    speeds = np.array([0.3, -0.2, 0.5, 0.1, -0.4])
+    assert joint_speeds(ARM, q, jacobian(ARM, q) @ speeds) == pytest.approx(speeds, abs=1e-12)
+
+
+def test_joint_speeds_stay_bounded_at_the_elbow_singularity():
+    """Case 13 of the stiff and extreme cases: condition 5e9 at 1e-9 rad."""
+    q = np.array([0.2, -0.6, 1e-9, 0.9, 0.1])
+    assert 1e9 < condition(ARM, q) < 1e10
+    stretch = np.zeros(6)
+    stretch[:3] = 100 * joint_frames(ARM, q)[3, :3, 0]
+    undamped, *_ = np.linalg.lstsq(jacobian(ARM, q), stretch, rcond=None)
+    assert np.abs(undamped).max() > 1e6
+    twists = [*(np.eye(6) * np.repeat([100.0, 1.0], 3)), stretch]
+    for bend in (0.0, 1e-15, 1e-9, 1e-6, 1e-3, 1e-2, 0.1):
+        q[2] = bend
+        for twist in twists:
+            size = np.linalg.norm(twist / np.repeat([LENGTH_MM, 1.0], 3))
+            assert np.linalg.norm(joint_speeds(ARM, q, twist)) <= GAIN / LEAST * size * 1.000001
+
+
+def test_the_other_directions_are_followed_through_the_singularity():
+    q = [0.2, -0.6, 0.0, 0.9, 0.1]
+    u, values, v = np.linalg.svd(jacobian(ARM, q) / np.repeat([LENGTH_MM, 1.0], 3)[:, None])
+    for i in range(4):
+        assert values[i] > LEAST
+        twist = values[i] * u[:, i] * np.repeat([LENGTH_MM, 1.0], 3)
+        assert joint_speeds(ARM, q, twist) == pytest.approx(v[i], abs=1e-9)
+
+
+def test_speeds_do_not_jump_on_the_way_into_the_singularity():
+    twist = [50, 20, -30, 0.1, 0.2, -0.1]
+    bends = np.linspace(-0.3, 0.3, 2001)
+    speeds = np.array([joint_speeds(ARM, [0.2, -0.6, bend, 0.9, 0.1], twist) for bend in bends])
+    jumps = np.abs(np.diff(speeds, axis=0)).max()
+    assert jumps < 0.1 * np.abs(speeds).max()
+
+
+def test_a_twist_that_is_none():
+    for bad in ([1, 2, 3], [math.nan] * 6):
+        with pytest.raises(PoseError, match="give 3 speeds"):
+            joint_speeds(ARM, np.zeros(5), bad)
+
+
+# --- the sensor ------------------------------------------------------------------------------
+
+
+def hanging(wrist, z, x, y):
+    return wrist_pose(wrist, distances_at(wrist, z, x, y))
+
+
+def test_the_sensor_hangs_under_the_gripper():
+    wrist = Wrist(tips_mm=12)
+    level = WristPose(10, 0, 0, np.zeros((3, 3)))
+    found = sensor_pose(ARM, np.zeros(5), np.zeros(5), wrist, level)
+    assert found.T_base_sensor[:3, 3] == pytest.approx([466.7, 0, 185.4 - 22])
+    assert found.T_base_sensor[:3, 2] == pytest.approx([0, 0, 1])  # away from the object
+    assert not found.covariance.any()
+
+
+@pytest.mark.parametrize("gamma", [90, 70])
+def test_the_covariance_of_the_sensor_is_that_of_drawn_errors(gamma):
+    wrist = Wrist(gamma_rad=gamma * DEG, reading_mm=0.02)
+    q = np.array([0.4, -0.7, 1.1, 0.5, -0.3])
+    true = (6.0, 5 * DEG, -4 * DEG)
+    sd = np.array([1e-4, 2e-4, 1e-4, 3e-4, 5e-4])
+    told = sensor_pose(ARM, q, sd, wrist, hanging(wrist, *true))
+    rng = np.random.default_rng(7)
+    drawn = []
+    for _ in range(1500):
+        d = distances_at(wrist, *true) + rng.normal(0, wrist.reading_mm, 4)
+        T = sensor_pose(ARM, q + rng.normal(0, sd), sd, wrist, wrist_pose(wrist, d)).T_base_sensor
+        error = Rotation.from_matrix(T[:3, :3] @ told.T_base_sensor[:3, :3].T).as_rotvec()
+        drawn.append([*(T - told.T_base_sensor)[:3, 3], *error])
+    spread = np.sqrt(told.covariance.diagonal())
+    measured = np.cov(drawn, rowvar=False)
+    assert np.abs((measured - told.covariance) / np.outer(spread, spread)).max() < 0.12
+    assert np.linalg.eigvalsh(told.covariance / np.outer(spread, spread)).min() > 0
+
+
+def test_a_joint_covariance_may_be_full():
+    wrist = Wrist()
+    pose = WristPose(10, 0, 0, np.zeros((3, 3)))
+    q = [0.4, -0.7, 1.1, 0.5, -0.3]
+    sd = np.full(5, 1e-3)
+    by_sd = sensor_pose(ARM, q, sd, wrist, pose)
+    by_matrix = sensor_pose(ARM, q, np.diag(sd**2), wrist, pose)
+    assert by_matrix.covariance == pytest.approx(by_sd.covariance)
+    with pytest.raises(PoseError, match=r"give \(5,\) standard deviations"):
+        sensor_pose(ARM, q, [1e-3], wrist, pose)

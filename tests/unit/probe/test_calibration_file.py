@@ -1,0 +1,190 @@
+"""Calibration files: readable, the same every time, and refused when they do not fit."""
+
+import json
+import os
+
+import numpy as np
+import pytest
+
+from probe.calibration import (
+    calibrated,
+    calibration_from,
+    calibration_hash,
+    drift_of,
+    expected_counts,
+    known_load,
+    read_calibration,
+    write_calibration,
+)
+from probe.circuit import Electronics, Spread, drawn, read_sequence
+from probe.errors import CalibrationError
+from probe.frame import frame_from
+
+NONE = np.zeros((16, 16))
+BOARD = Electronics()
+
+
+@pytest.fixture(scope="module")
+def sensor():
+    return drawn(np.random.default_rng(3), Spread(dead=0.05, stuck=0.01, preloaded=0.01))
+
+
+@pytest.fixture(scope="module")
+def made(sensor):
+    def load(force, seed):
+        return known_load(recorded(sensor, NONE + force, seed), NONE + force)
+
+    return calibration_from(
+        recorded(sensor, NONE, 0),
+        [load(f, i) for i, f in enumerate((0.1, 0.4, 1.0, 2.5))],
+        sensor="bench-1",
+        made="2024-05-01T10:00:00Z",
+        board=BOARD,
+    )
+
+
+def recorded(fsr, forces, seed, board=BOARD):
+    rng = np.random.default_rng(seed)
+    return read_sequence(np.broadcast_to(forces, (220, 16, 16)), board, fsr, None, rng)[0]
+
+
+def test_a_file_gives_back_its_calibration_and_its_bytes(made, tmp_path):
+    path = tmp_path / "a.json"
+    digest = write_calibration(made, path)
+    back = read_calibration(path, sensor="bench-1", shape=(16, 16))
+    assert digest == calibration_hash(made) == calibration_hash(back)
+    assert write_calibration(back, tmp_path / "b.json") == digest
+    assert (tmp_path / "b.json").read_bytes() == path.read_bytes()
+    assert back.board == BOARD
+    for name in ("gain_s", "exponent", "break_n", "covariance", "condition"):
+        np.testing.assert_array_equal(getattr(back, name), getattr(made, name))
+    counts = recorded_counts()
+    np.testing.assert_array_equal(calibrated(counts, back).values, calibrated(counts, made).values)
+
+
+def recorded_counts():
+    return np.random.default_rng(1).integers(0, 300, (16, 16))
+
+
+def test_a_person_can_read_it(made, tmp_path):
+    path = tmp_path / "a.json"
+    write_calibration(made, path)
+    lines = path.read_text().splitlines()
+    assert max(map(len, lines)) < 1500
+    document = json.loads(path.read_text())
+    assert document["sensor"] == "bench-1"
+    assert len(document["condition"]) == 16
+    assert "".join(document["condition"]).count("D") == made.bad.sum() - "".join(
+        document["condition"]
+    ).count("S")
+    assert list(document)[-1] == "sha256"
+    assert [p.name for p in tmp_path.iterdir()] == ["a.json"]
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        (lambda d: d.update(version=2), "version 2"),
+        (lambda d: d.update(format="spec"), "no calibration"),
+        (lambda d: d["gain_s"][3].__setitem__(3, 1.0), "was changed"),
+        (lambda d: d.update(sensor="other"), "was changed"),
+        (lambda d: d.update(sha256="0"), "was changed"),
+        (lambda d: d.pop("gain_s"), "damaged"),
+        (lambda d: d["gain_s"].pop(), "damaged"),
+        (lambda d: d["board"].update(bits=99), "damaged"),
+        (lambda d: d["condition"].__setitem__(0, "?" * 16), "damaged"),
+    ],
+)
+def test_what_was_changed_is_refused(made, tmp_path, change, match):
+    path = tmp_path / "a.json"
+    write_calibration(made, path)
+    document = json.loads(path.read_text())
+    change(document)
+    path.write_text(json.dumps(document))
+    with pytest.raises(CalibrationError, match=match):
+        read_calibration(path)
+
+
+def test_another_sensor_s_file_and_no_file_are_refused(made, tmp_path):
+    path = tmp_path / "a.json"
+    write_calibration(made, path)
+    with pytest.raises(CalibrationError, match="'bench-1', not of 'bench-2'"):
+        read_calibration(path, sensor="bench-2")
+    with pytest.raises(CalibrationError, match="tactels"):
+        read_calibration(path, shape=(8, 8))
+    with pytest.raises(CalibrationError, match="cannot be read"):
+        read_calibration(tmp_path / "none.json")
+    path.write_bytes(b"\xff\x00 nonsense")
+    with pytest.raises(CalibrationError, match="JSON"):
+        read_calibration(path)
+    with pytest.raises(CalibrationError, match="cannot be written"):
+        write_calibration(made, tmp_path / "no" / "folder" / "a.json")
+
+
+def test_a_failed_writing_keeps_the_old_file(made, tmp_path, monkeypatch):
+    path = tmp_path / "a.json"
+    write_calibration(made, path)
+    before = path.read_bytes()
+
+    def full_disk(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full_disk)
+    with pytest.raises(CalibrationError, match="No space"):
+        write_calibration(made, path)
+    assert path.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["a.json"]
+
+
+def test_frames_and_plain_counts_are_read_alike(made):
+    counts = recorded_counts()
+    frame = frame_from(counts, t_ns=0, seq=0)
+    np.testing.assert_array_equal(calibrated(frame, made).values, calibrated(counts, made).values)
+    raw = calibrated(frame)
+    assert raw.unit == "counts"
+    np.testing.assert_array_equal(raw.values, counts)
+    with pytest.raises(CalibrationError, match="calibration of bench-1"):
+        calibrated(np.zeros((8, 8)), made)
+
+
+def test_bad_and_saturated_tactels_tell_no_force(made):
+    counts = np.full((16, 16), 200.0)
+    sound = np.argwhere(made.condition == 0)[0]
+    counts[tuple(sound)] = 1023
+    read = calibrated(counts, made)
+    assert read.bad[tuple(sound)]
+    assert (read.bad >= made.bad).all()
+    assert (read.values[read.bad] == 0).all()
+    assert np.isinf(read.sigma[read.bad]).all()
+    assert np.isfinite(read.values).all()
+
+
+def test_rest_reads_as_no_force(made, sensor):
+    for seed in range(5):
+        read = calibrated(recorded(sensor, NONE, seed)[0], made)
+        assert (read.values[~read.bad] > 0).mean() < 0.02
+
+
+def test_drift_of_bias_and_gain_warns_and_nothing_else_does(made, sensor):
+    one = NONE + 1.0
+    rest, load = recorded(sensor, NONE, 50), known_load(recorded(sensor, one, 51), one)
+    same = drift_of(made, rest, [load])
+    assert same.warning == ""
+    assert abs(same.gain) < 0.05
+    moved = drift_of(made, rest + 3)
+    assert "bias" in moved.warning
+    assert "calibrate again" in moved.warning
+    assert np.isnan(moved.gain)
+    more = known_load(recorded(sensor, 1.3 * one, 52), one)
+    assert "gain changed by +" in drift_of(made, rest, [more]).warning
+    with pytest.raises(CalibrationError):
+        drift_of(made, np.zeros((20, 8, 8)))
+
+
+def test_counts_and_forces_are_each_other_s_inverse(made):
+    forces = np.random.default_rng(2).uniform(0.3, 1.5, (3, 16, 16))
+    read = calibrated(expected_counts(forces, made), made)
+    np.testing.assert_allclose(read.values[~read.bad], forces[~read.bad], rtol=1e-5)
+    for bad in (np.zeros((8, 8)), NONE - 1, NONE + np.nan):
+        with pytest.raises(CalibrationError):
+            expected_counts(bad, made)

@@ -1,0 +1,236 @@
+"""Calibrating simulated sensors whose truth is known, and loads that do not suffice."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from probe.calibration import (
+    Condition,
+    Thresholds,
+    calibrated,
+    calibration_from,
+    even_load,
+    expected_counts,
+    known_load,
+)
+from probe.calibration.average import averaged
+from probe.calibration.law import Fitted, fitted, law_s
+from probe.calibration.pooled import pooled
+from probe.circuit import (
+    DATASHEET,
+    MEASURED,
+    Electronics,
+    Noise,
+    Spread,
+    drawn,
+    fsr_of,
+    read_counts,
+    read_sequence,
+)
+from probe.errors import CalibrationError
+
+BOARD = Electronics()
+NONE = np.zeros((16, 16))
+LEVELS = (0.1, 0.3, 0.8, 2.4)
+
+
+def recorded(fsr, forces, seed, board=BOARD, frames=220):
+    rng = np.random.default_rng(seed)
+    steady = np.broadcast_to(forces, (frames, 16, 16))
+    return read_sequence(steady, board, fsr, None, rng)[0]
+
+
+def calibration_of(fsr, levels=LEVELS, board=BOARD, frames=220, **more):
+    loads = [
+        known_load(recorded(fsr, NONE + f, [i], board, frames), NONE + f, f"{f} N each")
+        for i, f in enumerate(levels)
+    ]
+    rest = recorded(fsr, NONE, 99, board, frames)
+    return calibration_from(rest, loads, sensor="S1", board=board, **more)
+
+
+def test_an_average_leaves_spikes_out_and_knows_slow_noise():
+    rng = np.random.default_rng(1)
+    plain = np.rint(100 + 3 * rng.standard_normal((400, 4, 4)))
+    spiked = plain.copy()
+    spiked[rng.random(plain.shape) < 0.01] += 200
+    assert np.abs(averaged(spiked).mean - averaged(plain).mean).max() < 0.2
+    np.testing.assert_allclose(averaged(plain).sigma, 3 / 20, rtol=0.5)
+    slow = np.repeat(plain[:20], 20, axis=0)
+    assert np.median(averaged(slow).sigma) > 3 * np.median(averaged(plain).sigma)
+
+
+def test_a_law_without_noise_is_found_exactly():
+    force = np.repeat(np.array([0.05, 0.1, 0.4, 1.0, 2.5])[:, None], 3, axis=1)
+    gain, exponent, broken = np.array([1e-4, 3e-5, 2e-4]), np.array([1, 0.7, 1.4]), [0.01, 0, 0.03]
+    read = law_s(force, gain, exponent, np.array(broken))
+    found = fitted(force, read, 1e-3 * read, read > 0, np.zeros(3, bool))
+    np.testing.assert_allclose(found.gain_s, gain, rtol=1e-4)
+    np.testing.assert_allclose(found.exponent, exponent, rtol=1e-4)
+    np.testing.assert_allclose(found.break_n, broken, atol=1e-5)
+
+
+def test_the_covariance_is_the_scatter_of_repeated_fits():
+    rng = np.random.default_rng(0)
+    force = np.repeat(np.array([0.1, 0.2, 0.5, 1.0, 2.0])[:, None], 3000, axis=1)
+    clean = law_s(force, np.full(3000, 1e-4), np.full(3000, 1.0), np.full(3000, 0.03))
+    found = fitted(force, clean * (1 + 0.01 * rng.standard_normal(clean.shape)),
+                   0.01 * clean, clean > 0, np.zeros(3000, bool))  # fmt: skip
+    for values, index in ((np.log(found.gain_s), 0), (found.exponent, 1)):
+        expected = np.sqrt(np.median(found.covariance[:, index, index]))
+        assert values.std() == pytest.approx(expected, rel=0.35)
+
+
+def test_the_condition_of_every_tactel_is_found():
+    fsr = drawn(np.random.default_rng(4), replace(MEASURED, preload_n=0.5))
+    condition = calibration_of(fsr).condition
+    np.testing.assert_array_equal(condition == Condition.DEAD, fsr.dead)
+    assert ((condition == Condition.HIDDEN) <= (fsr.stuck_s > 1e-4).any(axis=0)).all()
+    np.testing.assert_array_equal(condition == Condition.STUCK, fsr.stuck_s > 0)
+    assert ((condition == Condition.PRELOADED) <= (fsr.preload_n > 0)).all()
+    assert (condition == Condition.PRELOADED).sum() >= 3
+
+
+@pytest.mark.parametrize("readout", ["grounded", "virtual"])
+def test_forces_of_held_out_touches(readout):
+    board = Electronics(readout=readout, feedback_ohm=1000.0)
+    fsr = drawn(np.random.default_rng(5), Spread(dead=0.1))
+    calibration = calibration_of(fsr, np.geomspace(0.1, 2.5, 6), board)
+    rng = np.random.default_rng(6)
+    errors, scaled = [], []
+    for seed in range(6):
+        forces = np.where(rng.random((16, 16)) < 0.3, rng.uniform(0.2, 2.0, (16, 16)), 0.0)
+        read = calibrated(recorded(fsr, forces, [6, seed], board, 100).mean(axis=0), calibration)
+        well = ~read.bad & (forces > 0)
+        errors.append((read.values / np.where(well, forces, 1) - 1)[well])
+        single = calibrated(recorded(fsr, forces, [7, seed], board, 1)[0], calibration)
+        scaled.append(((single.values - forces) / single.sigma)[~single.bad & (forces > 0)])
+    assert np.median(np.abs(np.concatenate(errors))) < 0.06
+    usual = np.abs(np.concatenate(scaled))
+    assert 0.7 < np.sqrt((usual[usual < 8] ** 2).mean()) < 1.4
+    assert (usual > 8).mean() < 0.01  # spikes
+
+
+def test_a_preloaded_tactel_has_a_negative_break_force():
+    preload = NONE.copy()
+    preload[3, 4] = 0.4
+    fsr = replace(fsr_of(), preload_n=preload, hysteresis=0.0, drift=0.0, series_ohm=NONE)
+    board = replace(BOARD, noise=Noise(0.3, 0, 0.05, 0, 0), bits=12)
+    calibration = calibration_of(fsr, board=board)
+    assert calibration.condition[3, 4] == Condition.PRELOADED
+    assert calibration.break_n[3, 4] == pytest.approx(-0.39, abs=0.02)
+    assert calibration.break_n[5, 5] == pytest.approx(0.01, abs=0.01)
+    assert calibration.exponent[3, 4] == pytest.approx(1.0, abs=0.02)
+    assert calibrated(recorded(fsr, NONE, 1, board).mean(axis=0), calibration).values[3, 4] < 0.02
+
+
+def test_without_a_board_counts_stand_for_the_conductance():
+    force = np.array([0.1, 0.3, 1.0, 3.0])
+    rng = np.random.default_rng(0)
+    loads = [
+        known_load(np.rint(4 + 90 * f**0.9 + rng.normal(size=(50, 16, 16))), NONE + f)
+        for f in force
+    ]
+    rest = np.rint(4 + rng.normal(size=(50, 16, 16))).clip(0)
+    calibration = calibration_from(rest, loads, sensor="mat")
+    read = calibrated(NONE + 4 + 90, calibration)
+    np.testing.assert_allclose(read.values, 1.0, rtol=0.05)
+    np.testing.assert_allclose(expected_counts(NONE + 1, calibration), 94, rtol=0.05)
+
+
+def test_an_even_load_spreads_over_its_footprint():
+    cover = np.zeros((16, 16))
+    cover[4:8, 4:8] = 1
+    load = even_load(np.zeros((20, 16, 16)), 8.0, cover)
+    assert load.forces_n[5, 5] == 0.5
+    assert load.forces_n.sum() == 8.0
+    assert load.name == "8 N"
+
+
+STILL = replace(BOARD, noise=Noise(0.3, 0, 0.05, 0, 0))  # a contact that does not flutter
+
+
+def refused(match, fsr=None, levels=LEVELS, board=STILL, **more):
+    with pytest.raises(CalibrationError, match=match):
+        calibration_of(fsr or fsr_of(), levels, board, frames=20, **more)
+
+
+def test_loads_that_do_not_determine_the_laws_are_named():
+    refused(r"felt only 2 different loads clearly, a law needs 3; add 1 on them", levels=(0.3, 1.0))
+    refused(r"felt loads of 0.5 ... 0.6 N only.*add a load of 1.5 N", levels=(0.5, 0.55, 0.6))
+    refused(r"carried less than 0.2 N", levels=(0.02, 0.05, 0.1))
+    refused(r"256 tactels \[\(0, 0\), \(0, 1\)", levels=(0.5, 0.5, 0.5))
+    bright = replace(STILL, readout="virtual", feedback_ohm=1e5)
+    refused(r"saturated.*below 0.3", levels=(0.3, 1.0, 2.4), board=bright)
+    with pytest.raises(CalibrationError, match="no loads"):
+        calibration_from(np.zeros((20, 16, 16)), [], sensor="S1")
+    dead = replace(fsr_of(), dead=NONE == 0)
+    refused("no tactel responds", fsr=dead)
+
+
+def test_a_load_on_a_corner_alone_says_which_tactels_it_missed():
+    forces = NONE.copy()
+    forces[:, :15] = 1.0
+    loads = [
+        known_load(recorded(fsr_of(), f * forces, i, STILL, 20), f * forces)
+        for i, f in enumerate(LEVELS)
+    ]
+    with pytest.raises(CalibrationError, match=r"16 tactels \[\(0, 15\), \(1, 15\)"):
+        calibration_from(recorded(fsr_of(), NONE, 9, STILL, 20), loads, sensor="S1", board=STILL)
+
+
+def test_frames_that_are_none_are_refused():
+    for bad in (np.zeros((3, 16, 16)), np.zeros((16, 16)), np.full((30, 16, 16), np.nan)):
+        with pytest.raises(CalibrationError, match="shape"):
+            averaged(bad)
+    frames = np.zeros((20, 16, 16))
+    for forces in (np.zeros((4, 4)), NONE - 1):
+        with pytest.raises(CalibrationError, match="forces"):
+            known_load(frames, forces)
+    with pytest.raises(CalibrationError, match="footprint"):
+        even_load(frames, 1.0, NONE)
+    other = [known_load(np.zeros((20, 8, 8)), np.ones((8, 8)))]
+    with pytest.raises(CalibrationError, match="one sensor"):
+        calibration_from(frames, other, sensor="S1")
+
+
+def test_a_stricter_law_needs_more_loads():
+    refused("a law needs 5", thresholds=Thresholds(levels=5))
+
+
+def test_the_reading_expected_of_a_force_is_the_reading_that_comes():
+    fsr = drawn(np.random.default_rng(8), Spread(dead=0.05, stuck=0.01, preloaded=0.02))
+    calibration = calibration_of(fsr, np.geomspace(0.1, 2.5, 6))
+    forces = NONE + 1.0
+    board = replace(BOARD, noise=Noise(0, 0, 0.05, 0, 0))
+    came = read_counts(forces, board, fsr, None, np.random.default_rng(0))[0]
+    sound = ~(calibration.condition == Condition.STUCK).any(axis=0)
+    error = (expected_counts(forces, calibration) - came)[:, sound]
+    assert sound.sum() > 10
+    assert np.abs(error).max() < 12
+    assert np.sqrt((error**2).mean()) < 3
+
+
+def test_tactels_that_are_alike_help_each_other_where_loads_are_few():
+    fsr = drawn(np.random.default_rng(2), DATASHEET)
+    calibration = calibration_of(fsr, (0.2, 0.6, 1.8))
+    truth = np.log(fsr.gain_s / fsr.gain_s.mean())
+    found = np.log(calibration.gain_s / np.exp(np.log(calibration.gain_s).mean()))
+    assert np.std(found - truth) < 0.05
+    assert calibration.exponent.std() < 0.05  # the loads alone: 0.08
+    assert np.median(np.sqrt(calibration.covariance[..., 0])) < 0.05
+
+
+def test_few_or_unlike_tactels_are_left_as_they_are():
+    rng = np.random.default_rng(3)
+    law = Fitted(
+        np.exp(rng.normal(size=40)), 1 + 0.1 * rng.normal(size=40), 0.1 * rng.random(40),
+        np.broadcast_to(1e-4 * np.eye(3), (40, 3, 3)), np.ones(40),
+    )  # fmt: skip
+    few = pooled(law, np.arange(40) < 20)
+    np.testing.assert_array_equal(few.gain_s, law.gain_s)
+    apart = replace(law, gain_s=np.r_[law.gain_s[:39], 1e9])
+    together = pooled(apart, np.ones(40, bool))
+    assert together.gain_s[39] == pytest.approx(1e9)
+    np.testing.assert_allclose(together.gain_s[:39], law.gain_s[:39], rtol=0.05)

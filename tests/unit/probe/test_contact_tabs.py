@@ -1,0 +1,320 @@
+"""Separate tabs: the law of a tip, balance, symmetry, leaving out, extremes and refusals."""
+
+import contextlib
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from probe.contact import tabs as tabs_module
+from probe.contact.contract import Touch, WristStiffness
+from probe.contact.plate import Pose, load_of, rest
+from probe.contact.plate_newton import Columns
+from probe.contact.tab_law import BETA, tip_laws
+from probe.contact.tabs import asked, settled, tabs
+from probe.contact.tips import HEXAGONS, Tips, hexagon, square, tip_points
+from probe.errors import ContactError
+from probe.sensor import Overlay, Sensor
+from probe.surface.indenters import (
+    Cross,
+    HalfPlane,
+    Plate,
+    Rough,
+    Sphere,
+    Strip,
+    TiltedPlane,
+    Washer,
+)
+
+SENSOR = Sensor()
+RIGID = WristStiffness(math.inf, math.inf)
+ONE_TAB = Sensor(rows=1, columns=1)
+AREA = math.pi * 1.2666**2 / 4
+
+
+@dataclass(frozen=True)
+class Lambda:
+    """A surface by formula."""
+
+    height: object
+    top_mm: float = 0.0
+
+    def heights_mm(self, points_mm):
+        return self.height(*points_mm.T)
+
+
+def pressed(surface, force=80.0, sensor=SENSOR, tips=None, **where):
+    at = {"x_mm": 0.0, "y_mm": 0.0, "theta_rad": 0.0, **where}
+    return tabs(surface, sensor, Touch(force_n=force, **at), tips)
+
+
+@pytest.mark.parametrize("force", [1e-6, 1.0, 80.0, 300.0, 1e5])
+def test_covered_wholly_a_tab_is_the_neo_hookean_column(force):
+    found = pressed(Plate(1.0), force)
+    np.testing.assert_allclose(found.forces_n, force / 256, rtol=1e-5)
+    stretch = 1 - (1.0 - found.z_mm) / 2.0
+    stress = (1 / 3) * (1 - stretch) * (1 + stretch + stretch**2) / stretch**2
+    assert stress * AREA * 256 == pytest.approx(force, rel=1e-5)
+
+
+def test_a_cross_at_80_n_is_strained_by_about_half():
+    # By linear springs the strain would be 1.06, which no tab can do.
+    found = pressed(Cross(width_mm=2.0, length_mm=26.0))
+    assert 0.4 < -found.z_mm / 2.0 < 0.55
+
+
+@pytest.mark.parametrize("points", [37, 127])
+@pytest.mark.parametrize("edge_mm", [-0.5, -0.3, -0.1, 0.0, 0.2, 0.4])
+def test_a_tip_covered_in_part_bears_more_than_its_share(points, edge_mm):
+    """Sinking by the same depth: F(c)/F(1) within .02 of c (1 + .59 (1 - c)). Numerics, L1."""
+    tips = Tips(points)
+    at, _ = tip_points(ONE_TAB, tips)
+    share = float((at[0, :, 0] <= edge_mm).mean())
+    tiny = 1e-6
+    touch = Touch(-edge_mm, 0.0, 0.0, tiny, wrist=RIGID)
+    part = tabs(HalfPlane(), ONE_TAB, touch, tips)
+    whole = tabs(Plate(), ONE_TAB, touch, tips)
+    ratio = whole.z_mm / part.z_mm
+    assert ratio == pytest.approx(share * (1 + BETA) / (1 + BETA * share), rel=1e-4)
+    assert abs(ratio - share * (1 + 0.59 * (1 - share))) < 0.022
+
+
+def test_the_measured_cover_law_is_met_within_three_per_cent():
+    for share, measured in ((0.25, 0.34), (0.5, 0.65), (1.0, 1.0)):
+        assert abs(share * (1 + BETA) / (1 + BETA * share) - measured) < 0.03
+
+
+def test_no_point_of_a_tip_pulls_and_the_force_rises_with_depth():
+    rng = np.random.default_rng(1)
+    forces = []
+    heights = rng.random((1, 19)) * 0.8
+    for depth in np.linspace(0.05, 0.9, 12):
+        found, _ = level(heights, depth)
+        assert (found >= 0).all()
+        forces.append(found.sum())
+    assert (np.diff(forces) > 0).all()
+
+
+def level(heights, depth):
+    """Return forces of one tip on which a plate stands at a depth below the top, and its column."""
+    from scipy.optimize import brentq
+
+    skin, column = tip_laws(SENSOR.overlay, heights.shape[1])
+    down = np.maximum(heights[0] - heights.max() + depth, 0)
+
+    def left(v):
+        return float(column(np.array([v]))[0][0] - skin(np.maximum(down - v, 0))[0].sum())
+
+    v = brentq(left, max(0.0, depth - 0.999 * skin.length_mm), 0.999 * column.length_mm)
+    return skin(np.maximum(down - v, 0))[0], v
+
+
+def test_two_heights_under_one_tip_agree_with_the_column_solved_alone():
+    touch = Touch(0.0, 0.0, 0.0, 1.5, wrist=RIGID)
+    surface = HalfPlane(floor_mm=-0.4)
+    found = tabs(surface, ONE_TAB, touch, Tips(37))
+    heights = asked(surface, touch, tip_points(ONE_TAB, Tips(37))[0])
+    forces, _ = level(heights, -found.z_mm)
+    assert -found.z_mm > 0.4
+    assert forces.sum() == pytest.approx(1.5, rel=1e-5)
+
+
+SCENES = {
+    "washer": Washer(),
+    "cross": Cross(),
+    "strip": Strip(),
+    "sphere": Sphere(40.0),
+    "half": HalfPlane(),
+    "step": HalfPlane(floor_mm=-0.3),
+    "rough": Rough(seed=2, rms_mm=0.1),
+    "plane": TiltedPlane(0.05, -0.03),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("tilt", [(0.0, 0.0), (0.03, -0.02), (0.1745, 0.0)])
+def test_forces_and_moments_balance(name, tilt):
+    touch = Touch(0.7, -0.4, 0.3, 80.0, *tilt)
+    found = tabs(SCENES[name], SENSOR, touch)
+    assert (found.forces_n >= 0).all()
+    assert found.forces_n.sum() == pytest.approx(80.0, rel=1e-5)
+    # Forces act at points of the tips, hence within a tab's radius of the tactel's centre.
+    x, y = SENSOR.centres_mm()[..., 0], SENSOR.centres_mm()[..., 1]
+    moment_x = 3000 * (found.tilt_x_rad - tilt[0])
+    moment_y = 3000 * (found.tilt_y_rad - tilt[1])
+    assert moment_x == pytest.approx((found.forces_n * y).sum(), abs=80 * 0.64)
+    assert moment_y == pytest.approx(-(found.forces_n * x).sum(), abs=80 * 0.64)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_what_is_left_out_changes_nothing(name):
+    touch = Touch(0.7, -0.4, 0.3, 60.0, 0.02, 0.01)
+    points, drop = tip_points(SENSOR, Tips())
+    heights = asked(SCENES[name], touch, points) - drop
+    skin, column = tip_laws(SENSOR.overlay, 19)
+    columns = Columns(column, np.arange(256) * 19, np.arange(4864) // 19, np.zeros(256))
+    whole = rest(points.reshape(-1, 2), heights.ravel(), skin, load_of(touch), columns=columns)
+    found, forces = settled(points, heights, SENSOR.overlay, load_of(touch))
+    assert found.pose.z_mm == pytest.approx(whole.pose.z_mm, abs=2e-6)
+    assert found.pose.tilt_x_rad == pytest.approx(whole.pose.tilt_x_rad, abs=1e-6)
+    np.testing.assert_allclose(forces, whole.forces_n.reshape(256, 19).sum(axis=1), atol=4e-5)
+
+
+def test_points_that_were_not_foreseen_to_touch_are_taken_in(monkeypatch):
+    calls = []
+
+    def counted(*args, **named):
+        calls.append(len(args[1]))
+        return rest(*args, **named)
+
+    def too_high(points_mm, heights_mm, overlay, load):
+        return Pose(-1e-3, 0.0, 0.0), 1e-3
+
+    touch = Touch(0.0, 0.0, 0.0, 200.0)
+    right = tabs(HalfPlane(floor_mm=-0.3), SENSOR, touch)
+    monkeypatch.setattr(tabs_module, "rest", counted)
+    monkeypatch.setattr(tabs_module, "foreseen_pose", too_high)
+    found = tabs(HalfPlane(floor_mm=-0.3), SENSOR, touch)
+    assert len(calls) > 1
+    assert calls[-1] > calls[0]
+    np.testing.assert_allclose(found.forces_n, right.forces_n, atol=1e-4)
+
+
+def test_a_symmetric_scene_gives_a_symmetric_image_but_for_the_points():
+    for points, within in ((19, 0.06), (127, 0.02)):
+        image = pressed(Strip(width_mm=3.3), tips=Tips(points)).forces_n
+        assert np.linalg.norm(image - image[:, ::-1]) < within * np.linalg.norm(image)
+
+
+def test_half_a_turn_about_a_symmetric_body_is_the_same_touch():
+    one = pressed(Strip(width_mm=3.3), theta_rad=0.2, x_mm=0.1)
+    other = pressed(Strip(width_mm=3.3), theta_rad=0.2 + math.pi, x_mm=-0.1)
+    np.testing.assert_allclose(other.forces_n, one.forces_n, rtol=1e-6, atol=1e-9)
+
+
+def test_frames_and_signs_of_a_touch():
+    # The sensor stands with its right half over the face, so its right columns bear.
+    found = pressed(HalfPlane(), x_mm=0.0, theta_rad=math.pi)
+    right = found.forces_n[:, 8:].sum()
+    assert right > 0.95 * 80
+    # The face pushes up on the right, which lifts it: zeta = z - tilt_y x rises with x.
+    assert found.tilt_y_rad < 0
+    top = pressed(HalfPlane(), x_mm=0.0, theta_rad=-math.pi / 2)
+    # theta = -90: the sensor's y is the surface's x, matter lies where the sensor's y <= 0.
+    assert top.forces_n[8:].sum() > 0.95 * 80
+    assert top.tilt_x_rad < 0
+
+
+def test_pose_and_forces_are_continuous_in_the_arm_s_tilt():
+    def at(turn):
+        return pressed(Cross(), tilt_x_rad=turn)
+
+    before = at(0.01)
+    for step in (1e-4, 1e-6):
+        after = at(0.01 + step)
+        assert np.abs(after.forces_n - before.forces_n).max() < 40 * step + 4e-4
+        assert abs(after.z_mm - before.z_mm) < 2 * step + 1e-6
+
+
+def test_no_force_is_an_exactly_zero_image():
+    found = pressed(Cross(), 0.0, tilt_x_rad=0.01)
+    assert not found.forces_n.any()
+    assert found.z_mm == math.inf
+    assert (found.tilt_x_rad, found.iterations, found.level) == (0.01, 0, "tabs")
+
+
+@pytest.mark.parametrize("force", [1e-9, 1e-3, 1.0, 80.0, 1e4, 1e9])
+@pytest.mark.parametrize("scene", ["flat", "needle", "corner", "sphere", "step", "tilt", "edge"])
+def test_extreme_scenes_give_a_finite_image_or_a_clear_refusal(force, scene):
+    surface, where = {
+        "flat": (Plate(), {}),
+        "needle": (Lambda(lambda x, y: np.where(np.hypot(x - 9, y) < 0.3, 0, -np.inf)), {}),
+        "corner": (Lambda(lambda x, y: -3 * np.hypot(x, y)), {"x_mm": 1.0}),
+        "sphere": (Sphere(2.0), {}),
+        "step": (HalfPlane(floor_mm=-1.0), {"x_mm": 5.0}),
+        "tilt": (Washer(floor_mm=-1.0), {"tilt_x_rad": math.radians(10)}),
+        "edge": (HalfPlane(), {"x_mm": 11.5}),
+    }[scene]
+    tipping = force > 1e3 and scene in ("needle", "edge", "step", "tilt", "corner")
+    if tipping:
+        with contextlib.suppress(ContactError):
+            found = pressed(surface, force, **where)
+    else:
+        found = pressed(surface, force, **where)
+    assert np.isfinite([*found.forces_n.ravel(), found.z_mm]).all()
+    assert found.forces_n.sum() == pytest.approx(force, rel=1e-5)
+    assert (found.forces_n >= 0).all()
+
+
+def test_a_needle_far_out_turns_the_plate_until_it_tips():
+    needle = Lambda(lambda x, y: np.where(np.hypot(x - 9, y) < 0.9, 0, -np.inf))
+    light = pressed(needle, 10.0)
+    assert light.tilt_y_rad == pytest.approx(-10 * 9 / 3000, rel=0.1)
+    with pytest.raises(ContactError, match=r"tips.*degrees"):
+        pressed(needle, 200.0)
+    with pytest.raises(ContactError, match=r"tips.*centre of pressure"):
+        pressed(needle, 1.0, wrist=WristStiffness(0.0, 0.0))
+
+
+def test_a_free_plate_finds_its_own_tilt():
+    found = pressed(TiltedPlane(0.05, -0.03), wrist=WristStiffness(0.0, 0.0))
+    assert found.tilt_y_rad == pytest.approx(-0.05, abs=1e-6)
+    assert found.tilt_x_rad == pytest.approx(-0.03, abs=1e-6)
+    np.testing.assert_allclose(found.forces_n, 80 / 256, rtol=1e-3)
+
+
+def test_a_longer_tab_bears_more_and_a_domed_one_gives_way():
+    lengths = np.zeros((16, 16))
+    lengths[3, 5] = 0.1
+    found = pressed(Plate(), tips=Tips(lengths_mm=lengths))
+    rest_of_them = np.delete(found.forces_n.ravel(), 3 * 16 + 5)
+    assert found.forces_n[3, 5] > 1.2 * rest_of_them.max()
+    domed = pressed(Plate(), tips=Tips(dome_mm=0.2))
+    plain = pressed(Plate())
+    assert domed.z_mm < plain.z_mm
+    np.testing.assert_allclose(domed.forces_n, 80 / 256, rtol=1e-3)
+
+
+def test_tabs_that_all_stand_off_by_the_same_are_a_sensor_moved():
+    shifts = np.broadcast_to([0.2, -0.1], (16, 16, 2)).copy()
+    shifted = pressed(Washer(), tips=Tips(shifts_mm=shifts), wrist=RIGID)
+    moved = pressed(Washer(), x_mm=0.2, y_mm=-0.1, wrist=RIGID)
+    np.testing.assert_allclose(shifted.forces_n, moved.forces_n, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: pressed(Plate(), sensor=Sensor(overlay=Overlay(kind="pad"))), "overlay is a pad"),
+        (lambda: pressed(Plate(), sensor=Sensor(overlay=Overlay(young_mpa=0.0))), "modulus 0"),
+        (lambda: pressed(Plate(-math.inf)), "nothing under the sensor to bear 80 N"),
+        (lambda: pressed(Plate(math.nan)), "no numbers"),
+        (lambda: pressed(Plate(math.inf)), "no numbers"),
+        (lambda: pressed(Plate(), -1.0), "force not negative"),
+        (lambda: pressed(Plate(), math.nan), "finite"),
+        (lambda: pressed(Plate(), math.inf), "finite"),
+        (lambda: pressed(Plate(), tips=Tips(8)), "patterns have 7, 19"),
+        (lambda: pressed(Plate(), tips=Tips(lengths_mm=np.zeros(3))), "lengths have shape"),
+    ],
+)
+def test_what_gives_no_touch_is_refused(call, message):
+    with pytest.raises(ContactError, match=message):
+        call()
+
+
+@pytest.mark.parametrize("n", HEXAGONS)
+def test_patterns_have_the_disc_s_moments(n):
+    points = hexagon(n)
+    assert points.shape == (n, 2)
+    np.testing.assert_allclose(points.mean(axis=0), 0, atol=1e-15)
+    np.testing.assert_allclose(points.T @ points / n, np.eye(2) / 4, atol=1e-14)
+    assert np.hypot(*points.T).max() < 1.06
+
+
+def test_the_points_of_a_pad_tile_its_squares():
+    points, drop = tip_points(Sensor(overlay=Overlay(kind="pad")), Tips(16))
+    assert points.shape == (256, 16, 2)
+    assert not drop.any()
+    assert len(np.unique(np.round(points.reshape(-1, 2), 9), axis=0)) == 4096
+    assert square(9).shape == (9, 2)

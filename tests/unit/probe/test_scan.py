@@ -1,0 +1,309 @@
+"""Guarded approach, raster, poses over a surface, and the arm that is not where it believes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from probe.arm.inverse import inverse
+from probe.arm.links import Arm, forward
+from probe.contact.contract import Touch
+from probe.errors import ContactError, PoseError, SurfaceError
+from probe.scan.approach import Guard, guarded_approach
+from probe.scan.kinesthetic import JointErrors, joint_path, kinesthetic, played
+from probe.scan.places import surface_to_sensor, touch_at
+from probe.scan.raster import raster
+from probe.sensor import Sensor
+
+DEG = math.pi / 180
+SQUARE = [(0, 0), (60, 0), (60, 60), (0, 60)]
+
+
+class Bench:
+    """A surface at some travel that pushes back; remembers what was done."""
+
+    def __init__(self, law, at=3.0):
+        self.law, self.at, self.went = law, at, []
+
+    def __call__(self, travel):
+        self.went.append(travel)
+        return self.law(travel - self.at) if travel > self.at else 0.0
+
+
+# --- approach ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        lambda d: 8 * d,  # the wrist
+        lambda d: 200 * d,
+        lambda d: 2 * d**3,  # hardening
+        lambda d: 40 * math.sqrt(d),  # softening
+        lambda d: 8 * d + 3 * math.sin(40 * d),  # slipping
+    ],
+)
+def test_the_wanted_force_is_reached_and_never_exceeded_much(law):
+    felt = []
+    bench = Bench(law)
+    end = guarded_approach(lambda travel: felt.append(bench(travel)) or felt[-1])
+    assert end
+    assert abs(end.force_n - 80) <= 1
+    assert max(felt) <= 120
+    assert end.travel_mm == bench.went[-1]
+    assert bench.at < end.felt_at_mm <= bench.at + 1.0
+    assert end.steps == len(felt) <= 60
+
+
+def test_nothing_there_gives_up_and_goes_back():
+    bench = Bench(lambda d: 8 * d, at=1e9)
+    end = guarded_approach(bench, Guard(travel_mm=12, step_mm=0.5))
+    assert not end
+    assert (end.reason, end.travel_mm, end.felt_at_mm) == ("no contact", 0, math.inf)
+    assert max(bench.went) == 12
+    assert bench.went[-1] == 0
+
+
+def test_a_surface_too_hard_for_the_step_lifts_the_sensor():
+    bench = Bench(lambda d: 1e4 * d)
+    end = guarded_approach(bench)
+    assert (end.reason, end.travel_mm) == ("force limit", 0)
+    assert bench.went[-1] == 0
+    assert max(bench.went) == 3.5  # not a step more
+
+
+def test_a_surface_too_soft_ends_at_the_travel_limit():
+    end = guarded_approach(Bench(lambda d: 0.6 + 0.1 * d), Guard(travel_mm=10))
+    assert (end.reason, end.travel_mm) == ("travel limit", 10)
+    assert end.force_n == pytest.approx(1.3)
+
+
+def test_a_force_that_jumps_over_the_wanted_one_is_told():
+    end = guarded_approach(Bench(lambda d: 90.0 if d > 0.123 else 10.0))
+    assert (end.reason, end.force_n) == ("too stiff", 10)
+    assert end.travel_mm == pytest.approx(3.123, abs=1e-4)
+
+
+def test_already_in_contact():
+    assert guarded_approach(lambda travel: 80.5).travel_mm == 0
+    assert guarded_approach(lambda travel: 300.0).reason == "force limit"
+    assert guarded_approach(lambda travel: 90.0).reason == "too stiff"
+
+
+def test_forces_and_limits_that_make_no_sense():
+    with pytest.raises(ContactError, match=r"the force at 0 mm is nan"):
+        guarded_approach(lambda travel: math.nan)
+    for guard in (
+        Guard(force_n=0.1),
+        Guard(most_n=80),
+        Guard(step_mm=0),
+        Guard(travel_mm=0.1),
+        Guard(tolerance_n=0),
+        Guard(travel_mm=math.inf),
+    ):
+        with pytest.raises(ContactError, match="contradict each other"):
+            guarded_approach(lambda travel: 0.0, guard)
+
+
+# --- raster -----------------------------------------------------------------------------
+
+
+def covered(places, theta, point, half=12.7):
+    c, s = math.cos(theta), math.sin(theta)
+    inside = np.abs((point - places) @ [[c, -s], [s, c]]) <= half + 1e-9
+    return inside.all(axis=1).any()
+
+
+def test_a_square_face():
+    plan = raster([SQUARE])
+    step = 4.25 * 1.5875
+    assert len(plan) == 49  # ceil((60 - 25.4) / 6.747) + 1 = 7, both ways
+    assert plan.lines.tolist() == sorted([*range(7)] * 7)
+    first, second, eighth = plan.places_mm[[0, 1, 7]]
+    assert second - first == pytest.approx([step, 0])  # left to right
+    assert eighth - first == pytest.approx([0, -step])  # top to bottom
+    assert plan.places_mm.mean(axis=0) == pytest.approx([30, 30])
+    overlap = 1 - step / 25.4
+    assert overlap == pytest.approx(0.734, abs=1e-3)
+    inside = plan.cover > 1 - 1e-9
+    assert inside.sum() == 25
+    assert plan.cover[0] == pytest.approx((1 - (3 * step + 12.7 - 30) / 25.4) ** 2)
+
+
+def test_a_step_of_four_and_a_quarter_sees_edges_at_four_places_between_tactels():
+    xs = np.unique(raster([SQUARE]).places_mm[:, 0].round(9)) / 1.5875
+    assert len({round(float(x % 1), 6) for x in xs}) == 4
+    xs = np.unique(raster([SQUARE], step_tactels=4).places_mm[:, 0].round(9)) / 1.5875
+    assert len({round(float(x % 1), 6) for x in xs}) == 1
+
+
+def test_a_face_smaller_than_the_sensor_is_one_touch():
+    plan = raster([[(0, 0), (20, 0), (20, 10), (0, 10)]])
+    assert plan.places_mm.tolist() == [[10, 5]]
+    assert plan.cover == pytest.approx([200 / 25.4**2])
+
+
+@pytest.mark.parametrize("theta", [0, 20, 45, -90])
+@pytest.mark.parametrize("sides", [3, 4, 5])
+def test_every_point_of_a_regular_face_is_under_a_touch(sides, theta):
+    turns = 2 * np.pi * np.arange(sides) / sides
+    corners = 40 * np.stack([np.cos(turns), np.sin(turns)], axis=1) + [100, -50]
+    plan = raster([corners], theta_rad=theta * DEG)
+    weights = np.random.default_rng(1).dirichlet(np.full(sides, 0.3), 400)
+    for point in weights @ corners:
+        assert covered(plan.places_mm, theta * DEG, point)
+
+
+def test_a_face_that_is_not_convex_and_one_with_a_hole():
+    ell = [(0, 0), (120, 0), (120, 40), (40, 40), (40, 120), (0, 120)]
+    plan = raster([ell])
+    assert not any(x > 60 and y > 60 for x, y in plan.places_mm)
+    assert covered(plan.places_mm, 0, np.array([119, 39]))
+    around = raster(
+        [[(0, 0), (120, 0), (120, 120), (0, 120)], [(20, 20), (20, 100), (100, 100), (100, 20)]]
+    )
+    assert not any(np.hypot(*(place - 60)) < 20 for place in around.places_mm)
+    assert around.cover.max() < 1
+
+
+@pytest.mark.parametrize("theta", [0.0, 0.3, math.pi])
+def test_cover_is_the_area_under_the_sensor(theta):
+    ell = np.array([(0, 0), (50, 0), (50, 20), (20, 20), (20, 50), (0, 50)], float)
+    plan = raster([ell], theta_rad=theta, least_cover=0)
+    grid = Sensor(rows=160, columns=160, pitch_mm=0.15875).centres_mm().reshape(-1, 2)
+    for place, cover in zip(plan.places_mm, plan.cover, strict=True):
+        x, y = Touch(*place, theta, 1.0).on_surface(grid).T
+        inside = (x >= 0) & (y >= 0) & (x <= 50) & (y <= 50) & ((x <= 20) | (y <= 20))
+        assert inside.mean() == pytest.approx(cover, abs=0.01)
+
+
+def test_loops_either_way_round_give_the_same_raster():
+    assert (raster([SQUARE[::-1]]).places_mm == raster([SQUARE]).places_mm).all()
+    far = raster([np.array(SQUARE) + 1e6])
+    assert far.places_mm - 1e6 == pytest.approx(raster([SQUARE]).places_mm, abs=1e-6)
+
+
+def test_faces_that_are_none():
+    for bad in (
+        [(0, 0), (1, 1)],
+        [(0, 0), (1, 1), (2, 2)],
+        [(0, 0), (1, 0), (math.nan, 1)],
+        [1, 2],
+    ):
+        with pytest.raises(SurfaceError):
+            raster([bad])
+    with pytest.raises(SurfaceError, match="without a loop"):
+        raster([])
+    for step in (0, -1, 17, math.nan):
+        with pytest.raises(SurfaceError, match="tactels; take more than 0 and at most 16"):
+            raster([SQUARE], step_tactels=step)
+
+
+def test_touches_of_a_raster():
+    touches = list(raster([SQUARE], theta_rad=0.3).touches(40.0))
+    assert len(touches) == len(raster([SQUARE], theta_rad=0.3))
+    assert (touches[0].theta_rad, touches[0].force_n, touches[0].tilt_x_rad) == (0.3, 40, 0)
+
+
+# --- poses ------------------------------------------------------------------------------
+
+
+def test_a_touch_is_where_the_sensor_stands():
+    T = surface_to_sensor(12, -3, 0.7, 5)
+    touch = touch_at(T, 80)
+    assert (touch.x_mm, touch.y_mm, touch.theta_rad) == pytest.approx((12, -3, 0.7))
+    points = np.array([(1.0, 2.0), (-3.0, 0.5)])
+    on_plane = T @ np.vstack([points.T, [0, 0], [1, 1]])
+    assert touch.on_surface(points) == pytest.approx(on_plane[:2].T)
+
+
+def test_tilts_are_those_of_the_contact_models():
+    a, b = 0.02, -0.03
+    about_x = np.array([[1, 0, 0], [0, math.cos(a), -math.sin(a)], [0, math.sin(a), math.cos(a)]])
+    about_y = np.array([[math.cos(b), 0, math.sin(b)], [0, 1, 0], [-math.sin(b), 0, math.cos(b)]])
+    T = surface_to_sensor(1, 2, 0.5, 3)
+    T[:3, :3] = T[:3, :3] @ about_x @ about_y
+    touch = touch_at(T, 1)
+    assert (touch.theta_rad, touch.tilt_x_rad, touch.tilt_y_rad) == pytest.approx((0.5, a, b))
+    for x, y in ((10, 0), (0, 10), (-7, 4)):
+        height = (T @ [x, y, 0, 1])[2]
+        assert height == pytest.approx(3 + a * y - b * x, abs=2e-3)
+
+
+def test_a_sensor_that_faces_elsewhere_is_refused():
+    upside_down = np.diag([1.0, -1.0, -1.0, 1.0])
+    with pytest.raises(PoseError, match="tilted by 180 degrees"):
+        touch_at(upside_down, 1)
+    with pytest.raises(PoseError, match="give T_surface_sensor"):
+        touch_at(np.eye(3), 1)
+
+
+# --- kinesthetic ------------------------------------------------------------------------
+
+
+def scan_poses():
+    T_base_surface = surface_to_sensor(260, -30, 0.2, 100)
+    plan = raster([SQUARE])
+    return [
+        T_base_surface @ surface_to_sensor(x, y, plan.theta_rad) for x, y in plan.places_mm.tolist()
+    ]
+
+
+def test_a_perfect_arm_is_where_it_believes():
+    poses = scan_poses()
+    perfect = JointErrors((0.0,) * 5, (0.0,) * 5)
+    found = kinesthetic(Arm(), poses, perfect, np.random.default_rng(1))
+    assert found.believed == pytest.approx(np.array(poses), abs=1e-9)
+    assert found.true == pytest.approx(np.array(poses), abs=1e-9)
+    assert np.abs(np.diff(found.angles_rad, axis=0)).max() < 0.5  # no jump to another branch
+
+
+def test_the_covariance_holds_what_happens():
+    poses = scan_poses()
+    errors = JointErrors((5e-4,) * 5, (0.0,) * 5)
+    rng = np.random.default_rng(2)
+    normed = []
+    for _ in range(10):
+        found = kinesthetic(Arm(), poses, errors, rng)
+        off = (found.true - found.believed)[:, :3, 3]
+        for error, covariance in zip(off, found.covariance, strict=True):
+            normed.append(error @ np.linalg.solve(covariance[:3, :3], error))
+    assert np.mean(normed) == pytest.approx(3, rel=0.15)  # chi square of 3 freedoms
+
+
+def test_the_same_seed_gives_the_same_poses():
+    poses = scan_poses()
+    first, second = (
+        kinesthetic(Arm(), poses, JointErrors(), np.random.default_rng(5)) for _ in range(2)
+    )
+    assert (first.true == second.true).all()
+    apart = np.linalg.norm((first.true - first.believed)[:, :3, 3], axis=1)
+    assert 0.05 < np.median(apart) < 2.0  # mm: tenths of a tactel to about one
+
+
+def test_play_drags_the_joint_along():
+    errors = JointErrors((0.0,) * 5, (0.2, 0.0, 0.2, 0.2, 0.2))
+    motor = np.zeros((7, 5))
+    motor[:, 0] = 0, 1, 2, 1.9, 1.85, 1, 0
+    motor[:, 1] = motor[:, 0]
+    stands = played(motor, errors, np.random.default_rng(3))
+    assert stands[1:, 0] == pytest.approx([0.9, 1.9, 1.9, 1.9, 1.1, 0.1])
+    assert stands[:, 1] == pytest.approx(motor[:, 1])
+    assert np.abs(stands[:, 2]).max() <= 0.1
+
+
+def test_a_pose_out_of_reach_is_named():
+    poses = [*scan_poses()[:3], surface_to_sensor(900, 0, 0, 100)]
+    with pytest.raises(PoseError, match=r"pose 3 of 4: .* out of reach .*nearer"):
+        kinesthetic(Arm(), poses, JointErrors(), np.random.default_rng(1))
+
+
+def test_a_path_keeps_its_branch():
+    arm = Arm()
+    start = inverse(arm, forward(arm, [0.1, -0.8, 1.2, 0.5, 0.2]))[0]
+    steps = [start + t * np.array([0.2, 0.1, -0.2, 0.1, 0.3]) for t in np.linspace(0, 1, 20)]
+    path = joint_path(arm, [forward(arm, q) for q in steps])
+    assert path == pytest.approx(np.array(steps), abs=1e-9)
+    assert joint_path(arm, []).shape == (0, 5)

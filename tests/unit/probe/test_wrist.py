@@ -1,0 +1,193 @@
+"""Distances -> tilt and back: the thesis's equations, their limits, errors, end stops, springs."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from probe.errors import PoseError
+from probe.wrist.distances import counts_of, distances_at, distances_mm, wrist_pose
+from probe.wrist.geometry import (
+    Wrist,
+    WristPose,
+    gripper_to_plate,
+    plate_to_sensor,
+    tilt_error_rad,
+)
+from probe.wrist.springs import pose_under_load, stiffness
+
+DEG = math.pi / 180
+
+
+def printed_angles(d, ab, ad, gamma):
+    """Return the angles as the thesis prints the equations, beta = 90 degrees."""
+    a, b, c, e = d
+    return (
+        math.atan((a - b - c + e) / (2 * ab * math.sin(gamma))),
+        math.atan((a + b - c - e) / (2 * ad)),
+    )
+
+
+def turn(axis, angle):
+    c, s = math.cos(angle), math.sin(angle)
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    matrix = np.eye(3)
+    matrix[[i, i, j, j], [i, j, i, j]] = c, -s, s, c
+    return matrix
+
+
+def test_the_matrix_is_a_rotation_and_differs_from_the_printed_one_in_one_sign():
+    x, y, gamma = 0.11, -0.15, 1.2
+    T = gripper_to_plate(Wrist(gamma_rad=gamma), WristPose(6.5, x, y, np.zeros((3, 3))))
+    assert T[:3, :3] == pytest.approx(turn(2, -gamma) @ turn(1, y) @ turn(0, x), abs=1e-15)
+    c1, s1, c2, s2 = math.cos(x), math.sin(x), math.cos(y), math.sin(y)
+    c, s = math.cos(gamma), math.sin(gamma)
+    printed = [
+        [c2 * c, s1 * s2 * c + c1 * s, c1 * s2 * c - s1 * s, 0],
+        [c2 * s, -s1 * s2 * s + c1 * c, -c1 * s2 * s - s1 * c, 0],
+        [-s2, s1 * c2, c1 * c2, 6.5],
+        [0, 0, 0, 1],
+    ]
+    assert np.argwhere(~np.isclose(T, printed)).tolist() == [[1, 0]]
+    assert T[1, 0] == -printed[1][0]
+
+
+@pytest.mark.parametrize("gamma", [90, 100, 45, 5, -90])
+def test_distances_are_those_between_the_plates(gamma):
+    wrist = Wrist(ab_mm=50, ad_mm=70, gamma_rad=gamma * DEG)
+    pose = WristPose(6.0, 8 * DEG, -7 * DEG, np.zeros((3, 3)))
+    # the lower plate in the wrist frame: a point of it and its normal
+    plate = turn(1, pose.theta_y_rad) @ turn(0, pose.theta_x_rad)
+    normal = plate[:, 2]
+    expected = [
+        (normal[2] * 6.0 - normal[:2] @ corner) / normal[2] for corner in wrist.corners_mm()
+    ]
+    d = distances_at(wrist, pose.z_mm, pose.theta_x_rad, pose.theta_y_rad)
+    assert d == pytest.approx(expected, abs=1e-12)
+    found = wrist_pose(wrist, d)
+    assert (found.z_mm, found.theta_x_rad, found.theta_y_rad) == pytest.approx(
+        (6.0, 8 * DEG, -7 * DEG), abs=1e-12
+    )
+    assert found.twist_mm == pytest.approx(0, abs=1e-12)
+    assert found.stops == ()
+
+
+def test_the_printed_equations_hold_for_small_tilts_and_a_rectangle_only():
+    wrist = Wrist()
+    d = distances_at(wrist, 5, 0.01, 0.01)
+    assert printed_angles(d, 60, 60, math.pi / 2) == pytest.approx((0.01, 0.01), abs=1e-6)
+    d = distances_at(wrist, 5, 10 * DEG, 10 * DEG)
+    x, _ = printed_angles(d, 60, 60, math.pi / 2)
+    assert abs(x / DEG - 10) == pytest.approx(0.15, abs=0.005)
+    oblique = Wrist(gamma_rad=60 * DEG)
+    x, _ = printed_angles(distances_at(oblique, 5, 0, 5 * DEG), 60, 60, 60 * DEG)
+    assert abs(x / DEG) > 2  # of a tilt that is not there
+    assert wrist_pose(oblique, distances_at(oblique, 5, 0, 5 * DEG)).theta_x_rad == pytest.approx(0)
+
+
+@pytest.mark.parametrize(("gamma", "degrees"), [(90, 0.0095), (1, 0.55), (0.01, 44)])
+def test_an_error_of_a_hundredth_of_a_millimetre(gamma, degrees):
+    """Case 11 of the stiff and extreme cases, and what numbers drawn at random make of it."""
+    error = tilt_error_rad(0.01, 60, gamma * DEG) / DEG
+    assert error == pytest.approx(degrees, rel=0.02)
+    rng = np.random.default_rng(1)
+    slopes = [
+        math.tan(printed_angles(d, 60, 60, gamma * DEG)[0])
+        for d in rng.normal(5, 0.01, (20_000, 4))
+    ]
+    assert math.atan(np.std(slopes)) / DEG == pytest.approx(error, rel=0.02)
+
+
+@pytest.mark.parametrize("gamma", [0, 1, 1.1, 179, 180, -0.5])
+def test_transducers_in_a_line_are_refused(gamma):
+    with pytest.raises(PoseError, match="almost in a line") as caught:
+        Wrist(gamma_rad=gamma * DEG)
+    assert "0.02" in caught.value.fix
+    Wrist(gamma_rad=1.15 * DEG)  # sin = 0.0201
+
+
+def test_a_wrist_without_size_is_refused():
+    for ab, ad in ((0, 60), (60, -1), (math.nan, 60), (math.inf, 60)):
+        with pytest.raises(PoseError, match="above 0 mm"):
+            Wrist(ab_mm=ab, ad_mm=ad)
+
+
+@pytest.mark.parametrize("gamma", [90, 60, 10])
+def test_the_covariance_is_that_of_drawn_errors(gamma):
+    wrist = Wrist(gamma_rad=gamma * DEG, tilt_rad=1.0)
+    true = distances_at(wrist, 5, 9 * DEG, -8 * DEG)
+    rng = np.random.default_rng(2)
+    poses = [wrist_pose(wrist, d) for d in rng.normal(true, wrist.reading_mm, (3000, 4))]
+    drawn = np.cov([(p.z_mm, p.theta_x_rad, p.theta_y_rad) for p in poses], rowvar=False)
+    told = wrist_pose(wrist, true).covariance
+    scale = np.sqrt(np.outer(told.diagonal(), told.diagonal()))
+    assert np.abs((drawn - told) / scale).max() < 0.08
+    assert np.std([p.twist_mm for p in poses]) == pytest.approx(wrist.reading_mm / 2, rel=0.07)
+
+
+def test_a_failing_transducer_is_found():
+    wrist = Wrist()
+    d = distances_at(wrist, 5, 0.05, 0.05)
+    d[2] += 0.2
+    with pytest.raises(PoseError, match=r"0\.05 mm off a plane; check the transducers"):
+        wrist_pose(wrist, d)
+    for bad in ([1, 2, 3], [1, 2, 3, math.nan]):
+        with pytest.raises(PoseError, match="give AA', BB', CC', DD'"):
+            wrist_pose(wrist, bad)
+
+
+def test_end_stops():
+    wrist = Wrist()
+    assert wrist_pose(wrist, distances_at(wrist, 10, 0, 0)).stops == ("z",)
+    at = wrist_pose(wrist, distances_at(wrist, 5, 10 * DEG, -10 * DEG))
+    assert at.stops == ("theta_x", "theta_y")
+    for z, x, y, name in ((-0.1, 0, 0, "z"), (11, 0, 0, "z"), (5, 0, 10.2 * DEG, "theta_y")):
+        with pytest.raises(PoseError, match=rf"{name} is .* end stops are at"):
+            wrist_pose(wrist, distances_at(wrist, z, x, y))
+
+
+def test_counts_are_distances_to_half_a_count():
+    wrist = Wrist()
+    d = distances_at(wrist, 4.2, 6 * DEG, -10 * DEG)
+    assert np.abs(distances_mm(wrist, counts_of(wrist, d)) - d).max() <= wrist.mm_per_count / 2
+    assert counts_of(wrist, [-100, 100, 0, 0]).tolist()[:2] == [0, 1023]
+
+
+def test_the_sensor_looks_the_other_way():
+    T = plate_to_sensor(Wrist(tips_mm=12))
+    assert np.linalg.det(T[:3, :3]) == pytest.approx(1)
+    above = T @ [0, 0, 1, 1]
+    assert above == pytest.approx([0, 0, 11, 1])  # off the object is nearer to the robot
+
+
+def test_springs():
+    wrist = Wrist()
+    held = stiffness(wrist)
+    assert held.tilt_x_nmm_rad == pytest.approx(3000)
+    assert held.tilt_y_nmm_rad == pytest.approx(3000)
+    rest = pose_under_load(wrist, 0)
+    assert (rest.z_mm, rest.stops) == (10, ("z",))
+    pressed = pose_under_load(wrist, 40, 300, -150)
+    assert (pressed.z_mm, pressed.theta_x_rad, pressed.theta_y_rad) == pytest.approx(
+        (5, 0.1, -0.05)
+    )
+    assert pressed.stops == ()
+    hard = pose_under_load(wrist, 200, 0, 1e6)
+    assert (hard.z_mm, hard.theta_y_rad, hard.stops) == (0, 10 * DEG, ("z", "theta_y"))
+    wide = stiffness(Wrist(ab_mm=30))
+    assert (wide.tilt_x_nmm_rad, wide.tilt_y_nmm_rad) == pytest.approx((750, 3000))
+    with pytest.raises(PoseError, match="makes a moment about y"):
+        stiffness(Wrist(gamma_rad=60 * DEG))
+
+
+def test_moments_of_an_oblique_wrist_are_those_of_its_springs():
+    wrist = Wrist(gamma_rad=70 * DEG, ab_mm=40, ad_mm=80)
+    x, y = 1e-5, -2e-5
+    stretch = distances_at(wrist, 5, x, y) - 5
+    forces = wrist.spring_n_mm * stretch
+    corners = wrist.corners_mm()
+    moments = np.array([corners[:, 1] @ forces, -corners[:, 0] @ forces])
+    loaded = pose_under_load(wrist, 40, *moments)
+    assert (loaded.theta_x_rad, loaded.theta_y_rad) == pytest.approx((x, y), rel=1e-4)
