@@ -41,6 +41,9 @@ from recognizer.symbols.template import Template, template_of
 
 Array = NDArray[np.float64]
 
+#: For touches that the first try does not answer.
+THOROUGH = Settings(candidates=24, finalists=6)
+
 
 @dataclass(frozen=True, slots=True)
 class Thresholds:
@@ -61,6 +64,7 @@ class Reader:
     lab: Lab
     sensor: Sensor
     settings: Settings = field(default_factory=Settings)
+    thorough: Settings = field(default_factory=lambda: THOROUGH)
     thresholds: Thresholds = field(default_factory=Thresholds)
     prepared: tuple[tuple[Encoding, Template, Bank], ...] = ()
 
@@ -76,7 +80,13 @@ def reader_for(
     for encoding in lab.encodings:
         template = template_of(encoding.alphabet, encoding.style, sensor)
         prepared.append((encoding, template, bank_of(template, sensor)))
-    return Reader(lab, sensor, settings or Settings(), thresholds or Thresholds(), tuple(prepared))
+    return Reader(
+        lab=lab,
+        sensor=sensor,
+        settings=settings or Settings(),
+        thresholds=thresholds or Thresholds(),
+        prepared=tuple(prepared),
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,14 +104,20 @@ def recognise(reader: Reader, signal: Signal, seq: int = 0) -> Recognition:
     if not signal.contact:
         return refused(seq, NO_CONTACT)
     image = image_of(reader.sensor, signal.forces, signal.trust)
+    answer = _answer(reader, _readings(reader, image, reader.settings), seq)
+    if not answer:  # spend more only where it is needed
+        again = _answer(reader, _readings(reader, image, reader.thorough), seq)
+        answer = again if again else answer
+    return answer
+
+
+def _readings(reader: Reader, image: Image, settings: Settings) -> list[Reading]:
+    """Return the verified places over all encodings, best first."""
     readings: list[Reading] = []
     for encoding, template, bank in reader.prepared:
-        found = fits(image, template, bank, reader.settings)
+        found = fits(image, template, bank, settings)
         readings += _verified(reader, image, encoding, template, found)
-    if not readings:
-        return refused(seq, TOO_FEW)
-    readings.sort(key=lambda reading: -reading.score)
-    return _answer(reader, readings, seq)
+    return sorted(readings, key=lambda reading: -reading.score)
 
 
 def unplaced(encoding: Encoding, fit: Fit) -> float:
@@ -153,6 +169,8 @@ def _verified(
 
 
 def _answer(reader: Reader, readings: list[Reading], seq: int) -> Recognition:
+    if not readings:
+        return refused(seq, TOO_FEW)
     best = readings[0]
     index = _index(best)
     other = next((r for r in readings[1:] if not _same(best, r)), None)

@@ -1,1 +1,93 @@
-"""`probe-sensor`: list, info, calibrate, record, replay, export, simulate, live."""
+"""`probe-sensor`: list, info, calibrate, record, replay, export, simulate, live.
+
+::
+
+    __init__.py    what an error or an interruption means for the exit code
+    app            which command: the modules below register themselves there
+    options        options that several commands share
+    report         results and errors as text and as JSON
+    progress       a bar on a terminal, notices beside it
+    stream         frames of a client while the terminal is served
+    devices        list, info           described    what info says
+    record         record               recorded     the work
+    replay         replay
+    files          export, import, repair
+    calibrate      calibrate            calibrated   the work, guided   step by step
+    simulate       simulate             simulated    the work
+    live           live                 live_loop, live_state, live_view, keys
+
+Results go to stdout, progress and messages to stderr. Exit codes: 0 done, 1 ran but failed,
+2 bad input, 3 device, 4 database, 130 interrupted. Nothing heavy is imported before it is
+needed: `probe-sensor --help` loads neither numpy, h5py and pyserial nor a plotting library.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from types import FrameType
+from typing import NoReturn
+
+FAILED, BAD_INPUT, DEVICE, INTERRUPTED = 1, 2, 3, 130
+
+Action = Callable[[], int]
+"""What a command does once its options are read; returns the exit code."""
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run `probe-sensor` and leave with its exit code."""
+    signal.signal(signal.SIGTERM, _end)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a name the terminal cannot show
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        code = run(given)
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        sys.stderr.write("\nprobe-sensor: interrupted\n")
+        code = INTERRUPTED
+    except BrokenPipeError:  # the reader of our output has gone, as in `| head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = FAILED
+    sys.exit(code)
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command; returns its exit code. Errors are reported, not raised."""
+    from typer import BadParameter, Exit
+
+    from probe.command import report
+    from probe.command.app import app, command_of
+    from probe.errors import ProbeError
+
+    usage_error: type[Exception] = BadParameter.__mro__[1]  # of every misused option
+    as_json = "--json" in arguments
+    try:
+        action = app(arguments or ["--help"], prog_name="probe-sensor", standalone_mode=False)
+        code = action() if callable(action) else int(action or 0)
+        return code if arguments else BAD_INPUT
+    except Exit as leaving:
+        return leaving.exit_code
+    except ProbeError as error:
+        report.error(error, as_json=as_json)
+        return error.exit_code
+    except usage_error as error:
+        message = str(getattr(error, "message", error))
+        fix = f"see {command_of(arguments)} --help"
+        report.error(ProbeError(message, fix=fix), as_json=as_json)
+        return BAD_INPUT
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        what = f"cannot write '{error.filename}'" if error.filename else "cannot write"
+        cause = f"{what}: {error.strerror or error}"
+        report.error(ProbeError(cause, fix="check folder, space and rights"), as_json=as_json)
+        return FAILED
+
+
+def _end(number: int, _frame: FrameType | None) -> NoReturn:
+    """Leave on a request to end, so that what is open is closed."""
+    sys.exit(128 + number)

@@ -28,7 +28,10 @@ from probe.surface.contract import Surface
 STEEPEST_RAD = 0.35  #: tilts beyond are not small
 KEPT = 2  #: condensed pads
 GROWTH = 1.5  #: from element to element of the margin
-NEAR = 0.1  #: of an element: lines so near a wall move there
+BESIDE = 0.15  #: of an element: from a wall to the lines next to it
+NEAR = 0.1  #: of an element: no two lines as near as that, but walls and tactels
+TINY = 1e-6  #: of an element: the same place
+FINER = 1.6  #: elements get thinner towards the top, by this power
 
 
 def elements(
@@ -37,7 +40,7 @@ def elements(
     touch: Touch,
     *,
     per_tactel: int = 2,
-    layers: int = 2,
+    layers: int = 3,
     margin_mm: float = 0.0,
     walls_mm: tuple[ArrayLike, ArrayLike] = ((), ()),
     memory_gb: float = 4.0,
@@ -105,7 +108,7 @@ def elements(
 def condensed_pad(
     sensor: Sensor,
     per_tactel: int = 2,
-    layers: int = 2,
+    layers: int = 3,
     margin_mm: float = 0.0,
     walls_mm: tuple[ArrayLike, ArrayLike] = ((), ()),
     memory_gb: float = 4.0,
@@ -129,13 +132,13 @@ def _condensed(
         raise ContactError(
             f"{per_tactel} elements on a tactel, {layers} layers, margin {margin_mm:g} mm; at "
             "least one element both ways, and a margin of 0 mm or more",
-            fix="take per_tactel=2, layers=2, margin_mm=0",
+            fix="take per_tactel=2, layers=3, margin_mm=0",
         )
     overlay, pitch = sensor.overlay, sensor.pitch_mm
     lines = PadLines(
         _along(sensor.columns, pitch, per_tactel, margin_mm, walls_x),
         _along(sensor.rows, pitch, per_tactel, margin_mm, walls_y),
-        np.linspace(0, overlay.height_mm, layers + 1),
+        overlay.height_mm * (1 - (1 - np.linspace(0, 1, layers + 1)) ** FINER),
     )
     tactels = ((sensor.rows + 1) // 2) * ((sensor.columns + 1) // 2)
     needed = lines.bytes_needed(tactels) / 1e9
@@ -168,14 +171,17 @@ def _along(
         count = max(1, math.ceil(math.log1p(margin / size * (GROWTH - 1)) / math.log(GROWTH)))
         steps = np.cumsum(GROWTH ** np.arange(count))
         lines = np.concatenate([lines, lines[-1] + margin * steps / steps[-1]])
-    for wall in walls:
-        if not 0 < wall < lines[-1] or np.abs(firm - wall).min() < size * 1e-6:
-            continue
-        firm = np.append(firm, wall)
-        near = np.abs(lines - wall) < NEAR * size
-        yields = near & (np.abs(lines[:, None] - firm).min(axis=1) > 0) & (lines < lines[-1])
-        lines = np.sort(np.append(lines[~yields], wall))
-    return lines
+    walls = tuple(w for w in walls if 0 < w < lines[-1])
+    firm = np.concatenate([firm, walls, lines[-1:]])
+    for wall in walls:  # a line there, in place of one too near, and one close by on each side
+        apart = np.abs(lines - wall) > NEAR * size
+        held = (np.abs(lines[:, None] - firm) <= TINY * size).any(axis=1)
+        lines = np.append(lines[apart | held], wall)
+        for beside in (wall - BESIDE * size, wall + BESIDE * size):
+            if 0 < beside < lines.max() and np.abs(lines - beside).min() > NEAR * size:
+                lines = np.append(lines, beside)
+    lines = np.sort(lines)
+    return np.asarray(lines[np.append(True, np.diff(lines) > TINY * size)])
 
 
 def _checked(sensor: Sensor, touch: Touch) -> None:

@@ -38,6 +38,11 @@ class Indented:
     section: Section
     iterations: int
 
+    @property
+    def pad_force_n(self) -> float:
+        """Force on the whole base."""
+        return float((self.section.ring @ self.base_mpa).sum())
+
     def stress_mpa(self, r_mm: Array) -> Array:
         """Return the pressure at the base at radii (n,); 0 beyond the pad."""
         inside = r_mm <= self.section.r[-1]
@@ -66,7 +71,7 @@ def indented(pad: Section, height_mm: Callable[[Array], Array], force_n: float) 
     Parameters
     ----------
     pad
-        Bonded at its base; its outer side is held in r if the pad goes on (`wide_pad`).
+        Bonded at its base, free at its outer side.
     height_mm
         Of the indenter at radii (m,), at most 0; -inf where there is nothing.
     force_n

@@ -19,12 +19,13 @@ from numpy.typing import NDArray
 from probe.contact.contract import Contact, Touch
 from probe.contact.layer_active_set import Pressed, equilibrium
 from probe.contact.layer_descent import descended
-from probe.contact.layer_influence import influence
+from probe.contact.layer_influence import Influence, influence
 from probe.contact.layer_kernel import layer_compliance
-from probe.contact.layer_patch import Patch, centres_mm, neighbours, patch_under
-from probe.contact.layer_solve import Plate, plate_of, pressure_image
+from probe.contact.layer_levels import leveled
+from probe.contact.layer_patch import Patch, centres_mm, patch_under
+from probe.contact.layer_solve import plate_of
 from probe.contact.neo_hooke import Linear
-from probe.contact.plate import load_of, rest
+from probe.contact.plate import Pose, load_of, rest
 from probe.errors import ContactError
 from probe.sensor import Sensor
 from probe.surface.contract import Surface
@@ -35,7 +36,8 @@ STEEPEST_RAD = 0.35  #: tilts beyond are not small
 DEEPEST = 0.5  #: mean indentation, of the pad's height, beyond which strains are not small
 THINNEST = 1.5  #: points in touch per cell, on the mean, below which a cover is chance
 _FEW = 8  # cells in touch, from which on THINNEST is asked
-_MARGIN = 0.5  # of the foreseen indentation, further down which cells are sampled in full
+_TURNED = 0.05  # of the indentation: what a turn may change across a cell
+_PASSES = 8
 
 
 def layer(
@@ -76,16 +78,16 @@ def layer(
     grid = influence(sensor, cells_per_tactel)
     if touch.force_n == 0:
         return _untouched(sensor, touch)
-    return press_patch(patch_under(surface, grid, touch, samples), touch)
+    patch = patch_under(surface, sensor, touch, cells_per_tactel=cells_per_tactel, samples=samples)
+    return press_patch(patch, touch)
 
 
 def press_patch(patch: Patch, touch: Touch) -> Contact:
     """Press the pad on a patch; x, y and theta of the touch are those of the patch.
 
-    For many forces and tilts at one place: the surface is not asked again where it is known.
     Parameters, returned value and errors as for `layer`.
     """
-    sensor = patch.grid.sensor
+    sensor = patch.sensor
     place = (touch.x_mm, touch.y_mm, touch.theta_rad)
     if place != (patch.touch.x_mm, patch.touch.y_mm, patch.touch.theta_rad):
         raise ContactError(
@@ -94,73 +96,112 @@ def press_patch(patch: Patch, touch: Touch) -> Contact:
         )
     if touch.force_n == 0:
         return _untouched(sensor, touch)
-    plate = plate_of(touch, sensor.reach_mm)
-    patch, first = _foreseen(patch, touch)
-    pressed = equilibrium(patch, plate, first)
-    if not pressed.converged:
-        pressed = descended(pressed, plate)
-    _refuse(pressed, plate)
-    z, turn_x, turn_y = pressed.plate
+    grid = influence(sensor, patch.cells_per_tactel)
+    pressed, pose = _settled(patch, grid, touch)
     return Contact(
-        forces_n=patch.grid.base_forces_n(pressure_image(pressed.patch, pressed.pressures)),
-        z_mm=float(z),
-        tilt_x_rad=float(turn_x / plate.reach_mm),
-        tilt_y_rad=float(turn_y / plate.reach_mm),
+        forces_n=grid.base_forces_n(pressed.levels.image(pressed.pressures)),
+        z_mm=pose.z_mm,
+        tilt_x_rad=pose.tilt_x_rad,
+        tilt_y_rad=pose.tilt_y_rad,
         level="layer",
         iterations=pressed.iterations,
     )
 
 
-def _foreseen(patch: Patch, touch: Touch) -> tuple[Patch, Array]:
-    """Return the patch sampled where it can touch, and about where the plate comes to rest.
+def _settled(patch: Patch, grid: Influence, touch: Touch) -> tuple[Pressed, Pose]:
+    """Return the contact and the plate at rest.
+
+    Cells and points far below the foreseen plate are left out. Those that turn out to be run
+    through are taken in, and where the plate turned the levels are taken anew.
+    """
+    pose, depth = _foreseen(patch, touch)
+    floor = -depth
+    for _ in range(_PASSES):
+        above = patch.highest_mm - pose.heights_mm(patch.centres_mm)
+        patch = patch.with_cells(np.flatnonzero(patch.neighbours(above >= floor)))
+        levels = leveled(patch, grid, pose, floor)
+        plate = plate_of(touch, levels)
+        pressed = equilibrium(levels, plate)
+        if not pressed.converged:
+            pressed = descended(pressed, plate)
+        b, reach = pressed.plate, levels.reach_mm
+        found = Pose(
+            pose.z_mm + float(b[0]),
+            pose.tilt_x_rad + float(b[1]) / reach,
+            pose.tilt_y_rad + float(b[2]) / reach,
+        )
+        moved = Pose(float(b[0]), float(b[1]) / reach, float(b[2]) / reach)
+        moved_mm = moved.heights_mm(centres_mm(grid.rows, grid.columns, grid.dx_mm))
+        sunk = grid.sunk_mm(levels.image(pressed.pressures)).ravel()
+        missed = levels.left_out_mm > moved_mm + sunk
+        turned = grid.dx_mm * max(abs(moved.tilt_x_rad), abs(moved.tilt_y_rad))
+        if not missed.any() and turned <= _TURNED * depth:
+            _refuse_steep(found)
+            _refuse_deep(pressed, sunk, touch)
+            _refuse_thin(patch, found, sunk.reshape(grid.rows, -1)[1:-1, 1:-1])
+            return pressed, found
+        pose = found
+        floor = min(floor, float((levels.left_out_mm - moved_mm)[missed].min(initial=0.0)))
+    raise ContactError(
+        f"the plate does not settle within {_PASSES} passes over the surface",
+        fix="report the scene; a stiffer wrist helps",
+    )
+
+
+def _foreseen(patch: Patch, touch: Touch) -> tuple[Pose, float]:
+    """Return about where the plate comes to rest, and how deep (mm) it stands in the pad.
 
     The plate is put on springs that do not know of each other: about what a stroke of one
     tactel's width feels.
     """
-    grid, pad = patch.grid, patch.grid.sensor.overlay
-    highest = patch.highest_mm
-    matter = np.flatnonzero(highest > -math.inf)
-    wave = np.array(2 / grid.sensor.pitch_mm)
+    pad = patch.sensor.overlay
+    matter = np.flatnonzero(patch.highest_mm > -math.inf)
     compliance = layer_compliance(
-        wave, height_mm=pad.height_mm, young_mpa=pad.young_mpa, poisson=pad.poisson
+        np.array(2 / patch.sensor.pitch_mm),
+        height_mm=pad.height_mm,
+        young_mpa=pad.young_mpa,
+        poisson=pad.poisson,
     )
-    springs = Linear(grid.dx_mm**2 / float(compliance))
-    points = centres_mm(grid)
-    found = rest(points[matter], highest[matter], springs, load_of(touch), tolerance=1e-6)
-    pose, reach = found.pose, grid.sensor.reach_mm
-    depth = highest - pose.heights_mm(points)
-    near = neighbours(depth > -_MARGIN * depth.max(), grid)
-    b = np.array([pose.z_mm, pose.tilt_x_rad * reach, pose.tilt_y_rad * reach])
-    return patch.with_cells(np.flatnonzero(near)), b
+    springs = Linear(patch.dx_mm**2 / float(compliance))
+    points, heights = patch.centres_mm[matter], patch.highest_mm[matter]
+    pose = rest(points, heights, springs, load_of(touch), tolerance=1e-6).pose
+    return pose, float((heights - pose.heights_mm(points)).max())
 
 
-def _refuse(pressed: Pressed, plate: Plate) -> None:
-    """Refuse what lies beyond the model."""
-    patch = pressed.patch
-    pad = patch.grid.sensor.overlay
-    turn = float(np.abs(pressed.plate[1:]).max()) / plate.reach_mm
+def _refuse_steep(pose: Pose) -> None:
+    turn = max(abs(pose.tilt_x_rad), abs(pose.tilt_y_rad))
     if turn > STEEPEST_RAD:
         raise ContactError(
             f"the plate tips: it comes to rest at a tilt of {math.degrees(turn):.3g} degrees, "
             f"beyond {math.degrees(STEEPEST_RAD):.3g}",
             fix="move the sensor, press with less force, or take a stiffer wrist",
         )
-    many = pressed.touching.sum(axis=0)
+
+
+def _refuse_deep(pressed: Pressed, sunk_mm: Array, touch: Touch) -> None:
+    """Refuse strains that are not small."""
+    height = pressed.levels.grid.sensor.overlay.height_mm
+    p = pressed.pressures
+    mean = float(sunk_mm[pressed.levels.cells] @ p / p.sum())
+    if mean > DEEPEST * height:
+        raise ContactError(
+            f"{touch.force_n:g} N press the pad of {height:g} mm in by {mean:.3g} mm on the "
+            f"mean, beyond {DEEPEST * height:g} mm strains are not small",
+            fix="press with less force, on more of the surface, or take tabs",
+        )
+
+
+def _refuse_thin(patch: Patch, pose: Pose, sunk_mm: Array) -> None:
+    """Refuse strokes whose cover is chance: hit by one point of a cell here and there."""
+    free = pose.heights_mm(patch.centres_mm) + sunk_mm.ravel()
+    many = (patch.heights_mm > free[patch.cells]).sum(axis=0)
     cells = int((many > 0).sum())
     if cells >= _FEW and many.sum() < THINNEST * cells:
         raise ContactError(
-            f"of {len(pressed.touching)} points in a cell of {patch.grid.dx_mm:.3g} mm only "
+            f"of {len(patch.heights_mm)} points in a cell of {patch.dx_mm:.3g} mm only "
             f"{many.sum() / cells:.2g} are in touch on the mean: the strokes are too thin to be "
             "felt by their true width",
             fix="take more cells per tactel or more samples per cell, or a wider stroke",
-        )
-    sunk = patch.grid.sunk_mm(pressure_image(patch, pressed.pressures)).ravel()[patch.cells]
-    mean = float(sunk @ pressed.pressures / pressed.pressures.sum())
-    if mean > DEEPEST * pad.height_mm:
-        raise ContactError(
-            f"{plate.force_n:g} N press the pad of {pad.height_mm:g} mm in by {mean:.3g} mm on "
-            f"the mean, beyond {DEEPEST * pad.height_mm:g} mm strains are not small",
-            fix="press with less force, on more of the surface, or take tabs",
         )
 
 

@@ -3,12 +3,12 @@
 For contacts on very many cells, and where the active set came back to one that was seen. Two
 convex problems, one in the other:
 
-- the plate held fast, the points' spring compressions f = D q >= 0 (`layer_active_set`) are the
-  minimum of a strictly convex quadratic function: conjugate gradients on the points in touch,
+- the plate held fast, the levels' spring compressions f = D q >= 0 (`layer_active_set`) are the
+  minimum of a strictly convex quadratic function: conjugate gradients on the levels in touch,
   projected steps where the set changes; the pad acts by its fast Fourier transform;
 - the plate's energy is convex with a continuous gradient in its three unknowns: Newton's
   step, halved while the energy rises along it. The three columns of its matrix are conjugate
-  gradients on the points in touch.
+  gradients on the cells in touch.
 
 References
 ----------
@@ -25,17 +25,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.contact.layer_active_set import Pressed, judged
-from probe.contact.layer_patch import Patch
-from probe.contact.layer_solve import (
-    Plate,
-    answers,
-    deep_mm,
-    glued,
-    levers,
-    pressure_image,
-    pseudo_inverse,
-)
+from probe.contact.layer_active_set import Pressed, deep_mm
+from probe.contact.layer_levels import Levels
+from probe.contact.layer_solve import Plate, answers, glued, pseudo_inverse
 from probe.errors import ContactError
 
 Array = NDArray[np.float64]
@@ -43,7 +35,7 @@ Array = NDArray[np.float64]
 MOST_POSES = 100
 MOST_GRADIENTS = 5000
 HALVINGS = 40
-TOLERANCE = 1e-8  #: of the force, for the plate; of the deepest gap, for the points
+TOLERANCE = 1e-8  #: of the force, for the plate; of the depth, for the levels
 _HESSIAN = 1e-4  # residual of the columns of the plate's matrix
 _PROPORTION = 1.0  # of chopped to free gradient; 1 is the usual choice
 _STEP = 1.9  # over the largest eigenvalue; below 2
@@ -51,17 +43,21 @@ _STEP = 1.9  # over the largest eigenvalue; below 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Springs:
-    """The function f'Af/2 - f'e of the points (S, cells) of a patch."""
+    """The function f'WAf/2 - f'We of the levels (COUNT, cells); W are their shares."""
 
-    patch: Patch
+    levels: Levels
     largest: float  # bound of A's eigenvalues
 
     def applied(self, f: Array) -> Array:
         """Return A f."""
-        grid = self.patch.grid
-        mean = f.mean(axis=0)
-        image = pressure_image(self.patch, mean / grid.edge_mm_mpa)
-        return f + (grid.sunk_mm(image).ravel()[self.patch.cells] - mean)
+        grid = self.levels.grid
+        mean = (self.levels.shares * f).sum(axis=0)
+        image = self.levels.image(mean / grid.edge_mm_mpa)
+        return f + (grid.sunk_mm(image).ravel()[self.levels.cells] - mean)
+
+    def dot(self, f: Array, g: Array) -> float:
+        """Return f'W g."""
+        return float(np.einsum("ij,ij,ij", f, self.levels.shares, g))
 
     def least(self, e: Array, f: Array, tolerance: float) -> Array:
         """Return the minimum over f >= 0 from a first guess."""
@@ -73,22 +69,22 @@ class _Springs:
             chopped = np.where(f > 0, 0.0, np.minimum(g, 0.0))
             if max(np.abs(free).max(), np.abs(chopped).max()) <= tolerance:
                 return f
-            reduced = np.vdot(np.minimum(f / step, free), free)
-            if np.vdot(chopped, chopped) > _PROPORTION**2 * reduced:
+            reduced = self.dot(np.minimum(f / step, free), free)
+            if self.dot(chopped, chopped) > _PROPORTION**2 * reduced:
                 Ap = self.applied(chopped)
-                along = np.vdot(g, chopped) / np.vdot(chopped, Ap)
+                along = self.dot(g, chopped) / self.dot(chopped, Ap)
                 f, g = f - along * chopped, g - along * Ap
                 p = free = np.where(f > 0, g, 0.0)
                 continue
             Ap = self.applied(p)
-            curvature = np.vdot(p, Ap)
-            along = np.vdot(g, p) / curvature
+            curvature = self.dot(p, Ap)
+            along = self.dot(g, p) / curvature
             falling = p > 0
-            reach = (f[falling] / p[falling]).min(initial=np.inf)
+            reach = float((f[falling] / p[falling]).min(initial=np.inf))
             if along <= reach:
                 f, g = np.maximum(f - along * p, 0.0), g - along * Ap
                 free = np.where(f > 0, g, 0.0)
-                p = free - (np.vdot(free, Ap) / curvature) * p
+                p = free - (self.dot(free, Ap) / curvature) * p
             else:
                 f, g = np.maximum(f - reach * p, 0.0), g - reach * Ap
                 f = np.maximum(f - step * np.where(f > 0, g, 0.0), 0.0)
@@ -105,58 +101,38 @@ def descended(begun: Pressed, plate: Plate) -> Pressed:
     ContactError
         When the limits of this module are reached; no scene is known that does.
     """
-    patch, b = begun.patch, begun.plate
-    iterations = begun.iterations
-    f = np.zeros(patch.heights_mm.shape)
-    while True:
-        b, f, more = _rested(patch, plate, b, f)
-        iterations += more
-        pressures = f.mean(axis=0) / patch.grid.edge_mm_mpa
-        _, bigger = judged(patch, plate, pressures, b)
-        if bigger is patch:
-            return Pressed(patch, f > 0, pressures, b, iterations, converged=True)
-        wider = np.zeros(bigger.heights_mm.shape)
-        wider[:, np.searchsorted(bigger.cells, patch.cells)] = f
-        patch, f = bigger, wider
-
-
-def _rested(patch: Patch, plate: Plate, b: Array, f: Array) -> tuple[Array, Array, int]:
-    """Return plate, spring compressions and Newton's steps."""
-    grid = patch.grid
+    levels, grid = begun.levels, begun.levels.grid
+    matter = levels.shares > 0
     softest = float(grid.compliance.max()) / grid.edge_mm_mpa
-    springs = _Springs(patch, max(1.0, softest))
-    at_cell, at_point = levers(patch, plate.reach_mm)
-    weight = grid.dx_mm**2 / (f.shape[0] * grid.edge_mm_mpa)  # N/mm of one point's spring
-    free = plate.free
-    K = np.where(np.isfinite(plate.stiffness), plate.stiffness, 0.0)
-    b = np.where(np.isfinite(plate.stiffness), b, plate.start)
-
-    def moments(f: Array) -> Array:
-        return weight * (at_cell @ f.sum(axis=0) + f.sum(axis=1) @ at_point)
+    springs = _Springs(levels, max(1.0, softest))
+    free, K = plate.free, plate.finite
+    area, edge = grid.dx_mm**2, grid.edge_mm_mpa
 
     def left(b: Array, f: Array) -> tuple[Array, Array]:
-        """Return the gradient of the plate's energy, with the points at their minimum."""
-        e = deep_mm(patch, b, plate.reach_mm)
-        f = springs.least(e, f, TOLERANCE * max(float(e.max()), 1e-300))
-        gradient = K * (b - plate.start) - moments(f)
+        """Return the gradient of the plate's energy, with the levels at their minimum."""
+        e = np.where(matter, deep_mm(levels, b), 0.0)
+        scale = max(float(e.max()), 1e-300)
+        f = springs.least(np.where(matter, e, -scale), f, TOLERANCE * scale)
+        gradient = K * (b - plate.start)
+        gradient -= area / edge * (levels.levers @ (levels.shares * f).sum(axis=0))
         gradient[0] += plate.force_n
         return gradient[free], f
 
-    gradient, f = left(b, f)
-    for iteration in range(1, MOST_POSES + 1):
+    b = np.where(free, begun.plate, plate.start)
+    gradient, f = left(b, np.zeros(levels.shares.shape))
+    for iteration in range(begun.iterations + 1, begun.iterations + MOST_POSES):
         size = plate.force_n + float((K * np.abs(b - plate.start)).max())
         if np.abs(gradient).max() <= 10 * TOLERANCE * size:
-            return b, f, iteration
-        touching = f > 0
-        if touching.any():
-            system = glued(patch, plate, touching)
+            pressures = (levels.shares * f).sum(axis=0) / edge
+            return Pressed(levels, f > 0, pressures, b, iteration, converged=True)
+        if (f > 0).any():
+            system = glued(levels, f > 0)
             R = system.levers[free]
-            stiff = grid.dx_mm**2 * (R @ answers(system, R.T, _HESSIAN))
-            stiff += system.turn[np.ix_(free, free)] + np.diag(K[free])
+            stiff = area * (R @ answers(system, R.T, _HESSIAN)) + np.diag(K[free])
             step = -pseudo_inverse((stiff + stiff.T) / 2) @ gradient
-        else:  # nothing is touched: go down to the highest point and a little deeper
+        else:  # nothing is touched: go down to the highest level and a little deeper
             step = np.zeros(int(free.sum()))
-            step[0] = 1.001 * float(deep_mm(patch, b, plate.reach_mm).max()) - grid.dx_mm
+            step[0] = 1.001 * float(deep_mm(levels, b).max()) - grid.dx_mm
         slope = float(gradient @ step)
         for halving in range(HALVINGS):
             there = b.copy()

@@ -6,7 +6,9 @@ convolution, two Fourier transforms: the compliance between cells is never a mat
 
 The layer has no edges in wave numbers, so the domain is the matrix and a free rim about it,
 `RIM` pad heights in total both ways: what a cell feels of the images of the others has then
-fallen to about 1e-5 of its own compliance. Beyond its edge the real pad ends. There this model
+fallen to about 1e-5 of its own compliance. On the way to the base the tents by which cells meet the
+surface (`layer_levels`) are taken off, and the stress is integrated over each cell: a factor
+1/sinc^2 and a factor sinc along either axis. Beyond its edge the real pad ends. There this model
 is an endless layer: against elements with a free edge (nu = .4999) a ring 2.6 h from the edge
 is 2 % too stiff, at 0.9 h 17 %. What the endless layer would carry beyond the matrix is given to
 the outermost tactels, where a free edge carries it; so the sum of all tactels is the force.
@@ -35,17 +37,20 @@ LARGEST_DOMAIN = 4096  #: cells along one side
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Influence:
-    """A bonded pad on a grid of cells; row 0 is the top row, as on the sensor."""
+    """A bonded pad on a grid of cells; row 0 is the top row, as on the sensor.
+
+    One more ring of cells stands about the matrix: the tents of `layer_levels` reach there.
+    """
 
     sensor: Sensor
     cells_per_tactel: int
-    rows: int  #: of cells on the matrix
+    rows: int  #: of cells, ring and all
     columns: int
     dx_mm: float
     edge_mm_mpa: float  #: compliance of what a cell does not resolve, see `edge_compliance`
     domain: tuple[int, int]  #: cells of the periodic domain
     compliance: Array  #: (domain rows, domain columns // 2 + 1) of waves, mm/MPa
-    base: Array  #: the same shape; share of the pressure that arrives at the base
+    base: Array  #: the same shape; what of the pressure arrives at the base
     own_mm_mpa: float  #: compliance of a cell under its own pressure
 
     def sunk_mm(self, pressure: Array) -> Array:
@@ -95,7 +100,7 @@ def influence(sensor: Sensor, cells_per_tactel: int) -> Influence:
     """
     _check(sensor, cells_per_tactel)
     pad = sensor.overlay
-    rows, columns = sensor.rows * cells_per_tactel, sensor.columns * cells_per_tactel
+    rows, columns = sensor.rows * cells_per_tactel + 2, sensor.columns * cells_per_tactel + 2
     dx = sensor.pitch_mm / cells_per_tactel
     domain = _domain(rows, pad.height_mm / dx), _domain(columns, pad.height_mm / dx)
     if max(domain) > LARGEST_DOMAIN:
@@ -111,7 +116,8 @@ def influence(sensor: Sensor, cells_per_tactel: int) -> Influence:
         q, height_mm=pad.height_mm, young_mpa=pad.young_mpa, poisson=pad.poisson
     )
     own = float(scipy.fft.irfft2(spectrum, s=domain)[0, 0])
-    base = base_ratio(q * pad.height_mm, pad.poisson)
+    along = [np.sinc(scipy.fft.fftfreq(domain[0])), np.sinc(scipy.fft.rfftfreq(domain[1]))]
+    base = base_ratio(q * pad.height_mm, pad.poisson) / (along[0][:, None] * along[1])
     spectrum.setflags(write=False)
     base.setflags(write=False)
     edge = edge_compliance(
@@ -135,7 +141,7 @@ def _nearest_tactel(
     """
     before = (domain - cells) // 2
     order = np.roll(np.arange(domain), before)
-    starts = before + per_tactel * np.arange(cells // per_tactel)
+    starts = before + 1 + per_tactel * np.arange((cells - 2) // per_tactel)
     starts[0] = 0
     return order, starts
 

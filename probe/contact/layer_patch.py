@@ -1,6 +1,6 @@
 """Heights of the surface under the matrix, only where they can matter.
 
-Surface + Influence's grid + place -> Patch. Every cell is looked at in 4 points; a cell whose
+Surface + cells + place -> Patch. Every cell is looked at in 4 points; a cell whose
 neighbourhood is level needs no more, one that can touch is sampled in full (16 points by
 default), all others never. The points of a cell are a lattice whose columns and rows are all
 different, and neighbouring cells look at different quarters of it, so a stroke along an axis
@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.contact.contract import Touch
-from probe.contact.layer_influence import Influence
 from probe.errors import ContactError
+from probe.sensor import Sensor
 from probe.surface.contract import Surface
 
 Array = NDArray[np.float64]
@@ -34,15 +34,32 @@ _SEARCH_LINES = 16  # across the matrix, each way
 class Patch:
     """What lies under the matrix: cells in flat numbers, row * columns + column, row 0 on top."""
 
-    grid: Influence
     surface: Surface
+    sensor: Sensor
     touch: Touch  #: its x, y and theta; force, tilt and wrist have no meaning here
+    cells_per_tactel: int
     offsets_mm: Array  #: (samples, 2) points of a cell from its centre, sensor frame
     coarse_mm: Array  #: (all cells,) height of the first of the points looked at
     highest_mm: Array  #: (all cells,) of the points looked at
     level: NDArray[np.bool_]  #: (all cells,) the cell and its neighbours are level
     cells: Cells  #: (n,) cells sampled in full, ascending
     heights_mm: Array  #: (samples, n) their heights
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of cells."""
+        n = self.cells_per_tactel
+        return self.sensor.rows * n, self.sensor.columns * n
+
+    @property
+    def dx_mm(self) -> float:
+        """Side of a cell."""
+        return self.sensor.pitch_mm / self.cells_per_tactel
+
+    @property
+    def centres_mm(self) -> Array:
+        """Centres (all cells, 2) of the cells, sensor frame."""
+        return centres_mm(*self.shape, self.dx_mm)
 
     def with_cells(self, cells: Cells) -> Patch:
         """Return the patch with these cells sampled as well."""
@@ -51,25 +68,38 @@ class Patch:
             return self
         fine = np.repeat(self.coarse_mm[None, new], len(self.offsets_mm), axis=0)
         rough = np.flatnonzero(~self.level[new])
-        points = centres_mm(self.grid)[new[rough]] + self.offsets_mm[:, None, :]
+        points = self.centres_mm[new[rough]] + self.offsets_mm[:, None, :]
         fine[:, rough] = _heights(self.surface, self.touch, points)
+        if not len(self.cells):
+            return replace(self, cells=new, heights_mm=fine)
         both = np.concatenate([self.cells, new])
         order = np.argsort(both, kind="stable")
         heights = np.concatenate([self.heights_mm, fine], axis=1)[:, order]
         return replace(self, cells=both[order], heights_mm=heights)
 
+    def neighbours(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return the cells of a mask (all cells,) and the eight around each."""
+        return _spread(mask.reshape(self.shape), np.logical_or).ravel()
 
-def patch_under(surface: Surface, grid: Influence, touch: Touch, samples: int = 16) -> Patch:
+
+def patch_under(
+    surface: Surface,
+    sensor: Sensor,
+    touch: Touch,
+    *,
+    cells_per_tactel: int = 4,
+    samples: int = 16,
+) -> Patch:
     """Return the first look at what lies under the matrix; no cell is sampled in full yet.
 
     Parameters
     ----------
     surface
         What is touched.
-    grid
-        The pad's cells.
-    touch
-        Where the sensor stands.
+    sensor, touch
+        The matrix, and where it stands.
+    cells_per_tactel
+        Cells along the side of a tactel.
     samples
         Points of a cell that is sampled in full: 16, 64 or 256.
 
@@ -84,61 +114,79 @@ def patch_under(surface: Surface, grid: Influence, touch: Touch, samples: int = 
             f"{samples} samples per cell, allowed are {', '.join(map(str, SAMPLES))}",
             fix="take 16 for a touch, 64 for a reference",
         )
-    coarse = _heights(surface, touch, _coarse_points(grid, samples))
-    _refuse_hidden(surface, grid, touch, coarse, samples)
-    shape = (grid.rows, grid.columns)
+    shape = sensor.rows * cells_per_tactel, sensor.columns * cells_per_tactel
+    dx = sensor.pitch_mm / cells_per_tactel
+    coarse = _heights(surface, touch, _coarse_points(*shape, dx, samples))
+    _refuse_hidden(surface, sensor, touch, coarse, dx / samples)
     highest = coarse.max(axis=0)
     high = _spread(highest.reshape(shape), np.maximum)
     low = _spread(coarse.min(axis=0).reshape(shape), np.minimum)
-    level = (high <= low + _LEVEL).ravel()
-    none = np.zeros(0, dtype=np.intp)
-    empty = np.zeros((samples, 0))
-    offsets = _lattice(samples) * grid.dx_mm
-    return Patch(grid, surface, touch, offsets, coarse[0], highest, level, none, empty)
+    return Patch(
+        surface=surface,
+        sensor=sensor,
+        touch=touch,
+        cells_per_tactel=cells_per_tactel,
+        offsets_mm=lattice(samples) * dx,
+        coarse_mm=coarse[0],
+        highest_mm=highest,
+        level=(high <= low + _LEVEL).ravel(),
+        cells=np.zeros(0, dtype=np.intp),
+        heights_mm=np.zeros((samples, 0)),
+    )
 
 
-def neighbours(mask: NDArray[np.bool_], grid: Influence) -> NDArray[np.bool_]:
-    """Return the cells of a mask (all cells,) and the eight around each."""
-    return _spread(mask.reshape(grid.rows, grid.columns), np.logical_or).ravel()
+@lru_cache(maxsize=16)
+def centres_mm(rows: int, columns: int, dx_mm: float) -> Array:
+    """Return the centres (rows * columns, 2) of a grid of cells about the origin."""
+    x = (np.arange(columns) - (columns - 1) / 2) * dx_mm
+    y = ((rows - 1) / 2 - np.arange(rows)) * dx_mm
+    centres = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    centres.setflags(write=False)
+    return centres
 
 
-def centres_mm(grid: Influence) -> Array:
-    """Return the centres (all cells, 2) of the cells, sensor frame."""
-    return _centres(grid.rows, grid.columns, grid.dx_mm)
+@lru_cache(maxsize=4)
+def lattice(samples: int) -> Array:
+    """Return points (samples, 2) of a unit cell about 0: the lattice with the widest gaps."""
+    i = np.arange(samples)
+    best, widest = i, -1
+    for step in range(1, samples, 2):
+        across = i * step % samples
+        dx, dy = np.minimum(i, samples - i)[1:], np.minimum(across, samples - across)[1:]
+        shortest = int((dx**2 + dy**2).min())
+        if shortest > widest:
+            best, widest = across, shortest
+    return (np.stack([i, best], axis=-1) + 0.5) / samples - 0.5
 
 
 def _heights(surface: Surface, touch: Touch, points: Array) -> Array:
     """Return heights (...) at points (..., 2) of the sensor frame."""
     asked = touch.on_surface(points.reshape(-1, 2))
-    heights = np.asarray(surface.heights_mm(asked), np.float64).reshape(points.shape[:-1])
-    if not (heights < np.inf).all():
+    heights = np.asarray(surface.heights_mm(asked), np.float64)
+    if heights.shape != (len(asked),) or not (heights < np.inf).all():
         raise ContactError(
-            "the surface gives heights that are infinite or no numbers",
-            fix="a height is a number, or -inf where there is no matter",
+            "the surface gives heights that are no numbers",
+            fix="give a finite height at each point, or -inf where there is no matter",
         )
-    return heights
+    return heights.reshape(points.shape[:-1])
 
 
 def _refuse_hidden(
-    surface: Surface, grid: Influence, touch: Touch, coarse: Array, samples: int
+    surface: Surface, sensor: Sensor, touch: Touch, coarse: Array, finest_mm: float
 ) -> None:
     """Refuse a surface whose top is under the matrix and was seen by no point.
 
     Asked only when the surface has a top that the first look did not meet: a blank place, or
     strokes thinner than the points are apart.
     """
-    seen = float(coarse.max(initial=-np.inf))
-    if surface.top_mm <= seen + _LEVEL:
+    seen, top = float(coarse.max()), surface.top_mm
+    if top <= seen + _LEVEL:
         return
-    width, height = grid.sensor.half_mm
-    lines = _search_lines(width, height)
-    found = float(_heights(surface, touch, lines).max())
-    below = surface.top_mm - max(seen, surface.top_mm - grid.sensor.overlay.height_mm)
-    if found > seen + 0.5 * below:
-        finest = grid.dx_mm / samples
+    found = float(_heights(surface, touch, _search_lines(*sensor.half_mm)).max())
+    if found - seen > 0.5 * min(top - seen, sensor.overlay.height_mm):
         raise ContactError(
-            f"strokes that rise to {found:g} mm lie between the points sampled every "
-            f"{finest:g} mm (the highest point seen is {seen:g} mm)",
+            f"strokes that rise to {found:g} mm lie between the points, at least "
+            f"{finest_mm:.2g} mm apart, that were looked at (the highest stands at {seen:g} mm)",
             fix="take more cells per tactel or more samples per cell, or a wider stroke",
         )
 
@@ -157,36 +205,13 @@ def _search_lines(half_width: float, half_height: float) -> Array:
 
 
 @lru_cache(maxsize=8)
-def _centres(rows: int, columns: int, dx: float) -> Array:
-    x = (np.arange(columns) - (columns - 1) / 2) * dx
-    y = ((rows - 1) / 2 - np.arange(rows)) * dx
-    centres = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    centres.setflags(write=False)
-    return centres
-
-
-@lru_cache(maxsize=8)
-def _coarse_points(grid: Influence, samples: int) -> Array:
+def _coarse_points(rows: int, columns: int, dx: float, samples: int) -> Array:
     """Return (COARSE, all cells, 2): of every cell another quarter of its lattice."""
     quarters = samples // COARSE
-    row, column = np.divmod(np.arange(grid.rows * grid.columns), grid.columns)
+    row, column = np.divmod(np.arange(rows * columns), columns)
     which = (row * 3 + column * 5 + row // quarters + column // quarters) % quarters
-    offsets = _lattice(samples).reshape(COARSE, quarters, 2) * grid.dx_mm
-    return centres_mm(grid) + offsets[:, which]
-
-
-@lru_cache(maxsize=4)
-def _lattice(samples: int) -> Array:
-    """Return points (samples, 2) of a unit cell about 0: the lattice with the widest gaps."""
-    i = np.arange(samples)
-    best, widest = i, -1
-    for step in range(1, samples, 2):
-        across = i * step % samples
-        dx, dy = np.minimum(i, samples - i)[1:], np.minimum(across, samples - across)[1:]
-        shortest = int((dx**2 + dy**2).min())
-        if shortest > widest:
-            best, widest = across, shortest
-    return (np.stack([i, best], axis=-1) + 0.5) / samples - 0.5
+    offsets = lattice(samples).reshape(COARSE, quarters, 2) * dx
+    return centres_mm(rows, columns, dx) + offsets[:, which]
 
 
 def _spread(image: NDArray[np.generic], join: np.ufunc) -> NDArray[np.generic]:

@@ -84,14 +84,16 @@ def _begun(problem: Problem, a: Array) -> State:
     """Return the state to begin with: the unknowns, withdrawn to within the laws' limits."""
     columns, limit = problem.columns, problem.law.limit_mm
     whole = limit if columns is None else limit + columns.law.limit_mm
-    deep = a @ problem.rows + problem.heights
+    pressed = a @ problem.rows + problem.heights
+    deepest = float(pressed.max())
     # At least a trace of contact, at most nearly the limit.
     least = 1e-9 * (1.0 if math.isinf(whole) else whole)
-    a[0] += min(max(least - float(deep.max()), 0.0), _NEAR_LIMIT * whole - float(deep.max()))
+    back = min(max(least - deepest, 0.0), _NEAR_LIMIT * whole - deepest)
+    a[0] += back
     if columns is None:
         return _at(problem, a, _NONE)
-    deepest = np.maximum.reduceat(a @ problem.rows + problem.heights, columns.starts)
-    v = np.maximum(columns.foreseen_mm, deepest - _NEAR_LIMIT * limit)
+    v = np.maximum.reduceat(pressed, columns.starts) + (back - _NEAR_LIMIT * limit)
+    v = np.maximum(columns.foreseen_mm, v)
     return _at(problem, a, np.minimum(v, _NEAR_LIMIT * columns.law.limit_mm))
 
 

@@ -1,10 +1,9 @@
 """Where the tips of the overlay are asked for contact: a few points on each. Thesis 4.2.
 
 Sensor + `Tips` -> points (rows * columns, q, 2) in the sensor frame and the depth of each
-below the highest place of its tip. A round tip carries a hexagonal pattern (7, 19, 37 or 61
-points of equal share) with the disc's own second moment, turned from tab to tab by the
-golden angle, so that what it misses at an edge does not add up along a stroke; a pad's
-tactel carries a square one (4, 9, 16 ... points).
+below the highest place of its tip. A round tip carries rings of points of equal share (7, 19,
+37, 61 ...), turned from tab to tab by the golden angle, so that what they miss at an edge does
+not add up along a stroke; a pad's tactel carries a square pattern (4, 9, 16 ... points).
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from probe.sensor import Sensor
 
 Array = NDArray[np.float64]
 
-HEXAGONS = tuple(3 * k * (k + 1) + 1 for k in range(1, 17))  #: 7, 19, 37, 61, 91 ... 817
+NUMBERS = tuple(3 * k * (k + 1) + 1 for k in range(1, 17))  #: 7, 19, 37, 61, 91 ... 817
 _GOLDEN_RAD = math.pi * (3 - math.sqrt(5))
 
 
@@ -29,7 +28,7 @@ _GOLDEN_RAD = math.pi * (3 - math.sqrt(5))
 class Tips:
     """What is known of the tips beyond the sensor's drawing, and how finely they are asked."""
 
-    points: int = 19  #: on each tip, one of `HEXAGONS`
+    points: int = 19  #: on each tip, one of `NUMBERS`
     dome_mm: float = 0.0  #: how far the rim of a round tip lies below its middle
     lengths_mm: Array | None = None  #: (rows, columns) how much longer each tab is than drawn
     shifts_mm: Array | None = None  #: (rows, columns, 2) how far each stands off its place
@@ -73,7 +72,7 @@ def _drawn(sensor: Sensor, number: int, dome_mm: float) -> tuple[Array, Array]:
     """Return points and drops of tips without defects."""
     tabs = sensor.rows * sensor.columns
     if sensor.overlay.kind == "tab":
-        unit = hexagon(number)
+        unit = rings(number)
         angle = _GOLDEN_RAD * np.arange(tabs)
         c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
         turned = np.stack([c * unit[:, 0] - s * unit[:, 1], s * unit[:, 0] + c * unit[:, 1]], -1)
@@ -90,20 +89,23 @@ def _drawn(sensor: Sensor, number: int, dome_mm: float) -> tuple[Array, Array]:
     return points, drop
 
 
-def hexagon(n: int) -> Array:
-    """Return n points (n, 2) of equal share on the unit disc, second moment 1/2 like the disc's."""
-    if n not in HEXAGONS:
+def rings(n: int) -> Array:
+    """Return n points (n, 2) of equal share on the unit disc: 1, 6, 12 ... on rings.
+
+    Each ring lies at the root mean square radius of its share of the disc.
+    """
+    if n not in NUMBERS:
         raise ContactError(
-            f"{n} points on a round tip; patterns have {', '.join(map(str, HEXAGONS))}",
+            f"{n} points on a round tip; patterns have {', '.join(map(str, NUMBERS))}",
             fix="take 19, or 37 for finer edges",
         )
-    ring = HEXAGONS.index(n) + 1
-    i, j = np.mgrid[-ring : ring + 1, -ring : ring + 1]
-    inside = np.abs(i + j) <= ring
-    i, j = i[inside], j[inside]
-    points = np.stack([i + j / 2, j * (math.sqrt(3) / 2)], axis=1)
-    moment = np.einsum("ni,ni->", points, points) / n
-    return np.asarray(points / math.sqrt(2 * moment))
+    ring = np.repeat(np.arange(17), [1, *range(6, 97, 6)])[:n]
+    inside = np.where(ring > 0, 3 * ring * (ring - 1) + 1, 0)
+    within = 3 * ring * (ring + 1) + 1
+    radius = np.sqrt((inside + within) / (2 * n)) * (ring > 0)
+    turn = (np.arange(n) - inside + ring % 2 / 2) / np.maximum(6 * ring, 1)
+    angle = 2 * math.pi * turn
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
 
 
 def square(n: int) -> Array:

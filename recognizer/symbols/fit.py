@@ -79,7 +79,7 @@ def fits(image: Image, template: Template, bank: Bank, settings: Settings) -> tu
     if len(start) == 0:
         return ()
     lattices = started(start, np.repeat(gain[None], len(start), axis=0))
-    lattices = refined(image, template, lattices, steps=settings.steps)
+    lattices = refined(image, template, lattices, steps=settings.steps, bare=False)
     best = np.argsort(-lattices.value, kind="stable")[: settings.finalists]
     lattices = started(lattices.pose[best], lattices.gain[best])
     lattices = refined(image, template, lattices, steps=settings.final_steps)

@@ -26,6 +26,7 @@ LEAST_PRESS = 0.2  #: of a tactel where the plane presses little or not at all
 LEAST_GAIN = 0.12  #: of the largest over the sensor: below it a tactel tells nothing of symbols
 NOISE = 0.15  #: standard deviation of psi on a covered tactel, until it is known better
 LIMITS = np.array([0.7, 0.4, 0.03])  #: of spread, exponent - 1 and scale - 1, `template`
+_SHALLOW = 0.4  # least depth of the bare face, against the largest gain
 _REACHED = 0.15  # psi beside symbols at which the bare face may be pressed
 _REACHING = 8  # such tactels, at least
 _FAR = 4.0  # standard deviations at which a tactel's loss stops growing
@@ -122,6 +123,7 @@ def refined(
     steps: int,
     noise: float = NOISE,
     shown: Shown | None = None,
+    bare: bool = True,
 ) -> Lattices:
     """Return the candidates after `steps` Gauss-Newton steps, with their log-likelihoods.
 
@@ -131,6 +133,8 @@ def refined(
         Standard deviation of psi on a covered tactel.
     shown
         What the cells show, where that is known; otherwise each cell shows what fits best.
+    bare
+        Whether the bare face between the symbols may be felt as well.
     """
     pose, gain = start.pose.copy(), start.gain.copy()
     noises = np.full(len(pose), noise)
@@ -154,7 +158,7 @@ def refined(
             break
         pose = pose + _moved(normal, image, pose, values, residual * sure)
         pose[:, 3:] = np.clip(pose[:, 3:], -LIMITS, LIMITS)
-        gain = _gain(image, felt, gain, values, sure > 0)
+        gain = _gain(image, felt, gain, values, sure > 0, bare)
     return Lattices(pose, gain, value, normal)
 
 
@@ -241,7 +245,9 @@ def _moved(normal: Array, image: Image, pose: Array, values: Array, pull: Array)
     return np.clip(step, -_STEP, _STEP)
 
 
-def _gain(image: Image, felt: Felt, gain: Array, values: Array, near: NDArray[np.bool_]) -> Array:
+def _gain(
+    image: Image, felt: Felt, gain: Array, values: Array, near: NDArray[np.bool_], bare: bool
+) -> Array:
     """Return the gains (b, 4) that explain the forces best, labels and pose held.
 
     Symbols press with the plane g, the bare face with what is left of it after its depth h,
@@ -252,7 +258,7 @@ def _gain(image: Image, felt: Felt, gain: Array, values: Array, near: NDArray[np
     by_symbol = np.abs(values[..., 1:3]).sum(axis=-1) > 0
     by_symbol |= response > 0.7
     flat = ~by_symbol & (felt.psi > _REACHED)
-    reached = flat & (flat.sum(axis=1) >= _REACHING)[:, None]
+    reached = flat & (bare & (flat.sum(axis=1) >= _REACHING))[:, None]
     weights = np.where(near & by_symbol, felt.contact * felt.press**2, 0.0) * felt.trust
     weights = np.where(reached, felt.trust, weights)
     share = np.where(reached, 1.0, response)
@@ -265,6 +271,7 @@ def _gain(image: Image, felt: Felt, gain: Array, values: Array, near: NDArray[np
     size = np.trace(normal[:, :3, :3], axis1=1, axis2=2)[:, None, None]
     normal += size * np.diag([0.0, 1e-2, 1e-2, 1e-6]) + 1e-9 * (1 + size) * np.eye(4)
     found = np.linalg.solve(normal, weighted.swapaxes(1, 2) @ image.forces[:, None])[..., 0]
-    depth = np.where(reached.any(axis=1) & (found[:, 3] > 0), found[:, 3], np.inf)
-    plane = np.where((found[:, :1] > 0), found[:, :3], gain[:, :3])
-    return np.column_stack([bounded_gain(plane), depth])
+    plane = bounded_gain(np.where(found[:, :1] > 0, found[:, :3], gain[:, :3]))
+    least = _SHALLOW * (plane @ basis.T).max(axis=1)
+    depth = np.where(reached.any(axis=1), np.maximum(found[:, 3], least), np.inf)
+    return np.column_stack([plane, depth])

@@ -1,0 +1,163 @@
+"""What a probe, a recording, and a calibration say of themselves: values, and lines to read."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from probe.command.report import number
+from probe.command.stream import Stream, name_of
+
+Described = tuple[dict[str, Any], dict[str, str]]
+"""What `--json` prints, and what people read."""
+
+_PAUSE_S = 0.5  # longer than that between frames is a pause
+
+
+def probe(url: str, sensor: int | None, seconds: float) -> Described:
+    """Listen to a probe for a while.
+
+    Raises
+    ------
+    PortError
+        When it is not there, or no probe.
+    """
+    from probe.client import Client
+
+    peak, saturated, full, heard = 0, 0, 1023, False
+    with Stream(Client(url, sensor=sensor)) as stream:
+        until_s = time.monotonic() + seconds
+        while not stream.ended:
+            for frame in stream.take(0.1):
+                if not heard:
+                    heard, until_s = True, time.monotonic() + seconds
+                    stream.client.ask_device()
+                peak = max(peak, int(frame.counts.max()))
+                saturated += int((frame.counts >= full).sum())
+            if heard and time.monotonic() > until_s:
+                break
+        ident, device = stream.ident(), stream.client.device
+        counts, notices = stream.client.statistics(), stream.client.notices()
+    values = {
+        "url": url,
+        "sensor": name_of(ident),
+        "ident": None if ident is None else asdict(ident),
+        "client": asdict(counts),
+        "device": None if device is None else asdict(device),
+        "peak": peak,
+        "notices": notices,
+    }
+    lines = {"port": url}
+    if ident is not None:
+        major, minor = ident.firmware
+        settling = f", settling {ident.settling_us:g} us" if ident.settling_us else ""
+        speed = f", {ident.baud:,} baud" if ident.baud else ""
+        lines["probe"] = f"{ident.name}, firmware {major}.{minor}{speed}, start {ident.boot}"
+        lines["sensor"] = (
+            f"{ident.sensor} of 0 ... {ident.sensors - 1}, {ident.rows}x{ident.columns}, "
+            f"{ident.bits} bits{settling}"
+        )
+    lines["rate"] = f"{counts.rate:.1f} frames a second"
+    lines["heard"] = (
+        f"{number(counts.frames, 'frame')}, lost {counts.lost}, failed checks {counts.failed}, "
+        f"doubtful {counts.doubtful}, reboots {counts.reboots}"
+    )
+    lines["peak"] = f"{peak} counts"
+    if device is not None:
+        lines["device"] = (
+            f"up {device.uptime_ms / 1000:.1f} s, sent {device.frames:,}, waited "
+            f"{device.transmit_waits:,} times for the line, unknown commands "
+            f"{device.receive_errors}"
+        )
+    return values, lines | {"notice": notice for notice in notices[-1:]}
+
+
+def recording(name: str) -> Described:
+    """Read a recording through.
+
+    Raises
+    ------
+    RecordingError
+        When it is none, damaged, or not closed.
+    """
+    from probe.recording.read import read_recording
+
+    held = read_recording(name)
+    seq, t_ns, peak, poses = [], [], 0, 0
+    for block in held.blocks():
+        seq.append(block.seq)
+        t_ns.append(block.t_ns)
+        peak = max(peak, int(block.counts.max(initial=0)))
+        poses += 0 if block.pose is None else int((~np.isnan(block.pose[:, 0, 0])).sum())
+    gaps = _gaps(np.concatenate([*seq, []]), np.concatenate([*t_ns, []]) * 1e-9)
+    origin = held.origin
+    files = [{"file": str(file.path), "frames": file.frames} for file in held.files]
+    values = {
+        "file": name,
+        "files": files,
+        "frames": len(held),
+        **gaps,
+        "sensor": origin.sensor,
+        "calibration": origin.calibration,
+        "units": origin.units,
+        "peak": peak,
+        "poses": poses,
+        "tool_version": held.tool_version,
+        "bytes": sum(file.path.stat().st_size for file in held.files),
+        "attributes": dict(origin.more),
+    }
+    lines = {
+        "recording": ", ".join(Path(file["file"]).name for file in files[:4])
+        + (f" ... ({len(files)} files)" if len(files) > 4 else ""),
+        "frames": f"{len(held):,} in {gaps['seconds']:.2f} s, {gaps['rate']:.1f} a second",
+        "gaps": f"{gaps['gaps']}, {gaps['lost']} frames lost; longest pause "
+        f"{1000 * gaps['longest_pause_s']:.1f} ms; restarts {gaps['restarts']}",
+        "sensor": origin.sensor or "not named",
+        "calibration": origin.calibration or "none",
+        "peak": f"{peak} {origin.units}",
+        "poses": f"of {number(poses, 'frame')}",
+        "size": f"{values['bytes'] / 1000:,.0f} kB",
+        "written by": held.tool_version or "another programme",
+    }
+    more = {str(key): _short(value) for key, value in origin.more.items()}
+    return values, lines | more
+
+
+def calibration(name: str) -> Described:
+    """Read a calibration.
+
+    Raises
+    ------
+    CalibrationError
+        When it is none, or was changed.
+    """
+    from probe.calibration import calibration_hash, read_calibration
+    from probe.command.calibrated import described
+
+    held = read_calibration(name)
+    return described(held, calibration_hash(held), name)
+
+
+def _gaps(seq: np.ndarray, t_s: np.ndarray) -> dict[str, Any]:
+    """Sum up numbers and times of a recording."""
+    steps, pauses = np.diff(seq), np.diff(t_s)
+    going = (steps > 0) & (pauses >= 0)
+    seconds = float(pauses[going].sum())
+    return {
+        "seconds": seconds,
+        "rate": float(going.sum()) / seconds if seconds > 0 else 0.0,
+        "gaps": int((steps[going] > 1).sum()),
+        "lost": int((steps[going] - 1).sum()),
+        "longest_pause_s": float(pauses[going].max(initial=0.0)),
+        "restarts": int((~going).sum()),
+    }
+
+
+def _short(value: Any) -> str:
+    text = str(value)
+    return text if len(text) <= 90 else f"{text[:87]}..."

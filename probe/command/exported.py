@@ -1,0 +1,161 @@
+"""A recording -> table, array, picture; each file whole or not there."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.calibration import Calibration, calibrated, read_calibration
+from probe.command import report
+from probe.errors import CalibrationError, ProbeError, RecordingError
+from probe.recording.read import Recording, read_recording
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """Which image a picture shows, and how."""
+
+    frame: int = 0
+    median: bool = False
+    azimuth_deg: float = -60.0
+    elevation_deg: float = 40.0
+
+
+def export_files(
+    path: Path,
+    csv: Path | None,
+    npy: Path | None,
+    png: Path | None,
+    view: View,
+    *,
+    calibration: Path | None,
+    live: bool,
+    replace: bool,
+    as_json: bool,
+) -> int:
+    """Write the files that were asked for; returns the exit code.
+
+    Raises
+    ------
+    RecordingError
+        When the recording cannot be read, or has no such frame.
+    CalibrationError
+        When the calibration is none, or of another sensor.
+    ProbeError
+        When a file is there already.
+    """
+    outputs = [out for out in (csv, npy, png) if out is not None]
+    for out in outputs:
+        refuse_taken(out, replace=replace)
+    recording = read_recording(path, live=live)
+    known = None if calibration is None else calibration_for(calibration, recording)
+    if png is not None:
+        _picture(recording, png, view, known)
+    if npy is not None:
+        _array(recording, npy, known)
+    if csv is not None:
+        from probe.recording.table import export_csv
+
+        export_csv(path, csv, live=live)
+    if as_json:
+        names = [str(out) for out in outputs]
+        report.write_json({"file": str(path), "frames": len(recording), "written": names})
+    else:
+        for out in outputs:
+            what = "picture" if out is png else report.number(len(recording), "frame")
+            report.write(f"{out}: {what}")
+    return 0
+
+
+def refuse_taken(out: Path, *, replace: bool) -> None:
+    """Refuse a file that is there already, unless it may be replaced.
+
+    Raises
+    ------
+    ProbeError
+        With the way out.
+    """
+    if out.exists() and not replace:
+        raise ProbeError("the file is there already", place=str(out),
+                         fix="choose another name, or replace it with --replace")  # fmt: skip
+
+
+@contextmanager
+def staged(out: Path) -> Iterator[Path]:
+    """Yield a name beside `out` to write to; it becomes `out` when all went well."""
+    draft = out.with_name(f".{out.stem}.{os.getpid()}{out.suffix}")
+    try:
+        yield draft
+        os.replace(draft, out)
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+def calibration_for(path: Path, recording: Recording) -> Calibration:
+    """Read the calibration of the sensor that made a recording.
+
+    Raises
+    ------
+    CalibrationError
+        When the recording names another calibration, or another sensor.
+    """
+    from probe.calibration import calibration_hash
+
+    known = read_calibration(path, sensor=recording.origin.sensor or None)
+    named = recording.origin.calibration
+    if named and named != calibration_hash(known):
+        raise CalibrationError(
+            f"the recording was made with calibration {named[:12]}..., not with this one",
+            fix="give the file whose hash `probe-sensor info` shows as that",
+            place=str(path),
+        )
+    return known
+
+
+def median_filtered(image: NDArray[Any]) -> NDArray[Any]:
+    """Return the median of the 3x3 neighbourhood of each reading; edges are repeated."""
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(image, 1, mode="edge"), (3, 3))
+    filtered: NDArray[Any] = np.median(around, axis=(2, 3))
+    return filtered
+
+
+def _picture(recording: Recording, out: Path, view: View, known: Calibration | None) -> None:
+    from probe.plot.frame import frame_picture
+
+    if view.frame >= len(recording):
+        raise RecordingError(
+            f"frame {view.frame} was asked for, it holds {len(recording)}",
+            fix=f"take 0 ... {len(recording) - 1}" if len(recording) else "record some frames",
+            place=str(recording.files[0].path),
+        )
+    block = recording.block(view.frame, view.frame + 1)
+    first = recording.block(0, 1)
+    image, unit = block.counts[0].astype(np.float64), recording.origin.units
+    if known is not None:
+        image, unit = calibrated(block.counts[0], known).values, "N"
+    if view.median:
+        image = median_filtered(image)
+    title = f"frame {view.frame}, {(block.t_ns[0] - first.t_ns[0]) * 1e-9:.3f} s"
+    if view.median:
+        title += ", median of 3x3"
+    with staged(out) as draft:
+        frame_picture(image, draft, unit=unit, title=title, azimuth_deg=view.azimuth_deg,
+                      elevation_deg=view.elevation_deg)  # fmt: skip
+
+
+def _array(recording: Recording, out: Path, known: Calibration | None) -> None:
+    shape = (len(recording), *recording.block(0, 0).counts.shape[1:])
+    with staged(out) as draft, open(draft, "wb") as file:
+        dtype = np.dtype("<u2" if known is None else "<f4")
+        header = {"descr": dtype.str, "fortran_order": False, "shape": shape}
+        np.lib.format.write_array_header_1_0(file, header)
+        for block in recording.blocks():
+            values = block.counts if known is None else calibrated(block.counts, known).values
+            file.write(np.ascontiguousarray(values, dtype).tobytes())

@@ -1,0 +1,121 @@
+"""`probe-sensor export | import | repair`: recordings to and from other formats."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from probe.command import Action
+from probe.command.options import Calibrated, Json, Output, Recording, Replace
+
+Target = Path | None
+
+
+def export(
+    recording: Recording,
+    csv: Annotated[
+        Target, typer.Option(metavar="OUT", show_default=False,
+                             help="A table: seq, t_ns, 256 readings, wrist, pose; counts."),
+    ] = None,
+    npy: Annotated[
+        Target, typer.Option(metavar="OUT", show_default=False,
+                             help="The images as a NumPy array (N, 16, 16)."),
+    ] = None,
+    png: Annotated[
+        Target, typer.Option(metavar="OUT", show_default=False,
+                             help="One image as heat map and as surface, see --frame."),
+    ] = None,
+    frame: Annotated[int, typer.Option(min=0, help="Which image --png shows, from 0.")] = 0,
+    median: Annotated[
+        bool, typer.Option("--median", help="--png: median of each 3x3 neighbourhood."),
+    ] = False,
+    azimuth: Annotated[
+        float, typer.Option(help="--png: from where the surface is seen, degrees."),
+    ] = -60.0,
+    elevation: Annotated[float, typer.Option(help="--png: and from how high, degrees.")] = 40.0,
+    calibration: Calibrated = None,
+    live: Annotated[
+        bool, typer.Option("--live", help="Also a recording that is still being written."),
+    ] = False,
+    replace: Replace = False,
+    as_json: Json = False,
+) -> Action:  # fmt: skip
+    """Write a recording as a table, as an array, or one of its images as a picture."""
+
+    def action() -> int:
+        from probe.command.exported import View, export_files
+
+        if csv is None and npy is None and png is None:
+            raise typer.BadParameter("nothing to write: give --csv, --npy or --png")
+        if calibration is not None and csv is not None:
+            raise typer.BadParameter("--csv holds counts; --calibration is for --npy and --png")
+        view = View(frame, median, azimuth, elevation)
+        return export_files(
+            recording, csv, npy, png, view, calibration=calibration, live=live, replace=replace,
+            as_json=as_json,
+        )  # fmt: skip
+
+    return action
+
+
+def import_(
+    array: Annotated[
+        Path, typer.Argument(metavar="FILE", show_default=False,
+                             help=".npy, .npz, .mat or HDF5 with images (N, 16, 16)."),
+    ],
+    output: Output,
+    dataset: Annotated[
+        str | None, typer.Option(metavar="NAME", show_default=False,
+                                 help="Which array, where there are several."),
+    ] = None,
+    rate: Annotated[float, typer.Option(help="Frames a second: an array tells no time.")] = 220.0,
+    sensor: Annotated[str, typer.Option(help="Name of the sensor.", show_default=False)] = "",
+    replace: Replace = False,
+    as_json: Json = False,
+) -> Action:  # fmt: skip
+    """Make a recording of others' images; values that are no counts are scaled."""
+
+    def action() -> int:
+        from probe.command import report
+        from probe.command.recorded import check_output
+        from probe.recording.imported import import_array
+
+        check_output(output, replace=replace)
+        made = import_array(array, output, dataset=dataset, rate_hz=rate, sensor=sensor,
+                            replace=replace)  # fmt: skip
+        more = dict(made.origin.more)
+        values = {"file": str(output), "frames": len(made), "units": made.origin.units, **more}
+        if as_json:
+            report.write_json(values)
+            return 0
+        scaled = f"; value = {more['scale_offset']:g} + {more['scale']:g} * count" \
+            if "scale" in more else ""  # fmt: skip
+        report.write(f"{output}: {report.number(len(made), 'frame')} of {array}{scaled}")
+        return 0
+
+    return action
+
+
+def repair(recording: Recording, as_json: Json = False) -> Action:
+    """Make a recording readable whose writer was killed, or that is damaged or cut short."""
+
+    def action() -> int:
+        from dataclasses import asdict
+
+        from probe.command import report
+        from probe.recording.repair import repair as repaired
+
+        done = repaired(recording)
+        if as_json:
+            report.write_json(asdict(done))
+        elif not done.changed:
+            report.write(f"{done.path} is whole; {report.number(done.frames, 'frame')}")
+        else:
+            report.write(
+                f"{done.path}: {report.number(done.frames, 'frame')} saved, {done.lost} lost"
+            )
+        return 0
+
+    return action

@@ -1,0 +1,89 @@
+"""`probe-sensor simulate TARGET`: touches of the files that were printed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from probe.command import Action
+from probe.command.options import Json, Replace
+
+EPILOG = """TARGET is a written part, [bold]out/cube/Cube-F1.stl[/] (with [bold]@lab.db[/]: in the \
+frame of its face), a registered face, [bold]lab.db#Cube/F1[/], or [bold]washer[/]. x and y lie \
+in the frame of the face: origin at its first vertex, x along its first edge.
+"""
+
+_Mm = Annotated[
+    float | None, typer.Option(show_default=False, help="Place of the sensor's centre, mm; the "
+                                                        "middle, or anywhere with --touches."),
+]  # fmt: skip
+
+
+def simulate(
+    target: Annotated[
+        str, typer.Argument(metavar="TARGET", show_default=False, help="What is touched."),
+    ],
+    x: _Mm = None,
+    y: _Mm = None,
+    theta: Annotated[
+        float | None, typer.Option(show_default=False, help="Turn of the sensor, degrees; 0, or "
+                                                            "any with --touches."),
+    ] = None,
+    force: Annotated[
+        float | None, typer.Option(min=0.0, show_default=False,
+                                   help="Force, N; 80, or 20 ... 120 with --touches."),
+    ] = None,
+    tilt_x: Annotated[
+        float | None, typer.Option(show_default=False, help="Tilt about the sensor's x, degrees; "
+                                                            "0, or up to 2 with --touches."),
+    ] = None,
+    tilt_y: Annotated[
+        float | None, typer.Option(show_default=False, help="The same about y."),
+    ] = None,
+    overlay: Annotated[str, typer.Option(metavar="tab|pad", help="Elastic overlay.")] = "tab",
+    accuracy: Annotated[
+        str, typer.Option(help="auto, a level of the contact model (footprint, tabs, layer, "
+                               "elements), or the largest error, as 0.01."),
+    ] = "auto",
+    noise: Annotated[
+        str, typer.Option(metavar="typical|quiet", help="Noise of contacts and board."),
+    ] = "typical",
+    touches: Annotated[
+        int | None, typer.Option(min=1, show_default=False,
+                                 help="So many touches at random; what is given is kept."),
+    ] = None,
+    frames: Annotated[int, typer.Option(min=1, help="Frames of each touch, 220 a second.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Of places and noise.")] = 0,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE.h5", show_default=False,
+                                  help="Recording to write."),
+    ] = None,
+    png: Annotated[
+        Path | None, typer.Option(metavar="FILE", show_default=False,
+                                  help="Picture of the first touch: surface and image."),
+    ] = None,
+    truth: Annotated[
+        Path | None, typer.Option(metavar="FILE", show_default=False,
+                                  help="JSON file of where every touch was; it is nowhere else."),
+    ] = None,
+    replace: Replace = False,
+    as_json: Json = False,
+) -> Action:  # fmt: skip
+    """Touch a part in simulation: a recording as the probe would give it, and a picture."""
+
+    def action() -> int:
+        from probe.command.simulated import Asked, simulate_touches
+
+        if overlay not in ("tab", "pad"):
+            raise typer.BadParameter(f"--overlay {overlay}: give tab or pad")
+        if noise not in ("typical", "quiet"):
+            raise typer.BadParameter(f"--noise {noise}: give typical or quiet")
+        asked = Asked(x, y, theta, force, tilt_x, tilt_y, touches, frames, seed)
+        return simulate_touches(
+            target, asked, overlay=overlay, accuracy=accuracy, noise=noise, output=output,
+            png=png, truth=truth, replace=replace, as_json=as_json,
+        )  # fmt: skip
+
+    return action

@@ -1,0 +1,123 @@
+"""Frames of a client while something else is done: a terminal served, an interruption seen.
+
+A thread takes the frames from the client; `Stream.take` returns those that wait, or none
+after a while, so that its caller is never held up.
+"""
+
+from __future__ import annotations
+
+import queue
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType, TracebackType
+from typing import Self
+
+from probe.client import Client
+from probe.errors import ProbeError
+from probe.frame import Frame
+from probe.protocol import IdentPacket
+
+WAITING = 2048  #: frames between the threads; beyond, the client counts overruns
+_IDENT_S = 2.0
+
+
+class Stream:
+    """The frames of a client; a context manager that closes the client too."""
+
+    def __init__(self, client: Client) -> None:
+        self.client = client
+        self.ended = False  #: whether there will be no more frames
+        self._queue: queue.Queue[Frame | None] = queue.Queue(WAITING)
+        self._failure: ProbeError | None = None
+        self._closed = threading.Event()
+        self._thread = threading.Thread(target=self._feed, name="frames", daemon=True)
+        self._thread.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._closed.set()
+        self.client.close()
+        self._thread.join()
+
+    def take(self, timeout_s: float) -> list[Frame]:
+        """Return all frames that wait; none if none came in `timeout_s`, or at the end.
+
+        Raises
+        ------
+        ProbeError
+            When the probe went away for good, or a recording is damaged.
+        """
+        frames: list[Frame] = []
+        try:
+            frame = self._queue.get(timeout=timeout_s)
+            while frame is not None:
+                frames.append(frame)
+                frame = self._queue.get_nowait()
+            self.ended = True
+        except queue.Empty:
+            return frames
+        if self._failure is not None:
+            if frames:  # the failure is told by the next call
+                self._queue.put(None)
+                self.ended = False
+                return frames
+            raise self._failure
+        return frames
+
+    def ident(self) -> IdentPacket | None:
+        """Return what the device is, after a short wait for its answer."""
+        until_s = time.monotonic() + _IDENT_S
+        while self.client.ident is None and time.monotonic() < until_s:
+            time.sleep(0.02)
+        return self.client.ident
+
+    def _feed(self) -> None:
+        try:
+            for frame in self.client.frames():
+                self._put(frame)
+        except ProbeError as failure:
+            self._failure = failure
+        self._put(None)
+
+    def _put(self, item: Frame | None) -> None:
+        while not self._closed.is_set():
+            try:
+                self._queue.put(item, timeout=0.1)
+            except queue.Full:
+                continue
+            return
+
+
+@contextmanager
+def interruption() -> Iterator[threading.Event]:
+    """Yield an event that Ctrl-C sets, so that what is being written can be ended in order.
+
+    A second Ctrl-C interrupts at once.
+    """
+    interrupted = threading.Event()
+
+    def note(_number: int, _frame: FrameType | None) -> None:
+        if interrupted.is_set():
+            raise KeyboardInterrupt
+        interrupted.set()
+
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield interrupted
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def name_of(ident: IdentPacket | None) -> str:
+    """Return how recordings and calibrations call the sensor that is read; empty: unknown."""
+    return "" if ident is None else f"{ident.name}/{ident.sensor}"

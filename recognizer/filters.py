@@ -1,0 +1,202 @@
+"""The filters before edges and symbols are looked for: bias, median, magnification, Sobel.
+
+Readings -> `TactileImage`: samples on a square grid in an image frame (x right along columns,
+y up against rows, mm). For one touch the image frame is the sensor frame; for a mosaic it is
+the mosaic's. Undefined samples (bad tactels, places that no touch has reached) stay out of
+every filter. Thesis 4.3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from probe.sensor import Sensor
+from recognizer.errors import RecognizerError
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+WIDEST_ERASED = 1  #: samples; lines no wider are erased by a 3 x 3 median, two wide survive
+
+
+class ImageError(RecognizerError):
+    """A tactile image that cannot be filtered."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TactileImage:
+    """Samples of what is felt, of one touch or of a mosaic (the thesis's TPI and GTI)."""
+
+    values: Array  #: (h, w) newtons, counts, or anything proportional; 0 where undefined
+    defined: Mask  #: (h, w)
+    step_mm: float  #: from sample to sample, both ways
+    corner_mm: tuple[float, float]  #: image frame, x and y of sample (0, 0), the upper left one
+
+    def xy_mm(self, rows: ArrayLike, columns: ArrayLike) -> Array:
+        """Return the places (..., 2) of (fractional) rows and columns."""
+        x = self.corner_mm[0] + np.asarray(columns, np.float64) * self.step_mm
+        y = self.corner_mm[1] - np.asarray(rows, np.float64) * self.step_mm
+        return np.stack([x, y], axis=-1)
+
+
+def tactile_image(
+    values: ArrayLike,
+    *,
+    step_mm: float,
+    defined: ArrayLike | None = None,
+    corner_mm: tuple[float, float] | None = None,
+) -> TactileImage:
+    """Return an image, checked.
+
+    Parameters
+    ----------
+    values
+        (h, w), finite wherever it is defined.
+    step_mm
+        From sample to sample: the tactel's pitch, or a quarter of it for a mosaic.
+    defined
+        (h, w), true where something is known; everywhere if not given.
+    corner_mm
+        Place of the upper left sample; by default the image's middle is the origin.
+
+    Raises
+    ------
+    ImageError
+        If it is no image, its step is no length, or a value is NaN or infinite.
+    """
+    given = np.array(values, np.float64)
+    known = np.ones(given.shape, np.bool_) if defined is None else np.array(defined, np.bool_)
+    if given.ndim != 2 or given.size == 0 or known.shape != given.shape:
+        raise ImageError(
+            f"values of shape {given.shape} with a mask of shape {known.shape}",
+            fix="give two (h, w) arrays of one shape",
+        )
+    if not (0 < step_mm < np.inf):
+        raise ImageError(f"a step of {step_mm} mm", fix="give the distance of two samples")
+    bad = known & ~np.isfinite(given)
+    if bad.any():
+        row, column = np.argwhere(bad)[0].tolist()
+        raise ImageError(
+            f"{int(bad.sum())} readings are NaN or infinite, the first at ({row}, {column})",
+            fix="mark them as undefined",
+        )
+    given[~known] = 0.0
+    given.setflags(write=False)
+    known.setflags(write=False)
+    if corner_mm is None:
+        h, w = given.shape
+        corner_mm = (-(w - 1) / 2 * step_mm, (h - 1) / 2 * step_mm)
+    return TactileImage(given, known, float(step_mm), corner_mm)
+
+
+def touch_image(sensor: Sensor, readings: ArrayLike, trust: ArrayLike | None = None) -> TactileImage:
+    """Return the image of one touch, in the sensor frame; tactels without trust are undefined."""
+    defined = None if trust is None else np.asarray(trust) > 0
+    return tactile_image(readings, step_mm=sensor.pitch_mm, defined=defined)
+
+
+def unbiased(image: TactileImage, bias: ArrayLike | None = None) -> TactileImage:
+    """Return readings over their bias, 0 or more.
+
+    Parameters
+    ----------
+    bias
+        (h, w) or a number: what is read without force; by default what the lowest twentieth
+        of the samples read.
+    """
+    if not image.defined.any():
+        return image
+    level = np.quantile(image.values[image.defined], 0.05) if bias is None else np.asarray(bias)
+    values = np.where(image.defined, np.maximum(image.values - level, 0.0), 0.0)
+    return _with(image, values)
+
+
+def median(image: TactileImage, thinnest_mm: float | None = None) -> TactileImage:
+    """Return the median of the 3 x 3 neighbourhood of every sample; edges are repeated.
+
+    It takes spikes away and keeps edges, but erases lines that are one sample wide: a stroke
+    must be at least two samples wide to survive.
+
+    Parameters
+    ----------
+    thinnest_mm
+        Width of the thinnest line that must survive; None where there is none.
+
+    Raises
+    ------
+    ImageError
+        If that line is not at least two samples wide.
+    """
+    if thinnest_mm is not None and thinnest_mm < (WIDEST_ERASED + 1) * image.step_mm:
+        raise ImageError(
+            f"a 3 x 3 median erases lines of one sample: {thinnest_mm:g} mm are "
+            f"{thinnest_mm / image.step_mm:.2g} samples of {image.step_mm:g} mm",
+            fix="leave the median out, or take it of a finer mosaic",
+        )
+    known = np.where(image.defined, image.values, np.nan)
+    padded = np.pad(known, 1, mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, (3, 3)).reshape(*known.shape, 9)
+    if image.defined.all():
+        values = np.partition(windows, 4, axis=-1)[..., 4]
+    else:  # of those neighbours that are defined
+        count = np.isfinite(windows).sum(axis=-1)
+        ranked = np.sort(windows, axis=-1)  # NaN last
+        low = np.take_along_axis(ranked, (np.maximum(count - 1, 0) // 2)[..., None], axis=-1)
+        high = np.take_along_axis(ranked, (np.minimum(count, 8) // 2)[..., None], axis=-1)
+        middle = np.where(count % 2 == 1, low[..., 0], (low + high)[..., 0] / 2)
+        values = np.where(image.defined, middle, 0.0)
+    return _with(image, values)
+
+
+def magnified(image: TactileImage, doublings: int = 2) -> TactileImage:
+    """Return an image sampled twice as finely for every doubling: 16 x 16 becomes 61 x 61.
+
+    Zeros go between the samples, and the image is convolved with
+
+        1/4 1/2 1/4
+        1/2  1  1/2
+        1/4 1/2 1/4
+
+    which joins neighbours by straight lines. The thesis's 64 x 64 images hold three more rows
+    and columns beyond the last tactel, which fall off to zero; there is nothing to be seen
+    there, and they are left out. Samples whose neighbours are undefined take what is left.
+    """
+    values, weights = image.values, image.defined.astype(np.float64)
+    values = values * weights
+    for _ in range(doublings):
+        values, weights = _doubled(values), _doubled(weights)
+    defined = weights > 0.5
+    filled = np.where(defined, values / np.where(defined, weights, 1.0), 0.0)
+    return TactileImage(filled, defined, image.step_mm / 2**doublings, image.corner_mm)
+
+
+def sobel(image: TactileImage) -> tuple[Array, Array]:
+    """Return the slopes (h, w) along x and y by Sobel's operators, per mm; edges are repeated.
+
+    Undefined samples count as 0: a place that nobody has felt looks like one without force, so
+    slopes beside it are to be left out by whoever knows better.
+    """
+    f = np.pad(image.values, 1, mode="edge")
+    across = f[:, 2:] - f[:, :-2]
+    down = f[2:, :] - f[:-2, :]
+    x = across[:-2] + 2 * across[1:-1] + across[2:]
+    y = -(down[:, :-2] + 2 * down[:, 1:-1] + down[:, 2:])
+    return x / (8 * image.step_mm), y / (8 * image.step_mm)
+
+
+def _doubled(values: Array) -> Array:
+    for axis in (0, 1):
+        rows = np.moveaxis(values, axis, 0)
+        finer = np.empty((2 * len(rows) - 1, *rows.shape[1:]))
+        finer[::2] = rows
+        finer[1::2] = (rows[1:] + rows[:-1]) / 2
+        values = np.moveaxis(finer, 0, axis)
+    return values
+
+
+def _with(image: TactileImage, values: Array) -> TactileImage:
+    values.setflags(write=False)
+    return replace(image, values=values)

@@ -1,0 +1,145 @@
+"""Finite elements against closed formulas, against one another, and the two laws of a tab."""
+
+import numpy as np
+import pytest
+
+from probe.contact.contract import Touch
+from probe.contact.elements import elements
+from probe.contact.elements_axisymmetric import DEGREES, apparent_modulus, section
+from probe.contact.elements_round import indented, washer_pad
+from probe.contact.elements_tab import Tab, compressed, partly_covered
+from probe.sensor import Overlay, Sensor
+from probe.surface.indenters import Sphere
+
+NEAR_HALF = (0.499, 0.4999, 0.49999, 0.5)
+#: Stiffness of a bonded disc of S = 1 over the reference, 8 elements through its height.
+LOCKING = {
+    "q1": {0.3: 1.005, 0.49: 1.13, 0.499: 1.95, 0.4999: 9.9, 0.49999: 89},
+    "q2": {0.3: 1.001, 0.49: 1.019, 0.499: 1.032, 0.4999: 1.039, 0.49999: 1.042},
+    "q1p0": {0.3: 1.004, 0.49: 1.026, 0.499: 1.030, 0.4999: 1.030, 0.49999: 1.030, 0.5: 1.030},
+    "q2q1": {0.3: 1.001, 0.49: 1.004, 0.499: 1.004, 0.4999: 1.004, 0.49999: 1.004, 0.5: 1.004},
+}
+
+
+def disc(poisson, kind="q2q1", parts=(16, 8)):
+    return apparent_modulus(2.0, 1.0, poisson, kind, parts=parts)
+
+
+@pytest.fixture(scope="module")
+def reference():
+    return {nu: disc(nu, parts=(64, 32)) for nu in LOCKING["q2q1"]}
+
+
+@pytest.mark.parametrize("kind", DEGREES)
+def test_locking_table(kind, reference):
+    for nu, ratio in LOCKING[kind].items():
+        assert disc(nu, kind) / reference[nu] == pytest.approx(ratio, rel=5e-3), nu
+
+
+@pytest.mark.parametrize(("kind", "allowed"), [("q1p0", 0.035), ("q2q1", 0.005)])
+def test_no_locking_towards_one_half(kind, allowed, reference):
+    errors = [disc(nu, kind) / reference[nu] - 1 for nu in (0.3, 0.49, *NEAR_HALF)]
+    assert max(np.abs(errors)) <= allowed
+    assert np.ptp(errors[2:]) <= 0.002
+
+
+@pytest.mark.parametrize(
+    ("shape", "low", "high"), [(0.15, 0.0, 0.07), (0.25, 0.0, 0.07), (1.0, -0.03, 0.0),
+                               (2.0, -0.03, 0.0)]
+)  # fmt: skip
+def test_bonded_disc_near_its_formula(shape, low, high):
+    # The formula is too low for slim discs and too high for flat ones.
+    found = apparent_modulus(2 * shape, 1.0, 0.49999, parts=(max(8, round(24 * shape)), 12))
+    assert low <= found / (1 + 2 * shape**2) - 1 <= high
+
+
+@pytest.mark.parametrize("shape", [0.5, 1.0, 2.0])
+def test_sliding_top_is_half_of_a_disc_twice_as_high(shape):
+    sliding = apparent_modulus(2 * shape, 1.0, 0.49999, parts=(32, 12), bonded_top=False)
+    whole = apparent_modulus(2 * shape, 2.0, 0.49999, parts=(32, 24))
+    assert sliding == pytest.approx(whole, rel=1e-6)
+    assert sliding == pytest.approx(1 + shape**2 / 2, rel=0.07)
+
+
+def test_cylinder_that_slides_at_both_ends_has_youngs_modulus():
+    part = section(np.linspace(0, 1, 4), np.linspace(0, 2, 3), 3.0, 0.45)
+    ends = [part.axial(slice(None), slice(k, k + 1)) for k in (0, part.z.size - 1)]
+    held = np.concatenate([*ends, part.radial(slice(0, 1), slice(None))])
+    found = part.solved(held, np.where(np.isin(held, ends[1]), -0.02, 0.0))
+    assert -(part.matrix[ends[1]] @ found).sum() == pytest.approx(3.0 * 0.01 * np.pi, rel=1e-9)
+
+
+@pytest.mark.parametrize(("ratio", "excess"), [(10, 1.18), (20, 1.05)])
+def test_thin_incompressible_layer_under_a_paraboloid(ratio, excess):
+    # F -> pi G a^6 / (32 R h^3) for a / h -> infinity.
+    height, bend, radius = 0.1, 200.0, 0.1 * ratio
+    r = np.concatenate([np.linspace(0, 1.5 * radius, 181), np.linspace(1.5, 2.5, 12)[1:] * radius])
+    pad = section(r, np.linspace(0, height, 5), 3.0, 0.5)
+    shear, force = 1.0, np.pi * radius**6 / (32 * bend * height**3) * excess
+    pressed = indented(pad, lambda r: -(r**2) / (2 * bend), force)
+    edge = pad.r[pressed.active].max()
+    expected = np.pi * shear * edge**6 / (32 * bend * height**3)
+    assert force / expected == pytest.approx(excess, rel=0.05)
+    assert pressed.top_n[pressed.active][1:].min() > 0
+
+
+def washer(parts, **options):
+    pad = washer_pad(3.5, 7.5, 2.0, 1.0, 0.4999, parts=parts, **options)
+    flat = lambda r: np.where((r > 3.5 - 1e-9) & (r < 7.5 + 1e-9), 0.0, -np.inf)  # noqa: E731
+    return indented(pad, flat, 80.0)
+
+
+def test_washer_of_figure_4_10():
+    sensor = Sensor(overlay=Overlay(kind="pad"))
+    fine = washer(24)
+    truth = fine.tactels_n(sensor)
+    assert fine.depth_mm == pytest.approx(0.26528, rel=3e-4)
+    assert truth == pytest.approx(truth[::-1, ::-1], abs=1e-12)
+    assert fine.pad_force_n == pytest.approx(80, rel=1e-9)
+    assert truth.sum() == pytest.approx(79.01, abs=0.01)  # the rest is borne beyond the matrix
+    for options, tactels, depth in (
+        ({"parts": 4}, 4e-3, 3.4e-3),
+        ({"parts": 8}, 9e-4, 1.5e-3),
+        ({"parts": 16}, 3e-4, 4e-4),
+        ({"parts": 8, "kind": "q1p0"}, 1e-2, 3e-2),
+        ({"parts": 24, "radius_mm": 35.0}, 1e-4, 1e-4),
+    ):
+        found = washer(**options)
+        error = found.tactels_n(sensor) - truth
+        assert np.sqrt((error**2).mean() / (truth**2).mean()) <= tactels
+        assert abs(found.depth_mm / fine.depth_mm - 1) <= depth
+
+
+@pytest.mark.parametrize(("height", "allowed"), [(1.0, 0.14), (2.0, 0.08)])
+def test_tab_law_to_half_its_height(height, allowed):
+    tab = Tab(height_mm=height)
+    strain = np.array([0.001, 0.1, 0.2, 0.3, 0.4, 0.5])
+    law = (tab.young_mpa / 3) * ((1 - strain) ** -2 - (1 - strain)) * np.pi * tab.diameter_mm**2 / 4
+    assert compressed(tab, strain * height, parts=6) == pytest.approx(law, rel=allowed)
+
+
+def test_partly_covered_tab_bears_less_than_all_and_more_than_its_share():
+    tab, strain = Tab(height_mm=1.0), np.array([0.1])
+    whole = partly_covered(tab, 1.0, strain, parts=3)
+    for share in (0.25, 0.5, 0.75):
+        part = float((partly_covered(tab, share, strain, parts=3) / whole)[0])
+        assert part == pytest.approx(share * (1 + 0.59 * (1 - share)), abs=0.03)
+
+
+def test_elements_in_space_agree_with_the_section():
+    sensor = Sensor(overlay=Overlay(kind="pad"))
+    ball = Sphere(20.0)
+    at = (0.3, -0.4)
+    found = elements(
+        ball, sensor, Touch(-at[0], -at[1], 0.0, 20.0), per_tactel=1, layers=2, margin_mm=6.0
+    )
+    r = np.concatenate([np.linspace(0, 6, 61), 6 + 19 * np.linspace(0, 1, 20)[1:] ** 2])
+    pad = section(r, 2 * (1 - (1 - np.linspace(0, 1, 9)) ** 1.6), 1.0, 0.4999)
+    points = lambda r: ball.heights_mm(np.stack([r, 0 * r], axis=-1))  # noqa: E731
+    truth = indented(pad, points, 20.0)
+    tactels = truth.tactels_n(sensor, at)
+    error = np.sqrt(((found.forces_n - tactels) ** 2).mean() / (tactels**2).mean())
+    assert error <= 8e-3
+    # The plate gives way to the moment; its height is that over the ball's axis.
+    z = found.z_mm + found.tilt_x_rad * at[1] - found.tilt_y_rad * at[0]
+    assert -z == pytest.approx(truth.depth_mm, rel=5e-3)
