@@ -76,7 +76,8 @@ def test_what_is_expected_of_a_force_reads_as_that_force(calibration, seed):
     assert np.isfinite(read.values).all()
     assert (read.values >= 0).all()
     assert (read.bad >= calibration.bad).all()
-    told = ~read.bad & (read.values > 0)
+    clipped = (counts <= 0) | (counts >= calibration.full)  # its column's coupling is not known
+    told = ~read.bad & (read.values > 0) & ~clipped.any(axis=0)
     np.testing.assert_allclose(read.values[told], forces[told], rtol=1e-4)
 
 
