@@ -92,7 +92,9 @@ def tactile_image(
     return TactileImage(given, known, float(step_mm), corner_mm)
 
 
-def touch_image(sensor: Sensor, readings: ArrayLike, trust: ArrayLike | None = None) -> TactileImage:
+def touch_image(
+    sensor: Sensor, readings: ArrayLike, trust: ArrayLike | None = None
+) -> TactileImage:
     """Return the image of one touch, in the sensor frame; tactels without trust are undefined."""
     defined = None if trust is None else np.asarray(trust) > 0
     return tactile_image(readings, step_mm=sensor.pitch_mm, defined=defined)

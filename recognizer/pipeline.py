@@ -35,6 +35,7 @@ from recognizer.recognition import (
 )
 from recognizer.signal import Signal
 from recognizer.symbols.fit import Fit, Settings, fits, scored
+from recognizer.symbols.pressing import pressing_of
 from recognizer.symbols.refine import Image, image_of, refined, started
 from recognizer.symbols.search import Bank, bank_of
 from recognizer.symbols.template import Template, template_of
@@ -103,18 +104,21 @@ def recognise(reader: Reader, signal: Signal, seq: int = 0) -> Recognition:
     """Return what one touch says."""
     if not signal.contact:
         return refused(seq, NO_CONTACT)
-    image = image_of(reader.sensor, signal.forces, signal.trust)
-    answer = _answer(reader, _readings(reader, image, reader.settings), seq)
+    answer = _answer(reader, _readings(reader, signal, reader.settings), seq)
     if not answer:  # spend more only where it is needed
-        again = _answer(reader, _readings(reader, image, reader.thorough), seq)
+        again = _answer(reader, _readings(reader, signal, reader.thorough), seq)
         answer = again if again else answer
     return answer
 
 
-def _readings(reader: Reader, image: Image, settings: Settings) -> list[Reading]:
+def _readings(reader: Reader, signal: Signal, settings: Settings) -> list[Reading]:
     """Return the verified places over all encodings, best first."""
     readings: list[Reading] = []
     for encoding, template, bank in reader.prepared:
+        pressing = pressing_of(reader.sensor, encoding.style.height_mm)
+        image = image_of(
+            reader.sensor, signal.forces, signal.trust, pressing, newtons=signal.newtons
+        )
         found = fits(image, template, bank, settings)
         readings += _verified(reader, image, encoding, template, found)
     return sorted(readings, key=lambda reading: -reading.score)

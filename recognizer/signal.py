@@ -25,6 +25,7 @@ class Signal:
     forces: Array  #: (rows, columns) newtons, or counts over the background
     trust: Array  #: (rows, columns) 0 ... 1
     contact: bool  #: whether anything is touched
+    newtons: bool  #: whether forces are in newtons
 
 
 def signal_of(
@@ -33,6 +34,7 @@ def signal_of(
     trust: Array | None = None,
     floor: float | None = None,
     least: float = CONTACT,
+    newtons: bool = False,
 ) -> Signal:
     """Return the signal of one image.
 
@@ -46,15 +48,17 @@ def signal_of(
         Reading without force; by default what the lowest twentieth of the tactels read.
     least
         How far the strongest tactels must rise above the floor for a contact.
+    newtons
+        Whether the readings are newtons.
     """
     known = np.ones(readings.shape) if trust is None else trust.astype(np.float64)
     good = readings[known > 0]
     if good.size == 0:
-        return Signal(np.zeros(readings.shape), known, contact=False)
+        return Signal(np.zeros(readings.shape), known, contact=False, newtons=newtons)
     level = float(np.quantile(good, 0.05)) if floor is None else floor
     forces = np.maximum(readings - level, 0.0)
     strongest = np.sort(forces[known > 0])[-_FEW:]
-    return Signal(forces, known * _alive(forces, known), bool(strongest[0] > least))
+    return Signal(forces, known * _alive(forces, known), bool(strongest[0] > least), newtons)
 
 
 def _alive(forces: Array, known: Array) -> Array:

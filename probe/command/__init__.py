@@ -12,7 +12,8 @@
     record         record               recorded     the work
     replay         replay
     files          export, import, repair
-    calibrate      calibrate            calibrated   the work, guided   step by step
+    calibrate      calibrate            calibrated   the work, guided   step by step,
+                                        loads, listen   what goes in, laws   what comes out
     simulate       simulate             simulated    the work
     live           live                 live_loop, live_state, live_view, keys
 
@@ -66,9 +67,11 @@ def run(arguments: list[str]) -> int:
     usage_error: type[Exception] = BadParameter.__mro__[1]  # of every misused option
     as_json = "--json" in arguments
     try:
-        action = app(arguments or ["--help"], prog_name="probe-sensor", standalone_mode=False)
+        nothing = arguments in ([], ["calibrate"])  # which command is not said
+        asked = [*arguments, "--help"] if nothing else arguments
+        action = app(asked, prog_name="probe-sensor", standalone_mode=False)
         code = action() if callable(action) else int(action or 0)
-        return code if arguments else BAD_INPUT
+        return BAD_INPUT if nothing else code
     except Exit as leaving:
         return leaving.exit_code
     except ProbeError as error:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import time
 from dataclasses import asdict
-from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from probe.command.report import number
 from probe.command.stream import Stream, name_of
@@ -16,7 +15,7 @@ from probe.command.stream import Stream, name_of
 Described = tuple[dict[str, Any], dict[str, str]]
 """What `--json` prints, and what people read."""
 
-_PAUSE_S = 0.5  # longer than that between frames is a pause
+_ANSWER_S = 0.5  # a probe that was asked for its statistics answers within that
 
 
 def probe(url: str, sensor: int | None, seconds: float) -> Described:
@@ -36,10 +35,14 @@ def probe(url: str, sensor: int | None, seconds: float) -> Described:
             for frame in stream.take(0.1):
                 if not heard:
                     heard, until_s = True, time.monotonic() + seconds
-                    stream.client.ask_device()
                 peak = max(peak, int(frame.counts.max()))
                 saturated += int((frame.counts >= full).sum())
             if heard and time.monotonic() > until_s:
+                stream.client.ask_device()
+                stream.take(_ANSWER_S)
+                until_s = time.monotonic() + _ANSWER_S
+                while stream.client.device is None and time.monotonic() < until_s:
+                    time.sleep(0.02)
                 break
         ident, device = stream.ident(), stream.client.device
         counts, notices = stream.client.statistics(), stream.client.notices()
@@ -74,7 +77,7 @@ def probe(url: str, sensor: int | None, seconds: float) -> Described:
             f"{device.transmit_waits:,} times for the line, unknown commands "
             f"{device.receive_errors}"
         )
-    return values, lines | {"notice": notice for notice in notices[-1:]}
+    return values, lines | ({"notice": notices[-1]} if notices else {})
 
 
 def recording(name: str) -> Described:
@@ -88,18 +91,20 @@ def recording(name: str) -> Described:
     from probe.recording.read import read_recording
 
     held = read_recording(name)
-    seq, t_ns, peak, poses = [], [], 0, 0
+    seq: list[NDArray[np.int64]] = [np.empty(0, np.int64)]
+    t_ns: list[NDArray[np.int64]] = [np.empty(0, np.int64)]
+    peak = poses = 0
     for block in held.blocks():
         seq.append(block.seq)
         t_ns.append(block.t_ns)
         peak = max(peak, int(block.counts.max(initial=0)))
         poses += 0 if block.pose is None else int((~np.isnan(block.pose[:, 0, 0])).sum())
-    gaps = _gaps(np.concatenate([*seq, []]), np.concatenate([*t_ns, []]) * 1e-9)
+    gaps = _gaps(np.concatenate(seq), np.concatenate(t_ns))
     origin = held.origin
-    files = [{"file": str(file.path), "frames": file.frames} for file in held.files]
+    files = [file.path for file in held.files]
     values = {
         "file": name,
-        "files": files,
+        "files": [str(path) for path in files],
         "frames": len(held),
         **gaps,
         "sensor": origin.sensor,
@@ -108,11 +113,11 @@ def recording(name: str) -> Described:
         "peak": peak,
         "poses": poses,
         "tool_version": held.tool_version,
-        "bytes": sum(file.path.stat().st_size for file in held.files),
+        "bytes": sum(path.stat().st_size for path in files),
         "attributes": dict(origin.more),
     }
     lines = {
-        "recording": ", ".join(Path(file["file"]).name for file in files[:4])
+        "recording": ", ".join(path.name for path in files[:4])
         + (f" ... ({len(files)} files)" if len(files) > 4 else ""),
         "frames": f"{len(held):,} in {gaps['seconds']:.2f} s, {gaps['rate']:.1f} a second",
         "gaps": f"{gaps['gaps']}, {gaps['lost']} frames lost; longest pause "
@@ -137,15 +142,15 @@ def calibration(name: str) -> Described:
         When it is none, or was changed.
     """
     from probe.calibration import calibration_hash, read_calibration
-    from probe.command.calibrated import described
+    from probe.command.laws import described
 
     held = read_calibration(name)
     return described(held, calibration_hash(held), name)
 
 
-def _gaps(seq: np.ndarray, t_s: np.ndarray) -> dict[str, Any]:
+def _gaps(seq: NDArray[np.int64], t_ns: NDArray[np.int64]) -> dict[str, Any]:
     """Sum up numbers and times of a recording."""
-    steps, pauses = np.diff(seq), np.diff(t_s)
+    steps, pauses = np.diff(seq), np.diff(t_ns) * 1e-9
     going = (steps > 0) & (pauses >= 0)
     seconds = float(pauses[going].sum())
     return {

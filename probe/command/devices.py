@@ -63,7 +63,7 @@ def info(
         from probe.command import described, report
 
         values: dict[str, Any]
-        if what.startswith(("serial:", "sim:", "file:")) or what.startswith("/dev/"):
+        if what.startswith(("serial:", "sim:", "file:", "/dev/")):
             values, lines = described.probe(what, sensor, seconds)
         elif what.endswith(".json"):
             values, lines = described.calibration(what)

@@ -14,9 +14,7 @@ Replace = Annotated[bool, typer.Option("--replace", help="Replace files that are
 Url = Annotated[
     str, typer.Argument(metavar="URL", help=f"A port: {URLS}.", show_default=False)
 ]  # fmt: skip
-Recording = Annotated[
-    Path, typer.Argument(metavar="FILE", help="A recording.", show_default=False)
-]
+Recording = Annotated[Path, typer.Argument(metavar="FILE", help="A recording.", show_default=False)]
 Output = Annotated[
     Path, typer.Option("-o", "--output", metavar="FILE", help="The file to write.",
                        show_default=False),

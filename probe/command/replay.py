@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from probe.command import Action
-from probe.command.options import Calibrated, Json, Recording
+from probe.command.options import Calibrated, Recording
 
 if TYPE_CHECKING:
     from probe.frame import Frame

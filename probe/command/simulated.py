@@ -11,7 +11,7 @@ import json
 import math
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -99,14 +99,17 @@ def simulate_touches(
             "simulated": target, "overlay": overlay, "level": level, "noise": noise,
             "seed": asked.seed, "frames_per_touch": asked.frames,
         }  # fmt: skip
-        recorder = output and stack.enter_context(
-            Recorder(output, sensor=f"simulated/{overlay}", attributes=attributes,
-                     roll_over_s=math.inf, replace=replace)
-        )  # fmt: skip
+        recorder = None
+        if output is not None:
+            recorder = stack.enter_context(
+                Recorder(output, sensor=f"simulated/{overlay}", attributes=attributes,
+                         roll_over_s=math.inf, replace=replace)
+            )  # fmt: skip
         told = stack.enter_context(progress_bar("touching", number))
         for i, felt in enumerate(_touched(scene, sensor, board, level, asked)):
-            for frame in felt.frames if recorder else ():
-                recorder.append(frame)
+            if recorder is not None:
+                for frame in felt.frames:
+                    recorder.append(frame)
             if i == 0:
                 first = felt
             kept.append(_told(scene, felt))
@@ -169,23 +172,24 @@ def _touch(scene: Scene, asked: Asked, rng: np.random.Generator) -> Touch:
         drawn = Touch(float(x), float(y), 0.0, FORCE_N)
     else:
         drawn = next(random_touches(scene.region, rng, Touches()))
-    given = {
-        "x_mm": asked.x_mm,
-        "y_mm": asked.y_mm,
-        "force_n": asked.force_n,
-        "theta_rad": _radians(asked.theta_deg),
-        "tilt_x_rad": _radians(asked.tilt_x_deg),
-        "tilt_y_rad": _radians(asked.tilt_y_deg),
-    }
-    known = {name: value for name, value in given.items() if value is not None}
-    bad = [name for name, value in known.items() if not math.isfinite(value)]
-    if bad:
-        raise SurfaceError(f"{', '.join(bad)} is no finite number", fix="give mm, degrees, N")
-    return replace(drawn, **known)
+    touch = Touch(
+        _or(asked.x_mm, drawn.x_mm),
+        _or(asked.y_mm, drawn.y_mm),
+        math.radians(_or(asked.theta_deg, math.degrees(drawn.theta_rad))),
+        _or(asked.force_n, drawn.force_n),
+        math.radians(_or(asked.tilt_x_deg, math.degrees(drawn.tilt_x_rad))),
+        math.radians(_or(asked.tilt_y_deg, math.degrees(drawn.tilt_y_rad))),
+        drawn.wrist,
+    )
+    numbers = (touch.x_mm, touch.y_mm, touch.theta_rad, touch.force_n, touch.tilt_x_rad,
+               touch.tilt_y_rad)  # fmt: skip
+    if not all(map(math.isfinite, numbers)):
+        raise SurfaceError("a touch at what is no finite number", fix="give mm, degrees and N")
+    return touch
 
 
-def _radians(degrees: float | None) -> float | None:
-    return None if degrees is None else math.radians(degrees)
+def _or(given: float | None, drawn: float) -> float:
+    return drawn if given is None else given
 
 
 def _told(scene: Scene, felt: Felt) -> dict[str, Any]:

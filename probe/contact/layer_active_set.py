@@ -1,6 +1,6 @@
 """Which levels of a surface press on the pad, how hard, and where the plate comes to rest.
 
-A cell i with pressure p_i meets levels k with shares w_k of its tent and depths h_k
+A cell i with pressure p_i meets levels k with shares w_k of its bell and depths h_k
 (`layer_levels`). Each presses through a spring of compliance D (what the grid does not resolve,
 `edge_compliance`), all of a cell sink together:
 

@@ -6,9 +6,9 @@ convolution, two Fourier transforms: the compliance between cells is never a mat
 
 The layer has no edges in wave numbers, so the domain is the matrix and a free rim about it,
 `RIM` pad heights in total both ways: what a cell feels of the images of the others has then
-fallen to about 1e-5 of its own compliance. On the way to the base the tents by which cells meet the
+fallen to about 1e-5 of its own compliance. On the way to the base the bells by which cells meet the
 surface (`layer_levels`) are taken off, and the stress is integrated over each cell: a factor
-1/sinc^2 and a factor sinc along either axis. Beyond its edge the real pad ends. There this model
+1/sinc^3 and a factor sinc along either axis. Beyond its edge the real pad ends. There this model
 is an endless layer: against elements with a free edge (nu = .4999) a ring 2.6 h from the edge
 is 2 % too stiff, at 0.9 h 17 %. What the endless layer would carry beyond the matrix is given to
 the outermost tactels, where a free edge carries it; so the sum of all tactels is the force.
@@ -39,7 +39,7 @@ LARGEST_DOMAIN = 4096  #: cells along one side
 class Influence:
     """A bonded pad on a grid of cells; row 0 is the top row, as on the sensor.
 
-    One more ring of cells stands about the matrix: the tents of `layer_levels` reach there.
+    One more ring of cells stands about the matrix: the bells of `layer_levels` reach there.
     """
 
     sensor: Sensor
@@ -117,7 +117,7 @@ def influence(sensor: Sensor, cells_per_tactel: int) -> Influence:
     )
     own = float(scipy.fft.irfft2(spectrum, s=domain)[0, 0])
     along = [np.sinc(scipy.fft.fftfreq(domain[0])), np.sinc(scipy.fft.rfftfreq(domain[1]))]
-    base = base_ratio(q * pad.height_mm, pad.poisson) / (along[0][:, None] * along[1])
+    base = base_ratio(q * pad.height_mm, pad.poisson) / np.square(along[0][:, None] * along[1])
     spectrum.setflags(write=False)
     base.setflags(write=False)
     edge = edge_compliance(

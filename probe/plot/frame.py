@@ -7,6 +7,7 @@ top, so at the largest y.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -59,7 +60,7 @@ def frame_picture(
 
 
 def _surface(
-    axes: object,
+    axes: Any,  # mplot3d has no types
     values: NDArray[np.float64],
     sensor: Sensor,
     heat: Normalize,
@@ -67,12 +68,9 @@ def _surface(
     seen_from_deg: tuple[float, float],
 ) -> None:
     """Draw tactels as a surface through their readings."""
-    from mpl_toolkits.mplot3d.axes3d import Axes3D
-
-    assert isinstance(axes, Axes3D)
     centres = sensor.centres_mm()
-    colours = ScalarMappable(heat, HEAT).to_rgba((values[1:, 1:] + values[:-1, :-1]
-                                                 + values[1:, :-1] + values[:-1, 1:]) / 4)  # fmt: skip
+    patches = (values[1:, 1:] + values[:-1, :-1] + values[1:, :-1] + values[:-1, 1:]) / 4
+    colours = ScalarMappable(heat, HEAT).to_rgba(patches)
     axes.plot_surface(
         centres[..., 0], centres[..., 1], values, rstride=1, cstride=1, facecolors=colours,
         edgecolor=(0.1, 0.1, 0.1, 0.5), linewidth=0.3, shade=False,
@@ -81,4 +79,4 @@ def _surface(
     axes.set_xlabel("x (mm)")
     axes.set_ylabel("y (mm)")
     axes.set_zlabel(label)
-    axes.set_box_aspect((1, 1, 0.6))
+    axes.set_box_aspect((1, 1, 0.6), zoom=0.85)

@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 
 ACROSS = 400  #: points in which the surface is drawn, each way
 DEPTH_MM = 3.0  #: below the top; what lies deeper is drawn as that
+FLAT_MM = 1.0  #: least range of heights
+NOTHING = "#e9dcc8"
 _BESIDE = 1.15  # of the sensor's reach is shown
 
 
@@ -54,9 +56,10 @@ def touch_picture(
     corners = np.array([(-half_x, -half_y), (half_x, -half_y), (half_x, half_y), (-half_x, half_y)])
     with page(path, 1000, 440) as figure:
         patch, felt = figure.subplots(1, 2)
-        heights, box, top = _heights(surface, sensor, touch)
-        drawn = patch.imshow(heights, cmap="bone", extent=box, vmin=top - DEPTH_MM, vmax=top,
-                             origin="lower")  # fmt: skip
+        heights, box, range_mm = _heights(surface, sensor, touch)
+        patch.set_facecolor(NOTHING)
+        drawn = patch.imshow(heights, cmap="bone", extent=box, origin="lower",
+                             norm=Normalize(*range_mm))  # fmt: skip
         figure.colorbar(drawn, ax=patch, label="height (mm)", shrink=0.85)
         outline = touch.on_surface(corners)
         patch.add_patch(Polygon(outline, fill=False, edgecolor="tab:orange", linewidth=1.5))
@@ -74,8 +77,8 @@ def touch_picture(
 
 def _heights(
     surface: Surface, sensor: Sensor, touch: Touch
-) -> tuple[Array, tuple[float, float, float, float], float]:
-    """Return heights about the sensor, nan where there is nothing; their box; the highest."""
+) -> tuple[Array, tuple[float, float, float, float], tuple[float, float]]:
+    """Return heights about the sensor, nan where there is nothing; their box and range."""
     reach = _BESIDE * sensor.reach_mm
     x = np.linspace(touch.x_mm - reach, touch.x_mm + reach, ACROSS)
     y = np.linspace(touch.y_mm - reach, touch.y_mm + reach, ACROSS)
@@ -84,4 +87,7 @@ def _heights(
     known = heights[np.isfinite(heights)]
     top = float(known.max()) if known.size else 0.0
     shown: Array = np.where(np.isfinite(heights), np.maximum(heights, top - DEPTH_MM), np.nan)
-    return shown, (float(x[0]), float(x[-1]), float(y[0]), float(y[-1])), top
+    low = float(np.nanmin(shown)) if known.size else 0.0
+    # A flat surface is drawn as bright as the top of another one.
+    range_mm = (min(low, top - FLAT_MM), top)
+    return shown, (float(x[0]), float(x[-1]), float(y[0]), float(y[-1])), range_mm

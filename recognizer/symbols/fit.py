@@ -53,7 +53,7 @@ class Fit:
     y_mm: float
     theta_rad: float
     nuisance: Array  #: (3,) spread, exponent - 1, scale - 1
-    gain: Array  #: (4,) plane: centre, slopes per half width and height; depth of the bare face
+    gain: Array  #: (4,) logarithm of the scale, depth, and its slopes, `pressing`
     cells: NDArray[np.int64]  #: (m, 2) column and upward row of the cells in view
     scores: Array  #: (m, q + 1) log-likelihoods, nats, 0 for the best; the last one: no symbol
     seen: Array  #: (m,) tactels that look at the cell, by how hard they press
@@ -65,7 +65,7 @@ class Fit:
 def fits(image: Image, template: Template, bank: Bank, settings: Settings) -> tuple[Fit, ...]:
     """Return the likeliest lattices of an image, best first; none if nothing is pressed."""
     gain = first_gain(image, template.ink)
-    if not (np.isfinite(gain[:3]).all() and gain[0] > 0):
+    if gain is None:
         return ()
     felt = felt_under(image, gain[None])
     weights = felt.press**2 * felt.trust
@@ -79,7 +79,7 @@ def fits(image: Image, template: Template, bank: Bank, settings: Settings) -> tu
     if len(start) == 0:
         return ()
     lattices = started(start, np.repeat(gain[None], len(start), axis=0))
-    lattices = refined(image, template, lattices, steps=settings.steps, bare=False)
+    lattices = refined(image, template, lattices, steps=settings.steps)
     best = np.argsort(-lattices.value, kind="stable")[: settings.finalists]
     lattices = started(lattices.pose[best], lattices.gain[best])
     lattices = refined(image, template, lattices, steps=settings.final_steps)
@@ -140,7 +140,7 @@ def _left(felt: Felt, tables: Floats, cells: NDArray[np.int64], best: int) -> fl
     one = Felt(
         felt.psi[cut],
         felt.press[cut],
-        felt.floor[cut],
+        felt.bare[cut],
         felt.contact[cut],
         felt.trust,
         felt.measure[cut],

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.symbols.template import Floats
+from recognizer.symbols.template import Floats, psi
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ class Felt:
 
     psi: Array  #: (b, n) of the forces over the gain
     press: Array  #: (b, n) 0 ... 1, how hard the plane presses; 1 where it does as in the middle
-    floor: Array  #: (b, n) psi of a tactel over the bare face, 0 where it does not reach it
+    bare: Array  #: (b, n) force over the bare face, as a share of that on a symbol
     contact: Array  #: (b, n) 1, falling to 0 where the sensor hangs in the air
     trust: Array  #: (n,)
     measure: Array  #: (b,) sum of log |d psi / d force|: makes planes of other gain comparable
@@ -53,7 +53,8 @@ def log_likelihoods(felt: Felt, tables: Floats, noise: Array) -> Array:
     """
     unit = noise[:, None] / np.maximum(felt.press, 1e-3)
     symbols = _each(felt, tables[..., 0], spread(tables), unit)
-    bare = np.stack([np.zeros_like(felt.floor), felt.floor], axis=-1)  # beyond the edge, or not
+    floor = psi(felt.bare)
+    bare = np.stack([np.zeros_like(floor), floor], axis=-1)  # beyond the edge of the face, or not
     nothing = _each(felt, bare, np.hypot(QUIET, bare), unit).max(axis=-1, keepdims=True)
     return np.concatenate([symbols, nothing], axis=-1)
 

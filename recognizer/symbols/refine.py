@@ -1,7 +1,7 @@
 """Refinement: pose and gain by Gauss-Newton, labels chosen anew at every step.
 
-With the labels held, the image is psi(f / g(x)) = T_label(R(theta) s + (x, y) - cell): six
-unknowns, three of the pose and three of the gain plane g, by weighted least squares over the
+With the labels held, the image is psi(f / g) = T_label(R(theta) s + (x, y) - cell), g the
+force on a plateau (`pressing`). Pose and gain take turns, by weighted least squares over the
 tactels, for all candidates at once; `noise` says what each is worth. Lattice frame and sensor
 frame in mm.
 """
@@ -10,30 +10,32 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import Sensor
 from recognizer.symbols.noise import Felt, log_likelihoods, spread
+from recognizer.symbols.pressing import Pressing
 from recognizer.symbols.template import Floats, Template, psi
 
 Array = NDArray[np.float64]
 
 STEEPEST = 1.7  #: slope of a gain plane; over 1 a part of the sensor hangs in the air
+USUAL = 0.25  #: depth of a usual touch, heights of the overlay, where the scale is not known
+DAMPING = 0.01  #: of the first step
 LEAST_PRESS = 0.2  #: of a tactel where the plane presses little or not at all
 LEAST_GAIN = 0.12  #: of the largest over the sensor: below it a tactel tells nothing of symbols
 NOISE = 0.15  #: standard deviation of psi on a covered tactel, until it is known better
 LIMITS = np.array([0.7, 0.4, 0.03])  #: of spread, exponent - 1 and scale - 1, `template`
-_SHALLOW = 0.4  # least depth of the bare face, against the largest gain
-_REACHED = 0.15  # psi beside symbols at which the bare face may be pressed
-_REACHING = 8  # such tactels, at least
 _FAR = 4.0  # standard deviations at which a tactel's loss stops growing
-_STEP = np.array([1.0, 1.0, 0.08, 0.5, 0.15, 0.01])  # largest change in one step
-_DAMPING = np.array([1.0, 1.0, 100.0, 1.0, 1.0, 100.0])
-_PRIOR = np.array([0.0, 0.0, 0.0, 0.5, 0.2, 0.01])
-_PRIOR = np.where(_PRIOR > 0, 1 / np.maximum(_PRIOR, 1e-9) ** 2, 0.0)
+# largest changes in one step: x, y, theta, spread, exponent, scale; gain
+_STEP = np.array([1.0, 1.0, 0.08, 0.5, 0.15, 0.01, 0.3, 0.1, 0.1, 0.1])
+_LEAST = np.array([1.0, 1.0, 100.0, 0.1, 0.1, 10.0, 1.0, 10.0, 10.0, 10.0])
+_PRIOR = np.array([0.0, 0.0, 0.0, 0.5, 0.2, 0.01])  # standard deviations; 0: not known
+_SCALE_KNOWN = 0.3  # of the logarithm of the force scale, where it is in newtons
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,11 +45,13 @@ class Image:
     points_mm: Array  #: (n, 2) sensor frame
     forces: Array  #: (n,) newtons, or anything proportional
     trust: Array  #: (n,) 0 ... 1, 0 for bad tactels
-    scale: Array  #: (2,) half width and half height of the sensor, mm
+    half_mm: Array  #: (2,) half width and half height of the sensor
+    pressing: Pressing
+    newtons: bool  #: whether the scale of the pressing is that of the forces
 
     def plane(self) -> Array:
-        """Return the basis (n, 3) of gain planes: 1, x and y over the half widths."""
-        return np.column_stack([np.ones(len(self.points_mm)), self.points_mm / self.scale])
+        """Return the basis (n, 3) of planes: 1, x and y over the half widths."""
+        return np.column_stack([np.ones(len(self.points_mm)), self.points_mm / self.half_mm])
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,47 +59,63 @@ class Lattices:
     """Candidates: sensor point s lies at R(theta) s + (x, y) in the lattice frame."""
 
     pose: Array  #: (b, 6) x, y (mm), theta (rad); spread, exponent - 1, scale - 1
-    gain: Array  #: (b, 4) of the plane, and how much less the bare face gets (inf: all of it)
+    gain: Array  #: (b, 4) logarithm of the scale; depth at the centre, slopes per half width
     value: Array  #: (b,) log-likelihood of the image, nats, up to a constant of the image
-    normal: Array  #: (b, 6, 6) inverse covariance of `pose`
+    normal: Array  #: (b, 10, 10) inverse covariance of `pose` and `gain`
 
 
-def image_of(sensor: Sensor, forces: Array, trust: Array) -> Image:
+def image_of(
+    sensor: Sensor, forces: Array, trust: Array, pressing: Pressing, *, newtons: bool
+) -> Image:
     """Return what is fitted of a frame: forces (rows, columns), trust (rows, columns)."""
     return Image(
         sensor.centres_mm().reshape(-1, 2),
         forces.reshape(-1).astype(np.float64),
         trust.reshape(-1).astype(np.float64),
         np.array(sensor.half_mm),
+        pressing,
+        newtons,
     )
 
 
-def first_gain(image: Image, ink: float) -> Array:
-    """Return the gain (4,) of an image that shows symbols of mean response `ink` all over."""
+def first_gain(image: Image, ink: float) -> Array | None:
+    """Return the gain (4,) of an image with symbols of mean response `ink` all over.
+
+    None where nothing presses.
+    """
     basis = image.plane()
     root = np.sqrt(image.trust)
-    gain = np.linalg.lstsq(basis * (root * ink)[:, None], image.forces * root, rcond=None)[0]
-    return np.append(bounded_gain(np.asarray(gain, np.float64)[None], 0.9)[0], np.inf)
+    plane = np.linalg.lstsq(basis * (root * ink)[:, None], image.forces * root, rcond=None)[0]
+    if not (np.isfinite(plane).all() and plane[0] > 0):
+        return None
+    pressing = image.pressing
+    scale = pressing.scale if image.newtons else plane[0] / float(pressing.force(np.array(USUAL)))
+    depth = pressing.depth(plane[0] / scale)
+    slopes = plane[1:] / (scale * float(pressing.slope(np.array(depth))))
+    gain = np.array([math.log(scale), depth, *slopes])
+    return np.asarray(bounded_gain(gain[None], 0.9)[0])
 
 
 def bounded_gain(gain: Array, steepest: float = STEEPEST) -> Array:
-    """Return planes (b, 3) whose slopes are at most `steepest` times their value at the centre."""
-    slope = np.abs(gain[:, 1:]).sum(axis=1)
-    limit = steepest * gain[:, 0]
+    """Return gains (b, 4) whose slopes are at most `steepest` times the depth at the centre."""
+    slope = np.abs(gain[:, 2:]).sum(axis=1)
+    limit = steepest * gain[:, 1]
     factor = np.where(slope > limit, limit / np.maximum(slope, 1e-300), 1.0)
-    return np.column_stack([gain[:, 0], gain[:, 1:] * factor[:, None]])
+    return np.column_stack([gain[:, :2], gain[:, 2:] * factor[:, None]])
 
 
 def felt_under(image: Image, gain: Array) -> Felt:
     """Return the image as it is under gains (b, 4)."""
-    plane = gain[:, :3] @ image.plane().T
-    least = LEAST_GAIN * plane.max(axis=1, keepdims=True)
-    divisor = np.maximum(plane, least)
+    depth = gain[:, 1:] @ image.plane().T
+    plain = image.pressing.force(depth)
+    least = LEAST_GAIN * plain.max(axis=1, keepdims=True)
+    share = np.maximum(plain, least)
+    divisor = np.exp(gain[:, :1]) * share
     return Felt(
         psi=psi(image.forces / divisor),
-        press=np.clip(plane / (0.5 * gain[:, :1]), LEAST_PRESS, 1.0),
-        floor=psi((plane - gain[:, 3:]) / divisor),
-        contact=np.clip(plane / least, 0.0, 1.0),
+        press=np.clip(depth / (0.5 * gain[:, 1:2]), LEAST_PRESS, 1.0),
+        bare=image.pressing.force(depth - image.pressing.symbol) / share,
+        contact=np.clip(plain / least, 0.0, 1.0),
         trust=image.trust,
         measure=-(image.trust * np.log(divisor + 3.0 * image.forces)).sum(axis=1),
     )
@@ -123,7 +143,6 @@ def refined(
     steps: int,
     noise: float = NOISE,
     shown: Shown | None = None,
-    bare: bool = True,
 ) -> Lattices:
     """Return the candidates after `steps` Gauss-Newton steps, with their log-likelihoods.
 
@@ -133,38 +152,107 @@ def refined(
         Standard deviation of psi on a covered tactel.
     shown
         What the cells show, where that is known; otherwise each cell shows what fits best.
-    bare
-        Whether the bare face between the symbols may be felt as well.
     """
-    pose, gain = start.pose.copy(), start.gain.copy()
-    noises = np.full(len(pose), noise)
-    value = start.value
-    normal = np.zeros((len(pose), 6, 6))
+    best = start
+    trial, damping = start, np.full(len(start.pose), DAMPING)
     for step in range(steps + 1):
-        felt = felt_under(image, gain)
-        cells, offsets = cells_and_offsets(image, pose, template.pitch_mm)
-        tables = tables_at(template, offsets, pose, felt)
-        scores = log_likelihoods(felt, tables, noises)
-        number, dense = _numbered(cells)
-        labels = _best(number, dense, scores) if shown is None else shown(cells)
-        value = np.take_along_axis(scores, labels[..., None], axis=2)[..., 0].sum(axis=1)
-        value += felt.measure + (felt.trust * np.log(felt.press)).sum(axis=1)
-        values = _labelled(tables, labels, felt)
-        width = noise * spread(values[:, :, None])[..., 0] / felt.press
-        residual = felt.psi - values[..., 0]
-        sure = felt.trust * (np.abs(residual) < _FAR * width) / width**2
-        normal = _normal(image, pose, values, sure)
+        seen = _seen(image, template, trial, noise, shown)
+        tried = replace(trial, value=seen.value, normal=seen.normal)
+        if step == 0:
+            best, at_best = tried, seen
+        else:
+            better = seen.value > best.value
+            best, at_best = _either(better, tried, best), _either(better, seen, at_best)
+            damping = np.where(better, damping / 3, np.minimum(damping * 8, 1e6))
         if step == steps:
             break
-        pose = pose + _moved(normal, image, pose, values, residual * sure)
-        pose[:, 3:] = np.clip(pose[:, 3:], -LIMITS, LIMITS)
-        gain = _gain(image, felt, gain, values, sure > 0, bare)
-    return Lattices(pose, gain, value, normal)
+        trial = _moved(best, at_best, damping)
+    return best
+
+
+def _seen(
+    image: Image, template: Template, at: Lattices, noise: float, shown: Shown | None
+) -> _Seen:
+    """Return how well lattices explain the image, and what a small change would do."""
+    felt = felt_under(image, at.gain)
+    cells, offsets = cells_and_offsets(image, at.pose, template.pitch_mm)
+    tables = tables_at(template, offsets, at.pose, felt)
+    scores = log_likelihoods(felt, tables, np.full(len(at.pose), noise))
+    number, dense = _numbered(cells)
+    labels = _best(number, dense, scores) if shown is None else shown(cells)
+    value = np.take_along_axis(scores, labels[..., None], axis=2)[..., 0].sum(axis=1)
+    value += felt.measure + (felt.trust * np.log(felt.press)).sum(axis=1)
+    value -= 0.5 * (_known(image, at) ** 2 * _precision(image)).sum(axis=1)
+    values = _labelled(tables, labels, felt)
+    jacobian, force = _jacobian(image, at, values, felt)
+    width = _width(image, at, values, felt, noise)
+    away = (image.forces - force) / width
+    sure = np.where(np.abs(away) < _FAR, felt.trust, 0.0) / width**2
+    weighted = (jacobian * sure[..., None]).swapaxes(1, 2)
+    normal = weighted @ jacobian + np.diag(_precision(image))
+    right = (weighted @ (image.forces - force)[..., None])[..., 0]
+    return _Seen(value, normal, right - _known(image, at) * _precision(image))
+
+
+def _moved(at: Lattices, seen: _Seen, damping: Array) -> Lattices:
+    """Return lattices after a Levenberg-Marquardt step."""
+    diagonal = np.einsum("bii->bi", seen.normal) * damping[:, None] + _LEAST
+    step = np.linalg.solve(
+        seen.normal + diagonal[:, :, None] * np.eye(diagonal.shape[1]), seen.right[..., None]
+    )[..., 0]
+    step = np.clip(step, -_STEP, _STEP)
+    pose, gain = at.pose + step[:, :6], at.gain + step[:, 6:]
+    pose[:, 3:] = np.clip(pose[:, 3:], -LIMITS, LIMITS)
+    gain[:, 1] = np.clip(gain[:, 1], 0.3 * at.gain[:, 1], 0.9)
+    return Lattices(pose, bounded_gain(gain), at.value, at.normal)
+
+
+def _either(better: NDArray[np.bool_], a: Any, b: Any) -> Any:
+    """Return the candidates of a where they are better, else those of b."""
+    picked = {
+        item.name: np.where(
+            better.reshape(-1, *[1] * (getattr(a, item.name).ndim - 1)),
+            getattr(a, item.name),
+            getattr(b, item.name),
+        )
+        for item in fields(a)
+    }
+    return type(a)(**picked)
+
+
+def _known(image: Image, at: Lattices) -> Array:
+    """Return how far (b, 10) each unknown lies from what is known of it beforehand."""
+    away = np.zeros((len(at.pose), 10))
+    away[:, 3:6] = at.pose[:, 3:]
+    if image.newtons:
+        away[:, 6] = at.gain[:, 0] - math.log(image.pressing.scale)
+    return away
+
+
+def _precision(image: Image) -> Array:
+    """Return what is known of each unknown beforehand, one over its variance (10,)."""
+    spread = np.concatenate([_PRIOR, [_SCALE_KNOWN if image.newtons else 0.0, 0.0, 0.0, 0.0]])
+    return np.where(spread > 0, 1 / np.maximum(spread, 1e-9) ** 2, 0.0)
+
+
+def _width(image: Image, at: Lattices, values: Array, felt: Felt, noise: float) -> Array:
+    """Return the standard deviation (b, n) of forces, from that of psi."""
+    total = _response(values[..., 0])
+    by_psi = (1 + 3 * total) * math.log(4.0) / 3.0
+    relative = noise * spread(values[:, :, None])[..., 0] / felt.press
+    return np.asarray(relative * by_psi * _plateau(image, at))
+
+
+def _plateau(image: Image, at: Lattices) -> Array:
+    """Return the force (b, n) on a plateau at every tactel, with the floor of `felt_under`."""
+    plain = image.pressing.force(at.gain[:, 1:] @ image.plane().T)
+    least = LEAST_GAIN * plain.max(axis=1, keepdims=True)
+    return np.asarray(np.exp(at.gain[:, :1]) * np.maximum(plain, least))
 
 
 def started(pose: Array, gain: Array) -> Lattices:
     """Return candidates of which nothing is known but pose (b, 6) and gain (b, 4)."""
-    return Lattices(pose, gain, np.zeros(len(pose)), np.zeros((len(pose), 6, 6)))
+    return Lattices(pose, gain, np.zeros(len(pose)), np.zeros((len(pose), 10, 10)))
 
 
 def chosen(cells: NDArray[np.int64], tables: Floats, scores: Array, felt: Felt) -> Array:
@@ -179,11 +267,13 @@ def tables_at(template: Template, offsets: Array, pose: Array, felt: Felt) -> Fl
     by = pose[:, 3:5].astype(np.float32)[:, :, None, None]
     tables[..., 0] += tables[..., 3] * by[:, 0] + tables[..., 4] * by[:, 1]
     tables *= felt.contact[..., None, None].astype(np.float32)
-    if felt.floor.any():
-        floor = felt.floor[..., None].astype(np.float32)
-        bare = floor > tables[..., 0]
-        tables[bare] = 0
-        tables[..., 0] = np.maximum(tables[..., 0], floor)
+    if felt.bare.any():
+        bare = felt.bare[..., None].astype(np.float32)
+        response = _response(tables[..., 0]).astype(np.float32)
+        total = response + (1 - response) * bare
+        by = (1 - bare) * (1 + 3 * response) / (1 + 3 * total)
+        tables = (tables * by[..., None]).astype(np.float32)
+        tables[..., 0] = psi(total)
     return tables
 
 
@@ -205,9 +295,15 @@ def _labelled(tables: Floats, labels: NDArray[np.int64], felt: Felt) -> Array:
     """
     values = np.take_along_axis(tables, labels.clip(min=0)[..., None, None], axis=2)[:, :, 0]
     found = np.where((labels >= 0)[..., None], values, 0).astype(np.float64)
-    bare = (labels < 0) & (felt.psi > felt.floor / 2)
-    found[bare, 0] = felt.floor[bare]
+    floor = psi(felt.bare)
+    bare = (labels < 0) & (felt.psi > floor / 2)
+    found[bare, 0] = floor[bare]
     return found
+
+
+def _response(table: Array | Floats) -> Array:
+    """Return y of psi(y)."""
+    return np.asarray(np.expm1(table * np.float32(math.log(4.0))) / np.float32(3.0))
 
 
 def _numbered(cells: NDArray[np.int64]) -> tuple[int, NDArray[np.int64]]:
@@ -220,58 +316,31 @@ def _numbered(cells: NDArray[np.int64]) -> tuple[int, NDArray[np.int64]]:
     return count * len(cells), dense
 
 
-def _jacobian(image: Image, pose: Array, values: Array) -> Array:
-    """Return the derivatives (b, n, 6) of psi by the pose and what is fitted with it."""
+def _jacobian(image: Image, at: Lattices, values: Array, felt: Felt) -> tuple[Array, Array]:
+    """Return the derivatives (b, n, 10) of the forces by pose and gain, and the forces (b, n)."""
+    pressing, basis, pose = image.pressing, image.plane(), at.pose
     c, s = np.cos(pose[:, 2, None]), np.sin(pose[:, 2, None])
     x, y = image.points_mm.T
     across, up = c * x - s * y, s * x + c * y
     slope_x, slope_y = values[..., 1], values[..., 2]
     turn, scale = slope_y * across - slope_x * up, slope_x * across + slope_y * up
-    return np.stack([slope_x, slope_y, turn, values[..., 3], values[..., 4], scale], axis=-1)
+    by_pose = np.stack([slope_x, slope_y, turn, values[..., 3], values[..., 4], scale], axis=-1)
+    total = _response(values[..., 0])
+    by_psi = (1 + 3 * total) * math.log(4.0) / 3.0
+    by_pose = by_pose * (by_psi * _plateau(image, at))[..., None]
+    depth = at.gain[:, 1:] @ basis.T
+    symbol = np.clip((total - felt.bare) / np.maximum(1 - felt.bare, 1e-3), 0.0, 1.5)
+    rest = np.where(total > 0, 1 - symbol, 0.0)  # beyond the edge of the face there is none
+    unit = np.exp(at.gain[:, :1])
+    lower = depth - pressing.symbol
+    force = unit * (symbol * pressing.force(depth) + rest * pressing.force(lower))
+    slope = unit * (symbol * pressing.slope(depth) + rest * pressing.slope(lower))
+    by_gain = np.concatenate([force[..., None], slope[..., None] * basis], axis=-1)
+    return np.concatenate([by_pose, by_gain], axis=-1), force
 
 
-def _normal(image: Image, pose: Array, values: Array, sure: Array) -> Array:
-    """Return the normal matrices (b, 6, 6), with what is known of the last three beforehand."""
-    jacobian = _jacobian(image, pose, values)
-    normal = (jacobian * sure[..., None]).swapaxes(1, 2) @ jacobian
-    return np.asarray(normal + np.diag(_PRIOR))
-
-
-def _moved(normal: Array, image: Image, pose: Array, values: Array, pull: Array) -> Array:
-    """Return the damped Gauss-Newton step (b, 6)."""
-    right = (_jacobian(image, pose, values).swapaxes(1, 2) @ pull[..., None])[..., 0]
-    right[:, 3:] -= _PRIOR[3:] * pose[:, 3:]
-    step = np.linalg.solve(normal + np.diag(_DAMPING), right[..., None])[..., 0]
-    return np.clip(step, -_STEP, _STEP)
-
-
-def _gain(
-    image: Image, felt: Felt, gain: Array, values: Array, near: NDArray[np.bool_], bare: bool
-) -> Array:
-    """Return the gains (b, 4) that explain the forces best, labels and pose held.
-
-    Symbols press with the plane g, the bare face with what is left of it after its depth h,
-    g - h: linear in both, once it is known which tactels reach the face.
-    """
-    basis = image.plane()
-    response = np.expm1(values[..., 0] * math.log(4.0)) / 3.0
-    by_symbol = np.abs(values[..., 1:3]).sum(axis=-1) > 0
-    by_symbol |= response > 0.7
-    flat = ~by_symbol & (felt.psi > _REACHED)
-    reached = flat & (bare & (flat.sum(axis=1) >= _REACHING))[:, None]
-    weights = np.where(near & by_symbol, felt.contact * felt.press**2, 0.0) * felt.trust
-    weights = np.where(reached, felt.trust, weights)
-    share = np.where(reached, 1.0, response)
-    sure = weights / (0.03 + 0.10 * share) ** 2
-    design = np.concatenate(
-        [basis[None] * share[..., None], -reached[..., None].astype(np.float64)], axis=-1
-    )
-    weighted = design * sure[..., None]
-    normal = weighted.swapaxes(1, 2) @ design
-    size = np.trace(normal[:, :3, :3], axis1=1, axis2=2)[:, None, None]
-    normal += size * np.diag([0.0, 1e-2, 1e-2, 1e-6]) + 1e-9 * (1 + size) * np.eye(4)
-    found = np.linalg.solve(normal, weighted.swapaxes(1, 2) @ image.forces[:, None])[..., 0]
-    plane = bounded_gain(np.where(found[:, :1] > 0, found[:, :3], gain[:, :3]))
-    least = _SHALLOW * (plane @ basis.T).max(axis=1)
-    depth = np.where(reached.any(axis=1), np.maximum(found[:, 3], least), np.inf)
-    return np.column_stack([plane, depth])
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    value: Array  # (b,) log-likelihood with what is known beforehand
+    normal: Array  # (b, 10, 10)
+    right: Array  # (b, 10)

@@ -1,0 +1,162 @@
+"""Calibrate from recordings, and say what came out: laws, unsound tactels, uncertainty."""
+
+from __future__ import annotations
+
+import datetime
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from probe.calibration import (
+    calibration_from,
+    calibration_hash,
+    drift_of,
+    even_load,
+    read_calibration,
+    write_calibration,
+)
+from probe.calibration.average import averaged
+from probe.calibration.condition import Thresholds, common_bias, raised
+from probe.circuit import Electronics
+from probe.command import FAILED, report
+from probe.command.exported import refuse_taken
+from probe.command.laws import condition_map, described, places
+from probe.command.listen import Counts, frames_of
+from probe.command.loads import Given
+from probe.errors import CalibrationError, CircuitError
+from probe.recording.read import read_recording
+
+_FULL = 1023
+
+
+def report_bias(
+    source: str,
+    sensor: int | None,
+    seconds: float,
+    calibration: Path | None,
+    *,
+    as_json: bool,
+) -> int:
+    """Say what an unloaded sensor reads; returns the exit code."""
+    counts, name = frames_of(source, sensor, seconds)
+    rest = averaged(counts, source)
+    high = raised(rest, _FULL, Thresholds())
+    values: dict[str, Any] = {
+        "source": source,
+        "sensor": name,
+        "frames": rest.frames,
+        "bias_counts": common_bias(rest),
+        "noise_counts": float(np.median(rest.noise)),
+        "raised": np.argwhere(high),
+    }
+    lines = {
+        "sensor": name or "not named",
+        "bias": f"{values['bias_counts']:.2f} counts, median of {rest.mean.size} tactels",
+        "noise": f"{values['noise_counts']:.2f} counts a frame",
+        "raised": places(high) or "none",
+    }
+    warning = ""
+    if calibration is not None:
+        known = read_calibration(calibration, sensor=name or None)
+        drift = drift_of(known, counts)
+        shift = float(np.abs(drift.bias_counts[~known.bad]).max(initial=0.0))
+        warning = drift.warning
+        values |= {"calibration": calibration_hash(known), "shift_counts": shift,
+                   "warning": warning}  # fmt: skip
+        lines["shift"] = f"{shift:.2f} counts at most since {known.made or 'the calibration'}"
+    if as_json:
+        report.write_json(values)
+    else:
+        report.pairs(lines)
+        if warning:
+            report.warning(warning)
+    return FAILED if warning else 0
+
+
+def calibrate_loads(
+    given: list[Given],
+    output: Path,
+    board: Electronics | None,
+    *,
+    sensor: str = "",
+    made: str = "",
+    replace: bool = False,
+    as_json: bool = False,
+) -> int:
+    """Calibrate from recordings and write the file; returns the exit code.
+
+    Raises
+    ------
+    CalibrationError
+        When loads are missing or of different sensors; the message names the load to add.
+    RecordingError
+        When a recording cannot be read.
+    """
+    refuse_taken(output, replace=replace)
+    rest = [load for load in given if load.newtons == 0]
+    if not rest:
+        raise CalibrationError("none of the recordings is of the unloaded sensor",
+                               fix="add one with 0 N: rest.h5=0")  # fmt: skip
+    name = sensor or _one_sensor(given)
+    counts = np.concatenate([_counts(load) for load in rest])
+    loads = [
+        even_load(_counts(load), load.newtons, load.footprint, f"{load.newtons:g} N")
+        for load in given
+        if load.newtons > 0
+    ]
+    when = made or datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
+    found = calibration_from(counts, loads, sensor=name, made=when, board=board)
+    digest = write_calibration(found, output)
+    values, lines = described(found, digest, str(output))
+    if as_json:
+        report.write_json(values)
+    else:
+        report.pairs(lines)
+        if found.bad.any():
+            report.write("\n" + condition_map(found))
+    return 0
+
+
+def board_from(text: str) -> Electronics | None:
+    """Read a board from the command line.
+
+    Raises
+    ------
+    CircuitError
+        When a name is unknown, or a value is none.
+    """
+    if text in ("", "none"):
+        return None
+    if text == "simulated":
+        return Electronics()
+    known = {item.name: item.type for item in fields(Electronics) if item.name != "noise"}
+    values: dict[str, Any] = {}
+    for part in text.split(","):
+        name, _, value = part.partition("=")
+        if name not in known:
+            raise CircuitError(f"a board has no '{name}'", fix=f"it has {', '.join(known)}",
+                               place="--board")  # fmt: skip
+        try:
+            values[name] = value if name == "readout" else int(value) if name == "bits" \
+                else float(value)  # fmt: skip
+        except ValueError:
+            raise CircuitError(f"{name}={value!r} is no number", fix=f"write {name}=NUMBER",
+                               place="--board") from None  # fmt: skip
+    return Electronics(**values)
+
+
+def _one_sensor(given: list[Given]) -> str:
+    names = {read_recording(load.recording).origin.sensor for load in given}
+    if len(names) != 1 or "" in names:
+        shown = ", ".join(sorted(name or "not named" for name in names))
+        raise CalibrationError(
+            f"the recordings are of these sensors: {shown}",
+            fix="calibrate one sensor at a time, or name it with --sensor",
+        )
+    return names.pop()
+
+
+def _counts(load: Given) -> Counts:
+    return read_recording(load.recording).block().counts

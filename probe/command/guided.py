@@ -1,0 +1,165 @@
+"""Calibrate a probe step by step: every load is recorded, then all are fitted.
+
+The recordings and their table stay, so that the fit can be repeated, or loads added, by
+`probe-sensor calibrate loads DIR/loads.csv`.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from probe.circuit import Electronics
+from probe.client import Client
+from probe.command import report
+from probe.command.calibrated import calibrate_loads
+from probe.command.exported import refuse_taken
+from probe.command.listen import Counts
+from probe.command.loads import Given, write_list
+from probe.command.stream import Stream, name_of
+from probe.errors import CalibrationError, PortError
+from probe.frame import Frame
+from probe.recording.record import Recorder
+
+LIST = "loads.csv"
+_FELT_COUNTS = 5.0  # above rest
+_STEADY = 0.05  # share by which a load may change while it is read
+
+
+@dataclass(frozen=True, slots=True)
+class Bench:
+    """What the steps share."""
+
+    url: str
+    stream: Stream
+    folder: Path
+    seconds: float
+    sensor: str
+
+
+def guide(
+    url: str,
+    output: Path,
+    forces_n: list[float],
+    folder: Path,
+    seconds: float,
+    sensor: int | None,
+    board: Electronics | None,
+    *,
+    made: str,
+    replace: bool,
+    as_json: bool,
+) -> int:
+    """Lead through a calibration; returns the exit code.
+
+    Raises
+    ------
+    PortError
+        When the probe is not there, or goes away.
+    CalibrationError
+        When the loads do not determine the laws, and no more are given.
+    """
+    refuse_taken(output, replace=replace)
+    refuse_taken(folder / LIST, replace=replace)
+    folder.mkdir(parents=True, exist_ok=True)
+    with Stream(Client(url, sensor=sensor)) as stream:
+        bench = Bench(url, stream, folder, seconds, name_of(stream.ident()))
+        report.message(f"{bench.sensor or url}; recordings go to {folder}")
+        given: list[Given] = []
+        rest: Counts | None = None
+        for force in [0.0, *forces_n]:
+            load, counts = _step(bench, force, rest, len(given), 1 + len(forces_n))
+            rest = counts if rest is None else rest
+            given.append(load)
+        while True:
+            write_list(folder / LIST, given)
+            try:
+                return calibrate_loads(given, output, board, sensor=bench.sensor, made=made,
+                                       replace=replace, as_json=as_json)  # fmt: skip
+            except CalibrationError as error:
+                report.message(f"not yet: {error.cause}\n  {error.fix}")
+                more_n = _another_load()
+                if more_n is None:
+                    raise
+                load, _ = _step(bench, more_n, rest, len(given), len(given) + 1)
+                given.append(load)
+
+
+def _step(
+    bench: Bench, force: float, rest: Counts | None, done: int, steps: int
+) -> tuple[Given, Counts]:
+    """Have one load put on, record it, and say how it was felt; again if the operator wants."""
+    what = f"put {force:g} N on the whole sensor, evenly" if force else "unload the sensor"
+    path = bench.folder / f"load-{done}-{force:g}N.h5"
+    while True:
+        _asked(f"{done + 1}/{steps}  {what}, then press Enter: ")
+        counts = _recorded(bench, path)
+        report.message(f"     {_felt(counts, rest)}")
+        if _asked("     Enter goes on, r reads it again: ") != "r":
+            return Given(path, force), counts
+
+
+def _recorded(bench: Bench, path: Path) -> Counts:
+    """Record what is on the sensor now."""
+    stream, frames = bench.stream, list[Frame]()
+    while stream.take(0.0):
+        pass  # what came while the load was put on
+    until_s = time.monotonic() + bench.seconds
+    while time.monotonic() < until_s and not stream.ended:
+        frames += stream.take(0.1)
+    if not frames:
+        raise PortError("no frame came", fix="see probe-sensor info", place=bench.url)
+    with Recorder(path, sensor=bench.sensor, replace=True) as recorder:
+        for frame in frames:
+            recorder.append(frame)
+    return np.stack([frame.counts for frame in frames])
+
+
+def _felt(counts: Counts, rest: Counts | None) -> str:
+    """Return in words what a load did."""
+    mean = counts.mean(axis=0)
+    if rest is None:
+        return f"{len(counts)} frames, median {np.median(mean):.1f} counts"
+    rise = mean - rest.mean(axis=0)
+    half = len(counts) // 2
+    change = float(np.median(counts[half:].mean(axis=0) - counts[:half].mean(axis=0)))
+    words = (
+        f"{len(counts)} frames, felt by {int((rise > _FELT_COUNTS).sum())} of {rise.size} tactels, "
+        f"median {np.median(rise):.1f} counts above rest"
+    )
+    if abs(change) > max(1.0, _STEADY * float(np.median(rise))):
+        words += f"; not steady, it changed by {change:+.1f} counts"
+    return words
+
+
+def _asked(prompt: str) -> str:
+    """Return a line of the operator's.
+
+    Raises
+    ------
+    CalibrationError
+        When there is nobody to answer.
+    """
+    sys.stderr.write(prompt)
+    sys.stderr.flush()
+    line = sys.stdin.readline()
+    if not line:
+        raise CalibrationError("the input ended before the calibration did",
+                               fix="answer every step, or use `calibrate loads`")  # fmt: skip
+    return line.strip()
+
+
+def _another_load() -> float | None:
+    """Return the force of a load that the operator will add; None to give up."""
+    while text := _asked("another load: its newtons, or Enter to give up: "):
+        with suppress(ValueError):
+            if 0 < float(text) < math.inf:
+                return float(text)
+        report.message(f"{text!r} is no force above 0")
+    return None

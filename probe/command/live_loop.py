@@ -1,0 +1,124 @@
+"""Watch a probe: on a terminal by `rich.live` and keys, elsewhere a line a second."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from threading import Event
+
+from rich.console import Console
+from rich.live import Live
+
+from probe.calibration import read_calibration
+from probe.client import Client
+from probe.command import INTERRUPTED, report
+from probe.command.keys import Pressed, keys
+from probe.command.live_state import LiveState
+from probe.command.live_view import line_of, rendered
+from probe.command.stream import Stream, interruption, name_of
+
+PER_SECOND = 15  #: pictures
+
+
+def watch(
+    url: str,
+    *,
+    sensor: int | None,
+    calibration: Path | None,
+    folder: Path,
+    seconds: float | None,
+    as_json: bool,
+) -> int:
+    """Show a probe until the operator quits, a recording ends, or `seconds` passed.
+
+    Raises
+    ------
+    PortError
+        When the probe is not there, or went away for good.
+    CalibrationError
+        When the calibration is none, or another sensor's.
+    """
+    known = None if calibration is None else read_calibration(calibration)
+    state = LiveState(url, folder, known)
+    with interruption() as interrupted, Stream(Client(url, sensor=sensor)) as stream:
+        try:
+            if known is not None and calibration is not None:
+                read_calibration(calibration, sensor=name_of(stream.ident()))
+            until_s = time.monotonic() + (float("inf") if seconds is None else seconds)
+            if sys.stdout.isatty() and not as_json:
+                return _on_terminal(state, stream, interrupted, until_s)
+            return _in_lines(state, stream, interrupted, until_s, as_json=as_json)
+        finally:
+            state.end_recording()
+
+
+def _on_terminal(state: LiveState, stream: Stream, interrupted: Event, until_s: float) -> int:
+    console = Console(highlight=False)
+    colours = console.color_system is not None and not console.no_color
+    with (
+        keys() as pressed,
+        Live(console=console, screen=True, auto_refresh=False) as view,
+    ):
+        while not (interrupted.is_set() or stream.ended) and time.monotonic() < until_s:
+            state.take(stream.take(0.0))
+            for notice in stream.client.notices():
+                state.notice = notice
+            counts, ident = stream.client.statistics(), stream.client.ident
+            height = console.size.height
+            picture = rendered(state, counts, ident, lines=height, colours=colours)
+            view.update(picture, refresh=True)
+            if not _obey(state, stream, pressed):
+                break
+    return 0
+
+
+def _obey(state: LiveState, stream: Stream, pressed: Pressed) -> bool:
+    """Wait for the next picture's time, do what the keys say; False to quit."""
+    actions: dict[str, Callable[[], None]] = {
+        "b": state.toggle_bias,
+        "s": state.save,
+        "r": lambda: state.toggle_recording(name_of(stream.client.ident)),
+    }
+    for key in pressed(1 / PER_SECOND):
+        if key == "q":
+            return False
+        if key == " ":
+            state.paused = not state.paused
+        elif key == "m":
+            state.median = not state.median
+        elif key in "01234567":
+            stream.client.select_sensor(int(key))
+            state.drop_bias()
+            state.notice = f"sensor {key}"
+        elif key in actions:
+            actions[key]()
+    return True
+
+
+def _in_lines(
+    state: LiveState, stream: Stream, interrupted: Event, until_s: float, *, as_json: bool
+) -> int:
+    due_s = time.monotonic() + 1.0
+    while not (interrupted.is_set() or stream.ended):
+        state.take(stream.take(0.1))
+        for notice in stream.client.notices():
+            report.message(notice)
+        now_s = time.monotonic()
+        if now_s >= min(due_s, until_s):
+            due_s += 1.0
+            counts = stream.client.statistics()
+            if as_json:
+                image = state.image()
+                peak = None if image is None else float(image.max())
+                seq = None if state.frame is None else state.frame.seq
+                values = {"seq": seq, "peak": peak, "unit": state.unit, **asdict(counts)}
+                report.write_json(values, line=True)
+            else:
+                report.write(line_of(state, counts))
+            sys.stdout.flush()
+        if now_s >= until_s:
+            return 0
+    return INTERRUPTED if interrupted.is_set() else 0

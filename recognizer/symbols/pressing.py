@@ -1,0 +1,69 @@
+"""How hard a tilted plate presses symbols and the bare face: depth -> force, and back.
+
+The plate stands at a depth u(x, y) = u0 + ux x + uy y below the tops of the symbols, a plane
+over the sensor, in heights of the overlay. A tactel on a symbol gets scale F(u), one over the
+bare face scale F(u - h), h the height of the symbols; the shape F is the overlay's: a
+neo-Hookean tab's (1 - u)^-2 - (1 - u), or a pad's, which stays linear. Thesis 3.3, 4.2.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.sensor import Sensor
+
+Array = NDArray[np.float64]
+
+DEEPEST = 0.8  #: heights of the overlay; beyond it F goes on straight
+
+
+@dataclass(frozen=True, slots=True)
+class Pressing:
+    """The law of an overlay over symbols of one height."""
+
+    hardens: bool  #: a tab does, a pad is taken as linear
+    symbol: float  #: height of the symbols over that of the overlay
+    scale: float  #: N, of a tactel on a plateau, where readings are newtons
+
+    def force(self, depth: Array) -> Array:
+        """Return F (0 without contact) at depths in heights of the overlay."""
+        u = np.clip(depth, 0.0, DEEPEST)
+        if not self.hardens:
+            return 3.0 * np.maximum(depth, 0.0)
+        beyond = np.maximum(depth - DEEPEST, 0.0) * _steep(DEEPEST)
+        return np.asarray((1 - u) ** -2 - (1 - u) + beyond)
+
+    def slope(self, depth: Array) -> Array:
+        """Return dF/du, 0 without contact."""
+        if not self.hardens:
+            return np.where(depth > 0, 3.0, 0.0)
+        return np.where(depth > 0, _steep(np.clip(depth, 0.0, DEEPEST)), 0.0)
+
+    def depth(self, force: float) -> float:
+        """Return the depth at which F has a value, at most `DEEPEST`."""
+        if not self.hardens:
+            return force / 3.0
+        table = np.linspace(0.0, DEEPEST, 257)
+        return float(np.interp(force, self.force(table), table))
+
+
+def pressing_of(sensor: Sensor, height_mm: float) -> Pressing:
+    """Return how a sensor's overlay presses symbols of a height."""
+    overlay = sensor.overlay
+    if overlay.kind == "tab":
+        area = math.pi * overlay.tab_diameter_mm**2 / 4
+    else:
+        area = sensor.pitch_mm**2
+    return Pressing(
+        hardens=overlay.kind == "tab",
+        symbol=height_mm / overlay.height_mm,
+        scale=overlay.young_mpa / 3.0 * area,
+    )
+
+
+def _steep(depth: Array | float) -> Array:
+    return np.asarray(2.0 * (1.0 - depth) ** -3 + 1.0)
