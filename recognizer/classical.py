@@ -63,7 +63,7 @@ class Settings:
     symbols: by_skeleton.Settings = field(default_factory=by_skeleton.Settings)
     acceptance: Acceptance = field(default_factory=Acceptance)
     conversion: Conversion = "likelihood"
-    error: float = 0.05  #: probability that a symbol is read wrong (likelihood)
+    error: float = 0.02  #: probability that a symbol is read wrong (likelihood)
     strangers: float = 0.1  #: share of the symbols that the face may not hold
     rim_mm: float = 2.0  #: how far the probe's centre may lie beyond the face
 

@@ -20,7 +20,7 @@ from recognizer.symbols.fit import Fit
 Ints = NDArray[np.int64]
 Array = NDArray[np.float64]
 
-CAP = 6.0  #: nats that one cell can cost at most
+CAP = 8.0  #: nats that one cell can cost at most
 WORN = 4.0  #: nats that a symbol costs that is registered but not felt at all
 ANCHORS = 3  #: cells tried as the one that is surely registered
 

@@ -5,7 +5,7 @@ With T = T_a_b and the tactels s of both images,
     a(s)   = g b(T^-1 s) + o        at the tactels of a over b,
     a(T s) = g b(s)      + o        at the tactels of b over a,
 
-g a plane, since a tilted sensor presses more on one side. Both ways together are symmetric:
+g and o planes, since a tilted sensor presses more on one side. Both ways together are symmetric:
 what interpolation takes from one image it takes from the other, and the bias of the shift
 cancels. Both hold the same noise, so they count half. A belief about the pose goes in as a
 prior; what the images alone say is returned apart from it.
@@ -31,7 +31,7 @@ STEPS = 12
 REACH = 1.0  #: tactels from the start; what is found further away is something else
 LEAST = 40  #: tactels of each image over the other
 FLOOR = 0.02  #: least standard deviation of a reading, share of the upper level
-INFLATION = 1.3  #: of the variance: interpolated errors are not independent; measured
+INFLATION = 2.6  #: of the variance: what aliases is not independent; measured on encoded faces
 _CUT = 6.0  # standard deviations from which a reading counts ever less
 _FARTHEST = 0.4  # tactels in one step
 _WIDEST = 0.1  # rad in one step
@@ -84,20 +84,24 @@ def aligned(a: Patch, b: Patch, start: Array, believed: Array, prior: Array) -> 
     """
     pitch = a.sensor.pitch_mm
     pose = np.asarray(start, np.float64)
-    for number in range(1, STEPS + 1):
-        rows = _rows(a, b, pose)
-        found = None if rows is None else _solved(rows, pose, believed, prior)
-        if rows is None or found is None:
+    steps = 0
+    while True:
+        rows, steps = _rows(a, b, pose), steps + 1
+        if rows is None:
+            return None
+        found = _solved(rows, pose, believed, prior)
+        if found is None:
             return None
         shift = np.clip(found.step[:2], -_FARTHEST * pitch, _FARTHEST * pitch)
         turn = min(_WIDEST, max(-_WIDEST, float(found.step[2])))
-        if max(np.abs(shift).max(), abs(turn) * a.sensor.reach_mm) < _DONE * pitch:
+        moves = max(np.abs(shift).max(), abs(turn) * a.sensor.reach_mm)
+        if moves < _DONE * pitch or steps == STEPS:
             break
         pose = np.append(pose[:2] + shift, wrapped(pose[2] + turn))
         if math.hypot(*(pose[:2] - start[:2])) > REACH * pitch:
             return None
     tactels = len(rows.target) / 2
-    return Aligned(pose, found.information, found.gain, found.rho, tactels, number)
+    return Aligned(pose, found.information, found.gain, found.rho, tactels, steps)
 
 
 def _rows(a: Patch, b: Patch, pose: Array) -> _Rows | None:
@@ -126,8 +130,8 @@ def _rows(a: Patch, b: Patch, pose: Array) -> _Rows | None:
 def _solved(rows: _Rows, pose: Array, believed: Array, prior: Array) -> _Step | None:
     """Return a step of pose, gain and offset together; None where the images are not alike."""
     target, n = rows.target, len(rows.slopes_b)
-    nuisance = np.column_stack([rows.values[:, None] * rows.plane, np.ones(len(target))])
-    ridge = np.diag([1e-9, 1.0, 1.0, 1e-9]) * (FLOOR / _SLOPE) ** 2
+    nuisance = np.concatenate([rows.values[:, None] * rows.plane, rows.plane], axis=1)
+    ridge = np.diag([1e-9, 1.0, 1.0, 1e-9, 1.0, 1.0]) * (FLOOR / _SLOPE) ** 2
     gain = np.linalg.solve(nuisance.T @ nuisance + ridge, nuisance.T @ target)
     if gain[0] <= 0:
         return None

@@ -18,9 +18,10 @@ from recognizer.signal import Signal
 
 Array = NDArray[np.float64]
 
-SMOOTHING = 0.5  #: tactels; .4 ... .6 register equally well, .7 worse
+SMOOTHING = 0.4  #: tactels; none to .4 register equally well, .5 and more worse
+TEXTURE = 0.8  #: tactels; smooths over the gaps between tabs (`texture`)
 LEAST_TRUST = 0.5  #: below, a tactel counts as bad
-_RIM = 2  # coefficients beyond the matrix, mirrored
+RIM = 2  #: coefficients beyond the matrix, mirrored
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,6 +35,8 @@ class Patch:
     good: NDArray[np.bool_]  #: (rows, columns)
     coefficients: Array  #: (rows + 4, columns + 4) of the cubic spline through `values`
     points_mm: Array  #: (rows * columns, 2)
+    smooth: Array  #: (rows * columns,) values without what the gaps between tabs make
+    slopes: Array  #: (2, rows * columns) of them by x and y, 1/tactel
 
 
 def patch_of(sensor: Sensor, signal: Signal) -> Patch:
@@ -58,22 +61,25 @@ def patch_of(sensor: Sensor, signal: Signal) -> Patch:
         scale = float(filled.max())
     raw = filled / scale if scale > 0 else filled
     values = gaussian_filter(raw, SMOOTHING, mode="nearest")
-    coefficients = np.pad(spline_filter(values, 3, mode="mirror"), _RIM, mode="reflect")
+    coefficients = np.pad(spline_filter(values, 3, mode="mirror"), RIM, mode="reflect")
     points = sensor.centres_mm().reshape(-1, 2)
-    for array in (raw, values, good, coefficients, points):
+    smooth = gaussian_filter(raw, TEXTURE, mode="nearest")
+    down, right = np.gradient(smooth)
+    slopes = np.stack([right.reshape(-1), -down.reshape(-1)])
+    for array in (raw, values, good, coefficients, points, smooth, slopes):
         array.setflags(write=False)
-    return Patch(sensor, scale, raw, values, good, coefficients, points)
+    return Patch(sensor, scale, raw, values, good, coefficients, points, smooth.reshape(-1), slopes)
 
 
 def asked(patch: Patch, points_mm: Array) -> tuple[Array, Array, Array]:
     """Return values and slopes by x and y (1/mm) at points (n, 2) inside `covered`."""
     sensor, pitch = patch.sensor, patch.sensor.pitch_mm
-    column = points_mm[:, 0] / pitch + ((sensor.columns - 1) / 2 + _RIM)
-    row = (sensor.rows - 1) / 2 + _RIM - points_mm[:, 1] / pitch
+    column = points_mm[:, 0] / pitch + ((sensor.columns - 1) / 2 + RIM)
+    row = (sensor.rows - 1) / 2 + RIM - points_mm[:, 1] / pitch
     i, j = np.floor(row).astype(np.intp), np.floor(column).astype(np.intp)
-    along_y, change_y = _basis(row - i)
-    along_x, change_x = _basis(column - j)
-    width = sensor.columns + 2 * _RIM
+    along_y, change_y = basis(row - i)
+    along_x, change_x = basis(column - j)
+    width = sensor.columns + 2 * RIM
     first = (i - 1) * width + (j - 1)
     near = patch.coefficients.reshape(-1)[first[:, None] + _stencil(width)].reshape(-1, 4, 4)
     by_x = (near @ np.stack([along_x, change_x], axis=-1)).swapaxes(1, 2)  # (n, 2, 4)
@@ -84,7 +90,7 @@ def asked(patch: Patch, points_mm: Array) -> tuple[Array, Array, Array]:
 
 
 def covered(sensor: Sensor, points_mm: Array, beyond: float = 0.0) -> NDArray[np.bool_]:
-    """Whether points lie between tactels' centres, or `beyond` (at most 1/2) tactels outside."""
+    """Whether points lie between tactels' centres, or up to `beyond` tactels outside."""
     half = (np.array([sensor.columns, sensor.rows]) - 1) / 2 + beyond
     return np.asarray((np.abs(points_mm) <= half * sensor.pitch_mm + 1e-9).all(axis=-1))
 
@@ -117,7 +123,7 @@ def _filled(forces: Array, good: NDArray[np.bool_]) -> Array:
     return filled
 
 
-def _basis(t: Array) -> tuple[Array, Array]:
+def basis(t: Array) -> tuple[Array, Array]:
     """Return the four cubic B-splines (n, 4) at t = 0 ... 1, and their slopes."""
     u = 1.0 - t
     values = np.stack(

@@ -61,6 +61,17 @@ def between_covariance(T_m_a: Array, T_m_b: Array, of_a: Array, of_b: Array) -> 
     return np.asarray((found + found.T) / 2)
 
 
+def composed_covariance(T_m_a: Array, T_a_b: Array, of_a: Array, of_b: Array) -> Array:
+    """Return the covariance (3, 3) of T_m_b from those of T_m_a and T_a_b, errors independent."""
+    c, s = math.cos(T_m_a[2]), math.sin(T_m_a[2])
+    turned = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    x, y = turned[:2, :2] @ T_a_b[:2]
+    by_a = np.eye(3)
+    by_a[:2, 2] = -y, x
+    found = by_a @ of_a @ by_a.T + turned @ of_b @ turned.T
+    return np.asarray((found + found.T) / 2)
+
+
 def planar_pose(T_plane_sensor: ArrayLike) -> Array:
     """Return (3,) of a pose (4, 4) that faces the plane z = 0.
 

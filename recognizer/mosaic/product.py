@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.mosaic.correlation import MAGNIFIED
+from recognizer.mosaic.raster import MAGNIFIED
 
 Array = NDArray[np.float64]
 

@@ -1,9 +1,9 @@
 """One touch of a mosaic: what was felt, and what is known of where. Thesis 4.3.
 
-Two things can be known. The arm believes a pose in a frame of its own (the robot's base, or a
+Three things can be known. The arm believes a pose in a frame of its own (the robot's base, or a
 first touch): every touch of a scan has it, with an error of a tactel or so. The reader decodes
 a pose in the frame of the face, with an error of hundredths of a tactel, where there are
-symbols enough.
+symbols enough. A probe that is moved by hand counts its steps from touch to touch.
 """
 
 from __future__ import annotations
@@ -31,15 +31,16 @@ class Placed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedTouch:
-    """What was felt, and where that may be; one of the two places is enough."""
+    """What was felt, and where that may be; one of the places is enough."""
 
     signal: Signal
     believed: Placed | None = None  #: by the arm, in the arm's plane
     decoded: Placed | None = None  #: by the reader, in the frame of the face
+    stepped: Placed | None = None  #: from the touch before, in its frame (dead reckoning)
     seq: int = 0
 
     def __post_init__(self) -> None:
-        if self.believed is None and self.decoded is None:
+        if self.believed is None and self.decoded is None and self.stepped is None:
             raise MosaicError(
                 f"touch {self.seq} has no place",
                 fix="give what the arm believes, or leave the touch out if it was not decoded",

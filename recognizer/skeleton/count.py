@@ -38,9 +38,9 @@ class Points:
 class Counting:
     """When a bend or a branch counts, in lattice units of the alphabet (reach x pitch)."""
 
-    spur: float = 0.45  #: branches with a free end that are shorter are pruned
-    hook: float = 0.45  #: of a free end, in which thinning may have bent the line
-    bow: float = 0.38  #: how far a line may bow from a straight one
+    spur: float = 0.4  #: branches with a free end that are shorter are pruned
+    hook: float = 0.3  #: of a free end, in which thinning may have bent the line
+    bow: float = 0.16  #: how far a line may bow from a straight one
     turn_rad: float = math.radians(40)  #: from which a bend is a corner
     near: float = 0.5  #: vertices nearer together are one
 

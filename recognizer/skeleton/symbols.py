@@ -33,7 +33,7 @@ THICK = 6  #: samples that a stroke is magnified to before it is thinned
 class Settings:
     """When ink is a symbol."""
 
-    share: float = 0.62  #: of the strongest reading nearby, from which a sample is ink
+    share: float = 0.58  #: of the strongest reading nearby, from which a sample is ink
     least_area: float = 0.3  #: of a symbol's stroke area; smaller specks are no symbols
     shape: float = 0.35  #: lattice units, rms, that the points may be off; inf: counts alone
     counting: Counting = field(default_factory=Counting)

@@ -27,9 +27,10 @@ from recognizer.symbols.refine import (
     refined,
     started,
     tables_at,
+    tilted_gain,
 )
 from recognizer.symbols.search import Bank, search
-from recognizer.symbols.template import Floats, Template
+from recognizer.symbols.template import Floats, Template, psi
 
 Array = NDArray[np.float64]
 
@@ -52,7 +53,7 @@ class Fit:
     x_mm: float
     y_mm: float
     theta_rad: float
-    nuisance: Array  #: (3,) spread, exponent - 1, scale - 1
+    nuisance: Array  #: (4,) width, cross-talk, exponent - 1, scale - 1
     gain: Array  #: (4,) logarithm of the scale, depth, and its slopes, `pressing`
     cells: NDArray[np.int64]  #: (m, 2) column and upward row of the cells in view
     scores: Array  #: (m, q + 1) log-likelihoods, nats, 0 for the best; the last one: no symbol
@@ -64,27 +65,34 @@ class Fit:
 
 def fits(image: Image, template: Template, bank: Bank, settings: Settings) -> tuple[Fit, ...]:
     """Return the likeliest lattices of an image, best first; none if nothing is pressed."""
-    gain = first_gain(image, template.ink)
-    if gain is None:
+    gains = [g for g in (first_gain(image, template.ink), tilted_gain(image)) if g is not None]
+    starts = [_searched(image, template, bank, gain, settings.candidates) for gain in gains]
+    if sum(len(start) for start in starts) == 0:
         return ()
-    felt = felt_under(image, gain[None])
-    weights = felt.press**2 * felt.trust
-    start = search(
-        bank,
-        felt.psi.reshape(bank.shape).astype(np.float32),
-        weights.reshape(bank.shape).astype(np.float32),
-        template.order,
-        settings.candidates,
-    )
-    if len(start) == 0:
-        return ()
-    lattices = started(start, np.repeat(gain[None], len(start), axis=0))
+    each = [len(start) for start in starts]
+    lattices = started(np.concatenate(starts), np.repeat(gains, each, axis=0))
     lattices = refined(image, template, lattices, steps=settings.steps)
     best = np.argsort(-lattices.value, kind="stable")[: settings.finalists]
     lattices = started(lattices.pose[best], lattices.gain[best])
     lattices = refined(image, template, lattices, steps=settings.final_steps)
     found = scored(image, template, lattices, settings)
     return tuple(sorted(found, key=lambda fit: -fit.value))
+
+
+def _searched(image: Image, template: Template, bank: Bank, gain: Array, keep: int) -> Array:
+    """Return the best lattices (n, 3) of the coarse search under a gain."""
+    felt = felt_under(image, gain[None])
+    response, bare = (np.expm1(felt.psi[0] * math.log(4.0)) / 3.0, felt.bare[0])
+    rest = np.maximum(1.0 - bare, 0.1)
+    seen = psi(np.maximum(response - bare, 0.0) / rest)
+    weights = (felt.press[0] * rest) ** 2 * felt.trust
+    return search(
+        bank,
+        seen.reshape(bank.shape).astype(np.float32),
+        weights.reshape(bank.shape).astype(np.float32),
+        template.order,
+        keep,
+    )
 
 
 def scored(

@@ -17,8 +17,8 @@ from recognizer.symbols.template import Floats, psi
 
 Array = NDArray[np.float64]
 
-QUIET = 0.25  #: spread where nothing is felt, against a tactel that a plateau covers
-DISPLACED_MM = 0.5  #: slopes count by this much, in the same measure
+QUIET = 0.8  #: spread where nothing is felt, against a tactel that a plateau covers
+DISPLACED_MM = 0.8  #: slopes count by this much, in the same measure
 MOST = 8.0  #: nats that one tactel can cost
 
 
@@ -35,7 +35,7 @@ class Felt:
 
 
 def spread(tables: Floats | Array) -> Floats:
-    """Return the spread (b, n, q) of psi around templates (b, n, q, 5), in units of the noise."""
+    """Return the spread (b, n, q) of psi around templates (b, n, q, 6), in units of the noise."""
     value, x, y = tables[..., 0], tables[..., 1], tables[..., 2]
     square = QUIET**2 + value * value + DISPLACED_MM**2 * (x * x + y * y)
     return np.asarray(np.sqrt(square), np.float32)
@@ -47,7 +47,7 @@ def log_likelihoods(felt: Felt, tables: Floats, noise: Array) -> Array:
     Parameters
     ----------
     tables
-        (b, n, q, 5) templates under each tactel.
+        (b, n, q, 6) templates under each tactel.
     noise
         (b,) standard deviation of psi on a covered tactel.
     """

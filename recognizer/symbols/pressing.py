@@ -43,12 +43,12 @@ class Pressing:
             return np.where(depth > 0, 3.0, 0.0)
         return np.where(depth > 0, _steep(np.clip(depth, 0.0, DEEPEST)), 0.0)
 
-    def depth(self, force: float) -> float:
-        """Return the depth at which F has a value, at most `DEEPEST`."""
+    def depth(self, force: Array) -> Array:
+        """Return the depths at which F has given values, at most `DEEPEST`."""
         if not self.hardens:
-            return force / 3.0
+            return np.asarray(force / 3.0)
         table = np.linspace(0.0, DEEPEST, 257)
-        return float(np.interp(force, self.force(table), table))
+        return np.asarray(np.interp(force, self.force(table), table))
 
 
 def pressing_of(sensor: Sensor, height_mm: float) -> Pressing:

@@ -29,12 +29,17 @@ DAMPING = 0.01  #: of the first step
 LEAST_PRESS = 0.2  #: of a tactel where the plane presses little or not at all
 LEAST_GAIN = 0.12  #: of the largest over the sensor: below it a tactel tells nothing of symbols
 NOISE = 0.15  #: standard deviation of psi on a covered tactel, until it is known better
-LIMITS = np.array([0.7, 0.4, 0.03])  #: of spread, exponent - 1 and scale - 1, `template`
+LIMITS = np.array([1.2, 0.7, 0.4, 0.03])  #: of width, cross-talk, exponent - 1, scale - 1
+_AROUND = 5  # tactels, side of a neighbourhood
+_EVEN = 0.3  # share of the highest readings that the lowest reach on the bare face
+_HIGH = 0.06  # and share of the highest of all
+_FEW = 10  # tactels, at least
 _FAR = 4.0  # standard deviations at which a tactel's loss stops growing
-# largest changes in one step: x, y, theta, spread, exponent, scale; gain
-_STEP = np.array([1.0, 1.0, 0.08, 0.5, 0.15, 0.01, 0.3, 0.1, 0.1, 0.1])
-_LEAST = np.array([1.0, 1.0, 100.0, 0.1, 0.1, 10.0, 1.0, 10.0, 10.0, 10.0])
-_PRIOR = np.array([0.0, 0.0, 0.0, 0.5, 0.2, 0.01])  # standard deviations; 0: not known
+# largest changes in one step: x, y, theta, width, cross-talk, exponent, scale; gain
+_STEP = np.array([1.0, 1.0, 0.08, 0.5, 0.5, 0.15, 0.01, 0.3, 0.1, 0.1, 0.1])
+_LEAST = np.array([1.0, 1.0, 100.0, 0.1, 0.1, 0.1, 10.0, 1.0, 10.0, 10.0, 10.0])
+_PRIOR = np.array([0.0, 0.0, 0.0, 0.6, 0.4, 0.2, 0.01])  # standard deviations; 0: not known
+_POSE = len(_PRIOR)
 _SCALE_KNOWN = 0.3  # of the logarithm of the force scale, where it is in newtons
 
 
@@ -45,6 +50,7 @@ class Image:
     points_mm: Array  #: (n, 2) sensor frame
     forces: Array  #: (n,) newtons, or anything proportional
     trust: Array  #: (n,) 0 ... 1, 0 for bad tactels
+    shape: tuple[int, int]  #: rows and columns
     half_mm: Array  #: (2,) half width and half height of the sensor
     pressing: Pressing
     newtons: bool  #: whether the scale of the pressing is that of the forces
@@ -58,10 +64,10 @@ class Image:
 class Lattices:
     """Candidates: sensor point s lies at R(theta) s + (x, y) in the lattice frame."""
 
-    pose: Array  #: (b, 6) x, y (mm), theta (rad); spread, exponent - 1, scale - 1
+    pose: Array  #: (b, 7) x, y (mm), theta (rad); width, cross-talk, exponent - 1, scale - 1
     gain: Array  #: (b, 4) logarithm of the scale; depth at the centre, slopes per half width
     value: Array  #: (b,) log-likelihood of the image, nats, up to a constant of the image
-    normal: Array  #: (b, 10, 10) inverse covariance of `pose` and `gain`
+    normal: Array  #: (b, 11, 11) inverse covariance of `pose` and `gain`
 
 
 def image_of(
@@ -72,6 +78,7 @@ def image_of(
         sensor.centres_mm().reshape(-1, 2),
         forces.reshape(-1).astype(np.float64),
         trust.reshape(-1).astype(np.float64),
+        forces.shape,
         np.array(sensor.half_mm),
         pressing,
         newtons,
@@ -90,10 +97,40 @@ def first_gain(image: Image, ink: float) -> Array | None:
         return None
     pressing = image.pressing
     scale = pressing.scale if image.newtons else plane[0] / float(pressing.force(np.array(USUAL)))
-    depth = pressing.depth(plane[0] / scale)
-    slopes = plane[1:] / (scale * float(pressing.slope(np.array(depth))))
+    depth = pressing.depth(np.array(plane[0] / scale))
+    slopes = plane[1:] / (scale * float(pressing.slope(depth)))
     gain = np.array([math.log(scale), depth, *slopes])
     return np.asarray(bounded_gain(gain[None], 0.9)[0])
+
+
+def tilted_gain(image: Image) -> Array | None:
+    """Return the gain (4,) of an image in which a part of the bare face is pressed; None if not.
+
+    Where a plate tilts over blank ground it comes down on the face itself, far deeper than on
+    symbols. There even the lowest readings of a neighbourhood as wide as a symbol are high.
+    """
+    from scipy.ndimage import percentile_filter
+
+    forces = image.forces.reshape(image.shape)
+    low, high = (
+        percentile_filter(forces, share, size=_AROUND, mode="nearest").reshape(-1)
+        for share in (20, 80)
+    )
+    known = image.trust > 0
+    flat = known & (low > _EVEN * high) & (low > _HIGH * np.max(high))
+    top = known & (low < _EVEN / 2 * high) & (image.forces > 0.8 * high)
+    if flat.sum() < _FEW or top.sum() < _FEW:
+        return None
+    pressing = image.pressing
+    scale = pressing.scale
+    if not image.newtons:
+        scale = float(np.median(image.forces[top])) / float(pressing.force(np.array(USUAL)))
+    depth = pressing.depth(image.forces / scale) + np.where(flat, pressing.symbol, 0.0)
+    basis, sure = image.plane(), np.sqrt(image.trust * (flat | top))
+    plane = np.linalg.lstsq(basis * sure[:, None], depth * sure, rcond=None)[0]
+    if not (np.isfinite(plane).all() and plane[0] > 0):
+        return None
+    return np.asarray(bounded_gain(np.array([[math.log(scale), *plane]]))[0])
 
 
 def bounded_gain(gain: Array, steepest: float = STEEPEST) -> Array:
@@ -125,7 +162,7 @@ def cells_and_offsets(image: Image, pose: Array, pitch: float) -> tuple[NDArray[
     """Return the cell (column, upward row) under each tactel and its offset, both (b, n, 2)."""
     c, s = np.cos(pose[:, 2, None]), np.sin(pose[:, 2, None])
     x, y = image.points_mm.T
-    c, s = c * (1 + pose[:, 5, None]), s * (1 + pose[:, 5, None])
+    c, s = c * (1 + pose[:, 6, None]), s * (1 + pose[:, 6, None])
     u = np.stack([pose[:, 0, None] + c * x - s * y, pose[:, 1, None] + s * x + c * y], axis=-1)
     cells = np.floor(u / pitch)
     return cells.astype(np.int64), u - (cells + 0.5) * pitch
@@ -201,7 +238,7 @@ def _moved(at: Lattices, seen: _Seen, damping: Array) -> Lattices:
         seen.normal + diagonal[:, :, None] * np.eye(diagonal.shape[1]), seen.right[..., None]
     )[..., 0]
     step = np.clip(step, -_STEP, _STEP)
-    pose, gain = at.pose + step[:, :6], at.gain + step[:, 6:]
+    pose, gain = at.pose + step[:, :_POSE], at.gain + step[:, _POSE:]
     pose[:, 3:] = np.clip(pose[:, 3:], -LIMITS, LIMITS)
     gain[:, 1] = np.clip(gain[:, 1], 0.3 * at.gain[:, 1], 0.9)
     return Lattices(pose, bounded_gain(gain), at.value, at.normal)
@@ -221,16 +258,16 @@ def _either(better: NDArray[np.bool_], a: Any, b: Any) -> Any:
 
 
 def _known(image: Image, at: Lattices) -> Array:
-    """Return how far (b, 10) each unknown lies from what is known of it beforehand."""
-    away = np.zeros((len(at.pose), 10))
-    away[:, 3:6] = at.pose[:, 3:]
+    """Return how far (b, 11) each unknown lies from what is known of it beforehand."""
+    away = np.zeros((len(at.pose), 11))
+    away[:, 3:_POSE] = at.pose[:, 3:]
     if image.newtons:
-        away[:, 6] = at.gain[:, 0] - math.log(image.pressing.scale)
+        away[:, _POSE] = at.gain[:, 0] - math.log(image.pressing.scale)
     return away
 
 
 def _precision(image: Image) -> Array:
-    """Return what is known of each unknown beforehand, one over its variance (10,)."""
+    """Return what is known of each unknown beforehand, one over its variance (11,)."""
     spread = np.concatenate([_PRIOR, [_SCALE_KNOWN if image.newtons else 0.0, 0.0, 0.0, 0.0]])
     return np.where(spread > 0, 1 / np.maximum(spread, 1e-9) ** 2, 0.0)
 
@@ -251,21 +288,22 @@ def _plateau(image: Image, at: Lattices) -> Array:
 
 
 def started(pose: Array, gain: Array) -> Lattices:
-    """Return candidates of which nothing is known but pose (b, 6) and gain (b, 4)."""
-    return Lattices(pose, gain, np.zeros(len(pose)), np.zeros((len(pose), 10, 10)))
+    """Return candidates of which nothing is known but pose (b, 3 or 7) and gain (b, 4)."""
+    pose = np.pad(pose, ((0, 0), (0, _POSE - pose.shape[1])))
+    return Lattices(pose, gain, np.zeros(len(pose)), np.zeros((len(pose), 11, 11)))
 
 
 def chosen(cells: NDArray[np.int64], tables: Floats, scores: Array, felt: Felt) -> Array:
-    """Return psi and slopes (b, n, 5) of the symbol that fits best in each cell, or of none."""
+    """Return psi and slopes (b, n, 6) of the symbol that fits best in each cell, or of none."""
     number, dense = _numbered(cells)
     return _labelled(tables, _best(number, dense, scores), felt)
 
 
 def tables_at(template: Template, offsets: Array, pose: Array, felt: Felt) -> Floats:
-    """Return templates (b, n, q, 5) at offsets, for the spread, exponent and gain fitted."""
+    """Return templates (b, n, q, 6) at offsets, for the width, cross-talk, exponent and gain fitted."""
     tables = template.at(offsets)
-    by = pose[:, 3:5].astype(np.float32)[:, :, None, None]
-    tables[..., 0] += tables[..., 3] * by[:, 0] + tables[..., 4] * by[:, 1]
+    by = pose[:, 3:6].astype(np.float32)[:, None, :, None]
+    tables[..., 0] += (tables[..., 3:] @ by)[..., 0]
     tables *= felt.contact[..., None, None].astype(np.float32)
     if felt.bare.any():
         bare = felt.bare[..., None].astype(np.float32)
@@ -289,7 +327,7 @@ def _best(number: int, dense: NDArray[np.int64], scores: Array) -> NDArray[np.in
 
 
 def _labelled(tables: Floats, labels: NDArray[np.int64], felt: Felt) -> Array:
-    """Return psi and slopes (b, n, 5) of given symbols, and of the bare face where there is none.
+    """Return psi and slopes (b, n, 6) of given symbols, and of the bare face where there is none.
 
     Beyond the edge of a face nothing is felt: a tactel without a symbol shows what is nearer.
     """
@@ -317,14 +355,15 @@ def _numbered(cells: NDArray[np.int64]) -> tuple[int, NDArray[np.int64]]:
 
 
 def _jacobian(image: Image, at: Lattices, values: Array, felt: Felt) -> tuple[Array, Array]:
-    """Return the derivatives (b, n, 10) of the forces by pose and gain, and the forces (b, n)."""
+    """Return the derivatives (b, n, 11) of the forces by pose and gain, and the forces (b, n)."""
     pressing, basis, pose = image.pressing, image.plane(), at.pose
     c, s = np.cos(pose[:, 2, None]), np.sin(pose[:, 2, None])
     x, y = image.points_mm.T
     across, up = c * x - s * y, s * x + c * y
     slope_x, slope_y = values[..., 1], values[..., 2]
     turn, scale = slope_y * across - slope_x * up, slope_x * across + slope_y * up
-    by_pose = np.stack([slope_x, slope_y, turn, values[..., 3], values[..., 4], scale], axis=-1)
+    free = np.moveaxis(values[..., 3:], -1, 0)
+    by_pose = np.stack([slope_x, slope_y, turn, *free, scale], axis=-1)
     total = _response(values[..., 0])
     by_psi = (1 + 3 * total) * math.log(4.0) / 3.0
     by_pose = by_pose * (by_psi * _plateau(image, at))[..., None]
@@ -342,5 +381,5 @@ def _jacobian(image: Image, at: Lattices, values: Array, felt: Felt) -> tuple[Ar
 @dataclass(frozen=True, slots=True)
 class _Seen:
     value: Array  # (b,) log-likelihood with what is known beforehand
-    normal: Array  # (b, 10, 10)
-    right: Array  # (b, 10)
+    normal: Array  # (b, 11, 11)
+    right: Array  # (b, 11)

@@ -127,8 +127,7 @@ def search(
 
     Returns
     -------
-    (n, 6) x, y (mm), theta, and 0 for what is not searched: sensor point s lies at
-    R(theta) s + (x, y) in the lattice frame.
+    (n, 3) x, y (mm), theta: sensor point s lies at R(theta) s + (x, y) in the lattice frame.
     """
     scores = lattice_scores(bank, values, weights, order)
     return _peaks(bank, scores, keep)
@@ -165,6 +164,4 @@ def _peaks(bank: Bank, scores: Floats, keep: int) -> NDArray[np.float64]:
     peaks = np.flatnonzero((cube >= most).ravel())
     order = peaks[np.argsort(-cube.ravel()[peaks], kind="stable")][:keep]
     turn, shift = np.divmod(order, n * n)
-    return np.column_stack(
-        [bank.shifts_mm[shift], bank.rotations_rad[turn], np.zeros((len(order), 3))]
-    )
+    return np.column_stack([bank.shifts_mm[shift], bank.rotations_rad[turn]])

@@ -7,10 +7,10 @@ the symbol's axes (x along the array's columns, y against its rows), mm.
 A tab feels the share of its tip that the plateau covers, and a little more than that share
 because a partly covered tip bulges into the open side; the pad passes on only what is
 coarser than its thickness (numerics of `probe.contact`). Responses are kept as
-psi(y) = log(1 + 3 y) / log 4, in which gain errors and noise have about one size. How sharp
-the sensor sees is fitted with the rest: the spread runs from -1/2, the overlay alone, to
-1/2, strokes printed too wide and seen through cross-talk; an exponent stands for a force law
-that is not quite the one that was taken off.
+psi(y) = log(1 + 3 y) / log 4, in which gain errors and noise have about one size. Three
+things are fitted with the rest, to first order: how much wider than asked the strokes are
+printed, how far tactels hear their neighbours, and an exponent, for a force law that is not
+quite the one that was taken off.
 Thesis 4.2, 6.2.
 """
 
@@ -32,8 +32,9 @@ STEP_MM = 0.05  #: grid of the tables
 _BULGE = 0.59  #: F(c)/F(1) = c (1 + bulge (1 - c)) for a tip covered by the share c
 _PENETRATION_MM = 0.4  #: of the plateau into the overlay, for the part of a wall that is felt
 _PSI = 3.0
-WIDER_MM = 0.1  #: how much wider strokes are at the far end of the spread
-CROSS_TALK = 0.4  #: tactels, standard deviation, at the far end of the spread
+WIDER_MM = 0.1  #: unit of the width
+CROSS_TALK = 0.12  #: of a reading that its neighbours get; twice that at the far end
+LOW, HIGH = 0.7, 1.1  #: exponents between which the slope is taken
 
 
 def psi(response: NDArray[np.float64] | Floats) -> NDArray[np.float64]:
@@ -48,7 +49,7 @@ class Template:
     pitch_mm: float
     order: int  #: number of symbols
     half_mm: float  #: the grid covers offsets -half ... half in x and y
-    values: Floats  #: (n, n, order, 5) psi of the response, slopes by x, y (mm), spread, exponent
+    values: Floats  #: (n, n, order, 6) psi, slopes by x, y (mm), width, cross-talk, exponent
     ink: float  #: mean response over a cell
 
     @property
@@ -57,7 +58,7 @@ class Template:
         return int(self.values.shape[0])
 
     def at(self, offsets_mm: NDArray[np.float64]) -> Floats:
-        """Return psi and slopes (..., order, 5) at offsets (..., 2); 0 outside the grid."""
+        """Return psi and slopes (..., order, 6) at offsets (..., 2); 0 outside the grid."""
         index = np.rint((offsets_mm + self.half_mm) / STEP_MM).astype(np.intp)
         inside = np.all((index >= 0) & (index < self.size), axis=-1)
         index[np.logical_not(inside)] = 0
@@ -76,39 +77,33 @@ def template_of(alphabet: Alphabet, style: SymbolStyle, sensor: Sensor) -> Templ
     steps = math.ceil(extent / STEP_MM) + 1
     axis = (np.arange(2 * steps + 1) - steps) * STEP_MM
     x, y = np.meshgrid(axis, axis)
-    values = np.zeros((len(axis), len(axis), alphabet.order, 5), np.float32)
+    values = np.zeros((len(axis), len(axis), alphabet.order, 6), np.float32)
     ink = []
     for label, glyph in enumerate(alphabet.glyphs):
-        strokes = np.array(glyph.strokes, dtype=np.float64) * reach
-        presence = _presence(_distance(strokes, x, y), style)
-        wide = _presence(
-            _distance(strokes, x, y), replace(style, stroke_mm=style.stroke_mm + WIDER_MM)
+        away = _distance(np.array(glyph.strokes, dtype=np.float64) * reach, x, y)
+        thin, usual, wide = (
+            _felt(_presence(away, replace(style, stroke_mm=style.stroke_mm + by)), sensor)
+            for by in (-WIDER_MM, 0.0, WIDER_MM)
         )
-        felt = _felt(presence, sensor)
-        sharp, smeared = psi(felt), psi(_smeared(_felt(wide, sensor), sensor))
-        middle = (sharp + smeared) / 2
-        ink.append(felt.sum() * STEP_MM**2 / style.pitch_mm**2)
-        values[..., label, 0] = middle
-        values[..., label, 1] = np.gradient(middle, STEP_MM, axis=1)
-        values[..., label, 2] = np.gradient(middle, STEP_MM, axis=0)
-        values[..., label, 3] = smeared - sharp
-        values[..., label, 4] = _by_exponent(middle)
+        middle = _heard(usual, CROSS_TALK, sensor)
+        ink.append(usual.sum() * STEP_MM**2 / style.pitch_mm**2)
+        values[..., label, 0] = psi(middle)
+        values[..., label, 1] = np.gradient(values[..., label, 0], STEP_MM, axis=1)
+        values[..., label, 2] = np.gradient(values[..., label, 0], STEP_MM, axis=0)
+        wider = psi(_heard(wide, CROSS_TALK, sensor)) - psi(_heard(thin, CROSS_TALK, sensor))
+        values[..., label, 3] = wider / 2
+        values[..., label, 4] = psi(_heard(usual, 2 * CROSS_TALK, sensor)) - psi(usual)
+        values[..., label, 5] = (psi(middle**HIGH) - psi(middle**LOW)) / (HIGH - LOW)
     values.setflags(write=False)
     return Template(style.pitch_mm, alphabet.order, steps * STEP_MM, values, float(np.mean(ink)))
 
 
-def _by_exponent(table: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the derivative of psi(y^e) by e at e = 1, of a table of psi(y); 0 where y is 0."""
-    response = np.expm1(table * math.log1p(_PSI)) / _PSI
-    known = np.maximum(response, 1e-12)
-    return _PSI * response * np.log(known) / ((1 + _PSI * response) * math.log1p(_PSI))
+def _heard(felt: NDArray[np.float64], share: float, sensor: Sensor) -> NDArray[np.float64]:
+    """Return responses of tactels that hear a share of what stands one tactel away, all around."""
+    from scipy.signal import fftconvolve
 
-
-def _smeared(felt: NDArray[np.float64], sensor: Sensor) -> NDArray[np.float64]:
-    """Return responses as a sensor with cross-talk between its tactels gives them."""
-    from scipy.ndimage import gaussian_filter
-
-    return np.asarray(gaussian_filter(felt, CROSS_TALK * sensor.pitch_mm / STEP_MM))
+    around = fftconvolve(felt, _ring(sensor.pitch_mm), mode="same")
+    return np.asarray(np.maximum((1 - share) * felt + share * around, 0.0))
 
 
 def _distance(
@@ -134,8 +129,8 @@ def _presence(distance: NDArray[np.float64], style: SymbolStyle) -> NDArray[np.f
 
 def _blur_mm(sensor: Sensor) -> float:
     if sensor.overlay.kind == "tab":
-        return sensor.overlay.tab_diameter_mm / 2 + 2 * CROSS_TALK * sensor.pitch_mm
-    return sensor.pitch_mm / 2 + 1.5 * sensor.overlay.height_mm
+        return sensor.overlay.tab_diameter_mm / 2 + sensor.pitch_mm
+    return 1.5 * sensor.pitch_mm + 1.5 * sensor.overlay.height_mm
 
 
 def _felt(presence: NDArray[np.float64], sensor: Sensor) -> NDArray[np.float64]:
@@ -156,6 +151,14 @@ def _disc(radius: float) -> NDArray[np.float64]:
     x, y = np.meshgrid(axis, axis)
     disc = np.clip((radius - np.hypot(x, y)) / STEP_MM + 0.5, 0, 1)
     return np.asarray(disc / disc.sum())
+
+
+def _ring(radius: float) -> NDArray[np.float64]:
+    steps = math.ceil(radius / STEP_MM) + 1
+    axis = np.arange(-steps, steps + 1) * STEP_MM
+    x, y = np.meshgrid(axis, axis)
+    ring = np.clip(1 - np.abs(np.hypot(x, y) - radius) / STEP_MM, 0, 1)
+    return np.asarray(ring / ring.sum())
 
 
 def _box(width: float) -> NDArray[np.float64]:
