@@ -217,7 +217,7 @@ def _windowed(
 
 def _covariance(lattice: _Lattice, number: int, off_mm: float, acceptance: Acceptance) -> Array:
     """Return the covariance (3, 3) of x, y and theta at the image's origin."""
-    variance = max(acceptance.place_mm, off_mm) ** 2
+    variance = max(acceptance.place_mm, off_mm / math.sqrt(2)) ** 2
     turning = 1 / (lattice.spread / variance + number / acceptance.axes_rad**2)
     away = -lattice.turn * lattice.middle  # the origin from the middle, lattice frame
     by_turn = np.array([-away.imag, away.real, 1.0])

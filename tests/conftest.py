@@ -1,6 +1,77 @@
-"""One thread for the linear algebra: tests run side by side, and times mean CPU."""
+"""One thread for the linear algebra: tests run side by side, and times mean CPU.
+
+Databases of either engine: SQLite files, and a PostgreSQL server of this run's own.
+"""
 
 import os
+import subprocess
+import sys
+import tempfile
+from contextlib import ExitStack, contextmanager
+from itertools import count
+from pathlib import Path
+
+import pytest
 
 for library in ("OMP", "OPENBLAS", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
+ENGINES = ("sqlite", "postgresql")
+NUMBERS = count(1)  # of schemas on the server
+
+
+@pytest.fixture(scope="session")
+def postgresql_server():
+    """URL of a real server; its absence is a failure, so that nothing goes untested."""
+    script = Path(__file__).with_name("postgres.py")
+    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    server = subprocess.Popen([sys.executable, script], text=True, **pipes)
+    with server:
+        url = server.stdout.readline().strip()
+        if not url:
+            pytest.fail(server.stderr.read().strip(), pytrace=False)
+        yield url
+        server.stdin.close()
+        server.wait(timeout=60)
+
+
+@pytest.fixture(scope="session")
+def database_on(request):
+    """Return a context manager: engine -> URL of a new, empty database, gone at its end.
+
+    On the server it is a schema of its own, which costs a hundredth of a database.
+    """
+
+    @contextmanager
+    def made(engine):
+        if engine == "sqlite":
+            with tempfile.TemporaryDirectory() as folder:
+                yield str(Path(folder) / "lab.db")
+            return
+        server = request.getfixturevalue("postgresql_server")
+        name = f"lab{next(NUMBERS)}"
+        _on_server(server, f"CREATE SCHEMA {name}")
+        yield f"{server}?options=-csearch_path%3D{name}"
+        _on_server(server, f"DROP SCHEMA {name} CASCADE")
+
+    return made
+
+
+@pytest.fixture
+def new_database(database_on):
+    """Return a function that names a new, empty database of an engine."""
+    with ExitStack() as made:
+        yield lambda engine: made.enter_context(database_on(engine))
+
+
+def _on_server(server, statement):
+    import psycopg
+
+    with psycopg.connect(server, autocommit=True) as connection:
+        connection.execute(statement)
+
+
+@pytest.fixture(params=ENGINES)
+def lab_url(request, new_database):
+    """URL of an empty database; the test runs once on each engine."""
+    return new_database(request.param)

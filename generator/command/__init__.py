@@ -4,8 +4,9 @@
 
     __init__.py   which command, what an error or an interruption means for the exit code
     encode.py     encode-object SPEC.yaml...
-    tools.py      encode-object init | schema | printers | list
-    report.py     results and errors as text and as JSON
+    tools.py      encode-object init | schema | printers
+    objects.py    encode-object list | show | retire | export | import
+    report.py     results and errors as text and as JSON; object_report.py: of registered objects
     progress.py   a bar on a terminal
 
 Results go to stdout, progress and messages to stderr. Exit codes: 0 done, 1 could not be
@@ -23,7 +24,8 @@ from collections.abc import Callable, Sequence
 from types import FrameType
 from typing import NoReturn
 
-TOOLS = ("init", "schema", "printers", "list")
+TOOLS = ("init", "schema", "printers")
+OBJECTS = ("list", "show", "retire", "export", "import")
 WRITE_FAILED = 1
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -69,7 +71,8 @@ def run(arguments: list[str]) -> int:
         return error.exit_code
     except usage_error as error:
         message = str(getattr(error, "message", error))
-        fix = f"see encode-object {arguments[0] if arguments[:1] and arguments[0] in TOOLS else ''}"
+        named = arguments[0] if arguments[:1] and arguments[0] in TOOLS + OBJECTS else ""
+        fix = f"see encode-object {named}"
         report.error(GeneratorError(message, fix=f"{fix.strip()} --help"), as_json=as_json)
         return BAD_INPUT
     except BrokenPipeError:
@@ -85,6 +88,8 @@ def _chosen(arguments: list[str]) -> Action | int | None:
     """Read the options of the command that is meant; a spec file needs no command's name."""
     if arguments[:1] and arguments[0] in TOOLS:
         from generator.command.tools import app
+    elif arguments[:1] and arguments[0] in OBJECTS:
+        from generator.command.objects import app
     else:
         from generator.command.encode import app
     found: Action | int | None = app(

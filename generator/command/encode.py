@@ -28,6 +28,12 @@ More commands, each with --help:
 [bold]encode-object printers[/]        printers and their limits
 
 [bold]encode-object list[/]            the objects in a database
+
+[bold]encode-object show[/] OBJECT     all about one of them, and whether its files are unchanged
+
+[bold]encode-object retire[/] OBJECT   take it out of use; its cells stay taken
+
+[bold]encode-object export[/] FILE     objects for another lab; [bold]import[/] FILE takes them over
 """
 
 app = typer.Typer(

@@ -13,8 +13,12 @@ import typer
 from generator.errors import GeneratorError
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from generator.pipeline import Encoded, Made
     from generator.spec.problem import Problem
+
+WIDTH = 120  # characters of a table that is written to a file
 
 
 def write(text: str) -> None:
@@ -25,6 +29,24 @@ def write(text: str) -> None:
 def write_json(value: Any) -> None:
     """Write one JSON object to stdout."""
     write(json.dumps(value, indent=2))
+
+
+def table(*titles: str) -> Table:
+    """Return an empty table with these columns; `made for` and `file` may be broken."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    made = Table(box=SIMPLE_HEAD, pad_edge=False)
+    for title in titles:
+        made.add_column(title, no_wrap=title not in ("made for", "file"), overflow="fold")
+    return made
+
+
+def show(table: Table) -> None:
+    """Write a table to stdout."""
+    from rich.console import Console
+
+    Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH).print(table)
 
 
 def version(*, as_json: bool) -> None:
@@ -55,7 +77,7 @@ def error(problem: GeneratorError, *, as_json: bool) -> None:
     for number, each in enumerate(problems):
         if number:
             sys.stderr.write("\n")
-        _message(str(each), "error:", "red")
+        message(str(each), "error:", "red")
 
 
 def encoded(result: Encoded, *, dry_run: bool, as_json: bool) -> None:
@@ -66,7 +88,7 @@ def encoded(result: Encoded, *, dry_run: bool, as_json: bool) -> None:
     for made in result.objects:
         write(_object_text(made, dry_run))
         for warning in made.warnings:
-            _message(f"warning: {made.name}: {warning}", "warning:", "yellow")
+            message(f"warning: {made.name}: {warning}", "warning:", "yellow")
     share = result.used_cells / max(1, result.rows * result.columns)
     array = f"array {result.rows} x {result.columns}, {share:.0%} of its cells in use"
     if dry_run:
@@ -165,7 +187,7 @@ def _problem_values(problem: Problem) -> dict[str, Any]:
     }
 
 
-def _message(text: str, word: str, colour: str) -> None:
+def message(text: str, word: str, colour: str = "yellow") -> None:
     """Write a message to stderr; its kind in colour on a terminal."""
     if sys.stderr.isatty() and not os.environ.get("NO_COLOR"):
         text = text.replace(word, typer.style(word, fg=colour, bold=True), 1)

@@ -1,21 +1,15 @@
-"""`encode-object init | schema | printers | list`: what one needs around the making."""
+"""`encode-object init | schema | printers`: what one needs before the making."""
 
 from __future__ import annotations
 
 import math
 import os
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from generator.command import Action
-
-if TYPE_CHECKING:
-    from rich.table import Table
-
-WIDTH = 120  # characters of a table that is written to a file
 
 app = typer.Typer(
     add_completion=False,
@@ -92,74 +86,20 @@ def printers(as_json: Json = False) -> Action:
             report.write_json({"printers": [_printer_values(name) for name in PRINTERS]})
             return 0
         rows = [_printer_values(name) for name in PRINTERS]
-        table = _table("printer", "bed", "layer", "stroke >=", "gap >=", "height >=", "made for")
+        table = report.table(
+            "printer", "bed", "layer", "stroke >=", "gap >=", "height >=", "made for"
+        )
         for row in rows:
             bed = " x ".join(f"{side:g}" for side in row["bed_mm"])
             limits = ("layer_mm", "stroke_min_mm", "gap_min_mm", "height_min_mm")
             table.add_row(
                 row["name"], bed, *(f"{row[key]:g}" for key in limits), row["description"]
             )
-        _show(table)
+        report.show(table)
         report.write("lengths in mm; choose one with  print: {printer: NAME}")
         return 0
 
     return action
-
-
-@app.command(name="list")
-def list_(
-    database: Annotated[
-        str, typer.Option(metavar="URL", help="lab.db, sqlite:///lab.db, postgresql://host/name."),
-    ] = "sqlite:///lab.db",
-    as_json: Json = False,
-) -> Action:  # fmt: skip
-    """Print the objects that a database holds."""
-
-    def action() -> int:
-        from generator.command import report
-        from generator.spec.option import database_option
-
-        rows = _registered(url := database_option(database))
-        if as_json:
-            report.write_json({"objects": rows, "database": url})
-            return 0
-        if not rows:
-            report.write(f"no objects in {url}; make one with: encode-object SPEC.yaml")
-            return 0
-        table = _table("object", "shape", "faces", "symbols", "array", "pitch", "registered (UTC)")
-        for row in rows:
-            array = f"{row['profile']} {row['array']['rows']}x{row['array']['columns']}"
-            table.add_row(row["name"], row["shape"], str(row["faces"]), str(row["symbols"]), array,
-                          f"{row['pitch_mm']:g} mm", row["utc"][:16].replace("T", " "))  # fmt: skip
-        _show(table)
-        return 0
-
-    return action
-
-
-def _registered(url: str) -> list[dict[str, Any]]:
-    """Return the objects of a database as plain values, by name."""
-    from generator.database.open import open_database
-    from generator.database.read import list_objects
-    from generator.database.transaction import reading
-
-    with reading(open_database(url, writable=False)) as connection:
-        entries = list_objects(connection)
-    return [
-        {
-            "name": entry.name,
-            "shape": entry.object_type,
-            "faces": entry.number_of_faces,
-            "symbols": entry.symbols,
-            "profile": entry.profile,
-            "array": {"rows": entry.rows, "columns": entry.columns},
-            "pitch_mm": entry.pitch_mm,
-            "spec_hash": entry.spec_hash,
-            "tool_version": entry.tool_version,
-            "utc": entry.utc,
-        }
-        for entry in entries
-    ]
 
 
 def _printer_values(name: str) -> dict[str, Any]:
@@ -189,19 +129,3 @@ def _write_new(path: Path, text: str, force: bool) -> None:
             os.link(beside, path)  # fails, unlike a rename, if the file has come up meanwhile
     finally:
         beside.unlink(missing_ok=True)
-
-
-def _table(*titles: str) -> Table:
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
-    table = Table(box=SIMPLE_HEAD, pad_edge=False)
-    for title in titles:
-        table.add_column(title, no_wrap=title != "made for")
-    return table
-
-
-def _show(table: Table) -> None:
-    from rich.console import Console
-
-    Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH).print(table)

@@ -11,6 +11,7 @@ from sqlalchemy import Connection, select
 from generator.array.contract import SymbolArray
 from generator.database import tables
 from generator.database.canonical import canonical, digest
+from generator.database.occupancy import Cells, taken_cells
 
 _CHUNK = 64  #: cells looked up in one statement
 
@@ -45,11 +46,20 @@ def occupied(
     without
         An object whose cells do not count, because it is about to be replaced.
     """
+    if array_id is None:
+        return np.empty(0, np.int64), np.empty(0, np.int64)
+    spared = None if without is None else cells_of(connection, without, array_id)
+    return taken_cells(connection, array_id, without=spared)
+
+
+def cells_of(connection: Connection, object_id: int, array_id: int) -> Cells:
+    """Return the cells of an array that an object holds: rows (n,) and columns (n,)."""
     cells = tables.cells.c
-    query = select(cells.row, cells.column).where(cells.array_id == array_id)
-    if without is not None:
-        query = query.where(cells.object_id != without)
-    rows = connection.execute(query.order_by(cells.row, cells.column))
+    rows = connection.execute(
+        select(cells.row, cells.column).where(
+            cells.object_id == object_id, cells.array_id == array_id
+        )
+    )
     flat = np.fromiter(chain.from_iterable(rows), dtype=np.int64)
     return flat[0::2].copy(), flat[1::2].copy()
 

@@ -1,43 +1,29 @@
-"""Open the database, and make its schema when it is new.
+"""Open the database, make its schema when it is new and bring it up to date when it is old.
 
-A URL or a file name -> Engine. A SQLite database is one file in rollback-journal mode,
-not WAL: people copy `lab.db` and keep it on shared drives, and a WAL database is three
-files of which a copied one lacks the newest objects.
+A URL or a file name -> Engine. Another program's database is left alone, a newer schema is
+refused, an older one is brought to today's.
 """
 
 from __future__ import annotations
 
-import os
-import sqlite3
 from pathlib import Path
-from urllib.parse import quote
 
-from sqlalchemy import (
-    URL,
-    Connection,
-    Engine,
-    NullPool,
-    create_engine,
-    event,
-    insert,
-    inspect,
-    select,
-)
+from sqlalchemy import URL, Connection, Engine, insert, inspect, select, text
 
+from generator.database.engine import check_place, connectable
+from generator.database.migrate import migrate
 from generator.database.tables import FORMAT, SCHEMA_VERSION, meta, metadata
-from generator.database.transaction import (
-    WAIT_S,
-    begin_sqlite,
-    place_of,
-    reading,
-    writing,
-)
+from generator.database.transaction import WAIT_S, place_of, reading, writing
 from generator.database.url import normal_url
 from generator.errors import DatabaseError
 
 
-def open_database(url: str, *, writable: bool = True, wait_s: float = WAIT_S) -> Engine:
-    """Return an engine on a database whose schema this tool knows.
+def open_database(
+    url: str, *, writable: bool = True, wait_s: float = WAIT_S, keep_older: bool = True
+) -> Engine:
+    """Return an engine on a database with the schema of this tool.
+
+    A database of an earlier version is brought to this one (`migrate.py`), also for a reader.
 
     Parameters
     ----------
@@ -45,18 +31,20 @@ def open_database(url: str, *, writable: bool = True, wait_s: float = WAIT_S) ->
         A file (`lab.db`), `sqlite:///lab.db`, or `postgresql://user@host/name`.
     writable
         Make the database when it is new, and refuse one that cannot be written.
-        Without it nothing is ever made or changed.
+        Without it no object is ever made or changed.
     wait_s
         How long to wait for other writers, seconds.
+    keep_older
+        Copy a SQLite file of an earlier schema version before it is changed, and say so.
 
     Raises
     ------
     DatabaseError
         A place that does not exist or may not be written, a file that is no database
-        or another program's, a newer schema.
+        or another program's, a newer schema, an older one that may not be written.
     """
     normal = normal_url(url)
-    engine = _engine(normal, writable, wait_s)
+    engine = connectable(normal, writable, wait_s)
     with reading(engine) as connection:
         version = _schema_version(connection)
     if version is None:
@@ -66,7 +54,28 @@ def open_database(url: str, *, writable: bool = True, wait_s: float = WAIT_S) ->
         with writing(engine) as connection:
             if _schema_version(connection) is None:  # nobody else made it meanwhile
                 _create_schema(connection)
+    elif version < SCHEMA_VERSION:
+        migrate(_for_migration(normal, version, wait_s), _schema_version, keep=keep_older)
     return engine
+
+
+def _for_migration(url: URL, version: int, wait_s: float) -> Engine:
+    try:
+        return connectable(url, writable=True, wait_s=wait_s)
+    except DatabaseError as error:
+        raise DatabaseError(
+            f"the database has schema version {version}, must be brought to {SCHEMA_VERSION}, "
+            f"and {error.cause}",
+            fix="open it once where it may be written: encode-object list --database FILE",
+            place=place_of(url),
+        ) from error
+
+
+def existing_database(url: str) -> Engine:
+    """Return an engine for writing on a database that is there; raises as `open_database`."""
+    if not database_exists(url):
+        open_database(url, writable=False)  # says what is missing
+    return open_database(url)
 
 
 def database_exists(url: str) -> bool:
@@ -80,87 +89,23 @@ def database_exists(url: str) -> bool:
     normal = normal_url(url)
     if normal.get_backend_name() == "sqlite":
         path = Path(normal.database or "").absolute()
-        _check_place(path)
+        check_place(path)
         if not path.exists():
             return False
-    with reading(_engine(normal, writable=False, wait_s=WAIT_S)) as connection:
+    with reading(connectable(normal, writable=False, wait_s=WAIT_S)) as connection:
         return _schema_version(connection) is not None
-
-
-def _engine(url: URL, writable: bool, wait_s: float) -> Engine:
-    if url.get_backend_name() != "sqlite":
-        return _postgresql_engine(url, wait_s)
-    path = Path(url.database or "").absolute()
-    _check_place(path)
-    if writable:
-        _check_writable(path)
-    elif not path.exists():
-        fix = "register an object with encode-object first, or correct the file name"
-        raise DatabaseError("this database does not exist", fix=fix, place=str(path))
-    return _sqlite_engine(url, path, writable, wait_s)
-
-
-def _sqlite_engine(url: URL, path: Path, writable: bool, wait_s: float) -> Engine:
-    # mode=rw also without `writable`: a reader must undo what a killed writer left behind.
-    uri = f"file:{quote(str(path))}?mode={'rwc' if writable else 'rw'}"
-
-    def connect() -> sqlite3.Connection:
-        connection = sqlite3.connect(
-            uri, uri=True, timeout=wait_s, isolation_level=None, check_same_thread=False
-        )
-        connection.execute("PRAGMA foreign_keys = ON")
-        if not writable:
-            connection.execute("PRAGMA query_only = ON")
-        return connection
-
-    engine = create_engine(url, creator=connect, poolclass=NullPool)
-    event.listen(engine, "begin", begin_sqlite)
-    return engine
-
-
-def _check_place(path: Path) -> None:
-    """Refuse what SQLite would refuse later, or with fewer words."""
-    place = str(path)
-    if not path.parent.is_dir():
-        fix = f"make it with: mkdir -p {path.parent}"
-        raise DatabaseError(f"folder {path.parent} does not exist", fix=fix, place=place)
-    if path.is_dir():
-        fix = f"name a file in it, such as {path / 'lab.db'}"
-        raise DatabaseError("this is a folder, not a database file", fix=fix, place=place)
-
-
-def _check_writable(path: Path) -> None:
-    # The journal stands beside the file, so the folder must be writable too.
-    for need in (path, path.parent) if path.exists() else (path.parent,):
-        if not os.access(need, os.W_OK, effective_ids=os.access in os.supports_effective_ids):
-            fix = "allow writing there, or choose another database with --database"
-            raise DatabaseError(f"{need} may not be written", fix=fix, place=str(path))
-
-
-def _postgresql_engine(url: URL, wait_s: float) -> Engine:
-    try:
-        return create_engine(
-            url,
-            poolclass=NullPool,
-            connect_args={"connect_timeout": 10, "client_encoding": "utf8"},
-            execution_options={"wait_s": wait_s},
-        )
-    except ImportError as error:
-        fix = "install it with: pip install 'encoded-objects[postgres]'"
-        raise DatabaseError("psycopg is not installed", fix=fix, place=place_of(url)) from error
 
 
 def _schema_version(connection: Connection) -> int | None:
     """Return the schema's version, None in an empty database; refuse any other content."""
     url = connection.engine.url
-    inspector = inspect(connection)
-    names = set(inspector.get_table_names())
+    names = set(inspect(connection).get_table_names())
     ours = names & set(metadata.tables)
     # On a server other programs may have tables beside ours; a file belongs to one program.
     if not ours and (not names or url.get_backend_name() != "sqlite"):
         return None
     stored: dict[str, str] = {}
-    if "meta" in ours and {"key", "value"} <= {c["name"] for c in inspector.get_columns("meta")}:
+    if "meta" in ours and {"key", "value"} <= _columns_of_meta(connection):
         stored = {str(key): str(value) for key, value in connection.execute(select(meta))}
     if stored.get("format") != FORMAT:
         raise DatabaseError(
@@ -184,6 +129,10 @@ def _schema_version(connection: Connection) -> int | None:
             place=place_of(url),
         )
     return version
+
+
+def _columns_of_meta(connection: Connection) -> set[str]:
+    return set(connection.execute(text("SELECT * FROM meta LIMIT 0")).keys())
 
 
 def _create_schema(connection: Connection) -> None:

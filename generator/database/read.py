@@ -33,6 +33,7 @@ from generator.polyhedron.frame import face_frame, face_polygon
 from generator.polyhedron.winged import Face, Polyhedron, WingedEdge
 
 __all__ = [
+    "existing",
     "faces_at",
     "find_object",
     "list_objects",
@@ -55,6 +56,22 @@ def find_object(connection: Connection, name: str) -> ObjectEntry | None:
     return next(iter(found), None)
 
 
+def existing(connection: Connection, name: str) -> ObjectEntry:
+    """Return the entry of the object called `name`; raises as `read_object`."""
+    entry = find_object(connection, name)
+    if entry is None:
+        names = connection.execute(
+            select(tables.objects.c.name).order_by(tables.objects.c.name).limit(8)
+        ).scalars()
+        known = ", ".join(names) or "none yet"
+        raise DatabaseError(
+            f"no object is called '{name}'",
+            fix=f"registered objects: {known}",
+            place=place_of(connection.engine.url),
+        )
+    return entry
+
+
 def read_object(connection: Connection, name: str) -> RegisteredObject:
     """Return everything about the object called `name`; all numbers bit for bit.
 
@@ -63,7 +80,7 @@ def read_object(connection: Connection, name: str) -> RegisteredObject:
     DatabaseError
         When no object has this name; the fix lists names that are known.
     """
-    entry = _existing(connection, name)
+    entry = existing(connection, name)
     polyhedron = _read_polyhedron(connection, entry)
     layout = read_layout(connection, name)
     row = connection.execute(
@@ -93,7 +110,7 @@ def read_object(connection: Connection, name: str) -> RegisteredObject:
 
 def read_layout(connection: Connection, name: str) -> Layout:
     """Return the layout of the object called `name`, bit for bit what was registered."""
-    entry = _existing(connection, name)
+    entry = existing(connection, name)
     known = connection.execute(
         select(tables.objects.c.layout, tables.objects.c.layout_warnings).where(
             tables.objects.c.object_id == entry.object_id
@@ -192,21 +209,6 @@ def read_parts(connection: Connection, object_id: int) -> tuple[RegisteredPart, 
     )
 
 
-def _existing(connection: Connection, name: str) -> ObjectEntry:
-    entry = find_object(connection, name)
-    if entry is None:
-        names = connection.execute(
-            select(tables.objects.c.name).order_by(tables.objects.c.name).limit(8)
-        ).scalars()
-        known = ", ".join(names) or "none yet"
-        raise DatabaseError(
-            f"no object is called '{name}'",
-            fix=f"registered objects: {known}",
-            place=place_of(connection.engine.url),
-        )
-    return entry
-
-
 def _select_entries() -> Select[Any]:
     objects, arrays, provenance = tables.objects.c, tables.arrays.c, tables.provenance.c
     symbols = (
@@ -231,6 +233,9 @@ def _select_entries() -> Select[Any]:
             provenance.spec_hash,
             provenance.tool_version,
             provenance.utc,
+            func.coalesce(objects.retired_utc, ""),
+            func.coalesce(provenance.imported_from, ""),
+            func.coalesce(provenance.imported_utc, ""),
         )
         .select_from(tables.objects)
         .join(tables.arrays)

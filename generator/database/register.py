@@ -29,10 +29,11 @@ from generator.alphabet.outline import SymbolStyle
 from generator.array.contract import SymbolArray
 from generator.database import tables
 from generator.database.canonical import canonical, digest
-from generator.database.cells import array_key, find_array, occupied
+from generator.database.cells import array_key, cells_of, find_array, occupied
+from generator.database.occupancy import Cells, free_cells, take_cells
 from generator.database.read import find_object, read_layout
 from generator.database.registered import ObjectEntry, RegisteredPart
-from generator.database.rows import Rows, layout_rows, polyhedron_rows
+from generator.database.rows import insert_rows, layout_rows, polyhedron_rows
 from generator.database.transaction import place_of, writing
 from generator.errors import DatabaseError
 from generator.layout.placement import Layout
@@ -91,6 +92,8 @@ def register(connection: Connection, registration: Registration, *, replace: boo
     """
     _check(registration)
     known = find_object(connection, registration.name)
+    if known is not None:
+        require_in_use(connection, known)
     if known is not None and not replace:
         _check_same(connection, known, registration)
         record_parts(connection, known.object_id, registration.parts)
@@ -99,12 +102,13 @@ def register(connection: Connection, registration: Registration, *, replace: boo
         remove_object(connection, known.object_id)
     array_id, object_id = _insert_object(connection, registration, known)
     for table, rows in polyhedron_rows(object_id, registration.polyhedron):
-        _insert(connection, table, rows)
+        insert_rows(connection, table, rows)
     for table, rows in layout_rows(object_id, array_id, registration.layout):
-        _insert(connection, table, rows)
+        insert_rows(connection, table, rows)
+    take_cells(connection, array_id, _all_cells(registration.layout))
     record_parts(connection, object_id, registration.parts)
     spec = canonical(registration.spec)
-    _insert(
+    insert_rows(
         connection,
         tables.provenance,
         [
@@ -121,17 +125,29 @@ def register(connection: Connection, registration: Registration, *, replace: boo
 
 
 def require_same_spec(connection: Connection, known: ObjectEntry, spec: Any) -> None:
-    """Refuse a spec that is not the one under which an object is registered.
+    """Refuse a spec that is not the one under which an object is registered and in use.
 
     Raises
     ------
     DatabaseError
         With the way out: another name, or `--replace`.
     """
+    require_in_use(connection, known)
     if not known.same_spec(spec):
         raise DatabaseError(
             f"'{known.name}' is registered already, with another spec ({known.utc})",
             fix="give this object another name, or replace the registered one with --replace",
+            place=place_of(connection.engine.url),
+        )
+
+
+def require_in_use(connection: Connection, known: ObjectEntry) -> None:
+    """Refuse to make an object that was retired: its cells stay as they are."""
+    if known.retired_utc:
+        raise DatabaseError(
+            f"'{known.name}' was retired ({known.retired_utc})",
+            fix="give this object another name, or bring the retired one back with: "
+            f"encode-object retire '{known.name}' --undo",
             place=place_of(connection.engine.url),
         )
 
@@ -150,7 +166,7 @@ def record_parts(connection: Connection, object_id: int, written: Sequence[Regis
     last = connection.execute(
         select(func.coalesce(func.max(parts.position), -1)).where(parts.object_id == object_id)
     ).scalar_one()
-    _insert(
+    insert_rows(
         connection,
         tables.parts,
         [
@@ -170,6 +186,11 @@ def record_parts(connection: Connection, object_id: int, written: Sequence[Regis
 
 def remove_object(connection: Connection, object_id: int) -> None:
     """Remove an object and all that belongs to it; its cells are free again."""
+    array_id = connection.execute(
+        select(tables.objects.c.array_id).where(tables.objects.c.object_id == object_id)
+    ).scalar_one_or_none()
+    if array_id is not None:
+        free_cells(connection, array_id, cells_of(connection, object_id, array_id))
     # Children first: a parent's cascade would search every table once per row.
     for table in reversed(tables.metadata.sorted_tables):
         if "object_id" in table.c:
@@ -210,6 +231,15 @@ def _check(registration: Registration) -> None:
             and 0 <= face.columns.min() <= face.columns.max() < array.columns
         ):
             raise ValueError(f"cells of face {face.face} lie beyond the array")
+        if not np.isfinite(face.centres_mm).all():
+            raise ValueError(f"symbols of face {face.face} have no place")
+
+
+def _all_cells(layout: Layout) -> Cells:
+    rows = [face.rows for face in layout.faces]
+    columns = [face.columns for face in layout.faces]
+    none = np.empty(0, np.int64)
+    return np.concatenate([none, *rows]), np.concatenate([none, *columns])
 
 
 def _check_same(connection: Connection, known: ObjectEntry, registration: Registration) -> None:
@@ -281,8 +311,3 @@ def _number_of(connection: Connection, table: Table, number: str, key: str, **va
     new = insert(table).values(definition_sha256=key, **values).returning(table.c[number])
     inserted: int = connection.execute(new).scalar_one()
     return inserted
-
-
-def _insert(connection: Connection, table: Table, rows: Rows) -> None:
-    if rows:
-        connection.execute(insert(table), rows)

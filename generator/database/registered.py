@@ -36,6 +36,9 @@ class ObjectEntry:
     spec_hash: str
     tool_version: str
     utc: str  #: when it was registered, ISO 8601
+    retired_utc: str = ""  #: when it was retired; empty while in use
+    imported_from: str = ""  #: the database that it came from; empty where it was made here
+    imported_utc: str = ""
 
     def same_spec(self, spec: Any) -> bool:
         """Whether this object was registered from the same plain values."""

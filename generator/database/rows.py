@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from sqlalchemy import Table
+from sqlalchemy import Connection, Table, insert
 
 from generator.database import tables
 from generator.database.face_type import face_type
@@ -103,6 +103,12 @@ def layout_rows(object_id: int, array_id: int, layout: Layout) -> Iterator[tuple
     )
     for face in layout.faces:
         yield tables.cells, _cell_rows(object_id, array_id, face)
+
+
+def insert_rows(connection: Connection, table: Table, rows: Rows) -> None:
+    """Insert rows of one table, all of which name the same columns; none is well, too."""
+    if rows:
+        connection.execute(insert(table), rows)
 
 
 def _cell_rows(object_id: int, array_id: int, face: FaceLayout) -> Rows:

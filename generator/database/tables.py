@@ -10,10 +10,13 @@ Versions
 1
     meta, arrays, alphabets, objects, vertices, faces, edges, faces_to_vertices,
     edges_to_vertices, placements, cells, parts, provenance.
+2
+    occupancy; objects.retired_utc; provenance.imported_from, provenance.imported_utc.
 
 What a version promises: a reader of version n reads every database of version n.
 A change that a reader of version n would misread raises `SCHEMA_VERSION`, and
-`open.py` refuses the newer file with the reason.
+`open.py` refuses the newer file with the reason. An older one is brought to this version
+when it is opened, by `migrations/v2.py` and its successors.
 """
 
 from __future__ import annotations
@@ -29,6 +32,7 @@ from sqlalchemy import (
     ForeignKeyConstraint,
     Index,
     Integer,
+    LargeBinary,
     MetaData,
     PrimaryKeyConstraint,
     String,
@@ -38,7 +42,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.types import UserDefinedType
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 FORMAT = "encoded-objects"  #: `meta.format`: whose tables these are
 
 
@@ -113,6 +117,7 @@ objects = Table(
     Column("chamfer_mm", REAL, nullable=False),
     Column("layout", Text, nullable=False),  #: net | faces
     Column("layout_warnings", Text, nullable=False),  #: JSON, texts for the person who asked
+    Column("retired_utc", String(32)),  #: ISO 8601; NULL while in use. Its cells stay taken
     UniqueConstraint("object_id", "array_id"),  # so that cells can name both
     CheckConstraint("name <> ''", name="object_has_name"),
     CheckConstraint("pitch_mm > 0 AND stroke_mm > 0", name="symbols_have_size"),
@@ -268,6 +273,18 @@ cells = Table(
     sqlite_with_rowid=False,
 )
 
+# The same cells as bits, a row per tile of 64 x 64 (`occupancy.py`): what placing reads.
+occupancy = Table(
+    "occupancy",
+    metadata,
+    Column("array_id", ForeignKey("arrays.array_id"), nullable=False),
+    Column("tile_row", BigInteger, nullable=False),
+    Column("tile_column", BigInteger, nullable=False),
+    Column("bits", LargeBinary, nullable=False),  #: 512 bytes
+    PrimaryKeyConstraint("array_id", "tile_row", "tile_column"),
+    sqlite_with_rowid=False,
+)
+
 # One row per part and file format; a file of many parts (3MF) has a row for each of them.
 parts = Table(
     "parts",
@@ -289,5 +306,7 @@ provenance = Table(
     Column("tool_version", Text, nullable=False),
     Column("spec_hash", String(64), nullable=False),  #: SHA-256 of `spec`
     Column("spec", Text, nullable=False),  #: canonical JSON
-    Column("utc", String(32), nullable=False),  #: ISO 8601; the only clock in the database
+    Column("utc", String(32), nullable=False),  #: ISO 8601, when it was registered
+    Column("imported_from", Text),  #: database that it came from; NULL where it was made here
+    Column("imported_utc", String(32)),
 )

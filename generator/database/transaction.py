@@ -20,6 +20,13 @@ WAIT_S = 60.0  #: how long a writer waits for its turn, and a reader for a commi
 _TURN = int.from_bytes(b"encoded", "big")  #: the advisory lock of writers on PostgreSQL
 
 
+class LostRaceError(DatabaseError):
+    """Another writer was first; done again on the state it left, the work may succeed.
+
+    `generator.database.race.in_turn` does it again.
+    """
+
+
 @contextmanager
 def writing(engine: Engine) -> Iterator[Connection]:
     """Open a transaction that alone may write; commits at the end, undone on any error.
@@ -86,11 +93,20 @@ def explained(error: DBAPIError, url: URL) -> DatabaseError:
     for codes, cause, fix in _MEANINGS:
         if code is not None and code.startswith(codes):
             return DatabaseError(cause, fix=fix, place=place)
+    if code in _RACES:
+        fix = "run the same command again"
+        return LostRaceError("another writer was first", fix=fix, place=place)
     if code is not None and code.startswith(("SQLITE_CONSTRAINT", "23")):
         if code in _NOT_UNIQUE and "cells" in first_line:
-            return DatabaseError(
+            return LostRaceError(
                 "the object needs cells of the array that another object holds",
                 fix="place it again on the cells that are free now",
+                place=place,
+            )
+        if code in _NOT_UNIQUE and "objects" in first_line:
+            return LostRaceError(
+                "an object of this name was registered meanwhile",
+                fix="run the same command again",
                 place=place,
             )
         return DatabaseError(f"the database refuses the object: {first_line}", place=place)
@@ -100,11 +116,12 @@ def explained(error: DBAPIError, url: URL) -> DatabaseError:
     return DatabaseError(f"the database failed: {first_line} ({code})", place=place)
 
 
+_RACES = ("40001", "40P01")  # serialization failure, deadlock
 _NOT_UNIQUE = ("SQLITE_CONSTRAINT_PRIMARYKEY", "SQLITE_CONSTRAINT_UNIQUE", "23505")
 
 _MEANINGS: tuple[tuple[tuple[str, ...], str, str], ...] = (
     (
-        ("SQLITE_BUSY", "SQLITE_LOCKED", "55P03", "40001", "40P01"),
+        ("SQLITE_BUSY", "SQLITE_LOCKED", "55P03"),
         "other programs keep the database locked",
         "wait until they have ended, then run the same command again",
     ),

@@ -56,3 +56,10 @@ def part_file(url: URL, file: str) -> str:
     if url.get_backend_name() != "sqlite":
         return str(path)
     return Path(os.path.relpath(path, Path(url.database or "").absolute().parent)).as_posix()
+
+
+def part_path(url: URL, file: str) -> Path:
+    """Return where a part's file is, from how the database names it: `part_file` undone."""
+    if url.get_backend_name() != "sqlite":
+        return Path(file)
+    return Path(os.path.normpath(Path(url.database or "").absolute().parent / file))

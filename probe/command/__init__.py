@@ -78,9 +78,8 @@ def run(arguments: list[str]) -> int:
         report.error(error, as_json=as_json)
         return error.exit_code
     except usage_error as error:
-        message = str(getattr(error, "message", error))
         fix = f"see {command_of(arguments)} --help"
-        report.error(ProbeError(message, fix=fix), as_json=as_json)
+        report.error(ProbeError(_misuse(error), fix=fix), as_json=as_json)
         return BAD_INPUT
     except BrokenPipeError:
         raise
@@ -89,6 +88,14 @@ def run(arguments: list[str]) -> int:
         cause = f"{what}: {error.strerror or error}"
         report.error(ProbeError(cause, fix="check folder, space and rights"), as_json=as_json)
         return FAILED
+
+
+def _misuse(error: Exception) -> str:
+    """Return what is wrong with an option, with the option's name."""
+    if getattr(error, "param", None) is None:  # a message of our own, which names it
+        return str(getattr(error, "message", error))
+    told = str(getattr(error, "format_message", error.__str__)())
+    return told.replace("Invalid value for ", "").removesuffix(".")
 
 
 def _end(number: int, _frame: FrameType | None) -> NoReturn:

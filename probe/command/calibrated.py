@@ -94,7 +94,7 @@ def calibrate_loads(
     RecordingError
         When a recording cannot be read.
     """
-    refuse_taken(output, replace=replace)
+    refuse_taken(output, ".json", replace=replace)
     rest = [load for load in given if load.newtons == 0]
     if not rest:
         raise CalibrationError("none of the recordings is of the unloaded sensor",

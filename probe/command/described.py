@@ -26,10 +26,8 @@ def probe(url: str, sensor: int | None, seconds: float) -> Described:
     PortError
         When it is not there, or no probe.
     """
-    from probe.client import Client
-
     peak, saturated, full, heard = 0, 0, 1023, False
-    with Stream(Client(url, sensor=sensor)) as stream:
+    with Stream(url, sensor=sensor) as stream:
         until_s = time.monotonic() + seconds
         while not stream.ended:
             for frame in stream.take(0.1):
@@ -48,7 +46,7 @@ def probe(url: str, sensor: int | None, seconds: float) -> Described:
         counts, notices = stream.client.statistics(), stream.client.notices()
     values = {
         "url": url,
-        "sensor": name_of(ident),
+        "sensor": name_of(ident, url),
         "ident": None if ident is None else asdict(ident),
         "client": asdict(counts),
         "device": None if device is None else asdict(device),

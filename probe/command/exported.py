@@ -51,9 +51,11 @@ def export_files(
     ProbeError
         When a file is there already.
     """
-    outputs = [out for out in (csv, npy, png) if out is not None]
-    for out in outputs:
-        refuse_taken(out, replace=replace)
+    outputs = []
+    for out, suffix in ((csv, ".csv"), (npy, ".npy"), (png, ".png")):
+        if out is not None:
+            refuse_taken(out, suffix, replace=replace)
+            outputs.append(out)
     recording = read_recording(path, live=live)
     known = None if calibration is None else calibration_for(calibration, recording)
     if png is not None:
@@ -74,14 +76,26 @@ def export_files(
     return 0
 
 
-def refuse_taken(out: Path, *, replace: bool) -> None:
-    """Refuse a file that is there already, unless it may be replaced.
+def refuse_taken(out: Path, suffix: str, *, replace: bool) -> None:
+    """Refuse a file that is there already, unless it may be replaced, before work is done.
+
+    Parameters
+    ----------
+    out, suffix
+        The file to write, and how its name has to end.
+    replace
+        Whether a file of that name may go.
 
     Raises
     ------
     ProbeError
-        With the way out.
+        With the way out; also for a folder that is not there, and another ending.
     """
+    if out.suffix.lower() != suffix:
+        fix = f"write {out.with_suffix(suffix)}" if out.name else "give a name"
+        raise ProbeError(f"the name of this file has to end in {suffix}", fix=fix, place=str(out))
+    if not out.parent.is_dir():
+        raise ProbeError(f"there is no folder {out.parent}", fix="make it first", place=str(out))
     if out.exists() and not replace:
         raise ProbeError("the file is there already", place=str(out),
                          fix="choose another name, or replace it with --replace")  # fmt: skip

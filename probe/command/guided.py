@@ -16,7 +16,6 @@ from pathlib import Path
 import numpy as np
 
 from probe.circuit import Electronics
-from probe.client import Client
 from probe.command import report
 from probe.command.calibrated import calibrate_loads
 from probe.command.exported import refuse_taken
@@ -65,11 +64,11 @@ def guide(
     CalibrationError
         When the loads do not determine the laws, and no more are given.
     """
-    refuse_taken(output, replace=replace)
-    refuse_taken(folder / LIST, replace=replace)
+    refuse_taken(output, ".json", replace=replace)
     folder.mkdir(parents=True, exist_ok=True)
-    with Stream(Client(url, sensor=sensor)) as stream:
-        bench = Bench(url, stream, folder, seconds, name_of(stream.ident()))
+    refuse_taken(folder / LIST, ".csv", replace=replace)
+    with Stream(url, sensor=sensor) as stream:
+        bench = Bench(url, stream, folder, seconds, name_of(stream.ident(), url))
         report.message(f"{bench.sensor or url}; recordings go to {folder}")
         given: list[Given] = []
         rest: Counts | None = None
@@ -113,6 +112,8 @@ def _recorded(bench: Bench, path: Path) -> Counts:
     until_s = time.monotonic() + bench.seconds
     while time.monotonic() < until_s and not stream.ended:
         frames += stream.take(0.1)
+        for notice in stream.client.notices():
+            report.message(f"     {notice}")
     if not frames:
         raise PortError("no frame came", fix="see probe-sensor info", place=bench.url)
     with Recorder(path, sensor=bench.sensor, replace=True) as recorder:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from probe.command import report
 from probe.command.stream import Stream, interruption, name_of
 from probe.errors import PortError
 from probe.frame import COLUMNS, ROWS
@@ -24,15 +25,14 @@ def frames_of(source: str, sensor: int | None, seconds: float) -> tuple[Counts, 
     if not source.startswith(("serial:", "sim:", "file:")):
         recording = read_recording(source)
         return recording.block().counts, recording.origin.sensor
-    from probe.client import Client
 
-    with interruption() as interrupted, Stream(Client(source, sensor=sensor)) as stream:
+    with interruption() as interrupted, Stream(source, sensor=sensor) as stream:
         counts = _listen(stream, seconds)
         if interrupted.is_set():
             raise KeyboardInterrupt
         if not len(counts):
             raise PortError("no frame came", fix="see probe-sensor info", place=source)
-        return counts, name_of(stream.ident())
+        return counts, name_of(stream.ident(), source)
 
 
 def _listen(stream: Stream, seconds: float) -> Counts:
@@ -40,7 +40,10 @@ def _listen(stream: Stream, seconds: float) -> Counts:
     images: list[Counts] = []
     began_ns: int | None = None
     while not stream.ended:
-        for frame in stream.take(1.0):
+        frames = stream.take(1.0)
+        for notice in stream.client.notices():
+            report.message(notice)
+        for frame in frames:
             began_ns = frame.t_ns if began_ns is None else began_ns
             if frame.t_ns - began_ns > seconds * 1e9:
                 return np.stack(images)

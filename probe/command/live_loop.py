@@ -13,7 +13,6 @@ from rich.console import Console
 from rich.live import Live
 
 from probe.calibration import read_calibration
-from probe.client import Client
 from probe.command import INTERRUPTED, report
 from probe.command.keys import Pressed, keys
 from probe.command.live_state import LiveState
@@ -43,10 +42,10 @@ def watch(
     """
     known = None if calibration is None else read_calibration(calibration)
     state = LiveState(url, folder, known)
-    with interruption() as interrupted, Stream(Client(url, sensor=sensor)) as stream:
+    with interruption() as interrupted, Stream(url, sensor=sensor) as stream:
         try:
             if known is not None and calibration is not None:
-                read_calibration(calibration, sensor=name_of(stream.ident()))
+                read_calibration(calibration, sensor=name_of(stream.ident(), url) or None)
             until_s = time.monotonic() + (float("inf") if seconds is None else seconds)
             if sys.stdout.isatty() and not as_json:
                 return _on_terminal(state, stream, interrupted, until_s)
@@ -64,11 +63,11 @@ def _on_terminal(state: LiveState, stream: Stream, interrupted: Event, until_s: 
     ):
         while not (interrupted.is_set() or stream.ended) and time.monotonic() < until_s:
             state.take(stream.take(0.0))
-            for notice in stream.client.notices():
-                state.notice = notice
+            if notices := stream.client.notices():
+                state.notice = "; ".join(notices[-3:])
             counts, ident = stream.client.statistics(), stream.client.ident
             height = console.size.height
-            picture = rendered(state, counts, ident, lines=height, colours=colours)
+            picture = rendered(state, counts, ident, height=height, colours=colours)
             view.update(picture, refresh=True)
             if not _obey(state, stream, pressed):
                 break
@@ -80,7 +79,7 @@ def _obey(state: LiveState, stream: Stream, pressed: Pressed) -> bool:
     actions: dict[str, Callable[[], None]] = {
         "b": state.toggle_bias,
         "s": state.save,
-        "r": lambda: state.toggle_recording(name_of(stream.client.ident)),
+        "r": lambda: state.toggle_recording(name_of(stream.client.ident, state.url)),
     }
     for key in pressed(1 / PER_SECOND):
         if key == "q":
@@ -102,23 +101,29 @@ def _in_lines(
     state: LiveState, stream: Stream, interrupted: Event, until_s: float, *, as_json: bool
 ) -> int:
     due_s = time.monotonic() + 1.0
-    while not (interrupted.is_set() or stream.ended):
+    while True:
         state.take(stream.take(0.1))
         for notice in stream.client.notices():
             report.message(notice)
         now_s = time.monotonic()
-        if now_s >= min(due_s, until_s):
+        over = interrupted.is_set() or stream.ended or now_s >= until_s
+        if over or now_s >= due_s:
             due_s += 1.0
-            counts = stream.client.statistics()
-            if as_json:
-                image = state.image()
-                peak = None if image is None else float(image.max())
-                seq = None if state.frame is None else state.frame.seq
-                values = {"seq": seq, "peak": peak, "unit": state.unit, **asdict(counts)}
-                report.write_json(values, line=True)
-            else:
-                report.write(line_of(state, counts))
-            sys.stdout.flush()
-        if now_s >= until_s:
-            return 0
-    return INTERRUPTED if interrupted.is_set() else 0
+            _report(state, stream, as_json=as_json)
+        if over:
+            return INTERRUPTED if interrupted.is_set() else 0
+
+
+def _report(state: LiveState, stream: Stream, *, as_json: bool) -> None:
+    counts, image = stream.client.statistics(), state.image()
+    if as_json:
+        values = {
+            "seq": None if state.frame is None else state.frame.seq,
+            "peak": None if image is None else float(image.max()),
+            "unit": state.unit,
+            **asdict(counts),
+        }
+        report.write_json(values, line=True)
+    else:
+        report.write(line_of(state, counts))
+    sys.stdout.flush()

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.calibration import Calibration, calibrated, calibration_hash, drift_of
-from probe.command.exported import median_filtered
+from probe.command.exported import median_filtered, staged
 from probe.frame import Frame
 from probe.recording.names import part_of
 from probe.recording.record import Recorder
@@ -132,8 +132,11 @@ class LiveState:
         title = f"frame {self.frame.seq}" + (", median of 3x3" if self.median else "")
         if self.bias is not None:
             title += ", less bias"
-        frame_picture(image, picture, unit=self.unit, title=title)
-        np.save(picture.with_suffix(".npy"), self.frame.counts)
+        array = picture.with_suffix(".npy")
+        with staged(picture) as draft:
+            frame_picture(image, draft, unit=self.unit, title=title)
+        with staged(array) as draft:
+            np.save(draft, self.frame.counts)
         self.notice = f"saved {picture.name} and .npy"
 
     def age(self) -> str:

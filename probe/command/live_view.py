@@ -6,14 +6,16 @@ character: two rows of tactels share a line.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
+from itertools import groupby
+from textwrap import wrap
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Group, RenderableType
+from rich.console import Console, ConsoleOptions, RenderResult
+from rich.segment import Segment
 from rich.style import Style
-from rich.table import Table
-from rich.text import Text
 
 from probe.client import ClientStatistics
 from probe.command.live_state import LiveState
@@ -25,7 +27,24 @@ KEYS = "q quit  space pause  0-7 sensor  b bias  m median  s save  r record"
 #: black, violet, red, orange, pale yellow: rises in brightness, also without hue
 _ANCHORS = ((8, 6, 16), (74, 12, 107), (165, 44, 96), (237, 105, 37), (251, 180, 26),
             (252, 255, 164))  # fmt: skip
-_SHADES = " .:-=+*#%@"
+SHADES = " .:-=+*#%@"
+UPPER_HALF = "\u2580"  # its foreground stands over its background
+GAP = 3  # characters
+BOLD, DIM, YELLOW, RED = map(Style.parse, ("bold", "dim", "yellow", "bold red"))
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """Lines of pieces of text; cheaper to draw than tables."""
+
+    lines: list[list[Segment]]
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """Give the pieces to the console."""
+        for number, line in enumerate(self.lines):
+            if number:
+                yield Segment.line()
+            yield from line
 
 
 def rendered(
@@ -33,9 +52,9 @@ def rendered(
     counts: ClientStatistics,
     ident: IdentPacket | None,
     *,
-    lines: int,
+    height: int,
     colours: bool,
-) -> RenderableType:
+) -> Picture:
     """Return the whole view.
 
     Parameters
@@ -44,26 +63,29 @@ def rendered(
         What is shown.
     counts, ident
         What the client counted, and what the device is.
-    lines
-        Height of the terminal.
+    height
+        Of the terminal, lines.
     colours
         Whether it has any; characters of rising weight otherwise.
     """
     image = state.image()
-    grid = Table.grid(padding=(0, 3))
-    grid.add_row(
-        Text("waiting for frames ...") if image is None
-        else heat_map(image / state.scale, small=lines < LOW, colours=colours),
-        _numbers(state, image, counts, ident),
-    )  # fmt: skip
-    head = Text("probe-sensor  ", style="bold", no_wrap=True, overflow="ellipsis")
-    head.append(state.url, style="not bold")
-    foot = [Text(KEYS, style="dim", no_wrap=True), Text(state.notice, style="yellow")]
-    return Group(head, grid, _legend(state, colours), *foot)
+    if image is None:
+        blocks = [[Segment("waiting for frames ...")]]
+    else:
+        blocks = heat_map(image / state.scale, small=height < LOW, colours=colours)
+    numbers = _numbers(state, image, counts, ident)[: max(height - 5, 4)]
+    wide = max(sum(len(part.text) for part in line) for line in blocks)
+    lines = [_head(state)]
+    for i in range(max(len(blocks), len(numbers))):
+        left = blocks[i] if i < len(blocks) else [Segment(" " * wide)]
+        lines.append([*left, Segment(" " * GAP), *(numbers[i] if i < len(numbers) else ())])
+    lines += [_legend(state, colours), [Segment(KEYS, DIM)]]
+    lines += [[Segment(text, YELLOW)] for text in wrap(state.notice, len(KEYS))]
+    return Picture(lines)
 
 
-def heat_map(share: NDArray[np.float64], *, small: bool, colours: bool) -> Text:
-    """Return readings as blocks.
+def heat_map(share: NDArray[np.float64], *, small: bool, colours: bool) -> list[list[Segment]]:
+    """Return readings as lines of blocks.
 
     Parameters
     ----------
@@ -72,28 +94,20 @@ def heat_map(share: NDArray[np.float64], *, small: bool, colours: bool) -> Text:
     small
         Two rows of tactels a line.
     colours
-        Characters of rising weight otherwise.
+        Characters of rising weight otherwise, of the larger of two rows where it is small.
     """
-    text = Text(no_wrap=True)
     if not colours:
-        shades = np.clip((share * len(_SHADES)).astype(int), 0, len(_SHADES) - 1)
-        rows = shades[::2] if small else shades
-        wide = 1 if small else 2
-        return text.append("\n".join("".join(_SHADES[s] * wide for s in row) for row in rows))
+        shades = np.clip((share * len(SHADES)).astype(int), 0, len(SHADES) - 1)
+        wide, rows = (1, np.maximum(shades[::2], shades[1::2])) if small else (2, shades)
+        return [[Segment("".join(SHADES[shade] * wide for shade in row))] for row in rows.tolist()]
     levels = np.clip((share * (LEVELS - 1)).round().astype(int), 0, LEVELS - 1)
-    if small:
-        lines = [zip(top, under, strict=True) for top, under in zip(levels[::2].tolist(),
-                 levels[1::2].tolist(), strict=True)]  # fmt: skip
-        block = "\u2580"  # upper half: its foreground over the background
-    else:
-        lines = [zip(row, row, strict=True) for row in levels.tolist()]
-        block = "  "
-    for number, line in enumerate(lines):
-        if number:
-            text.append("\n")
-        for top, under in line:
-            text.append(block, _style(top, under))
-    return text
+    above, under = (levels[::2], levels[1::2]) if small else (levels, levels)
+    block = UPPER_HALF if small else "  "
+    return [
+        [Segment(block * len(list(equal)), _style(*pair))
+         for pair, equal in groupby(zip(*rows, strict=True))]
+        for rows in zip(above.tolist(), under.tolist(), strict=True)
+    ]  # fmt: skip
 
 
 def line_of(state: LiveState, counts: ClientStatistics) -> str:
@@ -108,46 +122,46 @@ def line_of(state: LiveState, counts: ClientStatistics) -> str:
     )
 
 
+def _head(state: LiveState) -> list[Segment]:
+    head = [Segment("probe-sensor  ", BOLD)]
+    if state.recorder is not None:
+        recorded = f"{state.recorder.path.name}, {state.recorder.frames:,} frames  "
+        head += [Segment("REC ", RED), Segment(recorded)]
+    if state.paused:
+        head += [Segment("PAUSED  ", RED)]
+    return [*head, Segment(state.url)]
+
+
 def _numbers(
     state: LiveState,
     image: NDArray[np.float64] | None,
     counts: ClientStatistics,
     ident: IdentPacket | None,
-) -> Table:
-    table = Table.grid(padding=(0, 2))
-    rows = [("rate", f"{counts.rate:.1f} frames/s"), ("frames", f"{counts.frames:,}"),
-            ("lost", f"{counts.lost:,}"), ("failed", f"{counts.failed:,}"),
-            ("reboots", str(counts.reboots)), ("reopened", str(counts.reopenings))]  # fmt: skip
-    if counts.overruns:
-        rows.append(("overruns", str(counts.overruns)))
+) -> list[list[Segment]]:
     name = "..." if ident is None else f"{ident.sensor} of {ident.name}, {ident.bits} bits"
-    rows += [("sensor", name), ("calibration", state.age())]
-    if image is not None:
-        rows += [("peak", f"{_reading(float(image.max()), state.unit)} at {_place(image)}"),
-                 ("sum", _reading(float(image.sum()), state.unit))]  # fmt: skip
     chosen = [word for word, on in (("bias off the image", state.bias is not None),
                                     ("taking bias", state.taking_bias),
                                     ("median 3x3", state.median)) if on]  # fmt: skip
-    rows.append(("filter", ", ".join(chosen) or "none"))
-    for title, value in rows:
-        bad = title in ("lost", "failed", "reboots", "reopened", "overruns") and value != "0"
-        table.add_row(Text(title, style="dim"), Text(value, style="yellow" if bad else ""))
-    if state.recorder is not None:
-        recorded = f"{state.recorder.path.name}, {state.recorder.frames:,} frames"
-        table.add_row(Text("REC", style="bold red"), Text(recorded))
-    if state.paused:
-        table.add_row(Text("PAUSED", style="bold yellow"), Text("space goes on"))
-    return table
+    trouble = ("lost", "failed", "reboots", "reopenings", "overruns")
+    counted = {title: f"{getattr(counts, title):,}" for title in trouble}
+    rows = {"rate": f"{counts.rate:.1f} frames/s", "frames": f"{counts.frames:,}", **counted}
+    rows |= {"sensor": name, "calibration": state.age()}
+    if image is not None:
+        rows["peak"] = f"{_reading(float(image.max()), state.unit)} at {_place(image)}"
+        rows["sum"] = _reading(float(image.sum()), state.unit)
+    rows["filter"] = ", ".join(chosen) or "none"
+    return [
+        [Segment(f"{title:<13}", DIM),
+         Segment(value, YELLOW if title in trouble and value != "0" else None)]
+        for title, value in rows.items()
+    ]  # fmt: skip
 
 
-def _legend(state: LiveState, colours: bool) -> Text:
-    text = Text("0 ", no_wrap=True)
+def _legend(state: LiveState, colours: bool) -> list[Segment]:
+    scale = [Segment(SHADES)]
     if colours:
-        for level in range(0, LEVELS, 4):
-            text.append(" ", _style(level, level))
-    else:
-        text.append(_SHADES)
-    return text.append(f" {_reading(state.scale, state.unit)}")
+        scale = [Segment(" ", _style(level, level)) for level in range(0, LEVELS, 4)]
+    return [Segment("0 "), *scale, Segment(f" {_reading(state.scale, state.unit)}")]
 
 
 def _reading(value: float, unit: str) -> str:

@@ -9,7 +9,6 @@ from threading import Event
 from typing import Any
 
 from probe.calibration import Calibration, calibration_hash, read_calibration
-from probe.client import Client
 from probe.command import INTERRUPTED, report
 from probe.command.progress import Told, progress_bar
 from probe.command.stream import Stream, interruption, name_of
@@ -63,7 +62,7 @@ def record_port(
     """
     check_output(output, replace=replace)
     known = None if calibration is None else read_calibration(calibration)
-    with interruption() as interrupted, Stream(Client(url, sensor=sensor, bits=bits)) as stream:
+    with interruption() as interrupted, Stream(url, sensor=sensor, bits=bits) as stream:
         first = _first(stream, interrupted)
         if not first:
             if interrupted.is_set():
@@ -71,7 +70,7 @@ def record_port(
                 return INTERRUPTED
             raise PortError("it ended before a frame came", fix="see whether it holds frames",
                             place=url)  # fmt: skip
-        name = _sensor(stream, known, calibration)
+        name = _sensor(stream, url, known, calibration)
         recorder = Recorder(
             output, sensor=name, calibration=calibration_hash(known) if known else "",
             attributes={"url": url}, replace=replace,
@@ -114,10 +113,10 @@ def _first(stream: Stream, interrupted: Event) -> list[Frame]:
     return frames
 
 
-def _sensor(stream: Stream, known: Calibration | None, calibration: Path | None) -> str:
+def _sensor(stream: Stream, url: str, known: Calibration | None, calibration: Path | None) -> str:
     """Return the sensor's name; refuse a calibration of another one."""
-    name = name_of(stream.ident())
-    if known is not None and calibration is not None and known.sensor != name:
+    name = name_of(stream.ident(), url)
+    if known is not None and calibration is not None and name and known.sensor != name:
         read_calibration(calibration, sensor=name)
     return name
 

@@ -50,11 +50,10 @@ def _pipe(url: str, *, as_json: bool) -> int:
     """Write every frame when its time has come."""
     import sys
 
-    from probe.client import Client
     from probe.command import INTERRUPTED
     from probe.command.stream import Stream, interruption
 
-    with interruption() as interrupted, Stream(Client(url)) as stream:
+    with interruption() as interrupted, Stream(url) as stream:
         first = True
         while not stream.ended and not interrupted.is_set():
             frames = stream.take(0.1)

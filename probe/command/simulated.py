@@ -18,10 +18,11 @@ from typing import Any
 import numpy as np
 
 from probe.circuit import QUIET, Electronics, Noise, fsr_of, read_counts
-from probe.command import report
+from probe.command import INTERRUPTED, report
 from probe.command.exported import refuse_taken, staged
 from probe.command.progress import progress_bar
 from probe.command.recorded import check_output
+from probe.command.stream import interruption
 from probe.contact.contract import Contact, Touch
 from probe.contact.press import accuracy_of, level_for, press
 from probe.errors import SurfaceError
@@ -72,7 +73,7 @@ def simulate_touches(
     replace: bool,
     as_json: bool,
 ) -> int:
-    """Simulate and write; returns the exit code.
+    """Simulate and write; returns the exit code. What an interruption leaves is complete.
 
     Raises
     ------
@@ -85,9 +86,9 @@ def simulate_touches(
     """
     if output is not None:
         check_output(output, replace=replace)
-    for out in (png, truth):
+    for out, suffix in ((png, ".png"), (truth, ".json")):
         if out is not None:
-            refuse_taken(out, replace=replace)
+            refuse_taken(out, suffix, replace=replace)
     sensor = Sensor(overlay=Overlay(kind="pad" if overlay == "pad" else "tab"))
     level = level_for(sensor, accuracy_of(accuracy))
     board = Electronics(noise=QUIET if noise == "quiet" else Noise())
@@ -101,11 +102,13 @@ def simulate_touches(
         }  # fmt: skip
         recorder = None
         if output is not None:
+            draft = stack.enter_context(staged(output))  # a refused touch leaves no file
             recorder = stack.enter_context(
-                Recorder(output, sensor=f"simulated/{overlay}", attributes=attributes,
-                         roll_over_s=math.inf, replace=replace)
+                Recorder(draft, sensor=f"simulated/{overlay}", attributes=attributes,
+                         roll_over_s=math.inf)
             )  # fmt: skip
         told = stack.enter_context(progress_bar("touching", number))
+        interrupted = stack.enter_context(interruption())
         for i, felt in enumerate(_touched(scene, sensor, board, level, asked)):
             if recorder is not None:
                 for frame in felt.frames:
@@ -114,6 +117,8 @@ def simulate_touches(
                 first = felt
             kept.append(_told(scene, felt))
             told.show(i + 1, f"{i + 1:,} of {number:,}")
+            if interrupted.is_set():
+                break
     if png is not None:
         _picture(scene, sensor, first, png, noise)
     result = {
@@ -126,7 +131,10 @@ def simulate_touches(
             draft.write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", "utf-8")
     written = [str(out) for out in (output, png, truth) if out is not None]
     _say(result, first, written, as_json=as_json)
-    return 0
+    if len(kept) == number:
+        return 0
+    report.message(f"probe-sensor: interrupted after {len(kept):,} of {number:,} touches")
+    return INTERRUPTED
 
 
 def scene_of(target: str) -> Scene:
@@ -222,7 +230,8 @@ def _picture(scene: Scene, sensor: Sensor, felt: Felt, png: Path, noise: str) ->
     if noise == "quiet":
         what += ", without noise"
     with staged(png) as draft:
-        touch_picture(scene.surface, sensor, felt.touch, felt.frames[0].counts, draft, title=what)
+        touch_picture(scene.surface, sensor, felt.touch, felt.contact.forces_n,
+                      felt.frames[0].counts, draft, title=what)  # fmt: skip
 
 
 def _say(result: dict[str, Any], first: Felt, written: list[str], *, as_json: bool) -> None:
@@ -231,14 +240,14 @@ def _say(result: dict[str, Any], first: Felt, written: list[str], *, as_json: bo
         summary = {name: value for name, value in result.items() if name != "touches"}
         report.write_json(summary | {
             "touches": len(kept), "frames": len(kept) * result["frames_per_touch"],
+            "first": kept[0] | {"peak_counts": first.frames[0].counts.max()},
             "written": written,
         })  # fmt: skip
         return
     what = "/".join(part for part in (result["object"], result["face"]) if part)
-    head = f"{what or result['target']}: {report.number(len(kept), 'touch')}".replace(
-        "touchs", "touches"
-    )
-    report.write(f"{head}, {result['overlay']} overlay, level {result['level']}")
+    number = "1 touch" if len(kept) == 1 else f"{len(kept):,} touches"
+    report.write(f"{what or result['target']}: {number}, {result['overlay']} overlay, level "
+                 f"{result['level']}")  # fmt: skip
     if len(kept) == 1:
         one, counts = kept[0], first.frames[0].counts
         report.write(

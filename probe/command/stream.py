@@ -18,6 +18,7 @@ from typing import Self
 from probe.client import Client
 from probe.errors import ProbeError
 from probe.frame import Frame
+from probe.port.url import address_of
 from probe.protocol import IdentPacket
 
 WAITING = 2048  #: frames between the threads; beyond, the client counts overruns
@@ -25,10 +26,24 @@ _IDENT_S = 2.0
 
 
 class Stream:
-    """The frames of a client; a context manager that closes the client too."""
+    """The frames of a probe; a context manager that lets go of the port too.
 
-    def __init__(self, client: Client) -> None:
-        self.client = client
+    Parameters
+    ----------
+    url, sensor, bits
+        As of a `Client`.
+
+    Raises
+    ------
+    PortError
+        When the port cannot be opened.
+    """
+
+    def __init__(self, url: str, *, sensor: int | None = None, bits: int | None = None) -> None:
+        self.client = Client(url, sensor=sensor, bits=bits)
+        self._asked = sensor
+        if sensor is not None:
+            self.client.select_sensor(sensor)  # so that the ident tells of the sensor selected
         self.ended = False  #: whether there will be no more frames
         self._queue: queue.Queue[Frame | None] = queue.Queue(WAITING)
         self._failure: ProbeError | None = None
@@ -77,7 +92,10 @@ class Stream:
     def ident(self) -> IdentPacket | None:
         """Return what the device is, after a short wait for its answer."""
         until_s = time.monotonic() + _IDENT_S
-        while self.client.ident is None and time.monotonic() < until_s:
+        while time.monotonic() < until_s:
+            ident = self.client.ident
+            if ident is not None and self._asked in (None, ident.sensor):
+                break
             time.sleep(0.02)
         return self.client.ident
 
@@ -118,6 +136,19 @@ def interruption() -> Iterator[threading.Event]:
         signal.signal(signal.SIGINT, before)
 
 
-def name_of(ident: IdentPacket | None) -> str:
-    """Return how recordings and calibrations call the sensor that is read; empty: unknown."""
+def name_of(ident: IdentPacket | None, url: str) -> str:
+    """Return how recordings and calibrations call the sensor that is read; empty: unknown.
+
+    A recording that is played names the sensor that made it.
+
+    Raises
+    ------
+    RecordingError
+        When that recording cannot be read any more.
+    """
+    address = address_of(url)
+    if address.scheme == "file":
+        from probe.recording.read import read_recording
+
+        return read_recording(address.target).origin.sensor
     return "" if ident is None else f"{ident.name}/{ident.sensor}"

@@ -6,7 +6,8 @@ condensed once (`elements_pad`), kept in memory, and serves every further touch.
 
 Heights are asked at the nodes of the top, half an element apart: where a surface has walls,
 give their places as `walls_mm`, so that lines of the mesh lie there; otherwise an edge counts
-as if it stood at the next node.
+as if it stood at the next node. Strokes that the nodes miss, or are too wide for, are refused
+(`elements_seen`).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from numpy.typing import ArrayLike
 from probe.contact.contract import Contact, Touch
 from probe.contact.elements_line import Array
 from probe.contact.elements_pad import CondensedPad, PadLines, condensed
+from probe.contact.elements_seen import heights_at, refuse_unseen
 from probe.contact.elements_unilateral import rest, tips
 from probe.errors import ContactError
 from probe.sensor import Sensor
@@ -27,6 +29,7 @@ from probe.surface.contract import Surface
 
 STEEPEST_RAD = 0.35  #: tilts beyond are not small
 KEPT = 2  #: condensed pads
+ROUGH = 0.25  #: of the deepest point: strokes between the nodes that rise less are let pass
 GROWTH = 1.5  #: from element to element of the margin
 BESIDE = 0.15  #: of an element: from a wall to the lines next to it
 NEAR = 0.1  #: of an element: no two lines as near as that, but walls and tactels
@@ -73,27 +76,32 @@ def elements(
     ------
     ContactError
         For an overlay that is no pad, a mesh that is too large, a force that is negative or no
-        number, nothing under the pad, a plate that tips, a tilt that is not small, or a surface
-        that would go through the pad.
+        number, nothing under the pad, strokes too thin for the mesh, a plate that tips, a tilt
+        that is not small, or a surface that would go through the pad.
     """
     _checked(sensor, touch)
     pad = condensed_pad(sensor, per_tactel, layers, margin_mm, walls_mm, memory_gb)
     nodes = pad.nodes_mm
-    heights = np.asarray(surface.heights_mm(touch.on_surface(nodes)), dtype=np.float64)
-    if heights.shape != (nodes.shape[0],) or np.isnan(heights).any() or (heights == np.inf).any():
-        raise ContactError(
-            "the surface gives heights that are no numbers",
-            fix="give a finite height at each point, or -inf where there is no matter",
-        )
+    heights = heights_at(surface, touch, nodes)
+    height = sensor.overlay.height_mm
     if touch.force_n == 0:
         empty = np.zeros((sensor.rows, sensor.columns))
         return Contact(empty, np.inf, touch.tilt_x_rad, touch.tilt_y_rad, "elements", 0)
-    height = sensor.overlay.height_mm
+    lines, grid = (pad.x, pad.y), (pad.x.size, pad.y.size)
+    if not np.isfinite(heights).any():
+        low = heights.reshape(grid)
+        refuse_unseen(surface, touch, lines, low, low, np.zeros(grid, dtype=bool), 0.0)
     found = rest(nodes, heights, pad.between, pad.displaced, touch, height / 50)
     z, tilt_x, tilt_y = (float(v) for v in found.plate)
     if max(abs(tilt_x), abs(tilt_y)) > STEEPEST_RAD:
         raise tips()
-    deepest = float(pad.displaced(found.forces).max())
+    sunk = pad.displaced(found.forces)
+    deepest = float(sunk.max())
+    top = sunk + z + tilt_x * nodes[:, 1] - tilt_y * nodes[:, 0]
+    bears = found.forces.reshape(grid) > 0
+    refuse_unseen(
+        surface, touch, lines, heights.reshape(grid), top.reshape(grid), bears, ROUGH * deepest
+    )
     if deepest >= height:
         raise ContactError(
             f"{touch.force_n:g} N press the surface {deepest:.3g} mm into a pad of {height:g} mm",

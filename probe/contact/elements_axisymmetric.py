@@ -34,7 +34,8 @@ DEGREES: dict[Kind, tuple[int, int | None]] = {
     "q2q1": (2, 1),
 }
 COMPRESSIBLE = 1e-7  #: 1 - 2 nu counts as at least this where a pressure is eliminated
-PIVOT = 1e-3  #: a diagonal is taken as pivot down to this part of its column
+SOFTENED = 1e-7  #: of the volume over G: added to what a pressure gives way, while factoring
+REFINED = 2  #: steps towards the matrix that is not softened
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,6 +47,7 @@ class Section:
     z: Array  #: (k,) nodes along z from the base up, mm
     across: Along  #: shape functions along r
     ring: sp.csr_matrix  #: (m, m) integral of f_i f_j 2 pi r along r, mm^2
+    softened: Array  #: (n,) what pressures give way more in the matrix that is factored
 
     @property
     def unknowns(self) -> int:
@@ -71,20 +73,32 @@ class Section:
         )
 
     def solved(self, held: NDArray[np.intp], values: Array) -> Array:
-        """Return all unknowns (n,) or (n, k) for values (h,) or (h, k) of the held ones."""
+        """Return all unknowns (n,) or (n, k) for values (h,) or (h, k) of the held ones.
+
+        Near nu = .5 pressures have no diagonal, and pivoting fills the factor a hundredfold.
+        A little give makes the matrix quasi-definite: any order of pivots on its diagonal is
+        stable enough, and refinement takes the give back to rounding.
+
+        References
+        ----------
+        Vanderbei (1995), Symmetric quasidefinite matrices.
+        """
         free = np.ones(self.unknowns, dtype=bool)
         free[held] = False
         columns = values.reshape(held.size, -1)
         rows = self.matrix[free]
+        system, right = rows[:, free], -(rows[:, held] @ columns)
         factor = sla.splu(
-            rows[:, free],
+            sp.csc_matrix(system - sp.diags(self.softened[free])),
             permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=PIVOT,
+            diag_pivot_thresh=0.0,
             options={"SymmetricMode": True},
         )
+        answer = factor.solve(right)
+        for _ in range(REFINED):
+            answer += factor.solve(right - system @ answer)
         found = np.empty((self.unknowns, columns.shape[1]))
-        found[held] = columns
-        found[free] = factor.solve(-(rows[:, held] @ columns))
+        found[held], found[free] = columns, answer
         return found.reshape(-1, *values.shape[1:])
 
 
@@ -119,6 +133,7 @@ def section(r: Array, z: Array, young: float, poisson: float, kind: Kind = "q2q1
     rr = 2 * shear * sp.kron(stretch + hoop, mass) + shear * sp.kron(area, slope)
     zz = 2 * shear * sp.kron(area, slope) + shear * sp.kron(stretch, mass)
     rz = shear * sp.kron(sheared, mixed.T)
+    softened = np.zeros(0)
     if pressure is None:
         lame = 2 * shear * poisson / (1 - 2 * poisson)
         widened = integral(lambda u, v: u.grad[0] * v, f, f, turn)
@@ -147,10 +162,12 @@ def section(r: Array, z: Array, young: float, poisson: float, kind: Kind = "q2q1
         if pressure:
             give = (1 - 2 * poisson) / (2 * shear * poisson)
             matrix = sp.bmat([[matrix, opened.T], [opened, -give * volume]], format="csc")
+            softened = SOFTENED / shear * volume.diagonal()
         else:  # each element's own pressure is eliminated within it
             lame = 2 * shear * poisson / max(1 - 2 * poisson, COMPRESSIBLE)
             matrix = matrix + lame * (opened.T @ sp.diags(1 / volume.diagonal()) @ opened)
-    return Section(matrix.tocsc(), f.places, g.places, f, area)
+    softened = np.concatenate([np.zeros(matrix.shape[0] - softened.size), softened])
+    return Section(matrix.tocsc(), f.places, g.places, f, area, softened)
 
 
 def apparent_modulus(

@@ -9,6 +9,7 @@ mm, N, MPa; z = 0 is the indenter's highest point.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -24,6 +25,7 @@ from probe.sensor import Sensor
 
 STEPS = 60
 EVEN = 24  #: Gauss points along a tactel
+FAR = 0.75  #: of the thickness: elements of a pad far beside the washer
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,12 +142,13 @@ def washer_pad(
     """
     wide, n = outer_mm + 3 * thickness_mm, parts
     more = round(1.3 * n)
+    far = max(4, math.ceil((radius_mm - wide) / (FAR * thickness_mm)))
     r = np.concatenate(
         [
             _both(0, inner_mm, n),
             _both(inner_mm, outer_mm, more)[1:],
             outer_mm + (wide - outer_mm) * np.linspace(0, 1, more + 1)[1:] ** 2.2,
-            np.linspace(wide, radius_mm, max(4, n // 3) + 1)[1:],
+            np.linspace(wide, radius_mm, far + 1)[1:],
         ]
     )
     z = thickness_mm * (1 - (1 - np.linspace(0, 1, n + 1)) ** 1.6)

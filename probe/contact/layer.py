@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.contact.contract import Contact, Touch
-from probe.contact.layer_active_set import Pressed, equilibrium
+from probe.contact.layer_active_set import Pressed, deep_mm, equilibrium
 from probe.contact.layer_descent import descended
 from probe.contact.layer_influence import Influence, influence
 from probe.contact.layer_kernel import layer_compliance
-from probe.contact.layer_levels import leveled
+from probe.contact.layer_levels import Levels, Look, leveled
 from probe.contact.layer_patch import Patch, centres_mm, patch_under
 from probe.contact.layer_solve import plate_of
 from probe.contact.neo_hooke import Linear
@@ -37,7 +37,10 @@ DEEPEST = 0.5  #: mean indentation, of the pad's height, beyond which strains ar
 THINNEST = 1.5  #: points in touch per cell, on the mean, below which a cover is chance
 _FEW = 8  # cells in touch, from which on THINNEST is asked
 _TURNED = 0.05  # of the indentation: what a turn may change across a cell
-_PASSES = 8
+_LEAST = 2e-3  # of a cell: indentations below are not resolved
+_PASSES = 25
+FARTHEST_RAD = 0.05  #: turn of the plate between two looks at the surface
+_HELD_RAD = 1e-4  # the same for the last, where the plate was held
 
 
 def layer(
@@ -75,7 +78,7 @@ def layer(
         more than is small, an indentation beyond small strain, strokes too thin to be sampled,
         a force that is negative or no number, heights that are no numbers.
     """
-    grid = influence(sensor, cells_per_tactel)
+    influence(sensor, cells_per_tactel)  # refuses overlays and numbers of cells
     if touch.force_n == 0:
         return _untouched(sensor, touch)
     patch = patch_under(surface, sensor, touch, cells_per_tactel=cells_per_tactel, samples=samples)
@@ -112,40 +115,55 @@ def _settled(patch: Patch, grid: Influence, touch: Touch) -> tuple[Pressed, Pose
     """Return the contact and the plate at rest.
 
     Cells and points far below the foreseen plate are left out. Those that turn out to be run
-    through are taken in, and where the plate turned the levels are taken anew.
+    through are taken in, and where the plate turned the levels are taken anew; what was taken
+    in once stays, so the passes end. A plate that falls far over has too few levels below it:
+    it goes a part of the way, and looks again.
     """
     pose, depth = _foreseen(patch, touch)
+    looks: list[Look] = []
     floor = -depth
     for _ in range(_PASSES):
         above = patch.highest_mm - pose.heights_mm(patch.centres_mm)
-        patch = patch.with_cells(np.flatnonzero(patch.neighbours(above >= floor)))
-        levels = leveled(patch, grid, pose, floor)
-        plate = plate_of(touch, levels)
-        pressed = equilibrium(levels, plate)
-        if not pressed.converged:
-            pressed = descended(pressed, plate)
-        b, reach = pressed.plate, levels.reach_mm
-        found = Pose(
-            pose.z_mm + float(b[0]),
-            pose.tilt_x_rad + float(b[1]) / reach,
-            pose.tilt_y_rad + float(b[2]) / reach,
+        some = above >= min(floor, float(above.max()))
+        patch = patch.with_cells(np.flatnonzero(patch.neighbours(some)))
+        looks.append(Look(pose, floor))
+        levels = leveled(patch, grid, looks[-1], looks[:-1])
+        pressed, held = _pressed(levels, touch)
+        turn = float(np.abs(pressed.plate[1:]).max()) / levels.reach_mm
+        b = min(1.0, FARTHEST_RAD / max(turn, 1e-300)) * pressed.plate
+        moved = Pose(float(b[0]), float(b[1]) / levels.reach_mm, float(b[2]) / levels.reach_mm)
+        pose = Pose(
+            pose.z_mm + moved.z_mm,
+            pose.tilt_x_rad + moved.tilt_x_rad,
+            pose.tilt_y_rad + moved.tilt_y_rad,
         )
-        moved = Pose(float(b[0]), float(b[1]) / reach, float(b[2]) / reach)
         moved_mm = moved.heights_mm(centres_mm(grid.rows, grid.columns, grid.dx_mm))
         sunk = grid.sunk_mm(levels.image(pressed.pressures)).ravel()
         missed = levels.left_out_mm > moved_mm + sunk
-        turned = grid.dx_mm * max(abs(moved.tilt_x_rad), abs(moved.tilt_y_rad))
-        if not missed.any() and turned <= _TURNED * depth:
-            _refuse_steep(found)
+        depth = float(deep_mm(levels, b).max())
+        enough = _TURNED * max(depth / grid.dx_mm, _LEAST)
+        enough = min(enough, _HELD_RAD) if held else min(enough, FARTHEST_RAD)
+        if turn <= enough and not missed.any():
+            _refuse_steep(pose)
             _refuse_deep(pressed, sunk, touch)
-            _refuse_thin(patch, found, sunk.reshape(grid.rows, -1)[1:-1, 1:-1])
-            return pressed, found
-        pose = found
-        floor = min(floor, float((levels.left_out_mm - moved_mm)[missed].min(initial=0.0)))
+            _refuse_thin(patch, pose, sunk.reshape(grid.rows, -1)[1:-1, 1:-1])
+            return pressed, pose
+        floor = min(-depth, float((levels.left_out_mm - moved_mm)[missed].min(initial=0.0)))
+    _refuse_steep(pose)
+    _refuse_deep(pressed, sunk, touch)
     raise ContactError(
         f"the plate does not settle within {_PASSES} passes over the surface",
         fix="report the scene; a stiffer wrist helps",
     )
+
+
+def _pressed(levels: Levels, touch: Touch) -> tuple[Pressed, bool]:
+    """Return the contact on these levels, and whether the plate had to be held, softly, for it."""
+    plate = plate_of(touch, levels)
+    pressed = equilibrium(levels, plate)
+    if pressed.converged:
+        return pressed, False
+    return descended(pressed, plate.held(levels.reach_mm)), True
 
 
 def _foreseen(patch: Patch, touch: Touch) -> tuple[Pose, float]:
@@ -168,8 +186,12 @@ def _foreseen(patch: Patch, touch: Touch) -> tuple[Pose, float]:
     return pose, float((heights - pose.heights_mm(points)).max())
 
 
+def _turn(pose: Pose) -> float:
+    return max(abs(pose.tilt_x_rad), abs(pose.tilt_y_rad))
+
+
 def _refuse_steep(pose: Pose) -> None:
-    turn = max(abs(pose.tilt_x_rad), abs(pose.tilt_y_rad))
+    turn = _turn(pose)
     if turn > STEEPEST_RAD:
         raise ContactError(
             f"the plate tips: it comes to rest at a tilt of {math.degrees(turn):.3g} degrees, "

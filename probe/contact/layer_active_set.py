@@ -48,7 +48,7 @@ class Pressed:
     """The pad in equilibrium, or an iterate on the way."""
 
     levels: Levels
-    touching: NDArray[np.bool_]  #: (COUNT, cells) levels in touch
+    touching: NDArray[np.bool_]  #: (levels, cells) levels in touch
     pressures: Array  #: (cells,) MPa
     plate: Array  #: (3,) b, mm
     iterations: int
@@ -99,12 +99,12 @@ def equilibrium(levels: Levels, plate: Plate) -> Pressed:
 
 
 def deep_mm(levels: Levels, b: Array) -> Array:
-    """Return h - R b (COUNT, cells): how deep each level stands in the pad as it was."""
+    """Return h - R b (levels, cells): how deep each level stands in the pad as it was."""
     return levels.depths_mm - b @ levels.levers
 
 
 def springs_mm(levels: Levels, pressures: Array, b: Array) -> Array:
-    """Return D q (COUNT, cells): by how much each level compresses its spring; < 0: a gap."""
+    """Return D q (levels, cells): by how much each level compresses its spring; < 0: a gap."""
     sunk = levels.grid.sunk_mm(levels.image(pressures)).ravel()[levels.cells]
     sunk -= levels.grid.edge_mm_mpa * pressures
     return levels.depths_mm - (b @ levels.levers + sunk)
@@ -121,4 +121,4 @@ def _deepest(levels: Levels, b: Array) -> NDArray[np.bool_]:
     """Return the levels that the plate meets first."""
     deep = deep_mm(levels, b)
     deepest = deep.max()
-    return deep >= deepest - 1e-9 * max(1.0, abs(deepest))
+    return np.asarray(deep >= deepest - 1e-9 * max(1.0, abs(deepest)))

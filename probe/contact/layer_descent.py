@@ -1,7 +1,7 @@
 """The layer's equilibrium by descent: no matrix, and it always ends.
 
-For contacts on very many cells, and where the active set came back to one that was seen. Two
-convex problems, one in the other:
+For where the active set came back to one that was seen: in some 1 % of scenes at random, with tiny
+forces on weak wrists. Two convex problems, one in the other:
 
 - the plate held fast, the levels' spring compressions f = D q >= 0 (`layer_active_set`) are the
   minimum of a strictly convex quadratic function: conjugate gradients on the levels in touch,
@@ -32,9 +32,9 @@ from probe.errors import ContactError
 
 Array = NDArray[np.float64]
 
-MOST_POSES = 100
+MOST_POSES = 50
 MOST_GRADIENTS = 5000
-HALVINGS = 40
+HALVINGS = 20
 TOLERANCE = 1e-8  #: of the force, for the plate; of the depth, for the levels
 _HESSIAN = 1e-4  # residual of the columns of the plate's matrix
 _PROPORTION = 1.0  # of chopped to free gradient; 1 is the usual choice
@@ -43,7 +43,7 @@ _STEP = 1.9  # over the largest eigenvalue; below 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Springs:
-    """The function f'WAf/2 - f'We of the levels (COUNT, cells); W are their shares."""
+    """The function f'WAf/2 - f'We of the levels (levels, cells); W are their shares."""
 
     levels: Levels
     largest: float  # bound of A's eigenvalues
@@ -53,7 +53,7 @@ class _Springs:
         grid = self.levels.grid
         mean = (self.levels.shares * f).sum(axis=0)
         image = self.levels.image(mean / grid.edge_mm_mpa)
-        return f + (grid.sunk_mm(image).ravel()[self.levels.cells] - mean)
+        return np.asarray(f + (grid.sunk_mm(image).ravel()[self.levels.cells] - mean))
 
     def dot(self, f: Array, g: Array) -> float:
         """Return f'W g."""
@@ -61,12 +61,12 @@ class _Springs:
 
     def least(self, e: Array, f: Array, tolerance: float) -> Array:
         """Return the minimum over f >= 0 from a first guess."""
-        step = _STEP / self.largest
+        step, nothing = _STEP / self.largest, self.levels.shares <= 0
         g = self.applied(f) - e
         free = np.where(f > 0, g, 0.0)
         p = free
         for _ in range(MOST_GRADIENTS):
-            chopped = np.where(f > 0, 0.0, np.minimum(g, 0.0))
+            chopped = np.where((f > 0) | nothing, 0.0, np.minimum(g, 0.0))
             if max(np.abs(free).max(), np.abs(chopped).max()) <= tolerance:
                 return f
             reduced = self.dot(np.minimum(f / step, free), free)
@@ -94,12 +94,12 @@ class _Springs:
 
 
 def descended(begun: Pressed, plate: Plate) -> Pressed:
-    """Return the contact in equilibrium, from where the active set gave up.
+    """Return the contact in equilibrium, begun at the plane of the levels.
 
     Raises
     ------
     ContactError
-        When the limits of this module are reached; no scene is known that does.
+        When the limits of this module are reached: forces that a fraction of one cell bears.
     """
     levels, grid = begun.levels, begun.levels.grid
     matter = levels.shares > 0
@@ -109,16 +109,16 @@ def descended(begun: Pressed, plate: Plate) -> Pressed:
     area, edge = grid.dx_mm**2, grid.edge_mm_mpa
 
     def left(b: Array, f: Array) -> tuple[Array, Array]:
-        """Return the gradient of the plate's energy, with the levels at their minimum."""
+        """Return the gradient of the plate's energy, and the levels at their minimum."""
         e = np.where(matter, deep_mm(levels, b), 0.0)
-        scale = max(float(e.max()), 1e-300)
-        f = springs.least(np.where(matter, e, -scale), f, TOLERANCE * scale)
+        scale = float(e.max())
+        f = springs.least(e, f, TOLERANCE * scale) if scale > 0 else np.zeros_like(f)
         gradient = K * (b - plate.start)
         gradient -= area / edge * (levels.levers @ (levels.shares * f).sum(axis=0))
         gradient[0] += plate.force_n
         return gradient[free], f
 
-    b = np.where(free, begun.plate, plate.start)
+    b = np.where(free, 0.0, plate.start)
     gradient, f = left(b, np.zeros(levels.shares.shape))
     for iteration in range(begun.iterations + 1, begun.iterations + MOST_POSES):
         size = plate.force_n + float((K * np.abs(b - plate.start)).max())

@@ -1,9 +1,9 @@
 """What each cell of the pad meets: a few levels of matter, each with its share of the cell.
 
 Patch + a plane near the plate -> Levels. The points of a patch are sorted by their depth below
-the surface, seen from the plane, into `COUNT` bins. A cell of the pad takes the points under a
-bell about its centre (the quadratic spline, three cells wide): every level has a share and a
-mean depth there. Bells of neighbours overlap and add to 1, so how strokes lie to the grid
+the surface, seen from the plane, into at most `COUNT` bins. A cell of the pad takes the points
+under a bell about its centre (the quadratic spline, three cells wide): every level has a share
+and a mean depth there. Bells of neighbours overlap and add to 1, so how strokes lie to the grid
 hardly matters: the stiffness of a strip 3.5 cells wide varies by 0.04 %, by 2.3 % where each
 cell looks at itself alone.
 
@@ -13,6 +13,7 @@ way to the base.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -25,7 +26,8 @@ from probe.contact.plate import Pose
 
 Array = NDArray[np.float64]
 
-COUNT = 8  #: levels
+COUNT = 8  #: levels at most; one where all that counts is flat
+_LEVEL = 1e-12  # mm, or of the greatest depth; depths that differ less are one
 _LEAST = 1e-3  # share of a bell below which a cell meets nothing
 
 
@@ -37,9 +39,9 @@ class Levels:
     plane: Pose
     cells: Cells  #: (n,) cells of the grid that meet matter, flat numbers, ascending
     levers: Array  #: (3, n) R = [1, y/L, -x/L] at their centres
-    shares: Array  #: (COUNT, n) of the bell, their sum is at most 1
-    depths_mm: Array  #: (COUNT, n) mean depth; -inf where the share is 0
-    left_out_mm: Array  #: (grid cells,) greatest depth of matter that is in no level
+    shares: Array  #: (levels, n) of the bell, their sum is at most 1
+    depths_mm: Array  #: (levels, n) mean depth; -inf where the share is 0
+    left_out_mm: Array  #: (grid cells,) greatest depth of matter below the look
 
     @property
     def reach_mm(self) -> float:
@@ -53,7 +55,22 @@ class Levels:
         return image.reshape(self.grid.rows, self.grid.columns)
 
 
-def leveled(patch: Patch, grid: Influence, plane: Pose, floor_mm: float) -> Levels:
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What was looked at: matter that stands over a plane that lies deeper by the floor."""
+
+    plane: Pose  #: about where the plate comes to rest
+    floor_mm: float  #: seen from the plane, <= 0
+
+    def depths_mm(self, patch: Patch) -> Array:
+        """Return how high the points (samples, cells) of a patch stand over the plane."""
+        plane = self.plane
+        depths = patch.heights_mm - plane.heights_mm(patch.centres_mm[patch.cells])
+        depths -= (plane.heights_mm(patch.offsets_mm) - plane.z_mm)[:, None]
+        return depths
+
+
+def leveled(patch: Patch, grid: Influence, look: Look, earlier: Sequence[Look] = ()) -> Levels:
     """Return the levels of the cells of a patch that were sampled in full.
 
     Parameters
@@ -62,22 +79,26 @@ def leveled(patch: Patch, grid: Influence, plane: Pose, floor_mm: float) -> Leve
         Heights under the matrix.
     grid
         The pad's cells: those of the patch and a ring about them.
-    plane
-        About where the plate comes to rest.
-    floor_mm
-        Depth, seen from the plane, below which points are left out.
+    look
+        Points below are left out.
+    earlier
+        What these saw is one more level where it lies deeper than the look.
     """
-    centres = patch.centres_mm[patch.cells]
-    depth = patch.heights_mm - plane.heights_mm(centres)
-    depth -= (plane.heights_mm(patch.offsets_mm) - plane.z_mm)[:, None]
+    depth = look.depths_mm(patch)
     top = float(depth.max())
-    step = max((top - floor_mm) / COUNT, 1e-300)
-    inside = depth >= floor_mm
-    number = np.where(inside, np.clip((depth - floor_mm) / step, 0, COUNT - 1), -1).astype(np.int8)
+    floor_mm = min(look.floor_mm, top)
+    step = max(top - floor_mm, _LEVEL * max(1.0, abs(top))) / COUNT
+    near = depth >= floor_mm
+    number = np.where(near, np.clip((depth - floor_mm) / step, 0, COUNT - 1), COUNT + 1)
+    number = number.astype(np.int8)
+    for other in earlier:
+        number[(other.depths_mm(patch) >= other.floor_mm) & ~near] = COUNT
+    inside = number <= COUNT
+    used = np.flatnonzero(np.bincount(number.ravel(), minlength=COUNT + 2)[: COUNT + 1])
 
     samples, n = depth.shape
-    sorted_points = np.zeros((samples, 2, COUNT, n))
-    np.equal(number[:, None, :], np.arange(COUNT)[:, None], out=sorted_points[:, 0])
+    sorted_points = np.empty((samples, 2, len(used), n))
+    np.equal(number[:, None, :], used[:, None], out=sorted_points[:, 0])
     np.multiply(
         sorted_points[:, 0], np.where(inside, depth, 0.0)[:, None, :], out=sorted_points[:, 1]
     )
@@ -85,23 +106,23 @@ def leveled(patch: Patch, grid: Influence, plane: Pose, floor_mm: float) -> Leve
 
     row, column = np.divmod(patch.cells, patch.shape[1])
     first = row * grid.columns + column  # of the nine grid cells about it, the upper left
-    sums = np.zeros((2 * COUNT, grid.rows * grid.columns))
-    for k, part in enumerate(spread.reshape(9, 2 * COUNT, n)):
+    sums = np.zeros((2 * len(used), grid.rows * grid.columns))
+    for k, part in enumerate(spread.reshape(9, 2 * len(used), n)):
         sums[:, first + (k // 3) * grid.columns + k % 3] += part
-    shares, moments = sums.reshape(2, COUNT, -1)
+    shares, moments = sums.reshape(2, len(used), -1)
     cells = np.flatnonzero(shares.sum(axis=0) > _LEAST)
     shares, moments = shares[:, cells], moments[:, cells]
     none = np.full_like(shares, -np.inf)
     depths = np.divide(moments, shares, out=none, where=shares > 0)
 
     left_out = np.full(grid.rows * grid.columns, -np.inf)
-    seen = patch.highest_mm - plane.heights_mm(patch.centres_mm)
-    seen[patch.cells] = np.where(inside, -np.inf, depth).max(axis=0)
+    seen = patch.highest_mm - look.plane.heights_mm(patch.centres_mm)
+    seen[patch.cells] = np.where(near, -np.inf, depth).max(axis=0)
     left_out.reshape(grid.rows, -1)[1:-1, 1:-1] = seen.reshape(patch.shape)
     x, y = centres_mm(grid.rows, grid.columns, grid.dx_mm)[cells].T / grid.sensor.reach_mm
     return Levels(
         grid=grid,
-        plane=plane,
+        plane=look.plane,
         cells=cells,
         levers=np.stack([np.ones_like(x), y, -x]),
         shares=shares,

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from probe.surface.contract import Surface
 
 Array = NDArray[np.float64]
 Cells = NDArray[np.intp]
+Number = TypeVar("Number", np.float64, np.bool_)
 
 COARSE = 4  #: points per cell of the first look
 SAMPLES = (16, 64, 256)  #: points per cell of the second, to choose from
@@ -117,10 +119,10 @@ def patch_under(
     shape = sensor.rows * cells_per_tactel, sensor.columns * cells_per_tactel
     dx = sensor.pitch_mm / cells_per_tactel
     coarse = _heights(surface, touch, _coarse_points(*shape, dx, samples))
-    _refuse_hidden(surface, sensor, touch, coarse, dx / samples)
     highest = coarse.max(axis=0)
     high = _spread(highest.reshape(shape), np.maximum)
     low = _spread(coarse.min(axis=0).reshape(shape), np.minimum)
+    _refuse_hidden(surface, sensor, touch, high, low, dx / samples)
     return Patch(
         surface=surface,
         sensor=sensor,
@@ -172,18 +174,27 @@ def _heights(surface: Surface, touch: Touch, points: Array) -> Array:
 
 
 def _refuse_hidden(
-    surface: Surface, sensor: Sensor, touch: Touch, coarse: Array, finest_mm: float
+    surface: Surface, sensor: Sensor, touch: Touch, high: Array, low: Array, finest_mm: float
 ) -> None:
     """Refuse a surface whose top is under the matrix and was seen by no point.
 
-    Asked only when the surface has a top that the first look did not meet: a blank place, or
-    strokes thinner than the points are apart.
+    Asked only when the surface has a top that the first look did not meet: a blank place, strokes
+    thinner than the points are apart, or the top of something round. The last rises over the
+    highest point seen about it by less than what was seen there differs.
     """
-    seen, top = float(coarse.max()), surface.top_mm
+    seen, top = float(high.max()), surface.top_mm
     if top <= seen + _LEVEL:
         return
-    found = float(_heights(surface, touch, _search_lines(*sensor.half_mm)).max())
-    if found - seen > 0.5 * min(top - seen, sensor.overlay.height_mm):
+    points = _search_lines(*sensor.half_mm)
+    heights = _heights(surface, touch, points)
+    highest = int(heights.argmax())
+    found, at = float(heights[highest]), points[highest]
+    rows, columns = high.shape
+    row = min(int((0.5 - at[1] / (2 * sensor.half_mm[1])) * rows), rows - 1)
+    column = min(int((0.5 + at[0] / (2 * sensor.half_mm[0])) * columns), columns - 1)
+    near, lowest = float(high[row, column]), float(low[row, column])
+    differ = near - lowest if lowest > -np.inf else 0.0
+    if found - seen > 0.5 * min(top - seen, sensor.overlay.height_mm) and found - near > differ:
         raise ContactError(
             f"strokes that rise to {found:g} mm lie between the points, at least "
             f"{finest_mm:.2g} mm apart, that were looked at (the highest stands at {seen:g} mm)",
@@ -214,7 +225,7 @@ def _coarse_points(rows: int, columns: int, dx: float, samples: int) -> Array:
     return centres_mm(rows, columns, dx) + offsets[:, which]
 
 
-def _spread(image: NDArray[np.generic], join: np.ufunc) -> NDArray[np.generic]:
+def _spread(image: NDArray[Number], join: np.ufunc) -> NDArray[Number]:
     """Return an image in which each cell joins the eight around it."""
     spread = image.copy()
     spread[1:] = join(spread[1:], image[:-1])

@@ -51,6 +51,14 @@ class Plate:
         """(3,) K with 0 where the plate is held fast."""
         return np.where(self.free, self.stiffness, 0.0)
 
+    def held(self, by_mm: float) -> Plate:
+        """Return the plate held to the plane as well: by its force, where it is `by_mm` off."""
+        whole = self.stiffness + np.array([0.0, 1.0, 1.0]) * (self.force_n / by_mm)
+        start = self.start.copy()
+        turns = np.flatnonzero(self.free)[1:]
+        start[turns] *= self.stiffness[turns] / whole[turns]
+        return Plate(self.force_n, start, whole)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Glued:
@@ -87,7 +95,7 @@ def plate_of(touch: Touch, levels: Levels) -> Plate:
 
 
 def glued(levels: Levels, touching: NDArray[np.bool_]) -> Glued:
-    """Return the system of the levels in touch (COUNT, cells)."""
+    """Return the system of the levels in touch (levels, cells)."""
     some = np.flatnonzero(touching.any(axis=0))
     touching = touching[:, some]
     shares = np.where(touching, levels.shares[:, some], 0.0)

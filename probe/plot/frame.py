@@ -1,4 +1,4 @@
-"""One image as heat map and as surface that can be turned. Thesis figures 4.9 and 4.10.
+"""Images as heat maps and as surfaces that can be turned. Thesis figures 4.9 and 4.10.
 
 Axes are those of the sensor frame (mm, seen through the sensor's back); row 0 lies at the
 top, so at the largest y.
@@ -6,6 +6,7 @@ top, so at the largest y.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,9 @@ from probe.plot.canvas import HEAT, in_mm, page
 from probe.sensor import Sensor
 
 UNITS = {"counts": "reading (ADC counts)", "N": "force (N)", "scaled": "reading (scaled)"}
+WIDTH, HEIGHT = 1000, 440  #: px, of each image
+#: left, low, wide and high of heat map, its scale, and the surface: shares of WIDTH and HEIGHT
+_PLACES = ((0.07, 0.13, 0.352, 0.8), (0.437, 0.2, 0.015, 0.66), (0.5, 0.02, 0.49, 0.96))
 
 
 def frame_picture(
@@ -30,33 +34,53 @@ def frame_picture(
     azimuth_deg: float = -60.0,
     elevation_deg: float = 40.0,
 ) -> None:
-    """Draw an image twice: from above, and as a surface.
+    """Draw an image twice, from above and as a surface; see `frames_picture`."""
+    frames_picture({title: image}, path, unit=unit, sensor=sensor, azimuth_deg=azimuth_deg,
+                   elevation_deg=elevation_deg)  # fmt: skip
+
+
+def frames_picture(
+    images: Mapping[str, ArrayLike],
+    path: Path,
+    *,
+    unit: str = "counts",
+    sensor: Sensor | None = None,
+    azimuth_deg: float = -60.0,
+    elevation_deg: float = 40.0,
+) -> None:
+    """Draw images below each other, each from above and as a surface.
 
     Parameters
     ----------
-    image
-        (rows, columns) readings, row 0 on top.
+    images
+        Titles, and (rows, columns) readings, row 0 on top.
     path
         PNG to write.
     unit
         counts, N, or what else the readings are.
-    title
-        Above the heat map.
     sensor
-        Whose image it is; the 16x16 matrix of the thesis by default.
+        Whose images they are; the 16x16 matrix of the thesis by default.
     azimuth_deg, elevation_deg
-        From where the surface is seen.
+        From where the surfaces are seen.
     """
-    values, matrix = np.asarray(image, dtype=np.float64), sensor or Sensor()
+    matrix = sensor or Sensor()
     half_x, half_y = matrix.half_mm
     label = UNITS.get(unit, f"reading ({unit})")
-    heat = Normalize(min(0.0, float(values.min())), max(float(values.max()), 1e-9))
-    with page(path, 1000, 440) as figure:
-        flat, turned = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2, projection="3d")
-        flat.imshow(values, cmap=HEAT, norm=heat, extent=(-half_x, half_x, -half_y, half_y))
-        in_mm(flat, title)
-        figure.colorbar(ScalarMappable(heat, HEAT), ax=flat, label=label, shrink=0.85)
-        _surface(turned, values, matrix, heat, label, (azimuth_deg, elevation_deg))
+    with page(path, WIDTH, HEIGHT * len(images)) as figure:
+        figure.set_layout_engine("none")
+        high = 1 / len(images)
+        for row, (title, image) in enumerate(images.items()):
+            values = np.asarray(image, dtype=np.float64)
+            heat = Normalize(min(0.0, float(values.min())), max(float(values.max()), 1e-9))
+            low = 1 - (row + 1) * high
+            flat, scale, turned = (
+                figure.add_axes((x, low + y * high, wide, tall * high), projection=kind)
+                for (x, y, wide, tall), kind in zip(_PLACES, (None, None, "3d"), strict=True)
+            )
+            flat.imshow(values, cmap=HEAT, norm=heat, extent=(-half_x, half_x, -half_y, half_y))
+            in_mm(flat, title)
+            figure.colorbar(ScalarMappable(heat, HEAT), cax=scale, label=label)
+            _surface(turned, values, matrix, heat, (azimuth_deg, elevation_deg))
 
 
 def _surface(
@@ -64,7 +88,6 @@ def _surface(
     values: NDArray[np.float64],
     sensor: Sensor,
     heat: Normalize,
-    label: str,
     seen_from_deg: tuple[float, float],
 ) -> None:
     """Draw tactels as a surface through their readings."""
@@ -76,7 +99,7 @@ def _surface(
         edgecolor=(0.1, 0.1, 0.1, 0.5), linewidth=0.3, shade=False,
     )  # fmt: skip
     axes.view_init(elev=seen_from_deg[1], azim=seen_from_deg[0])
+    axes.set_zlim(heat.vmin, heat.vmax)
     axes.set_xlabel("x (mm)")
     axes.set_ylabel("y (mm)")
-    axes.set_zlabel(label)
-    axes.set_box_aspect((1, 1, 0.6), zoom=0.85)
+    axes.set_box_aspect((1, 1, 0.6), zoom=0.95)

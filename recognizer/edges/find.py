@@ -101,7 +101,7 @@ def face_edges(
 def outline(image: TactileImage, sensor: Sensor, finding: Finding | None = None) -> Outline:
     """Return edges and corners that one touch feels, in the sensor frame; see `face_edges`."""
     chosen = finding or Finding()
-    over = unbiased(image, 0.0) if image.values.min() >= 0 else unbiased(image)
+    over = unbiased(image)
     rough = tuple(edge for edge in classical_edges(image, chosen) if _bounds(over, edge, chosen))[
         : chosen.most
     ]

@@ -39,8 +39,8 @@ class Fitting:
     gain: float = 0.15  #: standard deviation of tactels' gains
     floor: float = 0.07  #: of noise and of tabs off their places, over the pressure
     farthest: float = 3.0  #: standard deviations, beyond which a reading counts ever less
-    model_mm: float = 0.04  #: standard deviation of an edge that the model alone makes
-    model_rad: float = math.radians(0.3)
+    model_mm: float = 0.06  #: standard deviation of an edge that the model alone makes
+    model_rad: float = math.radians(0.4)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

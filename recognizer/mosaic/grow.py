@@ -19,7 +19,7 @@ from recognizer.mosaic.errors import MosaicError
 from recognizer.mosaic.graph import ARM, OUTLIER, Solved, Tie, covariances, solved
 from recognizer.mosaic.mosaic import ALONE, PARTLY, Mosaic, MosaicSettings, no_touches
 from recognizer.mosaic.pair import CONSTANT
-from recognizer.mosaic.patch import patch_of
+from recognizer.mosaic.patch import Patch, patch_of
 from recognizer.mosaic.place import placing
 from recognizer.mosaic.planar import composed, inverse
 from recognizer.mosaic.texture import far_apart
@@ -74,8 +74,8 @@ def added(mosaic: Mosaic, touch: PlacedTouch) -> Mosaic:
             place=f"touch {touch.seq}",
         )
     number = len(mosaic)
-    mosaic = _framed(mosaic, touch)
     patch = patch_of(mosaic.sensor, touch.signal)
+    mosaic = _framed(mosaic, touch, patch)
     place = placing(mosaic, touch, patch, number)
     ties = mosaic.ties + place.ties
     grown = replace(
@@ -133,7 +133,7 @@ def _again(mosaic: Mosaic, number: int) -> Mosaic:
     return _updated(tried, _solved(tried), {number})
 
 
-def _framed(mosaic: Mosaic, touch: PlacedTouch) -> Mosaic:
+def _framed(mosaic: Mosaic, touch: PlacedTouch, patch: Patch) -> Mosaic:
     """Return the mosaic in the frame in which a touch can be placed."""
     if touch.decoded is None:
         if not mosaic.on_face or touch.believed is None or _hangs(mosaic):
@@ -141,27 +141,40 @@ def _framed(mosaic: Mosaic, touch: PlacedTouch) -> Mosaic:
         # the arm's frame is not known: nothing decoded was believed as well
         return replace(mosaic, arm_covariance=np.full((3, 3), np.inf))
     believed = touch.believed
-    if believed is not None and not _hangs(mosaic):
+    if believed is not None and not _hangs(mosaic) and (mosaic.on_face or not len(mosaic)):
         mosaic = replace(mosaic, arm=composed(touch.decoded.pose, inverse(believed.pose)))
     if mosaic.on_face or not len(mosaic):
         return mosaic
-    if believed is not None:
-        T_face_plane = composed(touch.decoded.pose, inverse(composed(mosaic.arm, believed.pose)))
-    elif touch.stepped is not None:
-        stands = composed(mosaic.poses[-1], touch.stepped.pose)
-        T_face_plane = composed(touch.decoded.pose, inverse(stands))
-    else:
+    if believed is None and touch.stepped is None:
         raise MosaicError(
             "the first decoded touch does not say where it stands for the arm",
             fix="give what the arm believes of it, too",
             place=f"touch {touch.seq}",
         )
+    stands = placing(mosaic, replace(touch, decoded=None), patch, len(mosaic)).pose
+    T_face_plane = composed(touch.decoded.pose, inverse(stands))
+    return _turned(mosaic, T_face_plane)
+
+
+def _turned(mosaic: Mosaic, T_new_old: Array) -> Mosaic:
+    """Return the mosaic in another frame, laid anew."""
+    c, s = np.cos(T_new_old[2]), np.sin(T_new_old[2])
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    canvas, lying = empty_canvas(mosaic.sensor.pitch_mm), list(mosaic.laid)
+    for n, how in enumerate(mosaic.laid):
+        if how is not None:
+            pose = composed(T_new_old, how.pose)
+            again = Laid(pose, turn @ how.covariance @ turn.T, how.gain)
+            lying[n] = again
+            canvas = laid(canvas, mosaic.patches[n], again)
     return replace(
         mosaic,
-        poses=composed(T_face_plane, mosaic.poses),
-        arm=composed(T_face_plane, mosaic.arm),
-        laid=(None,) * len(mosaic),
-        canvas=empty_canvas(mosaic.sensor.pitch_mm),
+        poses=composed(T_new_old, mosaic.poses),
+        covariances=turn @ mosaic.covariances @ turn.T,
+        arm=composed(T_new_old, mosaic.arm),
+        arm_covariance=turn @ mosaic.arm_covariance @ turn.T,
+        laid=tuple(lying),
+        canvas=canvas,
     )
 
 

@@ -22,7 +22,7 @@ from recognizer.mosaic.patch import Patch, covered
 from recognizer.mosaic.planar import inverse, moved, wrapped
 from recognizer.mosaic.raster import magnified
 from recognizer.mosaic.search import Settings, nats, searched, window_mm
-from recognizer.mosaic.texture import far_apart, kept, seen_motions
+from recognizer.mosaic.texture import far_apart, held, kept, scales, seen_motions
 
 Array = NDArray[np.float64]
 
@@ -109,20 +109,19 @@ def registered(
     motions = seen_motions(a, over, best.pose)
     if motions.shape[1] == 0:
         return refused(believed, covariance, CONSTANT)
-    information = kept(best.information, motions, a.sensor)
+    if motions.shape[1] < 3:
+        again = _held(a, b, best, motions, believed, prior)
+        if again is None:
+            return refused(believed, covariance, NOISE)
+        best = again
+    information = kept(best.information, motions, a.sensor, covariance)
     others = [v for v, _, other in refined[1:] if _elsewhere(best.pose, other.pose, information, a)]
     margin = score - max(others, default=-math.inf)
     if margin < (limits.margin_beyond if max(reach) > period_mm / 2 else limits.margin):
         return refused(believed, covariance, AMBIGUOUS, margin)
-    together = np.asarray(np.linalg.inv(information + prior), np.float64)
-    pose = best.pose
-    if motions.shape[1] < 3:  # what the images leave open stays as believed
-        away = pose - believed
-        away[2] = wrapped(away[2])
-        pose = believed + together @ information @ away
     return Registration(
-        pose=pose,
-        covariance=together,
+        pose=best.pose,
+        covariance=np.asarray(np.linalg.inv(information + prior), np.float64),
         information=information,
         rank=motions.shape[1],
         gain=best.gain * a.scale / b.scale,
@@ -168,6 +167,17 @@ def _hopeless(a: Patch, b: Patch, believed: Array, limits: Settings, reach_mm: f
         if not varies(patch, over, limits.contrast):
             return CONSTANT
     return ""
+
+
+def _held(
+    a: Patch, b: Patch, found: Aligned, motions: Array, believed: Array, prior: Array
+) -> Aligned | None:
+    """Align again in the motions that are seen; what they leave open stays as believed."""
+    away = found.pose - believed
+    away[2] = wrapped(away[2])
+    unit = scales(a.sensor)
+    start = believed + unit * (motions @ (motions.T @ (away / unit)))
+    return aligned(a, b, start, believed, prior + held(motions, a.sensor))
 
 
 def _elsewhere(best: Array, other: Array, information: Array, a: Patch) -> bool:

@@ -49,6 +49,11 @@ def placing(mosaic: Mosaic, touch: PlacedTouch, patch: Patch, number: int) -> Pl
     """Return where a touch belongs in a mosaic that may hold it already under this number."""
     given = _given(touch, number)
     predicted = _predicted(mosaic, touch, number)
+    if touch.decoded is not None and _contradicted(mosaic, touch, number):
+        # neighbours shall say who is right
+        other = placing(mosaic, replace(touch, decoded=None), patch, number)
+        if not other.reason:
+            return replace(other, ties=(given[0], *other.ties))
     near = _near(mosaic, patch, predicted, number)
     reason, start = _found(mosaic, patch, predicted, near, number)
     pairs: list[tuple[int, Registration]] = []
@@ -87,6 +92,17 @@ def _given(touch: PlacedTouch, number: int) -> list[Tie]:
     if touch.stepped is not None and number > 0:
         ties.append(tie(number - 1, touch.stepped, "stepped"))
     return ties
+
+
+def _contradicted(mosaic: Mosaic, touch: PlacedTouch, number: int) -> bool:
+    """Whether a decoded place is not where the touch should stand."""
+    if touch.decoded is None or not len(mosaic) or not (touch.believed or touch.stepped):
+        return False
+    expected = _predicted(mosaic, replace(touch, decoded=None), number)
+    away = touch.decoded.pose - expected.pose
+    away[2] = wrapped(away[2])
+    spread = expected.covariance + touch.decoded.covariance
+    return float(away @ np.linalg.solve(spread, away)) > FREE
 
 
 def _pose(mosaic: Mosaic, frame: int) -> Array:
@@ -148,8 +164,9 @@ def _found(
         return CONSTANT, predicted.pose
     if not near:
         return ALONE, predicted.pose
-    reach = window_mm(predicted.covariance, limits)
-    turn = limits.sigmas * math.sqrt(predicted.covariance[2, 2]) * mosaic.sensor.reach_mm
+    spread = predicted.covariance + mosaic.covariances[near[0]]
+    reach = window_mm(spread, limits)
+    turn = limits.sigmas * math.sqrt(spread[2, 2]) * mosaic.sensor.reach_mm
     if max(*reach, turn) <= limits.near_tactels * pitch:
         return "", predicted.pose
     canvas = mosaic.canvas
@@ -157,7 +174,7 @@ def _found(
         canvas = laid(canvas, patch, own, -1)
     around = mosaic.sensor.reach_mm + math.hypot(*reach) + pitch
     shown = reference(canvas, float(predicted.pose[0]), float(predicted.pose[1]), around)
-    found = searched(shown, patch, predicted.pose, predicted.covariance, limits)
+    found = searched(shown, patch, predicted.pose, spread, limits)
     if not found.candidates:
         return NOISE, predicted.pose
     best = found.candidates[0]

@@ -26,6 +26,8 @@ from recognizer.mosaic.raster import MAGNIFIED, Raster, enlarged, laid_under, ma
 
 Array = NDArray[np.float64]
 
+BEST = 0.94  #: correlation that true places have; more of it is chance, not evidence
+
 
 @dataclass(frozen=True, slots=True)
 class Settings:
@@ -62,7 +64,7 @@ class Searched:
 
 def nats(rho: Array, tactels: Array, settings: Settings) -> Array:
     """Return how much likelier images are if they show the same, by their correlation."""
-    known = np.clip(np.nan_to_num(rho), 0.0, 0.9999)
+    known = np.clip(np.nan_to_num(rho), 0.0, BEST)
     readings = settings.independent * np.minimum(tactels, settings.enough)
     return np.asarray(-readings / 2 * np.log1p(-(known**2)))
 

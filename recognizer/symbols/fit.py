@@ -43,7 +43,7 @@ class Settings:
     steps: int = 4  #: Gauss-Newton steps of all of them
     finalists: int = 2  #: lattices that are refined to the end
     final_steps: int = 6
-    least_noise: float = 0.06  #: below it a fit is not believed
+    least_noise: float = 0.05  #: below it a fit is not believed
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,12 +112,14 @@ def scored(
     felt = felt_under(image, lattices.gain)
     cells, offsets = cells_and_offsets(image, lattices.pose, template.pitch_mm)
     tables = tables_at(template, offsets, lattices.pose, felt)
+    away = _away(felt, tables, cells)
     if noise is None:
-        best = int(np.argmax(lattices.value))
-        noise = max(settings.least_noise, _left(felt, tables, cells, best))
+        best = np.minimum(np.abs(away[int(np.argmax(lattices.value))]), 4 * NOISE)
+        left = math.sqrt(float((felt.trust * best**2).sum() / felt.trust.sum()))
+        noise = max(settings.least_noise, left)
     each = log_likelihoods(felt, tables, np.full(len(cells), noise))
     level = felt.measure + (felt.trust * np.log(felt.press)).sum(axis=1)
-    scale = (noise / NOISE) ** 2
+    scale = (noise / NOISE) ** 2 * _alike(away * felt.trust, image.shape)
     found = []
     for b in range(len(cells)):
         names, dense = np.unique(cells[b], axis=0, return_inverse=True)
@@ -136,26 +138,29 @@ def scored(
                 seen=np.bincount(dense, felt.press[b] * felt.trust, len(names)).astype(np.float64),
                 noise=noise,
                 value=float(most.sum() + level[b]),
-                covariance=scale * np.linalg.pinv(lattices.normal[b])[:3, :3],
+                covariance=scale[b] * np.linalg.pinv(lattices.normal[b])[:3, :3],
             )
         )
     return tuple(found)
 
 
-def _left(felt: Felt, tables: Floats, cells: NDArray[np.int64], best: int) -> float:
-    """Return the standard deviation of psi, on a covered tactel, that a lattice leaves."""
-    cut = slice(best, best + 1)
-    one = Felt(
-        felt.psi[cut],
-        felt.press[cut],
-        felt.bare[cut],
-        felt.contact[cut],
-        felt.trust,
-        felt.measure[cut],
-    )
-    table = tables[cut]
-    scores = log_likelihoods(one, table, np.array([NOISE]))
-    values = chosen(cells[cut], table, scores, one)
-    away = (one.psi - values[..., 0]) * one.press / spread(values[:, :, None])[..., 0]
-    away = np.minimum(np.abs(away), 4 * NOISE)
-    return math.sqrt(float((felt.trust * away**2).sum() / felt.trust.sum()))
+def _away(felt: Felt, tables: Floats, cells: NDArray[np.int64]) -> Array:
+    """Return how far (b, n) readings lie from the likeliest labels, on a covered tactel's scale."""
+    scores = log_likelihoods(felt, tables, np.full(len(cells), NOISE))
+    values = chosen(cells, tables, scores, felt)
+    return (felt.psi - values[..., 0]) * felt.press / spread(values[:, :, None])[..., 0]
+
+
+def _alike(away: Array, shape: tuple[int, int]) -> Array:
+    """Return by how much (b,) neighbours that err alike widen a covariance, 1 or more.
+
+    The sum of the autocorrelation of what is left over the eight neighbours.
+    """
+    left = np.clip(away, -4 * NOISE, 4 * NOISE).reshape(-1, *shape)
+    left = left - left.mean(axis=(1, 2), keepdims=True)
+    own = np.maximum((left * left).sum(axis=(1, 2)), 1e-12)
+    side = (left[:, 1:] * left[:, :-1]).sum(axis=(1, 2))
+    side += (left[:, :, 1:] * left[:, :, :-1]).sum(axis=(1, 2))
+    across = (left[:, 1:, 1:] * left[:, :-1, :-1]).sum(axis=(1, 2))
+    across += (left[:, 1:, :-1] * left[:, :-1, 1:]).sum(axis=(1, 2))
+    return np.asarray(np.maximum(1.0, 1.0 + 2.0 * (side + across) / own))

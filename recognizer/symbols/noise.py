@@ -18,7 +18,7 @@ from recognizer.symbols.template import Floats, psi
 Array = NDArray[np.float64]
 
 QUIET = 0.8  #: spread where nothing is felt, against a tactel that a plateau covers
-DISPLACED_MM = 0.8  #: slopes count by this much, in the same measure
+DISPLACED_MM = 1.0  #: slopes count by this much, in the same measure
 MOST = 8.0  #: nats that one tactel can cost
 
 

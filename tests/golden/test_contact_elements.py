@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from probe.contact.contract import Touch
+from probe.contact.contract import Touch, WristStiffness
 from probe.contact.elements import elements
 from probe.contact.elements_axisymmetric import DEGREES, apparent_modulus, section
 from probe.contact.elements_round import indented, washer_pad
@@ -69,17 +69,23 @@ def test_cylinder_that_slides_at_both_ends_has_youngs_modulus():
     assert -(part.matrix[ends[1]] @ found).sum() == pytest.approx(3.0 * 0.01 * np.pi, rel=1e-9)
 
 
-@pytest.mark.parametrize(("ratio", "excess"), [(10, 1.18), (20, 1.05)])
-def test_thin_incompressible_layer_under_a_paraboloid(ratio, excess):
-    # F -> pi G a^6 / (32 R h^3) for a / h -> infinity.
-    height, bend, radius = 0.1, 200.0, 0.1 * ratio
-    r = np.concatenate([np.linspace(0, 1.5 * radius, 181), np.linspace(1.5, 2.5, 12)[1:] * radius])
-    pad = section(r, np.linspace(0, height, 5), 3.0, 0.5)
-    shear, force = 1.0, np.pi * radius**6 / (32 * bend * height**3) * excess
+@pytest.mark.parametrize(
+    ("ratio", "excess", "edge"), [(10, 1.180, 0.886), (20, 1.049, 0.936), (40, 1.013, 0.967)]
+)
+def test_thin_incompressible_layer_under_a_paraboloid(ratio, excess, edge):
+    # F -> pi G a^6 / (32 R h^3) for a / h -> infinity, with a = 2 sqrt(R depth) of that limit;
+    # the contact itself ends about 1.2 h further in, where the layer is no longer thin. So a^6
+    # of the true edge is half as much at a / h = 10: it is no measure of the force. The Fourier
+    # kernel of the endless layer gives the same excess (1.180, 1.049) and edge (.886, .936).
+    height, bend, radius, shear = 0.1, 200.0, 0.1 * ratio, 1.0
+    r = np.concatenate([np.linspace(0, 1.2 * radius, 145), np.linspace(1.2, 2.2, 12)[1:] * radius])
+    pad = section(r, np.linspace(0, height, 5), 3 * shear, 0.5)
+    force = np.pi * shear * radius**6 / (32 * bend * height**3) * excess
     pressed = indented(pad, lambda r: -(r**2) / (2 * bend), force)
-    edge = pad.r[pressed.active].max()
-    expected = np.pi * shear * edge**6 / (32 * bend * height**3)
-    assert force / expected == pytest.approx(excess, rel=0.05)
+    thin = 2 * np.sqrt(bend * pressed.depth_mm)
+    found = force / (np.pi * shear * thin**6 / (32 * bend * height**3))
+    assert found == pytest.approx(excess, rel=2e-3)
+    assert pad.r[pressed.active].max() / thin == pytest.approx(edge, rel=8e-3)
     assert pressed.top_n[pressed.active][1:].min() > 0
 
 
@@ -102,7 +108,7 @@ def test_washer_of_figure_4_10():
         ({"parts": 8}, 9e-4, 1.5e-3),
         ({"parts": 16}, 3e-4, 4e-4),
         ({"parts": 8, "kind": "q1p0"}, 1e-2, 3e-2),
-        ({"parts": 24, "radius_mm": 35.0}, 1e-4, 1e-4),
+        ({"parts": 24, "radius_mm": 35.0}, 1e-5, 1e-5),
     ):
         found = washer(**options)
         error = found.tactels_n(sensor) - truth
@@ -126,20 +132,24 @@ def test_partly_covered_tab_bears_less_than_all_and_more_than_its_share():
         assert part == pytest.approx(share * (1 + 0.59 * (1 - share)), abs=0.03)
 
 
-def test_elements_in_space_agree_with_the_section():
+@pytest.mark.parametrize("wrist", [WristStiffness(), WristStiffness(1e9, 1e9)])
+def test_elements_in_space_agree_with_the_section(wrist):
     sensor = Sensor(overlay=Overlay(kind="pad"))
     ball = Sphere(20.0)
     at = (0.3, -0.4)
-    found = elements(
-        ball, sensor, Touch(-at[0], -at[1], 0.0, 20.0), per_tactel=1, layers=2, margin_mm=6.0
-    )
+    touch = Touch(-at[0], -at[1], 0.0, 20.0, wrist=wrist)
+    found = elements(ball, sensor, touch, per_tactel=1, layers=2, margin_mm=6.0)
     r = np.concatenate([np.linspace(0, 6, 61), 6 + 19 * np.linspace(0, 1, 20)[1:] ** 2])
     pad = section(r, 2 * (1 - (1 - np.linspace(0, 1, 9)) ** 1.6), 1.0, 0.4999)
     points = lambda r: ball.heights_mm(np.stack([r, 0 * r], axis=-1))  # noqa: E731
     truth = indented(pad, points, 20.0)
-    tactels = truth.tactels_n(sensor, at)
+    # The plate gives way to the moment about the sensor's centre, and the ball rolls on it.
+    turn = found.tilt_x_rad, found.tilt_y_rad
+    middle = at[0] + ball.radius_mm * turn[1], at[1] - ball.radius_mm * turn[0]
+    tactels = truth.tactels_n(sensor, middle)
     error = np.sqrt(((found.forces_n - tactels) ** 2).mean() / (tactels**2).mean())
-    assert error <= 8e-3
-    # The plate gives way to the moment; its height is that over the ball's axis.
-    z = found.z_mm + found.tilt_x_rad * at[1] - found.tilt_y_rad * at[0]
+    assert error <= 8e-3  # 1.2e-3 with two elements on a tactel
+    z = found.z_mm + turn[0] * at[1] - turn[1] * at[0]
     assert -z == pytest.approx(truth.depth_mm, rel=5e-3)
+    for about, moment in zip(turn, (middle[1] * 20, -middle[0] * 20), strict=True):
+        assert about * wrist.tilt_x_nmm_rad == pytest.approx(moment, rel=0.06)  # .004 with two

@@ -1,8 +1,5 @@
 """Whatever is registered comes back bit for bit, and no cell is ever held twice."""
 
-import tempfile
-from pathlib import Path
-
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -12,6 +9,7 @@ from generator.alphabet.known import ALPHABETS
 from generator.alphabet.outline import SymbolStyle
 from generator.array.profiles import PROFILES
 from generator.database.canonical import canonical
+from generator.database.cells import held_cells
 from generator.database.open import open_database
 from generator.database.read import faces_at, list_objects, read_object
 from generator.database.register import (
@@ -81,21 +79,31 @@ def registrations(draw):
     )  # fmt: skip
 
 
-@settings(deadline=None, max_examples=60)
-@given(registrations())
-def test_everything_comes_back_bit_for_bit(registration):
-    with tempfile.TemporaryDirectory() as folder:
-        engine = open_database(str(Path(folder) / "lab.db"))
-        with writing(engine) as connection:
-            register(connection, registration)
-        with writing(engine) as connection:  # the same once more changes nothing
-            register(connection, registration)
-        with reading(engine) as connection:
-            known = read_object(connection, registration.name)
-            for face in registration.layout.faces:
-                objects, faces = faces_at(connection, 1, face.rows, face.columns)
-                assert (objects == known.entry.object_id).all()
-                assert (faces == face.face).all()
+@settings(deadline=None, max_examples=40)
+@given(registration=registrations())
+def test_everything_comes_back_bit_for_bit(database_on, registration):
+    with database_on("sqlite") as url:
+        comes_back(open_database(url), registration)
+
+
+@settings(deadline=None, max_examples=12)
+@given(registration=registrations())
+def test_everything_comes_back_bit_for_bit_from_a_server(database_on, registration):
+    with database_on("postgresql") as url:
+        comes_back(open_database(url), registration)
+
+
+def comes_back(engine, registration):
+    with writing(engine) as connection:
+        register(connection, registration)
+    with writing(engine) as connection:  # the same once more changes nothing
+        register(connection, registration)
+    with reading(engine) as connection:
+        known = read_object(connection, registration.name)
+        for face in registration.layout.faces:
+            objects, faces = faces_at(connection, 1, face.rows, face.columns)
+            assert (objects == known.entry.object_id).all()
+            assert (faces == face.face).all()
     assert same_layout(known.layout, registration.layout)
     assert repr(known.style) == repr(registration.style)  # repr tells -0.0 from 0.0
     assert canonical(known.spec) == canonical(dict(registration.spec))
@@ -132,38 +140,51 @@ def small(name, first, count):
     )  # fmt: skip
 
 
-@settings(deadline=None, max_examples=40)
-@given(steps)
-def test_objects_never_share_a_cell(steps):
+@settings(deadline=None, max_examples=25)
+@given(steps=steps)
+def test_objects_never_share_a_cell(database_on, steps):
+    with database_on("sqlite") as url:
+        shares_no_cell(open_database(url), steps)
+
+
+@settings(deadline=None, max_examples=8)
+@given(steps=steps)
+def test_objects_on_a_server_never_share_a_cell(database_on, steps):
+    with database_on("postgresql") as url:
+        shares_no_cell(open_database(url), steps)
+
+
+def shares_no_cell(engine, steps):
     """Any run of registrations, replacements and removals against a dictionary of sets."""
     held: dict[str, range] = {}
     spec: dict[str, tuple[int, int]] = {}
-    with tempfile.TemporaryDirectory() as folder:
-        engine = open_database(str(Path(folder) / "lab.db"))
-        for step, name, first, count in steps:
-            asked = range(first, first + count)  # equal to any other where it is empty
-            others = {c for other, cells in held.items() if other != name for c in cells}
-            try:
-                with writing(engine) as connection:
-                    if step == "remove":
-                        entry = find_object(connection, name)
-                        if entry is not None:
-                            remove_object(connection, entry.object_id)
-                    else:
-                        replace = step == "replace"
-                        register(connection, small(name, first, count), replace=replace)
-            except DatabaseError:
-                changed = step == "register" and spec.get(name) not in (None, (first, count))
-                assert changed or others & set(asked)
-            else:
-                assert step == "remove" or not others & set(asked)
+    for step, name, first, count in steps:
+        asked = range(first, first + count)  # equal to any other where it is empty
+        others = {c for other, cells in held.items() if other != name for c in cells}
+        try:
+            with writing(engine) as connection:
                 if step == "remove":
-                    held.pop(name, None)
-                    spec.pop(name, None)
+                    entry = find_object(connection, name)
+                    if entry is not None:
+                        remove_object(connection, entry.object_id)
                 else:
-                    held[name], spec[name] = asked, (first, count)
-            with reading(engine) as connection:
-                assert [e.name for e in list_objects(connection)] == sorted(held)
-                rows, columns = occupied(connection, find_array(connection, ARRAY))
-                cells = (rows * 65 + columns).tolist()
-                assert cells == sorted(c for cells in held.values() for c in cells)
+                    replace = step == "replace"
+                    register(connection, small(name, first, count), replace=replace)
+        except DatabaseError:
+            changed = step == "register" and spec.get(name) not in (None, (first, count))
+            assert changed or others & set(asked)
+        else:
+            assert step == "remove" or not others & set(asked)
+            if step == "remove":
+                held.pop(name, None)
+                spec.pop(name, None)
+            else:
+                held[name], spec[name] = asked, (first, count)
+        with reading(engine) as connection:
+            assert [e.name for e in list_objects(connection)] == sorted(held)
+            rows, columns = occupied(connection, find_array(connection, ARRAY))
+            cells = (rows * 65 + columns).tolist()
+            assert cells == sorted(c for cells in held.values() for c in cells)
+            assert held_cells(connection, 1)[:, :2].tolist() == [
+                [cell // 65, cell % 65] for cell in cells
+            ]  # the bits say what the cells say

@@ -54,7 +54,7 @@ def test_help_names_every_option_and_command(capsys):
     assert run(["--help"]) == 0
     text = capsys.readouterr().out
     words = "--output -o --format --database --dry-run --verify --replace --json"
-    words += " SPEC.yaml... init schema printers list"
+    words += " SPEC.yaml... init schema printers list show retire export import"
     for word in (*words.split(), "shape: {cube: 60 mm}", "130 interrupted"):
         assert word in text
     assert run(["-h"]) == 0

@@ -11,7 +11,7 @@ import pytest
 from sqlalchemy import select, text
 
 from generator.database.open import database_exists, open_database
-from generator.database.tables import meta, metadata
+from generator.database.tables import SCHEMA_VERSION, meta, metadata
 from generator.database.transaction import reading, writing
 from generator.database.url import normal_url
 from generator.errors import DatabaseError
@@ -66,7 +66,7 @@ def test_a_new_database_has_all_tables_and_its_version(tmp_path):
     assert path.is_file()
     with reading(engine) as connection:
         stored = [tuple(row) for row in connection.execute(select(meta).order_by(meta.c.key))]
-        assert stored == [("format", "encoded-objects"), ("schema_version", "1")]
+        assert stored == [("format", "encoded-objects"), ("schema_version", str(SCHEMA_VERSION))]
         for table in metadata.sorted_tables:
             connection.execute(select(table)).all()
     assert os.listdir(tmp_path) == [path.name]  # one file, so that it can be copied
@@ -147,7 +147,7 @@ def test_another_programs_database_is_left_alone(tmp_path):
         assert path.read_bytes() == before
 
 
-@pytest.mark.parametrize("version", ["2", "77"])
+@pytest.mark.parametrize("version", ["3", "77"])
 def test_a_newer_schema_is_refused(tmp_path, version):
     path = tmp_path / "lab.db"
     engine = open_database(str(path))
@@ -156,7 +156,7 @@ def test_a_newer_schema_is_refused(tmp_path, version):
             text("UPDATE meta SET value = :v WHERE key = 'schema_version'"), {"v": version}
         )
     said = refused(path)
-    assert f"schema version {version}, newer than 1" in said
+    assert f"schema version {version}, newer than {SCHEMA_VERSION}" in said
     assert "pip install --upgrade" in said
     assert version in refused(path, writable=False)
 

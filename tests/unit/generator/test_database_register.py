@@ -85,8 +85,8 @@ def held(engine):
 
 
 @pytest.fixture
-def engine(tmp_path):
-    return open_database(str(tmp_path / "lab.db"))
+def engine(lab_url):
+    return open_database(lab_url)
 
 
 def test_an_object_comes_back_exactly(engine):
@@ -305,6 +305,10 @@ def test_an_unknown_object_is_named_beside_the_known_ones(engine):
 def test_impossible_registrations_are_refused_before_anything_is_written(engine):
     with pytest.raises(ValueError, match="beyond the array"):
         register_one(engine, cube_on(63 * 65 - 300))
+    nowhere = layout_from(0)
+    nowhere.faces[2].centres_mm[5, 1] = math.nan
+    with pytest.raises(ValueError, match="no place"):
+        register_one(engine, cube_on(0, layout=nowhere))
     with pytest.raises(ValueError, match="mm"):
         register_one(engine, cube_on(0, style=SymbolStyle(pitch_mm=6.0)))
     assert held(engine) == []

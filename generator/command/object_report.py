@@ -1,0 +1,207 @@
+"""What is said about registered objects: as text for people, as plain values for JSON."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.markup import escape
+
+from generator.command import report
+
+if TYPE_CHECKING:
+    from generator.database.carry import Carried
+    from generator.database.part_state import PartState
+    from generator.database.registered import ObjectEntry, RegisteredFace, RegisteredObject
+    from generator.layout.placement import FaceLayout
+
+
+def listed(entries: Sequence[ObjectEntry], url: str, *, as_json: bool) -> None:
+    """Say which objects a database holds."""
+    if as_json:
+        report.write_json({"objects": [_entry_values(e) for e in entries], "database": url})
+        return
+    if not entries:
+        report.write(f"no objects in {url}; make one with: encode-object SPEC.yaml")
+        return
+    titles = ["object", "shape", "faces", "symbols", "array", "pitch", "registered (UTC)"]
+    some_retired = any(entry.retired_utc for entry in entries)
+    table = report.table(*titles, *(["retired (UTC)"] if some_retired else []))
+    for e in entries:
+        array = f"{e.profile} {e.rows}x{e.columns}"
+        counts = str(e.number_of_faces), str(e.symbols)
+        row = [e.name, e.object_type, *counts, array, f"{e.pitch_mm:g} mm", _minute(e.utc)]
+        table.add_row(*map(escape, row + ([_minute(e.retired_utc)] if some_retired else [])))
+    report.show(table)
+
+
+def shown(held: RegisteredObject, files: Sequence[PartState], url: str, *, as_json: bool) -> None:
+    """Say all about one object."""
+    if as_json:
+        report.write_json(_object_values(held, files) | {"database": url})
+        return
+    e, style, alphabet = held.entry, held.style, held.alphabet.get("name", "")
+    lengths = f"height {style.height_mm:g}, stroke {style.stroke_mm:g}"
+    lines = [
+        f"{e.name}: {e.object_type}, {e.number_of_faces} faces, {e.symbols} symbols",
+        f"  array        {e.profile} {e.rows}x{e.columns}, layout {held.layout.kind}",
+        f"  symbols      {alphabet}, pitch {style.pitch_mm:g}, {lengths} mm",
+        f"  registered   {_minute(e.utc)} UTC by version {e.tool_version}, spec {e.spec_hash[:12]}",
+    ]
+    if e.imported_from:
+        lines.append(f"  imported     {_minute(e.imported_utc)} UTC from {e.imported_from}")
+    if e.retired_utc:
+        lines.append(f"  retired      {_minute(e.retired_utc)} UTC; its cells stay taken")
+    lines += [f"  warning      {warning}" for warning in held.layout.warnings]
+    report.write("\n".join(lines))
+    table = report.table("face", "outline", "area", "symbols", "places", "first cell")
+    for face, on in _faces(held):
+        first = f"({on.rows[0]}, {on.columns[0]})" if len(on.rows) else "blank"
+        counts = str(len(on.rows)), str(on.places)
+        row = face.name, face.face_type, f"{face.area_mm2:.0f} mm2", *counts, first
+        table.add_row(*map(escape, row))
+    report.show(table)
+    if not files:
+        report.write("no files are registered")
+        return
+    table = report.table("part", "format", "state", "file")
+    for each in files:
+        table.add_row(*map(escape, (each.part.name, each.part.format, each.state, str(each.path))))
+    report.show(table)
+    if any(each.state != "ok" for each in files):
+        report.write("files that are not ok: make them again from the same spec, on the same cells")
+
+
+def retired(entries: Sequence[ObjectEntry], done: str, url: str, *, as_json: bool) -> None:
+    """Say that objects were `removed`, `restored` or `retired`."""
+    if as_json:
+        report.write_json({done: [_entry_values(e) for e in entries], "database": url})
+        return
+    cells = {
+        "removed": "are free again",
+        "restored": "were taken all the time",
+        "retired": "stay taken",
+    }
+    for entry in entries:
+        report.write(f"{entry.name}: {done}; its {entry.symbols} cells {cells[done]}")
+
+
+def warning_before(entries: Sequence[ObjectEntry]) -> str:
+    """Return what is to be known before objects are removed."""
+    lines = [
+        f"{e.name}: {e.number_of_faces} faces, {e.symbols} cells, registered {_minute(e.utc)} UTC"
+        for e in entries
+    ]
+    lines.append("Parts of them that still exist will be taken for other objects.")
+    return "\n".join(lines) + "\n"
+
+
+def exported(done: Carried, file: Path, url: str, *, as_json: bool) -> None:
+    """Say what was exported, and what the other lab does with it."""
+    if as_json:
+        report.write_json({"exported": list(done.copied), "file": str(file), "database": url})
+        return
+    there = f"in the other lab: encode-object import {file.name}"
+    report.write(f"{_counted(done.copied)} of {url} exported to {file}; {there}")
+
+
+def imported(done: Carried, url: str, *, dry_run: bool, as_json: bool) -> None:
+    """Say what was imported, what was there already, and what was refused."""
+    if as_json:
+        values = {
+            "imported": list(done.copied),
+            "known": list(done.known),
+            "refused": [{"name": r.name, "cause": r.cause, "fix": r.fix} for r in done.refused],
+        }
+        report.write_json(values | {"dry_run": dry_run, "database": url})
+        return
+    verb = "would be imported" if dry_run else "imported"
+    report.write("\n  ".join([f"{_counted(done.copied)} {verb} into {url}", *done.copied]))
+    if done.known:
+        report.write(f"{_counted(done.known)} known already, left as they are")
+    for each in done.refused:
+        report.message(f"refused: '{each.name}' {each.cause}\n  fix: {each.fix}", "refused:")
+
+
+def _counted(names: Sequence[str]) -> str:
+    return "1 object" if len(names) == 1 else f"{len(names)} objects"
+
+
+def _faces(held: RegisteredObject) -> list[tuple[RegisteredFace, FaceLayout]]:
+    """Return the faces of an object with their symbols; layouts may be in another order."""
+    layouts = {layout.face: layout for layout in held.layout.faces}
+    return [(face, layouts[face.face_id]) for face in held.faces if face.face_id in layouts]
+
+
+def _entry_values(entry: ObjectEntry) -> dict[str, Any]:
+    """Return one line of the list as plain values."""
+    return {
+        "name": entry.name,
+        "shape": entry.object_type,
+        "faces": entry.number_of_faces,
+        "symbols": entry.symbols,
+        "profile": entry.profile,
+        "array": {"rows": entry.rows, "columns": entry.columns},
+        "pitch_mm": entry.pitch_mm,
+        "spec_hash": entry.spec_hash,
+        "tool_version": entry.tool_version,
+        "utc": entry.utc,
+        "retired_utc": entry.retired_utc or None,
+    }
+
+
+def _object_values(held: RegisteredObject, files: Sequence[PartState]) -> dict[str, Any]:
+    """Return all about an object as plain values; `faces` are the faces, not their number."""
+    entry = held.entry
+    return _entry_values(entry) | {
+        "faces": [_face_values(face, on) for face, on in _faces(held)],
+        "layout": held.layout.kind,
+        "warnings": list(held.layout.warnings),
+        "files": [
+            {
+                "part": each.part.name,
+                "format": each.part.format,
+                "file": str(each.path),
+                "sha256": each.part.sha256,
+                "state": each.state,
+            }
+            for each in files
+        ],
+        "provenance": {
+            "tool_version": entry.tool_version,
+            "spec_hash": entry.spec_hash,
+            "utc": entry.utc,
+            "spec": held.spec,
+            "imported_from": entry.imported_from or None,
+            "imported_utc": entry.imported_utc or None,
+        },
+    }
+
+
+def _face_values(face: RegisteredFace, on: FaceLayout) -> dict[str, Any]:
+    """Return a face as plain values; each cell is row, column, label."""
+    place = face.placement
+    cells = zip(on.rows.tolist(), on.columns.tolist(), on.labels.tolist(), strict=True)
+    return {
+        "name": face.name,
+        "type": face.face_type,
+        "area_mm2": face.area_mm2,
+        "symbols": len(on.labels),
+        "places": on.places,
+        "placement": None
+        if place is None
+        else {
+            "row": place.row,
+            "column": place.column,
+            "rotation_deg": math.degrees(place.rotation_rad),
+            "x_mm": place.x_mm,
+            "y_mm": place.y_mm,
+        },
+        "cells": [list(cell) for cell in cells],
+    }
+
+
+def _minute(utc: str) -> str:
+    return utc[:16].replace("T", " ")

@@ -1,0 +1,205 @@
+"""`encode-object list | show | retire | export | import`: the objects of a lab's database."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from generator.command import Action
+
+app = typer.Typer(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, also for errors.")]
+Database = Annotated[
+    str, typer.Option(metavar="URL", help="lab.db, sqlite:///lab.db, postgresql://host/name.")
+]
+Only = Annotated[
+    list[str] | None,
+    typer.Option("--object", metavar="NAME", show_default=False,
+                 help="Only this one; may be given several times."),
+]  # fmt: skip
+LAB = "sqlite:///lab.db"
+
+
+@app.command(name="list")
+def list_(database: Database = LAB, as_json: Json = False) -> Action:
+    """Print the objects that a database holds."""
+
+    def action() -> int:
+        from generator.command import object_report
+        from generator.database.open import open_database
+        from generator.database.read import list_objects
+        from generator.database.transaction import reading
+        from generator.spec.option import database_option
+
+        url = database_option(database)
+        with reading(open_database(url, writable=False)) as connection:
+            entries = list_objects(connection)
+        object_report.listed(entries, url, as_json=as_json)
+        return 0
+
+    return action
+
+
+@app.command()
+def show(
+    name: Annotated[str, typer.Argument(metavar="OBJECT", help="As `list` names it.")],
+    database: Database = LAB,
+    as_json: Json = False,
+) -> Action:
+    """Print all about one object: faces, cells, origin, files and whether they are unchanged."""
+
+    def action() -> int:
+        from generator.command import object_report
+        from generator.database.open import open_database
+        from generator.database.part_state import part_state
+        from generator.database.read import read_object
+        from generator.database.transaction import reading
+        from generator.spec.option import database_option
+
+        url = database_option(database)
+        engine = open_database(url, writable=False)
+        with reading(engine) as connection:
+            held = read_object(connection, name)
+        files = [part_state(engine.url, part) for part in held.parts]
+        object_report.shown(held, files, url, as_json=as_json)
+        return 0
+
+    return action
+
+
+@app.command()
+def retire(
+    names: Annotated[list[str], typer.Argument(metavar="OBJECT...", help="As `list` names them.")],
+    database: Database = LAB,
+    free: Annotated[
+        bool, typer.Option("--free", help="Remove it and free its cells for other objects."),
+    ] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Confirm --free without a question.")] = False,
+    undo: Annotated[bool, typer.Option("--undo", help="Bring retired objects back.")] = False,
+    as_json: Json = False,
+) -> Action:  # fmt: skip
+    """Take objects out of use; their cells stay taken, so that no other object is mistaken.
+
+    With --free an object is removed altogether: destroy its parts first, since a touch on one
+    will name whichever object gets the cells.
+    """
+
+    def action() -> int:
+        from generator.command import object_report
+        from generator.database import retire as change
+        from generator.database.open import existing_database
+        from generator.database.race import in_turn
+        from generator.spec.option import database_option
+
+        if free and undo:
+            raise typer.BadParameter("--free and --undo exclude each other")
+        url = database_option(database)
+        engine = existing_database(url)
+        if free and not yes:
+            _confirm(url, names, as_json=as_json)
+        do = change.remove if free else change.restore if undo else change.retire
+        unique = tuple(dict.fromkeys(names))
+        entries = in_turn(engine, lambda connection: [do(connection, name) for name in unique])
+        done = "removed" if free else "restored" if undo else "retired"
+        object_report.retired(entries, done, url, as_json=as_json)
+        return 0
+
+    return action
+
+
+@app.command()
+def export(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The database file to write.")],
+    database: Database = LAB,
+    objects: Only = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
+    as_json: Json = False,
+) -> Action:
+    """Write objects into a file for another lab: a database, without the files of parts."""
+
+    def action() -> int:
+        from generator.command import object_report
+        from generator.database.exchange import export_objects
+        from generator.spec.option import database_option
+
+        url = database_option(database)
+        done = export_objects(url, file, names=objects or (), force=force)
+        object_report.exported(done, file, url, as_json=as_json)
+        return 0
+
+    return action
+
+
+@app.command(name="import")
+def import_(
+    file: Annotated[str, typer.Argument(metavar="FILE", help="What another lab exported.")],
+    database: Database = LAB,
+    objects: Only = None,
+    rename: Annotated[
+        list[str] | None,
+        typer.Option("--rename", metavar="OLD=NEW", show_default=False,
+                     help="Another name here; may be given several times."),
+    ] = None,
+    skip_refused: Annotated[
+        bool, typer.Option("--skip-refused", help="Import the others where some cannot be."),
+    ] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Say what would be imported; change nothing."),
+    ] = False,
+    as_json: Json = False,
+) -> Action:  # fmt: skip
+    """Take over the objects of another lab on the cells that they have: all of them, or none.
+
+    An object is refused when another one here holds one of its cells or its name. One that is
+    here already, the same, is left as it is.
+    """
+
+    def action() -> int:
+        from generator.command import object_report
+        from generator.database.exchange import import_objects
+        from generator.spec.option import database_option
+
+        url = database_option(database)
+        done = import_objects(
+            url,
+            file,
+            names=objects or (),
+            renamed=dict(_renaming(given) for given in rename or ()),
+            skip_refused=skip_refused,
+            dry_run=dry_run,
+        )
+        object_report.imported(done, url, dry_run=dry_run, as_json=as_json)
+        return 0
+
+    return action
+
+
+def _confirm(url: str, names: list[str], *, as_json: bool) -> None:
+    """Ask before cells are freed; leave when the answer is no."""
+    from generator.command import object_report
+    from generator.database.open import open_database
+    from generator.database.read import existing
+    from generator.database.transaction import reading
+
+    with reading(open_database(url, writable=False)) as connection:
+        entries = [existing(connection, name) for name in dict.fromkeys(names)]
+    if as_json or not sys.stdin.isatty():
+        raise typer.BadParameter("--free removes objects for good; confirm it with --yes")
+    sys.stderr.write(object_report.warning_before(entries))
+    if not typer.confirm("Remove them and free their cells?", err=True):
+        raise typer.Exit(1)
+
+
+def _renaming(given: str) -> tuple[str, str]:
+    old, _, new = given.rpartition("=")
+    if not old or not new.strip():
+        raise typer.BadParameter(f"--rename takes OLD=NEW, not '{given}'")
+    return old, new.strip()

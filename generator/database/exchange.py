@@ -1,0 +1,191 @@
+"""Export objects into a file of their own, and import them in another lab.
+
+An exported file is a database like any other (SQLite), whatever engine it comes from: every
+command reads it. Importing works on a copy, so that a file is never changed, whichever
+schema version it has, and brings in all objects or none. Files of parts are not carried:
+they are named from where they lie, and made again from the same spec on the same cells.
+"""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager, suppress
+from datetime import UTC, datetime
+from pathlib import Path
+
+from sqlalchemy import URL, Connection, Engine
+
+from generator.database.carry import Carried, Origin, carry
+from generator.database.migrate import snapshot
+from generator.database.open import database_exists, open_database
+from generator.database.race import in_turn
+from generator.database.transaction import place_of, reading, writing
+from generator.database.url import normal_url
+from generator.errors import DatabaseError
+
+
+def export_objects(
+    url: str, file: Path, *, names: Sequence[str] = (), force: bool = False
+) -> Carried:
+    """Write objects of a database into a new database file, whole or not at all.
+
+    Parameters
+    ----------
+    names
+        Which objects; empty for all.
+    force
+        Replace a file that is there.
+
+    Raises
+    ------
+    DatabaseError
+        No object has a name asked for, the file is there already or cannot be written.
+    """
+    engine = open_database(url, writable=False)
+    file = file.absolute()
+    if _same(engine.url, normal_url(str(file))):
+        raise DatabaseError(
+            "a database cannot be exported into itself",
+            fix="name another file, such as for-the-other-lab.db",
+            place=str(file),
+        )
+    if file.exists() and not force:
+        fix = "choose another name, or replace it with --force"
+        raise DatabaseError("the file is there already", fix=fix, place=str(file))
+    if not file.parent.is_dir():
+        fix = f"make it with: mkdir -p {file.parent}"
+        raise DatabaseError(f"folder {file.parent} does not exist", fix=fix, place=str(file))
+    beside = file.with_name(f".{file.name}.{os.getpid()}")
+    try:
+        made = open_database(str(beside))
+        homes = (engine.url, normal_url(str(file)))
+        with reading(engine) as source, writing(made) as target:
+            carried = carry(source, target, names=names, homes=homes)
+        if force:
+            beside.replace(file)
+        else:
+            os.link(beside, file)  # fails, unlike a rename, if the file has come up meanwhile
+    except OSError as error:
+        fix = "choose a folder that may be written"
+        raise DatabaseError(f"cannot write: {error.strerror}", fix=fix, place=str(file)) from error
+    finally:
+        beside.unlink(missing_ok=True)
+    return carried
+
+
+def import_objects(
+    url: str,
+    given: str,
+    *,
+    names: Sequence[str] = (),
+    renamed: Mapping[str, str] | None = None,
+    skip_refused: bool = False,
+    dry_run: bool = False,
+) -> Carried:
+    """Bring the objects of another database into this one.
+
+    Parameters
+    ----------
+    url
+        The database that receives them; made when it is new.
+    given
+        A file or URL that holds them; it is not changed.
+    names, renamed
+        Which objects (empty for all), and their new names by their old ones.
+    skip_refused
+        Import the others where some are refused.
+    dry_run
+        Say what would be done, and do nothing.
+
+    Raises
+    ------
+    DatabaseError
+        An object is refused: its cells or its name are held here, or it was damaged.
+    """
+    home = normal_url(given)
+    engine_home = normal_url(url)
+    if _same(home, engine_home):
+        fix = "name the file that another lab exported"
+        raise DatabaseError("a database cannot be imported into itself", fix=fix, place=given)
+    from_file = home.get_backend_name() == "sqlite"
+    name = Path(home.database or "").name if from_file else place_of(home)
+    origin = Origin(name, datetime.now(UTC).isoformat(timespec="seconds"))
+    with _opened(home) as source_engine, reading(source_engine) as source:
+
+        def work(target: Connection) -> Carried:
+            return carry(
+                source,
+                target,
+                names=names,
+                renamed=renamed,
+                origin=origin,
+                skip_refused=skip_refused,
+                homes=(home, engine_home),
+            )
+
+        if not database_exists(url):  # what is refused leaves no database behind
+            with tempfile.TemporaryDirectory() as folder:
+                carried = in_turn(open_database(str(Path(folder) / "lab.db")), work)
+            if dry_run:
+                return carried
+        return (
+            _rehearsed(open_database(url), work) if dry_run else in_turn(open_database(url), work)
+        )
+
+
+class _RehearsedError(Exception):
+    """Undoes a transaction whose outcome is known."""
+
+
+def _rehearsed(engine: Engine, work: Callable[[Connection], Carried]) -> Carried:
+    outcome: list[Carried] = []
+
+    def undone(target: Connection) -> None:
+        outcome.append(work(target))
+        raise _RehearsedError
+
+    with suppress(_RehearsedError):
+        in_turn(engine, undone)
+    return outcome[-1]
+
+
+@contextmanager
+def _opened(home: URL) -> Iterator[Engine]:
+    """Open a database that is not changed: of a file, a copy of its own."""
+    url = home.render_as_string(hide_password=False)
+    if home.get_backend_name() != "sqlite":
+        yield open_database(url, writable=False)
+        return
+    path = Path(home.database or "").absolute()
+    if not database_exists(url):
+        there = "no objects are registered here" if path.exists() else "this file does not exist"
+        fix = "name a file that was written by: encode-object export FILE"
+        raise DatabaseError(there, fix=fix, place=str(path))
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / "lab.db"
+        try:
+            snapshot(path, copy)
+            with closing(sqlite3.connect(copy)) as plain:
+                said = plain.execute("PRAGMA integrity_check").fetchone()[0]
+                lost = plain.execute("PRAGMA foreign_key_check").fetchone()
+        except sqlite3.Error as error:
+            said, lost = str(error), None
+        if said != "ok" or lost:
+            cause = (
+                f"the file is damaged: {said if said != 'ok' else f'rows of {lost[0]} are lost'}"
+            )
+            raise DatabaseError(cause, fix="export it once more", place=str(path))
+        yield open_database(str(copy), writable=False, keep_older=False)
+
+
+def _same(one: URL, other: URL) -> bool:
+    """Whether two URLs name one database."""
+    if one == other:
+        return True
+    if {one.get_backend_name(), other.get_backend_name()} != {"sqlite"}:
+        return False
+    paths = Path(one.database or ""), Path(other.database or "")
+    return all(path.exists() for path in paths) and paths[0].samefile(paths[1])

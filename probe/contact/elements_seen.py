@@ -1,0 +1,122 @@
+"""Whether the nodes of a pad's top saw the surface that lies under it.
+
+Heights are asked at the nodes alone, so a stroke thinner than the mesh can lie between them, or
+count as if it were as wide as the mesh. Once the touch is solved, lines with many points run
+through the nodes, along x and along y, and find both. mm, sensor frame.
+"""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.contact.contract import Touch
+from probe.contact.elements_line import Array
+from probe.errors import ContactError
+from probe.surface.contract import Surface
+
+Value = TypeVar("Value", np.float64, np.bool_)
+
+STEP_MM = 0.01  #: between the points of a line, the thinnest stroke that a face can carry
+POINTS = 4000  #: of a line, at most
+LINES = 70  #: each way, at most
+COVERED = 0.25  #: of the place of a node that bears alone: less is not the node's to bear
+
+
+def heights_at(surface: Surface, touch: Touch, points: Array) -> Array:
+    """Return heights (n,) at points (n, 2) of the sensor frame.
+
+    Raises
+    ------
+    ContactError
+        For heights that are no numbers, or +inf.
+    """
+    heights = np.asarray(surface.heights_mm(touch.on_surface(points)), dtype=np.float64)
+    if heights.shape != (len(points),) or not (heights < np.inf).all():
+        raise ContactError(
+            "the surface gives heights that are no numbers",
+            fix="give a finite height at each point, or -inf where there is no matter",
+        )
+    return heights
+
+
+def refuse_unseen(
+    surface: Surface,
+    touch: Touch,
+    lines: tuple[Array, Array],
+    heights_mm: Array,
+    top_mm: Array,
+    bears: NDArray[np.bool_],
+    slack_mm: float,
+) -> None:
+    """Refuse a touch whose strokes are too thin for the mesh.
+
+    Parameters
+    ----------
+    lines
+        (mx,) and (my,) coordinates of the nodes, ascending.
+    heights_mm
+        (mx, my) of the surface at the nodes.
+    top_mm
+        (mx, my) of the pressed top at the nodes.
+    bears
+        (mx, my) nodes that bear a force.
+    slack_mm
+        Strokes that stand out by less are roughness.
+
+    Raises
+    ------
+    ContactError
+        When something lies between the nodes, or a node bears for a thinner stroke.
+    """
+    x, y = lines
+    for along, across, swapped in ((x, y, False), (y, x, True)):
+        rows = np.arange(across.size)[:: -(-across.size // LINES)]
+        seen, top = ((grid if swapped else grid.T)[rows] for grid in (heights_mm, top_mm))
+        bearing = (bears if swapped else bears.T)[rows]
+        fine = _places(along)
+        points = np.stack(np.meshgrid(fine, across[rows]), axis=-1)
+        asked = points[..., ::-1] if swapped else points
+        found = heights_at(surface, touch, asked.reshape(-1, 2)).reshape(points.shape[:2])
+        after = np.searchsorted(along, fine)
+        # What a node beside it bears is no more than an edge that is not on a line of the mesh.
+        around = _highest(top)
+        hidden = found > np.maximum(around[:, after - 1], around[:, after]) + slack_mm
+        # A node that stands out of both of its neighbours has at least its place's share there.
+        beside = np.pad(seen, ((0, 0), (1, 1)), constant_values=-np.inf)
+        lower = np.maximum(beside[:, :-2], beside[:, 2:])
+        ridge = bearing & (seen > lower + slack_mm)
+        nearest = np.searchsorted((along[1:] + along[:-1]) / 2, fine)
+        starts = np.searchsorted(nearest, np.arange(along.size))
+        half = np.where(np.isfinite(lower), (lower + seen) / 2, lower)
+        there = np.add.reduceat(found > half[:, nearest], starts, axis=1)
+        full = there >= COVERED * np.diff(np.append(starts, fine.size))
+        thin = ridge & ~full & ~_highest(bearing & full)
+        if hidden.any() or thin.any():
+            height = found[hidden].max() if hidden.any() else seen[thin].max()
+            raise ContactError(
+                f"strokes that rise to {height:.4g} mm are too thin for a mesh with nodes "
+                f"{np.diff(along).max():.2g} mm apart",
+                fix="give the strokes' walls_mm, more elements per_tactel, or take level layer",
+            )
+
+
+def _places(along: Array) -> Array:
+    """Return points along a line of nodes, several around each, ascending, ends left out."""
+    parts = np.clip(np.ceil(np.diff(along) / STEP_MM), 4, POINTS // along.size).astype(int)
+    return np.concatenate(
+        [
+            a + (b - a) * (np.arange(n) + 0.5) / n
+            for a, b, n in zip(along[:-1], along[1:], parts, strict=True)
+        ]
+    )
+
+
+def _highest(rows: NDArray[Value]) -> NDArray[Value]:
+    """Return the largest of each value and those in the rows before and after it."""
+    found = rows.copy()
+    np.maximum(found[1:], rows[:-1], out=found[1:])
+    np.maximum(found[:-1], rows[1:], out=found[:-1])
+    return found

@@ -1,0 +1,1 @@
+"""The closed loop: touches of written parts, simulated, read, and compared with the truth."""

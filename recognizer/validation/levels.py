@@ -1,0 +1,118 @@
+"""How bad sensors and prints are: distributions, and what a sensor of them reads.
+
+Level + surface + touch -> counts of the 16x16 matrix. None of it is known to the reader: the
+contact is that of `probe.contact`, not of the reader's template, and a sensor is drawn anew
+for every touch. `MISMATCH` is wrong in everything at once: strokes printed too wide, a scale
+that is off, tabs of other lengths at other places, a force law that is not the one taken
+off, tactels that hear their neighbours.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.contact.contract import Contact, Touch
+from probe.contact.press import press
+from probe.contact.tabs import tabs
+from probe.contact.tips import Tips
+from probe.sensor import Sensor
+from probe.surface.contract import Surface
+
+Array = NDArray[np.float64]
+
+COUNTS_PER_N = 150.0  #: of a tactel under small forces
+FULL = 1023  #: counts, 10 bits
+BIAS = 8.0  #: counts of an unloaded tactel
+POINTS = 19  #: on each tab
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """Standard deviations over the tactels, and what is wrong with all of them."""
+
+    name: str
+    gain: float  #: of the logarithm of the force
+    length_mm: float  #: of the tabs
+    noise_n: float  #: of a reading
+    shift_mm: float = 0.0  #: of the tabs' places, each way
+    dead: int = 0  #: tactels that read nothing, unknown to the reader
+    exponent: float = 1.0  #: reading ~ force^exponent
+    cross_talk: float = 0.0  #: tactels, width of the bell by which neighbours are heard
+    wider_mm: float = 0.0  #: strokes
+    scale: float = 0.0  #: of the print, less 1
+
+
+LOW = Level("low", gain=0.05, length_mm=0.0, noise_n=0.01)
+TYPICAL = Level("typical", gain=0.10, length_mm=0.03, noise_n=0.02, dead=1)
+HARD = Level("hard", gain=0.15, length_mm=0.05, noise_n=0.03, dead=3)
+MISMATCH = Level(
+    "mismatch", gain=0.12, length_mm=0.08, noise_n=0.03, shift_mm=0.12, exponent=0.8,
+    cross_talk=0.45, wider_mm=0.2, scale=0.01,
+)  # fmt: skip
+LEVELS = {level.name: level for level in (LOW, TYPICAL, HARD, MISMATCH)}
+
+
+@dataclass(frozen=True, slots=True)
+class Printed:
+    """A surface as a printer leaves it: everything wider by a stroke's excess, and scaled."""
+
+    surface: Surface
+    wider_mm: float
+    scale: float
+    about_mm: tuple[float, float]  #: point that the scale leaves where it is
+
+    @property
+    def top_mm(self) -> float:
+        """Height of the highest point."""
+        return self.surface.top_mm
+
+    def heights_mm(self, points_mm: Array) -> Array:
+        """Return the highest place within half the excess of each point."""
+        centre = np.array(self.about_mm)
+        at = (points_mm - centre) / (1 + self.scale) + centre
+        highest = self.surface.heights_mm(at)
+        if self.wider_mm > 0:
+            for turn in range(4):
+                angle = turn * math.pi / 2
+                by = self.wider_mm / 2 * np.array([math.cos(angle), math.sin(angle)])
+                highest = np.maximum(highest, self.surface.heights_mm(at + by))
+        return highest
+
+
+def read(
+    surface: Surface, sensor: Sensor, touch: Touch, level: Level, rng: np.random.Generator
+) -> tuple[NDArray[np.uint16], Contact]:
+    """Return the counts (rows, columns) of a sensor drawn from a level, and the contact.
+
+    Raises
+    ------
+    ContactError
+        The touch has no equilibrium.
+    """
+    shape = (sensor.rows, sensor.columns)
+    if level.wider_mm > 0 or level.scale != 0:
+        about = (touch.x_mm, touch.y_mm)
+        surface = Printed(surface, level.wider_mm, level.scale, about)
+    if sensor.overlay.kind == "tab":
+        tips = Tips(
+            points=POINTS,
+            lengths_mm=level.length_mm * rng.standard_normal(shape),
+            shifts_mm=level.shift_mm * rng.standard_normal((*shape, 2)),
+        )
+        contact = tabs(surface, sensor, touch, tips)
+    else:
+        contact = press(surface, sensor, touch)
+    forces = contact.forces_n
+    if level.cross_talk > 0:
+        from scipy.ndimage import gaussian_filter
+
+        forces = gaussian_filter(forces, level.cross_talk, mode="nearest")
+    forces = np.exp(level.gain * rng.standard_normal(shape)) * forces**level.exponent
+    forces = forces + level.noise_n * rng.standard_normal(shape)
+    forces.reshape(-1)[rng.permutation(forces.size)[: level.dead]] = 0.0
+    counts = np.clip(np.rint(BIAS + COUNTS_PER_N * forces), 0, FULL)
+    return counts.astype(np.uint16), contact

@@ -1,0 +1,297 @@
+"""Mosaics of raster scans of cubes, against the truth of the simulation and the thesis's way.
+
+    python tests/bench/recognizer_mosaic.py --errors 0.5 1 2 --seed 1
+    python tests/bench/recognizer_mosaic.py --profiles one-touch --readings counts
+
+An 80 mm cube of each profile is encoded, one face is touched every 4.25 tactels (100 touches)
+by an arm whose joints have noise and backlash, scaled so that the believed places err by so
+many tactels (rms); 80 N within 10 %, half a degree of tilt, 10 % spread of gain from tactel to
+tactel, 0.02 N of noise, one dead tactel; or counts of the simulated board. All lengths are in
+tactels of 1.5875 mm. Lines:
+
+    pairs       neighbours at most 4.6 tactels apart, from what the arm believes of both
+    chain       each touch laid on the one before it (or above it), errors about the first
+    mosaic      shape error after the best rigid motion; absolute error in the frame
+    decoded     the same with decoded places: every touch, or one in twelve
+    steps       no arm: steps that err by half a tactel and half a degree each
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import tempfile
+import time
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from generator.pipeline import encode
+from generator.spec import read_specs
+from probe.arm.links import Arm
+from probe.circuit import Electronics, fsr_of, read_counts
+from probe.contact.contract import Touch
+from probe.contact.press import press
+from probe.scan.kinesthetic import JointErrors, Kinesthetic, kinesthetic
+from probe.scan.places import surface_to_sensor
+from probe.scan.raster import raster
+from probe.sensor import Sensor
+from probe.simulate.registered import registered_object, registered_surface
+from recognizer.lab import open_lab
+from recognizer.mosaic.grow import added, settled
+from recognizer.mosaic.mosaic import Mosaic, MosaicSettings, no_touches, outliers
+from recognizer.mosaic.pair import registered
+from recognizer.mosaic.patch import Patch, patch_of
+from recognizer.mosaic.planar import (
+    between,
+    between_covariance,
+    composed,
+    planar_covariance,
+    planar_pose,
+    wrapped,
+)
+from recognizer.mosaic.product import product_shift
+from recognizer.mosaic.touch import Placed, PlacedTouch, decoded_place, placed
+from recognizer.pipeline import reader_for, recognise
+from recognizer.signal import Signal, signal_of
+
+SPECS = Path(__file__).parents[2] / "fixtures" / "specs"
+SENSOR = Sensor()
+P = SENSOR.pitch_mm
+DEG = math.pi / 180
+PITCH_MM = {"thesis": 12.0, "one-touch": 7.0}
+#: The face before the arm, and the frame that the operator taught, a little beside it.
+T_BASE_FACE = surface_to_sensor(260.0, -40.0, 0.0, 100.0)
+T_BASE_PLANE = surface_to_sensor(256.0, -37.0, 1.5 * DEG, 100.0)
+
+
+@dataclass
+class Scan:
+    """What was felt, believed and true."""
+
+    signals: list[Signal]
+    believed: list[Placed]  #: in the plane that the operator taught
+    true: np.ndarray  #: (n, 3) T_face_sensor
+    pitch_mm: float
+
+
+def scanned(database: str, name: str, pitch_mm: float, tactels: float, counts: bool, seed: int):
+    """Return a scan of the first face."""
+    rng = np.random.default_rng(seed)
+    surface = registered_surface(database, name).surface
+    face = registered_object(database, name).faces[0]
+    plan = raster([loop[:, :2] for loop in face.polygon_mm])
+    stands = [T_BASE_FACE @ surface_to_sensor(x, y, 0.0) for x, y in plan.places_mm.tolist()]
+    track = moved_arm(stands, tactels, seed)
+    gains = np.exp(rng.normal(0, 0.1, (16, 16)))
+    dead = np.ones((16, 16))
+    dead.flat[rng.integers(256)] = 0
+    fsr, state, signals, true = fsr_of(), None, [], []
+    for stand in track.true:
+        pose = planar_pose(np.linalg.inv(T_BASE_FACE) @ stand)
+        tilt = rng.uniform(-0.5, 0.5, 2) * DEG
+        touch = Touch(*pose.tolist(), 80 * rng.uniform(0.9, 1.1), *tilt.tolist())
+        forces = press(surface, SENSOR, touch).forces_n
+        if counts:
+            read, _ = read_counts(forces, Electronics(), fsr, state, rng)
+            signals.append(signal_of(read.astype(float)))
+        else:
+            read = np.maximum(forces * gains + rng.normal(0, 0.02, (16, 16)), 0)
+            signals.append(signal_of(read, trust=dead, floor=0.0, least=0.1, newtons=True))
+        true.append(pose)
+    back = np.linalg.inv(T_BASE_PLANE)
+    believed = []
+    for stand, covariance in zip(track.believed, track.covariance, strict=True):
+        spread = planar_covariance(covariance, back[:3, :3])
+        believed.append(placed(back @ stand, spread))
+    return Scan(signals, believed, np.array(true), pitch_mm)
+
+
+def moved_arm(stands, tactels: float, seed: int) -> Kinesthetic:
+    """Follow a scan, lifted between touches, with joint errors of the wanted size."""
+    lift = surface_to_sensor(0, 0, 0, 10.0)
+    path = [pose for stand in stands for pose in (lift @ stand, stand)]
+    scale = 1.0
+    for _ in range(3):
+        errors = JointErrors((3e-4 * scale,) * 5, (1e-3 * scale,) * 5)
+        track = kinesthetic(Arm(), path, errors, np.random.default_rng(seed))
+        away = (track.true - track.believed)[1::2, :2, 3]
+        scale *= tactels * P / math.sqrt(float((away**2).sum(axis=1).mean()))
+    return Kinesthetic(*(getattr(track, name)[1::2] for name in track.__dataclass_fields__))
+
+
+def rms(values) -> float:
+    """Return the root mean square."""
+    return float(np.sqrt(np.mean(np.square(values)))) if len(values) else math.nan
+
+
+def shape_errors(poses: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """Return distances (n,), tactels, after the rigid motion that fits best."""
+    a, b = poses[:, :2] - poses[:, :2].mean(0), true[:, :2] - true[:, :2].mean(0)
+    angle = math.atan2(float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum()), float((a * b).sum()))
+    c, s = math.cos(angle), math.sin(angle)
+    return np.hypot(*(b - a @ np.array([[c, s], [-s, c]])).T) / P
+
+
+def pairs(scan: Scan, patches: list[Patch]) -> None:
+    """Print pair registration, ours and the thesis's, and the drift of chains of them."""
+    at = np.array([place.pose for place in scan.believed])
+    ours, theirs, turns, inside, why = [], [], [], [], Counter()
+    ms, their_ms, links = 0.0, 0.0, {}
+    for b in range(len(at)):
+        for a in range(b):
+            if math.hypot(*(at[b] - at[a])[:2]) > 4.6 * P:
+                continue
+            true = between(scan.true[a], scan.true[b])
+            belief = between(at[a], at[b])
+            sure = between_covariance(
+                at[a], at[b], scan.believed[a].covariance, scan.believed[b].covariance
+            )
+            start = time.process_time()
+            found = registered(patches[a], patches[b], belief, sure, period_mm=scan.pitch_mm)
+            ms += time.process_time() - start
+            start = time.process_time()
+            window = min(7.5, 3 * math.sqrt(max(sure[0, 0], sure[1, 1])) / P)
+            forces = [np.asarray(scan.signals[k].forces) for k in (a, b)]
+            shift = product_shift(*forces, tuple(belief[:2] / P), window)
+            their_ms += time.process_time() - start
+            theirs.append(math.hypot(*(shift - true[:2] / P)))
+            why[found.reason] += 1
+            links[a, b] = found.pose, np.append(shift * P, belief[2])
+            if found:
+                away = found.pose - true
+                ours.append(math.hypot(*away[:2]) / P)
+                turns.append(away[2] / DEG)
+                inside.append(float(away @ np.linalg.solve(found.covariance, away)) < 7.815)
+    for name, errors, each in (("ours", ours, ms), ("product", theirs, their_ms)):
+        errors = np.array(errors)
+        near = errors[errors <= 1]
+        print(
+            f"  pairs   {name:8} median {np.median(errors):.3f}  rms (<= 1) {rms(near):.3f}  "
+            f"wrong lock {(errors > 1).mean():.4f}  {1e3 * each / sum(why.values()):.1f} ms"
+        )
+    print(
+        f"          undefined {1 - why[''] / sum(why.values()):.3f} {dict(why)}  turn rms "
+        f"{rms(turns):.2f} deg  in 95 % ellipse {np.mean(inside):.3f}"
+    )
+    for number, name in enumerate(("ours", "product")):
+        print(f"  chain   {name:8} rms {rms(chained(links, scan, number)):.2f}")
+
+
+def chained(links, scan: Scan, number: int) -> list[float]:
+    """Return errors, tactels, when each touch is laid on the nearest one before it."""
+    poses = {0: scan.true[0]}
+    for b in range(1, len(scan.true)):
+        befores = [a for a in range(b) if (a, b) in links and a in poses]
+        if befores:
+            a = max(befores)
+            poses[b] = composed(poses[a], links[a, b][number])
+    return [math.hypot(*(poses[n] - scan.true[n])[:2]) / P for n in poses if n]
+
+
+def grown(touches: list[PlacedTouch], pitch_mm: float) -> tuple[Mosaic, float, float]:
+    """Return a mosaic, ms per touch (median) and ms to settle."""
+    mosaic, times = no_touches(SENSOR, MosaicSettings(period_mm=pitch_mm)), []
+    for touch in touches:
+        start = time.process_time()
+        mosaic = added(mosaic, touch)
+        times.append(time.process_time() - start)
+    start = time.process_time()
+    mosaic = settled(mosaic)
+    return mosaic, 1e3 * float(np.median(times)), 1e3 * (time.process_time() - start)
+
+
+def told(name: str, scan: Scan, touches: list[PlacedTouch], *, face: bool) -> None:
+    """Grow a mosaic and print what it is worth."""
+    mosaic, ms, settle = grown(touches, scan.pitch_mm)
+    away = mosaic.poses - scan.true
+    away[:, 2] = wrapped(away[:, 2])
+    shape = shape_errors(mosaic.poses, scan.true)
+    line = f"  {name:16} shape rms {rms(shape):.3f} max {shape.max():.2f}"
+    if face:
+        nees = np.einsum("ni,nij,nj->n", away, np.linalg.inv(mosaic.covariances), away)
+        free = np.array([touch.decoded is None for touch in touches])
+        line += f"  absolute rms {rms(np.hypot(*away.T[:2])) / P:.3f}"
+        if free.any():
+            line += f" (not decoded {rms(np.hypot(*away[free].T[:2])) / P:.3f})"
+        line += f"  chi^2/3 {nees.mean() / 3:.2f} in 95 % {(nees < 7.815).mean():.2f}"
+    reasons = Counter(mosaic.reasons)
+    defined = np.array([not reason for reason in mosaic.reasons])
+    if not face and not defined.all():
+        line += (
+            f" (of the defined {rms(shape_errors(mosaic.poses[defined], scan.true[defined])):.3f})"
+        )
+    undefined = 1 - reasons[""] / len(mosaic)
+    print(f"{line}  undefined {undefined:.3f}  outliers {len(outliers(mosaic))}  "
+          f"{ms:.0f} ms/touch, settled in {settle:.0f} ms")  # fmt: skip
+    if undefined:
+        print(f"                   {dict(reasons)}")
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--profiles", nargs="+", default=["thesis", "one-touch"])
+    parser.add_argument("--errors", nargs="+", type=float, default=[0.5, 1.0, 2.0])
+    parser.add_argument("--readings", choices=("newtons", "counts"), default="newtons")
+    parser.add_argument("--seed", type=int, default=1)
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        for profile in given.profiles:
+            database = f"sqlite:///{folder}/{profile}.db"
+            specs = read_specs([SPECS / f"{profile}-cube.yaml"])
+            encode(specs, folder=Path(folder) / profile, database=database, formats=("stl",))
+            for tactels in given.errors:
+                measure(database, profile, tactels, given.readings == "counts", given.seed)
+
+
+def measure(database: str, profile: str, tactels: float, counts: bool, seed: int) -> None:
+    """Print all lines of one profile and one size of errors."""
+    scan = scanned(database, "", PITCH_MM[profile], tactels, counts, seed)
+    patches = [patch_of(SENSOR, signal) for signal in scan.signals]
+    n = len(patches)
+    print(f"{profile}, {n} touches, believed places err by {tactels:g} tactels rms")
+    believed = np.array([place.pose for place in scan.believed])
+    print(f"  as believed      shape rms {rms(shape_errors(believed, scan.true)):.3f}")
+    pairs(scan, patches)
+    told("mosaic", scan, touches_of(scan, {}), face=False)
+    if profile == "one-touch":
+        reader = reader_for(open_lab(database), SENSOR)
+        start = time.process_time()
+        answers = [recognise(reader, signal, k) for k, signal in enumerate(scan.signals)]
+        ms = 1e3 * (time.process_time() - start) / n
+        every = {k: place for k, a in enumerate(answers) if (place := decoded_place(a)) is not None}
+        errors = [math.hypot(*(place.pose - scan.true[k])[:2]) / P for k, place in every.items()]
+        print(f"  decoded alone    {len(every)} of {n}, rms {rms(errors):.3f}, {ms:.0f} ms/touch")
+        told("all decoded", scan, touches_of(scan, every), face=True)
+        some = {k: place for k, place in every.items() if k % 12 == 0}
+        told("1 in 12 decoded", scan, touches_of(scan, some), face=True)
+    rng = np.random.default_rng(seed)
+    spread = np.array([0.5 * P, 0.5 * P, 0.5 * DEG])
+    steps = []
+    for k, signal in enumerate(scan.signals):
+        before = scan.true[k - 1] if k else np.zeros(3)
+        step = between(before, scan.true[k]) + rng.normal(0, spread) * (k > 0)
+        first = placed(scan.true[0], (0.01, 0.01, 1e-4)) if k == 0 else None
+        stepped = placed(step, spread) if k else None
+        steps.append(PlacedTouch(signal, believed=first, stepped=stepped, seq=k))
+    reckoned = [scan.true[0]]
+    for touch in steps[1:]:
+        reckoned.append(composed(reckoned[-1], touch.stepped.pose))
+    away = np.array(reckoned) - scan.true
+    print(f"  steps as counted drift rms {rms(np.hypot(*away.T[:2])) / P:.2f}")
+    told("steps", scan, steps, face=True)
+
+
+def touches_of(scan: Scan, decoded: dict[int, Placed]) -> list[PlacedTouch]:
+    """Return the touches of a scan, some of them decoded."""
+    return [
+        PlacedTouch(signal, believed=believed, decoded=decoded.get(k), seq=k)
+        for k, (signal, believed) in enumerate(zip(scan.signals, scan.believed, strict=True))
+    ]
+
+
+if __name__ == "__main__":
+    main()

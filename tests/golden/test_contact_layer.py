@@ -1,0 +1,193 @@
+"""The layer against closed formulas, finite elements, and its kernel against mpmath."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+
+from probe.contact.contract import Touch, WristStiffness
+from probe.contact.elements_round import indented, washer_pad
+from probe.contact.layer import layer
+from probe.contact.layer_influence import influence
+from probe.contact.layer_kernel import (
+    base_ratio,
+    compliance_over_s,
+    compliance_ratio,
+    edge_compliance,
+    layer_compliance,
+)
+from probe.sensor import Overlay, Sensor
+from probe.surface.indenters import Paraboloid, Strip, Washer
+
+POISSON = (0.0, 0.3, 0.45, 0.49, 0.499, 0.4999, 0.49999, 0.5 - 2**-40, 0.5)
+S = [*10.0 ** np.linspace(-8, 2, 41), 0.999999, 1.0, 1.000001, 10.5, 19.7, 200.0, 400.0]
+HELD = WristStiffness(math.inf, math.inf)
+
+
+def pad(**given):
+    return Sensor(overlay=Overlay("pad", **given))
+
+
+def exact(s, poisson):
+    """T / s and B from the closed forms, with digits to spare."""
+    with mpmath.workdps(80):
+        s, nu = mpmath.mpf(float(s)), mpmath.mpf(poisson)
+        sh, ch = mpmath.sinh(s), mpmath.cosh(s)
+        below = 4 * (1 - nu) ** 2 + s**2 + (3 - 4 * nu) * sh**2
+        t = ((3 - 4 * nu) * sh * ch - s) / below
+        b = 2 * (1 - nu) * (2 * (1 - nu) * ch + s * sh) / below
+        return float(t / s), float(b)
+
+
+def solved(s, poisson):
+    """T and B from the equations of elasticity themselves, integrated through the layer.
+
+    u_x = U sin qx, u_z = W cos qx, stresses S cos qx and T sin qx; G = h = 1. The base holds
+    U = W = 0, on top S = -1, T = 0.
+    """
+    with mpmath.workdps(50):
+        q, nu = mpmath.mpf(s), mpmath.mpf(poisson)
+        soft, side = (1 - 2 * nu) / (2 * (1 - nu)), nu / (1 - nu)
+        through = mpmath.expm(
+            mpmath.matrix(
+                [
+                    [0, q, 0, 1],
+                    [-side * q, 0, soft, 0],
+                    [0, 0, 0, -q],
+                    [2 * q**2 / (1 - nu), 0, side * q, 0],
+                ]
+            )
+        )
+        stress = mpmath.lu_solve(through[2:, 2:], mpmath.matrix([-1, 0]))
+        sunk = -(through[1, 2] * stress[0] + through[1, 3] * stress[1])
+        return float(sunk * q / (1 - nu)), float(-stress[0])
+
+
+@pytest.mark.parametrize("poisson", POISSON)
+def test_kernel_within_1e_14(poisson):
+    s = np.array(S)
+    ratio, base = compliance_over_s(s, poisson), base_ratio(s, poisson)
+    for k, at in enumerate(S):
+        true, arrives = exact(at, poisson)
+        assert ratio[k] == pytest.approx(true, rel=1e-14, abs=0), at
+        assert base[k] == pytest.approx(arrives, rel=1e-14, abs=0), at
+
+
+@pytest.mark.parametrize("poisson", [0.0, 0.3, 0.4999, 0.5])
+@pytest.mark.parametrize("s", [0.01, 0.5, 3.0, 20.0])
+def test_kernel_solves_the_equations_of_the_layer(s, poisson):
+    ratio, base = solved(s, poisson)
+    assert compliance_ratio(np.array(s), poisson) == pytest.approx(ratio, rel=1e-13)
+    assert base_ratio(np.array(s), poisson) == pytest.approx(base, rel=1e-13)
+
+
+def test_kernel_limits():
+    for nu in POISSON:
+        assert compliance_ratio(np.array(1e3), nu) == 1  # a half-space
+        assert base_ratio(np.array(0.0), nu) == 1
+        even = layer_compliance(np.array(0.0), height_mm=3.0, young_mpa=2.0, poisson=nu)
+        confined = 3.0 * (1 + nu) * (1 - 2 * nu) / (2.0 * (1 - nu))
+        assert even == pytest.approx(confined, rel=1e-14, abs=0)
+    # Incompressible and thin: a film that flows, u = (q h)^2 h p / (3 G).
+    thin = layer_compliance(np.array(1e-6), height_mm=2.0, young_mpa=3.0, poisson=0.5)
+    assert thin == pytest.approx((2e-6) ** 2 * 2.0 / 3, rel=1e-11)
+
+
+def test_stress_of_a_line_at_the_base_by_quadrature():
+    """The base's spectrum, turned back into space: 1/pi of the integral of B(q h) cos qx."""
+    sensor = pad(height_mm=2.0, poisson=0.4999)
+    cells = 8
+    grid = influence(sensor, cells)
+    pressure = np.zeros((grid.rows, grid.columns))
+    pressure[1:-1, grid.columns // 2 - 1 : grid.columns // 2 + 1] = 1.0  # two columns of cells
+    felt = grid.base_forces_n(pressure)[8] / sensor.pitch_mm  # N/mm, far from the ends
+    with mpmath.workdps(20):
+        for column in (8, 10, 12):
+            low, high = ((column - 8 + e) * sensor.pitch_mm for e in (0, 1))
+
+            def density(q, low=low, high=high):
+                _, base = exact(2.0 * q, 0.4999)
+                reach = (mpmath.sin(q * high) - mpmath.sin(q * low)) / q
+                return base * reach * 2 * mpmath.sin(q * grid.dx_mm) / q
+
+            true = mpmath.quad(density, [1e-9, 1, 2, 4, 8, 16]) / mpmath.pi
+            # The bell that the spectrum takes off is of the pressure: put it on again.
+            assert felt[column] == pytest.approx(float(true), rel=2e-2, abs=2e-4)
+
+
+def test_nyquist_of_the_tactels_tells_where_deblurring_ends():
+    nyquist = math.pi / Sensor().pitch_mm
+    for height, share in ((1, 0.61), (2, 0.185), (4, 0.0065)):
+        assert base_ratio(np.array(nyquist * height), 0.4999) == pytest.approx(share, rel=0.03)
+
+
+def test_edge_compliance_of_a_thin_compressible_layer_is_its_own():
+    for nu in (0.0, 0.3, 0.45):
+        whole = layer_compliance(np.array(0.0), height_mm=1e-4, young_mpa=1.0, poisson=nu)
+        edge = edge_compliance(1.0, height_mm=1e-4, young_mpa=1.0, poisson=nu)
+        assert edge == pytest.approx(whole, rel=2e-3)
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.5])
+def test_hertz_on_a_thick_pad(poisson):
+    """A half-space's sphere, less what the base takes from its approach under a point force."""
+    height, bend, a = 20.0, 60.0, 3.0
+    star = 1.0 / (1 - poisson**2)
+    force = 4 * star * a**3 / (3 * bend)
+    s = np.linspace(0, 60, 6001)
+    stiffer = np.trapezoid(1 - compliance_ratio(s, poisson), s) / (math.pi * star * height)
+    touch = Touch(0.1, 0.3, 0, force, wrist=HELD)
+    sensor = pad(height_mm=height, poisson=poisson)
+    found = layer(Paraboloid(bend), sensor, touch, cells_per_tactel=6)
+    assert -found.z_mm == pytest.approx(a**2 / bend - stiffer * force, rel=1e-2)
+
+
+@pytest.mark.parametrize(("ratio", "excess", "cells"), [(10, 1.18, 8), (20, 1.05, 8)])
+def test_thin_incompressible_layer_under_a_paraboloid(ratio, excess, cells):
+    # F -> pi G a^6 / (32 R h^3) for a / h -> infinity; the depth is then a^2 / 4R.
+    height, bend = 10.0 / ratio, 400.0
+    sensor = pad(height_mm=height, young_mpa=3.0, poisson=0.5)
+    force = math.pi * 10.0**6 / (32 * bend * height**3) * excess
+    touch = Touch(0.1, 0.2, 0, force, wrist=HELD)
+    found = layer(Paraboloid(bend), sensor, touch, cells_per_tactel=cells)
+    assert -found.z_mm == pytest.approx(10.0**2 / (4 * bend), rel=3e-3)
+
+
+@pytest.fixture(scope="module")
+def washer():
+    part = washer_pad(3.5, 7.5, 2.0, 1.0, 0.4999, parts=24)
+    flat = lambda r: np.where((r > 3.5 - 1e-9) & (r < 7.5 + 1e-9), 0.0, -np.inf)  # noqa: E731
+    return indented(part, flat, 80.0)
+
+
+@pytest.mark.parametrize(
+    ("cells", "samples", "tactels", "depth"),
+    [(2, 16, 1e-2, 6e-3), (4, 16, 5e-3, 4e-3), (4, 64, 2e-3, 2e-3), (8, 16, 1.2e-3, 2e-3)],
+)
+def test_washer_of_figure_4_10(washer, cells, samples, tactels, depth):
+    sensor, kept, approaches = pad(), np.s_[1:-1, 1:-1], []
+    for x, y, theta in ((0, 0, 0), (0.31, -0.17, 0.4), (-0.7, 0.55, 1.1), (0.5, 0.6, 2.0)):
+        touch = Touch(x, y, theta, 80.0, wrist=HELD)
+        c, s = math.cos(theta), math.sin(theta)
+        truth = washer.tactels_n(sensor, (-c * x - s * y, s * x - c * y))[kept]
+        found = layer(Washer(), sensor, touch, cells_per_tactel=cells, samples=samples)
+        error = np.linalg.norm(found.forces_n[kept] - truth) / np.linalg.norm(truth)
+        approaches.append(-found.z_mm / washer.depth_mm - 1)
+        assert error <= tactels
+        assert abs(approaches[-1]) <= depth
+    assert abs(np.mean(approaches)) <= max(depth / 2, 2e-3)
+
+
+def test_strokes_thinner_than_a_cell_are_felt_alike_at_every_place():
+    """The force is where a fine grid has it; the depth is felt by the stroke's width, roughly."""
+    sensor, width = pad(), 0.25  # a cell of 4 per tactel is 0.4 wide
+    wide = layer(Strip(2 * width), sensor, Touch(0, 0, 0.1, 12.0, wrist=HELD)).z_mm
+    for x in (0.0, 0.13, 0.29):
+        touch = Touch(x, 0.0, 0.1, 12.0, wrist=HELD)
+        fine = layer(Strip(width), sensor, touch, cells_per_tactel=16)
+        found = layer(Strip(width), sensor, touch)
+        error = np.linalg.norm(found.forces_n - fine.forces_n) / np.linalg.norm(fine.forces_n)
+        assert error <= 0.03
+        assert 1 <= found.z_mm / fine.z_mm <= 1.25
+        assert found.z_mm < wide

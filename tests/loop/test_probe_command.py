@@ -1,0 +1,384 @@
+"""`probe-sensor` as its users start it: processes, signals, a terminal, the emulated firmware."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import pty
+import re
+import select
+import signal
+import struct
+import subprocess
+import sys
+import termios
+import time
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from generator.pipeline import encode
+from generator.spec import read_specs
+from probe.circuit import QUIET, Electronics, fsr_of, read_counts
+from probe.command import run
+from probe.errors import RecordingError
+from probe.frame import frame_from
+from probe.port.emulated import emulated_probe
+from probe.recording.read import read_frames, read_recording
+from probe.recording.record import Recorder
+
+COMMAND = (sys.executable, "-c", "from probe.command import main; main()")
+FULL_MV = 5000.0
+SHORT_S = 20.0  #: for anything, on a busy machine
+
+
+@contextmanager
+def started(*words, **named):
+    """Start a command; it is gone when the block ends."""
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True} | named
+    with subprocess.Popen([*COMMAND, *map(str, words)], **pipes) as process:
+        try:
+            yield process
+        finally:
+            if process.poll() is None:
+                process.kill()
+
+
+@pytest.fixture
+def asked(capsys):
+    """Run a command in this process: code, stdout, stderr."""
+
+    def ask(*words):
+        capsys.readouterr()
+        code = run([str(word) for word in words])
+        return code, *capsys.readouterr()
+
+    return ask
+
+
+def wait_for(what, timeout_s=SHORT_S):
+    until_s = time.monotonic() + timeout_s
+    while time.monotonic() < until_s:
+        if found := what():
+            return found
+        time.sleep(0.02)
+    raise AssertionError("it did not come")
+
+
+def held_in(path):
+    """Return how many frames of a recording that is being written are on the disk."""
+    try:
+        return len(read_recording(path, live=True))
+    except RecordingError:
+        return 0
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("lab")
+    (folder / "cube.yaml").write_text("{name: Cube, shape: {cube: 40 mm}}")
+    encode(read_specs([folder / "cube.yaml"]), folder=folder / "out", formats=("stl",),
+           database=f"sqlite:///{folder / 'lab.db'}")  # fmt: skip
+    return folder
+
+
+@pytest.mark.parametrize("overlay", ["tab", "pad"])
+def test_a_touch_of_a_registered_face(asked, lab, tmp_path, overlay):
+    out, png = tmp_path / "a.h5", tmp_path / "a.png"
+    target = f"sqlite:///{lab / 'lab.db'}#Cube/F2"
+    words = ["--x", "20", "--y", "18", "--theta", "25", "--force", "80", "--overlay", overlay,
+             "--accuracy", "0.05", "-o", out, "--png", png, "--json"]  # fmt: skip
+    code, text, err = asked("simulate", target, *words)
+    assert (code, err) == (0, "")
+    told = json.loads(text)
+    assert (told["object"], told["face"], told["frames"]) == ("Cube", "F2", 1)
+    assert told["written"] == [str(out), str(png)]
+    assert told["first"]["felt_n"] == pytest.approx(80, rel=1e-3)
+    frames = list(read_frames(out))
+    assert frames[0].counts.max() == told["first"]["peak_counts"]
+    assert frames[0].pose is None
+    assert (frames[0].counts > 30).sum() >= 40
+
+
+def test_an_object_or_a_face_that_is_not_registered(asked, lab):
+    for place, said in (("Cube/top", "fix: faces: F1, F2, F3, F4, F5, F6"),
+                        ("Cup/F1", "registered objects: Cube")):  # fmt: skip
+        code, _, err = asked("simulate", f"{lab / 'lab.db'}#{place}")
+        assert code == 2
+        assert said in err
+    (lab / "dead.db").write_bytes(b"no database" * 100)
+    code, _, err = asked("simulate", f"{lab / 'dead.db'}#Cube/F1")
+    assert code == 4
+    assert "fix: " in err
+
+
+def test_a_stream_of_touches_is_recorded_through_the_software_probe(asked, lab, tmp_path):
+    out, url = tmp_path / "a.h5", f"sim:{lab / 'lab.db'}#Cube/F1?rate=220&period=0.5"
+    code, text, err = asked("record", url, "-o", out, "--seconds", "1", "--json")
+    assert (code, err) == (0, "")
+    told = json.loads(text)
+    assert (told["frames"], told["lost"], told["failed"]) == (220, 0, 0)
+    peaks = [int(frame.counts.max()) for frame in read_frames(out)]
+    assert max(peaks) > 100
+    assert min(peaks) < 80
+
+
+def test_simulate_that_is_interrupted_leaves_what_it_has(lab, tmp_path):
+    out, truth = tmp_path / "a.h5", tmp_path / "a.json"
+    words = ["--touches", "100000", "-o", out, "--truth", truth, "--accuracy", "footprint"]
+    with started("simulate", f"{lab / 'lab.db'}#Cube/F1", *words) as process:
+        wait_for(lambda: any(held_in(path) for path in tmp_path.glob(".a.*.part.h5")))
+        process.send_signal(signal.SIGINT)
+        text, err = process.communicate(timeout=SHORT_S)
+    assert process.returncode == 130
+    assert "interrupted after" in err
+    touches = json.loads(truth.read_text())["touches"]
+    assert len(read_recording(out)) == len(touches) > 10
+    assert f"{len(touches):,} touches" in text
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.h5", "a.json"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_recording_that_is_ended_by_a_signal_is_complete(tmp_path, number):
+    out, part = tmp_path / "a.h5", tmp_path / "a.part.h5"
+    with started("record", "sim:?rate=400", "-o", out) as process:
+        wait_for(lambda: held_in(part))
+        process.send_signal(number)
+        text, err = process.communicate(timeout=SHORT_S)
+    assert process.returncode == (0 if number == signal.SIGINT else 128 + number)
+    assert err == ""
+    frames = list(read_frames(out))
+    if number == signal.SIGINT:
+        assert text.startswith(f"{out}: {len(frames)} frames in")
+    assert [f.seq - frames[0].seq for f in frames] == list(range(len(frames)))
+    assert not part.exists()
+
+
+def test_a_recording_killed_by_signal_9_is_repaired(asked, tmp_path):
+    out, part = tmp_path / "a.h5", tmp_path / "a.part.h5"
+    with started("record", "sim:?rate=400", "-o", out) as process:
+        wait_for(lambda: held_in(part))
+        code, _, err = asked("repair", out)
+        assert code == 2
+        assert "still being written" in err
+        process.kill()
+    assert not out.exists()
+    code, _, err = asked("info", out)
+    assert code == 2
+    assert "run `repair` on a.part.h5" in err
+    code, text, _ = asked("repair", out, "--json")
+    told = json.loads(text)
+    assert (code, told["changed"], told["lost"]) == (0, True, 0)
+    frames = list(read_frames(out))
+    assert len(frames) == told["frames"] >= 64
+    assert [f.seq for f in frames] == list(range(len(frames)))
+
+
+class Terminal:
+    """A command on a terminal of its own."""
+
+    def __init__(self, *words, lines=24, columns=90, **environment):
+        self.master, slave = pty.openpty()
+        fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("4H", lines, columns, 0, 0))
+        known = {name: os.environ[name] for name in os.environ if name not in ("NO_COLOR",)}
+        self.process = subprocess.Popen(
+            [*COMMAND, *map(str, words)], stdin=slave, stdout=slave, stderr=slave,
+            env={**known, "TERM": "xterm-256color", **environment}, start_new_session=True,
+            preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),  # Ctrl-C goes to it
+        )  # fmt: skip
+        os.close(slave)
+        self.text = ""
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait()
+        os.close(self.master)
+
+    def read(self):
+        """Take what was drawn meanwhile."""
+        while select.select([self.master], [], [], 0)[0]:
+            try:
+                self.text += os.read(self.master, 65536).decode()
+            except OSError:  # the other end is closed
+                return
+            if self.process.poll() is not None and not select.select([self.master], [], [], 0)[0]:
+                return
+
+    def until(self, pattern):
+        """Wait for text that is drawn from now on."""
+
+        def seen():
+            self.read()
+            return re.search(pattern, re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", self.text))
+
+        found = wait_for(seen)
+        self.text = ""
+        return found
+
+    def press(self, keys):
+        os.write(self.master, keys.encode())
+
+    def ended(self):
+        wait_for(lambda: (self.read(), self.process.poll() is not None)[1])
+        return self.process.returncode
+
+
+def test_live_on_a_terminal_obeys_its_keys(tmp_path):
+    with Terminal("live", "sim:", "--folder", tmp_path) as terminal:
+        terminal.until(r"rate +100\.0 frames/s")
+        terminal.press("b")
+        terminal.until("bias of 32 frames is off the image")
+        terminal.press("m3")
+        terminal.until("median 3x3")
+        terminal.until("3 of sim, 10 bits")
+        terminal.press("r")
+        terminal.until(r"REC live-001\.h5, [1-9]")
+        terminal.press("s")
+        terminal.until("saved image-001.png and .npy")
+        terminal.press(" ")
+        terminal.until("PAUSED")
+        assert "\x1b[48;5;" in terminal.text or terminal.until("sensor") is not None
+        terminal.press("q")
+        assert terminal.ended() == 0
+        assert "\x1b[?1049l" in terminal.text, "the screen is given back"
+    assert len(read_recording(tmp_path / "live-001.h5")) > 5
+    assert read_recording(tmp_path / "live-001.h5").origin.sensor == "sim/3"
+    names = sorted(path.name for path in tmp_path.iterdir())
+    assert names == ["image-001.npy", "image-001.png", "live-001.h5"]
+
+
+def test_live_without_colours_in_a_small_terminal_and_ended_by_ctrl_c():
+    with Terminal("live", "sim:", lines=12, columns=56, NO_COLOR="1") as terminal:
+        terminal.until(r"rate +100\.0 frames")
+        terminal.until(r"[.:=+*#@-]{3}")
+        terminal.until("frames")
+        terminal.read()
+        assert "\x1b[48;" not in terminal.text
+        assert "\x1b[38;" not in terminal.text
+        terminal.press("\x03")
+        assert terminal.ended() == 0
+
+
+def test_live_in_a_pipe_is_lines():
+    with started("live", "sim:") as process:
+        lines = [process.stdout.readline() for _ in range(2)]
+        process.send_signal(signal.SIGINT)
+        rest, err = process.communicate(timeout=SHORT_S)
+    assert process.returncode == 130
+    assert err == ""
+    for line in [*lines, *rest.splitlines(keepends=True)]:
+        assert re.fullmatch(r"frame \d+  1\d\d\.\d/s  lost 0  failed 0  reboots 0  "
+                            r"peak \d+ counts at \(\d+, \d+\)\n", line), line  # fmt: skip
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    """A recording of 81 frames in 0.8 s."""
+    with Recorder(tmp_path / "a.h5") as recorder:
+        for i in range(81):
+            recorder.append(frame_from(np.full((16, 16), i), t_ns=i * 10_000_000, seq=i))
+    return tmp_path / "a.h5"
+
+
+def test_the_reader_of_a_pipe_may_leave(recorded):
+    with started("replay", recorded, "--speed", "1") as process:
+        assert process.stdout.readline().startswith("seq,t_ns")
+        process.stdout.close()
+        process.wait(SHORT_S)
+        assert process.stderr.read() == ""
+    assert process.returncode == 1
+
+
+@pytest.mark.parametrize(("speed", "seconds"), [("1", 0.8), ("0.5", 1.6), ("0", 0.0)])
+def test_a_recording_is_replayed_at_its_speed(recorded, speed, seconds):
+    with started("replay", recorded, "--speed", speed) as process:
+        process.stdout.readline()
+        process.stdout.readline()
+        began_s = time.monotonic()
+        rest = process.stdout.read().count("\n")
+        took_s = time.monotonic() - began_s
+    assert (rest, process.returncode) == (80, 0)
+    assert seconds - 0.15 < took_s < seconds + 2.0
+
+
+@pytest.fixture(scope="module")
+def emulated():
+    """What uses it stands last, for it costs a processor as long as it runs."""
+    with emulated_probe() as probe:
+        probe.show(np.linspace(0, FULL_MV, 256).reshape(16, 16))
+        yield probe
+
+
+def test_record_shows_what_happens_to_the_probe_and_goes_on(asked, emulated, tmp_path):
+    out = tmp_path / "a.h5"
+    with started("record", emulated.url, "-o", out, "--seconds", "3", "--sensor", "2") as process:
+        wait_for(lambda: held_in(tmp_path / "a.part.h5"))
+        code, text, _ = asked("info", emulated.url, "--json")
+        assert code == 3
+        assert "in use by another programme" in json.loads(text)["error"]["cause"]
+        emulated.fault("unplug 0.3")
+        text, err = process.communicate(timeout=SHORT_S)
+    assert process.returncode == 0
+    assert "the device went away; it is tried again for 30 s" in err
+    assert "the port is open again after" in err
+    assert "reopenings 1" in text
+    held = read_recording(out)
+    assert held.origin.sensor == "FSR-uno/2"
+    expected = np.rint(np.linspace(0, 1023, 256).reshape(16, 16))
+    assert np.abs(held.block().counts[5:].mean(axis=0) - expected).max() < 2
+
+
+def test_a_calibration_is_guided_through_the_firmware(asked, emulated, tmp_path):
+    board = Electronics(noise=QUIET, bias_lsb=4.0)
+    out, folder = tmp_path / "cal.json", tmp_path / "loads"
+
+    def put_on(newtons):
+        forces = np.full((16, 16), newtons / 256)
+        counts, _ = read_counts(forces, board, fsr_of(16, 16), None, np.random.default_rng(1))
+        emulated.show(counts * (FULL_MV / 1023))
+
+    words = ["calibrate", "port", emulated.url, "-o", out, "--newtons", "40,100,200,400",
+             "--folder", folder, "--seconds", "0.3", "--board", "simulated"]  # fmt: skip
+    with started(*words, stdin=subprocess.PIPE) as process:
+        for newtons in (0, 40, 100, 200, 400):
+            told = ""
+            while not told.endswith("then press Enter: "):
+                letter = process.stderr.read(1)
+                assert letter, told
+                told += letter
+            assert f"put {newtons} N" in told or newtons == 0
+            put_on(newtons)
+            time.sleep(0.3)
+            process.stdin.write("\n\n")  # read it, and go on
+            process.stdin.flush()
+        text, err = process.communicate(timeout=SHORT_S)
+    assert process.returncode == 0, err
+    assert "felt by 256 of 256 tactels" in err
+    assert re.search(r"sound +256 of 256", text)
+    again = tmp_path / "again.json"
+    code, text, _ = asked("calibrate", "loads", folder / "loads.csv", "-o", again, "--board",
+                          "simulated", "--json")  # fmt: skip
+    assert (code, json.loads(text)["sound"]) == (0, 256)
+    put_on(150)
+    npy, made = tmp_path / "a.npy", tmp_path / "a.h5"
+    time.sleep(0.3)
+    assert asked("record", emulated.url, "-o", made, "--frames", "30", "--calibration", out)[0] == 0
+    assert asked("export", made, "--npy", npy, "--calibration", out)[0] == 0
+    assert np.load(npy)[5:].mean(axis=0).sum() == pytest.approx(150, rel=0.03)
+
+
+def test_live_shows_that_the_probe_went_away_and_came_back(emulated):
+    with Terminal("live", emulated.url, columns=110) as terminal:
+        terminal.until("of FSR-uno, 10 bits")
+        emulated.fault("unplug 0.5")
+        terminal.until("the device went away; it is tried again")
+        terminal.until("the port is open again after")
+        terminal.until(r"reopenings +1")
+        terminal.press("q")
+        assert terminal.ended() == 0

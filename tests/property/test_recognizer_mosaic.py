@@ -1,0 +1,101 @@
+"""Laws of poses in a plane, of the normalised correlation, and of the canvas."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from probe.sensor import Sensor
+from recognizer.mosaic.canvas import Laid, empty_canvas, laid
+from recognizer.mosaic.correlation import correlated
+from recognizer.mosaic.graph import PLANE, Tie, covariances, solved
+from recognizer.mosaic.image import image_of
+from recognizer.mosaic.patch import patch_of
+from recognizer.mosaic.planar import between, composed, inverse, moved
+from recognizer.mosaic.raster import Raster
+from recognizer.signal import signal_of
+
+SENSOR = Sensor()
+lengths = st.floats(-500, 500)
+poses = st.tuples(lengths, lengths, st.floats(-math.pi, math.pi)).map(np.array)
+seeds = st.integers(0, 2**32 - 1)
+
+
+def same(a, b):
+    away = a - b
+    away[2] = math.remainder(away[2], 2 * math.pi)
+    return np.abs(away).max() < 1e-9 * 1000
+
+
+@given(poses, poses, poses)
+def test_poses_are_a_group(a, b, c):
+    assert same(composed(composed(a, b), c), composed(a, composed(b, c)))
+    assert same(composed(a, inverse(a)), np.zeros(3))
+    assert same(composed(a, between(a, b)), b)
+    point = np.array([3.0, -4.0])
+    assert moved(composed(a, b), point) == pytest.approx(moved(a, moved(b, point)), abs=1e-8)
+
+
+@given(seeds, st.floats(1e-3, 1e3), st.floats(-1e3, 1e3))
+@settings(max_examples=20, deadline=None)
+def test_gain_and_offset_leave_the_correlation_as_it_is(seed, gain, offset):
+    rng = np.random.default_rng(seed)
+    values, known = rng.normal(size=(14, 13)), rng.random((14, 13)) > 0.1
+    image, seen = rng.normal(size=(9, 9)), rng.random((9, 9)) > 0.1
+    first = correlated(Raster(values, known, 0, 0, 1), Raster(image, seen, 0, 0, 1))
+    other = Raster(gain * image + offset, seen, 0, 0, 1)
+    second = correlated(Raster(values, known, 0, 0, 1), other)
+    assert second.rho == pytest.approx(first.rho, abs=1e-4, nan_ok=True)
+    assert np.nanmax(np.abs(first.rho)) <= 1
+
+
+@given(seeds, st.lists(poses, min_size=1, max_size=3))
+@settings(max_examples=8, deadline=None)
+def test_the_order_of_touches_does_not_matter_to_the_canvas(seed, places):
+    rng = np.random.default_rng(seed)
+    sure = np.diag([1e-3, 1e-3, 1e-6])
+    some = [
+        (patch_of(SENSOR, signal_of(rng.uniform(0, 9, (16, 16)))), Laid(pose, sure, 1.0))
+        for pose in places
+    ]
+    there, back = empty_canvas(SENSOR.pitch_mm), empty_canvas(SENSOR.pitch_mm)
+    for patch, how in some:
+        there = laid(there, patch, how)
+    for patch, how in reversed(some):
+        back = laid(back, patch, how)
+    assert there.tiles.keys() == back.tiles.keys()
+    one = image_of(there) if np.ptp(np.array(places)[:, :2], axis=0).max() < 100 else None
+    if one is not None:
+        two = image_of(back)
+        assert (one.count == two.count).all()
+        assert one.values == pytest.approx(two.values, abs=1e-9)
+        assert np.isfinite(one.error).all()
+    for patch, how in some:
+        there = laid(there, patch, how, -1)
+    assert not there.tiles
+
+
+@given(seeds, st.integers(2, 12))
+@settings(max_examples=20, deadline=None)
+def test_whatever_the_ties_say_there_is_a_pose_with_a_covariance(seed, n):
+    rng = np.random.default_rng(seed)
+    ties = []
+    for k in range(n):
+        sure = np.diag(10.0 ** rng.uniform(-2, 6, 3))
+        ties.append(Tie(PLANE, k, rng.normal(0, [50, 50, 2]), sure, "decoded"))
+    for _ in range(3 * n):
+        a, b = rng.choice(n, 2, replace=False).tolist()
+        root = rng.normal(size=(3, rng.integers(1, 4))) * 10.0 ** rng.uniform(-2, 3)
+        ties.append(Tie(a, b, rng.normal(0, [50, 50, 2]), root @ root.T, "pair"))
+    found = solved(ties, rng.normal(0, 50, (n, 3)), np.zeros(3), arm_stands=True)
+    assert np.isfinite(found.poses).all()
+    assert ((found.weights > 0) & (found.weights <= 1)).all()
+    spread = covariances(found.normal, range(n))
+    scale = np.sqrt(np.diagonal(spread, axis1=1, axis2=2))
+    assert (scale > 0).all()
+    relative = spread / (scale[:, :, None] * scale[:, None, :])
+    assert np.linalg.eigvalsh(relative).min() > -1e-6

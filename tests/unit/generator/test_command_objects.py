@@ -1,0 +1,176 @@
+"""`encode-object list | show | retire | export | import` as people run them."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from generator.command import run
+from generator.database.canonical import spec_hash
+
+CUBE = "name: {name}\nshape: {{cube: {edge} mm}}\noutput: {{formats: stl}}\n"
+ENTRY = "import sys; from generator.command import main; main()"
+
+
+@pytest.fixture(autouse=True)
+def _in_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "160")
+
+
+def make(name, database="lab.db", edge=30):
+    spec = Path(f"{name}.yaml")
+    spec.write_text(CUBE.format(name=name, edge=edge))
+    assert run([str(spec), "--database", database, "-o", f"out/{database}/{name}"]) == 0
+
+
+def said(capsys, *arguments, code=0):
+    """Run a command and return its JSON."""
+    capsys.readouterr()
+    assert run([*arguments, "--json"]) == code
+    text, messages = capsys.readouterr()
+    assert messages == ""
+    return json.loads(text)
+
+
+def test_show_names_faces_cells_files_and_origin(capsys):
+    make("Cube")
+    value = said(capsys, "show", "Cube")
+    assert (value["name"], value["shape"], value["symbols"]) == ("Cube", "cube", 96)
+    assert [face["name"] for face in value["faces"]] == ["F1", "F2", "F3", "F4", "F5", "F6"]
+    cells = {tuple(cell[:2]) for face in value["faces"] for cell in face["cells"]}
+    assert len(cells) == 96
+    assert value["faces"][0]["placement"]["row"] == value["faces"][0]["cells"][0][0]
+    assert {file["state"] for file in value["files"]} == {"ok"}
+    assert spec_hash(value["provenance"]["spec"]) == value["spec_hash"]
+    assert value["provenance"]["imported_from"] is None
+    assert value["database"] == "sqlite:///lab.db"
+    assert run(["show", "Cube"]) == 0
+    text = capsys.readouterr().out
+    for word in ("one-touch 63x65", "dense-4", "square", "900 mm2", "Cube-F1", "ok"):
+        assert word in text
+
+
+def test_show_tells_missing_and_changed_files(capsys):
+    make("Cube")
+    first, second, third, *_ = sorted(Path("out/lab.db/Cube").glob("*.stl"))
+    first.unlink()
+    second.write_bytes(second.read_bytes() + b"x")
+    third.unlink()
+    third.mkdir()
+    value = said(capsys, "show", "Cube")
+    states = {Path(file["file"]).name: file["state"] for file in value["files"]}
+    assert states[first.name] == "missing"
+    assert states[second.name] == "changed"
+    assert states[third.name] == "unreadable"
+    assert list(states.values()).count("ok") == 3
+    assert run(["show", "Cube"]) == 0
+    assert "make them again" in capsys.readouterr().out
+    third.rmdir()
+    make("Cube")
+    assert {file["state"] for file in said(capsys, "show", "Cube")["files"]} == {"ok"}
+
+
+def test_retired_objects_are_listed_as_such_and_keep_their_cells(capsys):
+    make("One")
+    make("Two")
+    one = said(capsys, "show", "One")["faces"]
+    assert said(capsys, "retire", "One")["retired"][0]["retired_utc"]
+    listed = said(capsys, "list")["objects"]
+    assert [entry["retired_utc"] is not None for entry in listed] == [True, False]
+    assert run(["list"]) == 0
+    assert "retired (UTC)" in capsys.readouterr().out
+    assert run(["One.yaml"]) == 4
+    assert "'One' was retired" in capsys.readouterr().err
+    make("Three")
+    taken = {tuple(cell[:2]) for face in one for cell in face["cells"]}
+    new = said(capsys, "show", "Three")["faces"]
+    assert not taken & {tuple(cell[:2]) for face in new for cell in face["cells"]}
+    assert run(["retire", "One", "--undo"]) == 0
+    assert capsys.readouterr().out == "One: restored; its 96 cells were taken all the time\n"
+    assert run(["One.yaml"]) == 0
+    assert said(capsys, "list")["objects"][0]["retired_utc"] is None
+
+
+def test_cells_are_freed_only_when_that_is_confirmed(capsys):
+    make("One")
+    capsys.readouterr()
+    assert run(["retire", "One", "--free"]) == 2  # stdin is no terminal here
+    assert "confirm it with --yes" in capsys.readouterr().err
+    assert run(["retire", "One", "--free", "--undo"]) == 2
+    assert len(said(capsys, "list")["objects"]) == 1
+    assert run(["retire", "One", "--free", "--yes"]) == 0
+    assert capsys.readouterr().out == "One: removed; its 96 cells are free again\n"
+    assert said(capsys, "list")["objects"] == []
+
+
+@pytest.mark.parametrize(("answer", "left"), [("n", 1), ("y", 0)])
+def test_a_person_is_asked_before_cells_are_freed(answer, left, capsys):
+    make("One")
+    ours, theirs = os.openpty()
+    os.write(ours, answer.encode() + b"\n")
+    done = subprocess.run(
+        [sys.executable, "-c", ENTRY, "retire", "One", "--free"],
+        stdin=theirs, capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    os.close(ours)
+    os.close(theirs)
+    assert "will be taken for other objects" in done.stderr
+    assert done.returncode == left
+    assert len(said(capsys, "list")["objects"]) == left
+
+
+def test_all_named_objects_are_retired_or_none(capsys):
+    make("One")
+    assert run(["retire", "One", "Ball"]) == 4
+    assert "no object is called 'Ball'" in capsys.readouterr().err
+    assert said(capsys, "list")["objects"][0]["retired_utc"] is None
+    for command in ("show", "retire", "export"):
+        assert run([command, "Ball", "--database", "no.db"]) == 4
+        assert "no.db" in capsys.readouterr().err
+    assert not Path("no.db").exists()
+
+
+def test_labs_exchange_objects(capsys):
+    make("Cube", "a.db")
+    make("Other", "b.db", edge=40)
+    value = said(capsys, "export", "for-b.db", "--database", "a.db")
+    assert value == {"exported": ["Cube"], "file": "for-b.db", "database": "sqlite:///a.db"}
+    assert run(["export", "for-b.db", "--database", "a.db"]) == 4
+    assert "--force" in capsys.readouterr().err
+    error = said(capsys, "import", "for-b.db", "--database", "b.db", code=4)["error"]
+    assert "'Cube' needs" in error["problems"][0]["cause"]
+    assert "'Other' holds here" in error["problems"][0]["cause"]
+    value = said(capsys, "import", "for-b.db", "--database", "b.db", "--skip-refused")
+    assert [refused["name"] for refused in value["refused"]] == ["Cube"]
+    assert run(["import", "for-b.db", "--database", "b.db", "--skip-refused"]) == 0
+    text, messages = capsys.readouterr()
+    assert text == "0 objects imported into sqlite:///b.db\n"
+    assert messages.startswith("refused: 'Cube' needs ")
+    value = said(capsys, "import", "for-b.db", "--database", "c.db", "--dry-run")
+    assert (value["imported"], value["dry_run"]) == (["Cube"], True)
+    assert not Path("c.db").exists()
+    command = ["import", "for-b.db", "--database", "c.db", "--rename", "Cube=Cube of A"]
+    assert run(command) == 0
+    assert capsys.readouterr().out == "1 object imported into sqlite:///c.db\n  Cube of A\n"
+    value = said(capsys, "show", "Cube of A", "--database", "c.db")
+    assert value["provenance"]["imported_from"] == "for-b.db"
+    assert {file["state"] for file in value["files"]} == {"ok"}  # found beside, where a.db is
+    assert run(command) == 0
+    assert "1 object known already" in capsys.readouterr().out
+    assert run([*command[:-1], "Cube"]) == 2
+    assert "--rename takes OLD=NEW" in capsys.readouterr().err
+
+
+def test_the_commands_run_on_a_server(capsys, database_on):
+    with database_on("postgresql") as url:
+        make("Cube", "a.db")
+        assert run(["export", "x.db", "--database", "a.db"]) == 0
+        assert said(capsys, "import", "x.db", "--database", url)["imported"] == ["Cube"]
+        make("Cube", url)  # the same cells again
+        assert said(capsys, "show", "Cube", "--database", url)["files"][0]["state"] == "ok"
+        assert run(["retire", "Cube", "--free", "--yes", "--database", url]) == 0
+        assert said(capsys, "list", "--database", url)["objects"] == []

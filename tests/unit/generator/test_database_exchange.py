@@ -1,0 +1,291 @@
+"""Objects between labs: the same on the other side or refused by name, and never shared."""
+
+import json
+import shutil
+import sqlite3
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from generator.alphabet.known import alphabet_named
+from generator.alphabet.outline import SymbolStyle
+from generator.array.profiles import PROFILES
+from generator.database.cells import find_array, held_cells, occupied
+from generator.database.exchange import export_objects, import_objects
+from generator.database.open import database_exists, open_database
+from generator.database.read import find_object, list_objects, read_object
+from generator.database.register import Registration, register, same_layout
+from generator.database.registered import RegisteredPart
+from generator.database.retire import remove, restore, retire
+from generator.database.transaction import reading, writing
+from generator.errors import DatabaseError
+from generator.layout.layout import lay_out
+from generator.polyhedron.shapes import cube, tetrahedron
+
+FIRST = Path(__file__).parents[3] / "fixtures" / "database" / "v1.db"
+SOLIDS = {"Cube": cube(30.0), "Tetra": tetrahedron(40.0), "Other": tetrahedron(50.0)}
+ENGINES = ("sqlite", "postgresql")
+
+
+def make(url, name, *, profile="one-touch", solid=None, **spec):
+    """Place and register an object as a command would."""
+    solid = solid or SOLIDS[name]
+    ready = PROFILES[profile]
+    array, style = ready.array(), SymbolStyle(pitch_mm=ready.pitch_mm)
+    clearances = [[np.full(len(loop), 1.0) for loop in face.loops] for face in solid.faces]
+    part = RegisteredPart("F1", "stl", "out/F1.stl", "ab" * 32, np.eye(4) / 3)
+    with writing(open_database(url)) as connection:
+        taken = occupied(connection, find_array(connection, array))
+        layout = lay_out(solid, array, style.pitch_mm, 2.0, clearances, taken,
+                         allow_blank_faces=True)  # fmt: skip
+        register(connection, Registration(
+            name, solid, layout, array, profile, alphabet_named(ready.alphabet), style,
+            {"name": name, **spec}, "0.1", (part,),
+        ))  # fmt: skip
+
+
+def names(url):
+    with reading(open_database(url, writable=False)) as connection:
+        return [entry.name for entry in list_objects(connection)]
+
+
+def held(url, name):
+    with reading(open_database(url, writable=False)) as connection:
+        return read_object(connection, name)
+
+
+def sound(url):
+    """Check that the bits of taken cells are those of the cells; return the cells by array."""
+    with reading(open_database(url, writable=False)) as connection:
+        numbers = {entry.array_id for entry in list_objects(connection)}
+        for number in numbers:
+            cells = held_cells(connection, number)[:, :2]
+            assert np.array_equal(np.stack(occupied(connection, number), axis=1), cells)
+            assert len(np.unique(cells, axis=0)) == len(cells)
+
+
+@pytest.fixture
+def file(tmp_path):
+    return tmp_path / "exchange.db"
+
+
+@pytest.mark.parametrize(("ours", "theirs"), list(product(ENGINES, ENGINES)))
+def test_objects_come_over_as_they_are(new_database, file, ours, theirs):
+    here, there = new_database(ours), new_database(theirs)
+    make(here, "Cube")
+    make(here, "Tetra", profile="thesis", solid=tetrahedron(150.0))
+    make(there, "Other", solid=cube(60.0), profile="large")
+    with writing(open_database(here)) as connection:
+        retire(connection, "Tetra")
+    assert export_objects(here, file).copied == ("Cube", "Tetra")
+    done = import_objects(there, str(file))
+    assert (done.copied, done.known, done.refused) == (("Cube", "Tetra"), (), ())
+    assert names(there) == ["Cube", "Other", "Tetra"]
+    for name in ("Cube", "Tetra"):
+        one, other = held(here, name), held(there, name)
+        assert same_layout(one.layout, other.layout)
+        assert one.polyhedron.vertices.tobytes() == other.polyhedron.vertices.tobytes()
+        assert (one.polyhedron.faces, one.polyhedron.edges) == (
+            other.polyhedron.faces, other.polyhedron.edges,
+        )  # fmt: skip
+        assert (one.style, one.alphabet, one.spec) == (other.style, other.alphabet, other.spec)
+        assert one.array.definition == other.array.definition
+        assert (one.entry.utc, one.entry.tool_version, one.entry.spec_hash) == (
+            other.entry.utc, other.entry.tool_version, other.entry.spec_hash,
+        )  # fmt: skip
+        assert one.entry.retired_utc == other.entry.retired_utc
+        assert (one.entry.imported_from, other.entry.imported_from) == ("", "exchange.db")
+        assert other.entry.imported_utc
+        assert one.parts[0].T_object_part.tobytes() == other.parts[0].T_object_part.tobytes()
+    sound(there)
+    again = import_objects(there, str(file))
+    assert (again.copied, again.known, again.refused) == ((), ("Cube", "Tetra"), ())
+    # The array goes on where the imported objects end.
+    make(there, "New", solid=cube(30.0))
+    sound(there)
+
+
+def test_files_of_parts_are_named_from_the_other_databases_folder(tmp_path):
+    here, there = tmp_path / "a", tmp_path / "b"
+    here.mkdir()
+    there.mkdir()
+    make(str(here / "lab.db"), "Cube")
+    export_objects(str(here / "lab.db"), there / "exchange.db")
+    import_objects(str(tmp_path / "lab.db"), str(there / "exchange.db"))
+    assert held(str(there / "exchange.db"), "Cube").parts[0].file == "../a/out/F1.stl"
+    assert held(str(tmp_path / "lab.db"), "Cube").parts[0].file == "a/out/F1.stl"
+
+
+def test_an_object_on_cells_that_are_held_is_refused_by_name(new_database, lab_url, file):
+    theirs = new_database("sqlite")
+    make(theirs, "Cube")
+    make(theirs, "Tetra", profile="thesis", solid=tetrahedron(150.0))
+    export_objects(theirs, file)
+    make(lab_url, "Other")
+    with pytest.raises(DatabaseError, match="nothing was imported: 'Cube' needs") as caught:
+        import_objects(lab_url, str(file))
+    assert "cells that 'Other' holds here" in str(caught.value)
+    assert "make 'Cube' again here" in caught.value.fix
+    assert "Tetra" not in str(caught.value)
+    assert names(lab_url) == ["Other"]
+    done = import_objects(lab_url, str(file), skip_refused=True)
+    assert done.copied == ("Tetra",)
+    assert [refused.name for refused in done.refused] == ["Cube"]
+    assert names(lab_url) == ["Other", "Tetra"]
+    sound(lab_url)
+    with writing(open_database(lab_url)) as connection:
+        remove(connection, "Other")
+    assert import_objects(lab_url, str(file), names=["Cube"]).copied == ("Cube",)
+    sound(lab_url)
+
+
+def test_a_name_that_is_held_is_refused_and_can_be_changed(new_database, lab_url, file):
+    theirs = new_database("sqlite")
+    make(theirs, "Cube")
+    export_objects(theirs, file)
+    make(lab_url, "Cube", solid=cube(40.0), profile="large")
+    with pytest.raises(DatabaseError, match="'Cube' is the name of another object") as caught:
+        import_objects(lab_url, str(file))
+    assert "--rename 'Cube=NEW'" in caught.value.fix
+    assert import_objects(lab_url, str(file), renamed={"Cube": "Their cube"}).copied == (
+        "Their cube",
+    )
+    known = import_objects(lab_url, str(file), renamed={"Cube": "Their cube"}).known
+    assert known == ("Their cube",)
+    assert names(lab_url) == ["Cube", "Their cube"]
+    sound(lab_url)
+
+
+def test_only_named_objects_go_out_and_come_in(new_database, file):
+    here, there = new_database("sqlite"), new_database("sqlite")
+    make(here, "Cube")
+    make(here, "Tetra")
+    with pytest.raises(DatabaseError, match="no object is called 'Ball'"):
+        export_objects(here, file, names=["Ball"])
+    assert not file.exists()
+    export_objects(here, file, names=["Tetra"])
+    assert names(str(file)) == ["Tetra"]
+    with pytest.raises(DatabaseError, match="no object is called 'Cube'"):
+        import_objects(there, str(file), names=["Cube"])
+    assert not database_exists(there)
+    make(there, "Other", profile="thesis", solid=tetrahedron(150.0))
+    assert import_objects(there, str(file), names=["Tetra"]).copied == ("Tetra",)
+
+
+def test_an_export_replaces_no_file_unless_told(new_database, file):
+    here = new_database("sqlite")
+    make(here, "Cube")
+    file.write_text("notes")
+    with pytest.raises(DatabaseError, match="there already"):
+        export_objects(here, file)
+    assert file.read_text() == "notes"
+    export_objects(here, file, force=True)
+    assert names(str(file)) == ["Cube"]
+    with pytest.raises(DatabaseError, match="into itself"):
+        export_objects(str(file), file, force=True)
+    with pytest.raises(DatabaseError, match="into itself"):
+        import_objects(str(file), str(file))
+    with pytest.raises(DatabaseError, match="mkdir"):
+        export_objects(here, file.parent / "no" / "x.db")
+    assert [path.name for path in file.parent.iterdir()] == ["exchange.db"]
+
+
+def test_a_rehearsed_import_changes_nothing(new_database, lab_url, file):
+    theirs = new_database("sqlite")
+    make(theirs, "Cube")
+    export_objects(theirs, file)
+    assert import_objects(lab_url, str(file), dry_run=True).copied == ("Cube",)
+    assert not database_exists(lab_url)
+    make(lab_url, "Other", profile="large", solid=cube(60.0))
+    assert import_objects(lab_url, str(file), dry_run=True).copied == ("Cube",)
+    assert names(lab_url) == ["Other"]
+    with reading(open_database(lab_url)) as connection:
+        assert len(occupied(connection, 2)[0]) == 0
+
+
+DAMAGE = {
+    "a symbol": ("UPDATE cells SET label = (label + 1) % 4 WHERE position = 3", "has symbol"),
+    "a cell": ('UPDATE cells SET "row" = "row" + 63 WHERE position = 3', "beyond its array"),
+    "the array": (
+        "UPDATE arrays SET definition = replace(definition, '63', '65')", "array",
+    ),
+    "its digest": ("UPDATE arrays SET definition_sha256 = 'x'", "definition was changed"),
+    "its size": ('UPDATE arrays SET "rows" = 9', "definition was changed"),
+    "the array's text": ("UPDATE arrays SET definition = '{}'", "cannot be made"),
+    "the alphabet": ("UPDATE alphabets SET definition = '{}'", "alphabet"),
+    "a foreign key": ("UPDATE faces_to_vertices SET vertex_id = 99 WHERE vertex_id = 1", "lost"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", DAMAGE)
+def test_a_damaged_file_brings_nothing_in(new_database, file, what):
+    statement, said = DAMAGE[what]
+    here, there = new_database("sqlite"), new_database("sqlite")
+    make(here, "Cube")
+    export_objects(here, file)
+    with sqlite3.connect(file) as connection:
+        connection.execute(statement)
+    connection.close()
+    for _ in range(2):
+        with pytest.raises(DatabaseError, match=said) as caught:
+            import_objects(there, str(file))
+        assert "export it once more" in caught.value.fix
+    assert not database_exists(there)
+
+
+def test_what_is_no_database_of_objects_is_refused(new_database, file, tmp_path):
+    there = new_database("sqlite")
+    with pytest.raises(DatabaseError, match="does not exist"):
+        import_objects(there, str(file))
+    file.write_bytes(b"solid cube\n" * 999)
+    with pytest.raises(DatabaseError, match="not a database"):
+        import_objects(there, str(file))
+    file.write_bytes(b"")
+    with pytest.raises(DatabaseError, match="no objects are registered"):
+        import_objects(there, str(file))
+    open_database(str(tmp_path / "whole.db"))
+    whole = (tmp_path / "whole.db").read_bytes()
+    file.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(DatabaseError, match=r"damaged|not a database|another program"):
+        import_objects(there, str(file))
+    assert not database_exists(there)
+
+
+def test_a_file_of_the_first_version_is_imported_and_not_changed(lab_url, tmp_path, caplog):
+    file = tmp_path / "old.db"
+    shutil.copy(FIRST, file)
+    file.chmod(0o444)
+    make(lab_url, "Other", profile="large", solid=cube(60.0))
+    done = import_objects(lab_url, str(file))
+    assert done.copied == ("Cube", "Prism", "Small box-1", "Small box-2")
+    assert file.read_bytes() == FIRST.read_bytes()
+    assert [path.name for path in tmp_path.iterdir()] == ["old.db"]
+    assert caplog.records == []
+    sound(lab_url)
+
+
+def test_retired_objects_keep_their_cells_and_are_not_made_again(lab_url):
+    make(lab_url, "Cube")
+    engine = open_database(lab_url)
+    with writing(engine) as connection:
+        entry = retire(connection, "Cube")
+        assert retire(connection, "Cube").retired_utc == entry.retired_utc != ""
+    with pytest.raises(DatabaseError, match="'Cube' was retired") as caught:
+        make(lab_url, "Cube")
+    assert "--undo" in caught.value.fix
+    before = held(lab_url, "Cube")
+    make(lab_url, "Tetra")
+    sound(lab_url)
+    with writing(engine) as connection:
+        assert restore(connection, "Cube").retired_utc == ""
+    after = held(lab_url, "Cube")
+    assert same_layout(before.layout, after.layout)
+    assert json.dumps(before.spec) == json.dumps(after.spec)
+    with writing(engine) as connection:
+        assert remove(connection, "Cube").symbols == before.entry.symbols
+        assert find_object(connection, "Cube") is None
+    sound(lab_url)
+    with writing(engine) as connection, pytest.raises(DatabaseError, match="called 'Cube'"):
+        retire(connection, "Cube")

@@ -1,0 +1,248 @@
+"""Databases of the first schema version, as they were written then, become today's."""
+
+import logging
+import os
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.migration import MigrationContext
+from sqlalchemy import select, text
+
+from generator.array.definition import array_from
+from generator.database import migrate, tables
+from generator.database.cells import held_cells, occupied
+from generator.database.migrations import v2
+from generator.database.open import database_exists, open_database
+from generator.database.read import list_objects, read_array, read_layout, read_object
+from generator.database.transaction import reading, writing
+from generator.errors import DatabaseError
+
+FIRST = Path(__file__).parents[3] / "fixtures" / "database"
+NAMES = ["Cube", "Prism", "Small box-1", "Small box-2"]
+
+
+@pytest.fixture
+def first_version(lab_url):
+    """A database of version 1: the committed file, or the committed dump on a server."""
+    if "://" not in lab_url:
+        shutil.copy(FIRST / "v1.db", lab_url)
+        return lab_url
+    import psycopg
+
+    with psycopg.connect(lab_url, autocommit=True) as connection:
+        connection.execute((FIRST / "v1.sql").read_bytes())
+    return lab_url
+
+
+@pytest.fixture
+def first_file(tmp_path):
+    shutil.copy(FIRST / "v1.db", tmp_path / "lab.db")
+    return tmp_path / "lab.db"
+
+
+def everything(path):
+    """All rows of a SQLite file, by table, as they are."""
+    connection = sqlite3.connect(path)
+    names = [r[0] for r in connection.execute("SELECT name FROM sqlite_master WHERE type='table'")]
+    found = {}
+    for name in sorted(names):
+        cursor = connection.execute(f'SELECT * FROM "{name}" ORDER BY 1, 2')
+        columns = [column[0] for column in cursor.description]
+        found[name] = sorted(list(zip(columns, row, strict=True)) for row in cursor)
+    connection.close()
+    return found
+
+
+def test_objects_of_the_first_version_are_all_there(first_version):
+    engine = open_database(first_version)
+    with reading(engine) as connection:
+        stored = {row.key: row.value for row in connection.execute(select(tables.meta))}
+        assert stored["schema_version"] == str(tables.SCHEMA_VERSION)
+        assert [entry.name for entry in list_objects(connection)] == NAMES
+        for entry in list_objects(connection):
+            assert (entry.retired_utc, entry.imported_from, entry.imported_utc) == ("", "", "")
+            held = read_object(connection, entry.name)
+            array = array_from(held.array.definition)
+            assert len(held.faces) == entry.number_of_faces == len(held.layout.faces)
+            assert sum(len(face.rows) for face in held.layout.faces) == entry.symbols > 0
+            for face in held.layout.faces:
+                np.testing.assert_array_equal(array.symbols(face.rows, face.columns), face.labels)
+        for array_id in (1, 2):
+            taken = np.stack(occupied(connection, array_id), axis=1)
+            np.testing.assert_array_equal(taken, held_cells(connection, array_id)[:, :2])
+        assert len(occupied(connection, 1)[0]) == 96 + 40 + 40
+        assert read_array(connection, 2).profile == "thesis"
+
+
+def test_the_migrated_schema_is_the_one_that_new_databases_get(first_version, new_database):
+    for url in (first_version, new_database("sqlite")):
+        with reading(open_database(url)) as connection:
+            context = MigrationContext.configure(connection, opts={"compare_type": False})
+            assert compare_metadata(context, tables.metadata) == []
+    if "://" in first_version:
+        return
+    with sqlite3.connect(first_version) as old, sqlite3.connect(url) as new:
+        for table in tables.metadata.tables:
+            listed = f'PRAGMA table_info("{table}")'
+            columns = [sorted(row[1:] for row in c.execute(listed)) for c in (old, new)]
+            assert columns[0] == columns[1]
+
+
+def test_every_row_stays_as_it_was_and_the_old_file_beside_it(first_file, caplog):
+    before = everything(first_file)
+    open_database(str(first_file))
+    after = everything(first_file)
+    added = {"retired_utc", "imported_from", "imported_utc"}
+    for table, rows in before.items():
+        if table != "meta":
+            kept = [[(k, v) for k, v in row if k not in added] for row in after[table]]
+            assert kept == rows
+    copy = first_file.with_name("lab.v1.db")
+    assert everything(copy) == before
+    assert sorted(os.listdir(first_file.parent)) == ["lab.db", "lab.v1.db"]
+    (record,) = caplog.records
+    assert record.levelno == logging.WARNING
+    assert f"{first_file}: brought from schema version 1 to 2; as it was: {copy}" in caplog.text
+    caplog.clear()
+    open_database(str(first_file))  # once is enough
+    assert caplog.records == []
+    assert sorted(os.listdir(first_file.parent)) == ["lab.db", "lab.v1.db"]
+
+
+def test_the_message_goes_to_stderr_and_json_stays_json(first_file):
+    command = "from generator.command import main; main(['list', '--json', '--database', 'lab.db'])"
+    done = subprocess.run(
+        [sys.executable, "-c", command], capture_output=True, text=True, cwd=first_file.parent
+    )
+    assert done.returncode == 0
+    assert done.stdout.startswith("{")
+    assert "brought from schema version 1 to 2" in done.stderr
+
+
+def test_a_reader_finds_an_older_database_and_migrates_it(first_version):
+    assert database_exists(first_version)
+    with reading(open_database(first_version, writable=False)) as connection:
+        assert read_layout(connection, "Cube").kind == "faces"
+    with (
+        pytest.raises(DatabaseError, match="may not be written"),
+        writing(open_database(first_version, writable=False)) as connection,
+    ):
+        connection.execute(text("DELETE FROM cells"))
+
+
+def test_a_copy_is_never_written_over_another_one(first_file):
+    (first_file.parent / "lab.v1.db").write_text("something else")
+    open_database(str(first_file))
+    assert (first_file.parent / "lab.v1.db").read_text() == "something else"
+    assert database_exists(str(first_file.parent / "lab.v1-2.db"))
+
+
+def test_a_migration_that_fails_changes_nothing(first_version, monkeypatch):
+    class NoMemoryError(Exception):
+        pass
+
+    def failing(operations):
+        done(operations)
+        raise NoMemoryError
+
+    done = v2.upgrade
+    monkeypatch.setattr(v2, "upgrade", failing)
+    before = None if "://" in first_version else Path(first_version).read_bytes()
+    with pytest.raises(NoMemoryError):
+        open_database(first_version)
+    if before is not None:
+        assert Path(first_version).read_bytes() == before
+        assert os.listdir(Path(first_version).parent) == ["lab.db"]
+    monkeypatch.undo()
+    with reading(open_database(first_version)) as connection:
+        assert [entry.name for entry in list_objects(connection)] == NAMES
+
+
+def test_no_copy_no_migration(first_file, monkeypatch):
+    def full(path, copy):
+        raise sqlite3.OperationalError("database or disk is full")
+
+    monkeypatch.setattr(migrate, "snapshot", full)
+    before = first_file.read_bytes()
+    with pytest.raises(DatabaseError, match=r"no copy can be made .* disk is full"):
+        open_database(str(first_file))
+    assert first_file.read_bytes() == before
+    assert os.listdir(first_file.parent) == ["lab.db"]
+
+
+KILLED = """
+import os, signal, sys
+from generator.database.migrations import v2
+from generator.database.open import open_database
+done = v2.upgrade
+def upgrade(operations):
+    done(operations)
+    if sys.argv[2] == "kill":
+        os.kill(os.getpid(), signal.SIGKILL)
+v2.upgrade = upgrade
+sys.stdin.readline()
+open_database(sys.argv[1])
+"""
+
+
+def started(url, how):
+    return subprocess.Popen(
+        [sys.executable, "-c", KILLED, url, how], stdin=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+
+
+def test_a_migration_killed_before_its_commit_leaves_the_old_version(first_version):
+    killed = started(first_version, "kill")
+    killed.communicate(b"go\n", timeout=60)
+    assert killed.returncode == -signal.SIGKILL
+    with reading(open_database(first_version)) as connection:  # migrates at last
+        assert [entry.name for entry in list_objects(connection)] == NAMES
+        assert len(occupied(connection, 1)[0]) == 176
+
+
+def test_many_may_open_an_older_database_at_once(first_version):
+    several = [started(first_version, "live") for _ in range(3)]
+    for process in several:
+        process.stdin.write(b"go\n")
+        process.stdin.flush()
+    said = [process.communicate(timeout=60)[1].decode() for process in several]
+    assert [process.returncode for process in several] == [0, 0, 0]
+    assert sum("brought from schema version 1" in text for text in said) == 1
+    if "://" not in first_version:
+        assert sorted(os.listdir(Path(first_version).parent)) == ["lab.db", "lab.v1.db"]
+
+
+def test_an_older_database_that_may_not_be_written_says_what_to_do():
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        shutil.copy(FIRST / "v1.db", folder / "lab.db")
+        folder.chmod(0o555)
+        (folder / "lab.db").chmod(0o444)
+        root = os.geteuid() == 0
+        if root:  # root may write anywhere
+            os.seteuid(65534)
+        try:
+            with pytest.raises(DatabaseError, match="schema version 1, must be brought to 2") as e:
+                open_database(str(folder / "lab.db"), writable=False)
+        finally:
+            if root:
+                os.seteuid(0)
+            folder.chmod(0o755)
+        assert "encode-object list" in e.value.fix
+        assert (folder / "lab.db").read_bytes() == (FIRST / "v1.db").read_bytes()
+
+
+def test_a_newer_schema_is_refused_on_either_engine(lab_url):
+    with writing(open_database(lab_url)) as connection:
+        connection.execute(text("UPDATE meta SET value = '3' WHERE key = 'schema_version'"))
+    for writable in (True, False):
+        with pytest.raises(DatabaseError, match="version 3, newer than 2"):
+            open_database(lab_url, writable=writable)

@@ -1,0 +1,175 @@
+"""Writers that meet: who loses places anew, a bounded number of times, and says so in the end."""
+
+import threading
+
+import numpy as np
+import pytest
+from sqlalchemy import text
+
+from generator.alphabet.known import alphabet_named
+from generator.alphabet.outline import SymbolStyle
+from generator.array.profiles import PROFILES
+from generator.database.cells import find_array, held_cells, occupied
+from generator.database.open import open_database
+from generator.database.race import in_turn
+from generator.database.read import find_object, list_objects
+from generator.database.register import Registration, register
+from generator.database.transaction import LostRaceError, reading, writing
+from generator.errors import DatabaseError
+from generator.layout.layout import lay_out
+from generator.polyhedron.shapes import tetrahedron
+
+ARRAY = PROFILES["one-touch"].array()
+SOLID = tetrahedron(40.0)
+CLEARANCES = [[np.full(len(loop), 1.0) for loop in face.loops] for face in SOLID.faces]
+
+
+def placed(connection):
+    taken = occupied(connection, find_array(connection, ARRAY))
+    return lay_out(SOLID, ARRAY, 7.0, 2.7, CLEARANCES, taken)
+
+
+def registration(name, layout, **spec):
+    return Registration(
+        name, SOLID, layout, ARRAY, "one-touch", alphabet_named("dense-4"), SymbolStyle(),
+        {"name": name, **spec}, "0",
+    )  # fmt: skip
+
+
+def no_pause():
+    return np.random.default_rng(1)
+
+
+def test_the_loser_of_a_race_places_anew(lab_url):
+    """Both choose their cells before their turn: the same ones."""
+    engine = open_database(lab_url)
+    both_placed = threading.Barrier(2, timeout=30)
+    tries = {"a": 0, "b": 0}
+
+    def write(name):
+        with reading(open_database(lab_url)) as connection:
+            early = placed(connection)
+        both_placed.wait()
+
+        def work(connection):
+            tries[name] += 1
+            layout = early if tries[name] == 1 else placed(connection)
+            return register(connection, registration(name, layout))
+
+        in_turn(engine, work)
+
+    writers = [threading.Thread(target=write, args=(name,)) for name in tries]
+    for writer in writers:
+        writer.start()
+    for writer in writers:
+        writer.join(60)
+    assert sorted(tries.values()) == [1, 2]
+    with reading(engine) as connection:
+        entries = list_objects(connection)
+        cells = held_cells(connection, 1)
+    assert [entry.name for entry in entries] == ["a", "b"]
+    assert len(np.unique(cells[:, :2], axis=0)) == sum(entry.symbols for entry in entries) > 40
+
+
+def test_a_lost_race_leaves_nothing_behind(lab_url):
+    engine = open_database(lab_url)
+    with writing(engine) as connection:
+        first = placed(connection)
+        register(connection, registration("first", first))
+    seen = []
+
+    def work(connection):
+        seen.append([entry.name for entry in list_objects(connection)])
+        layout = first if len(seen) < 3 else placed(connection)
+        return register(connection, registration("second", layout))
+
+    in_turn(engine, work, rng=no_pause())
+    assert seen == [["first"]] * 3
+
+
+def test_who_always_loses_gives_up_and_says_why(lab_url):
+    engine = open_database(lab_url)
+    with writing(engine) as connection:
+        first = placed(connection)
+        register(connection, registration("first", first))
+    tries = []
+
+    def work(connection):
+        tries.append(1)
+        return register(connection, registration("second", first))
+
+    with pytest.raises(LostRaceError, match="another object holds") as caught:
+        in_turn(engine, work, tries=3, rng=no_pause())
+    assert len(tries) == 3
+    assert caught.value.exit_code == 4
+    assert caught.value.fix
+
+
+def test_errors_that_are_no_race_are_not_tried_again(lab_url):
+    engine = open_database(lab_url)
+    tries = []
+
+    def work(connection):
+        tries.append(1)
+        layout = placed(connection)
+        register(connection, registration("one", layout))
+        return register(connection, registration("one", layout, other=1))
+
+    with pytest.raises(DatabaseError, match="another spec"):
+        in_turn(engine, work)
+    assert len(tries) == 1
+    with reading(engine) as connection:
+        assert list_objects(connection) == ()
+
+
+def test_a_writer_without_turns_on_a_server_is_a_race_too(new_database):
+    """A program that does not know of turns takes the cells while we register."""
+    url = new_database("postgresql")
+    engine, other = open_database(url), open_database(url)
+    with writing(engine) as connection:  # an object to copy the rows of
+        register(connection, registration("known", placed(connection)))
+        row, column = held_cells(connection, 1)[0, :2].tolist()
+    reached = threading.Event()
+    with reading(engine) as connection:
+        wanted = placed(connection)
+
+    def meddle():
+        with other.connect() as connection, connection.begin():
+            statement = 'UPDATE cells SET "row" = :r, "column" = :c WHERE "row" = :old_r'
+            connection.execute(
+                text(f'{statement} AND "column" = :old_c'),
+                {"r": int(wanted.faces[3].rows[0]), "c": int(wanted.faces[3].columns[0]),
+                 "old_r": row, "old_c": column},
+            )  # fmt: skip
+            reached.set()
+            connection.execute(text("SELECT pg_sleep(0.3)"))
+
+    thread = threading.Thread(target=meddle)
+    tries = []
+
+    def work(connection):
+        tries.append(1)
+        if len(tries) == 1:
+            thread.start()
+            assert reached.wait(10)
+            return register(connection, registration("mine", wanted))
+        rows, columns = held_cells(connection, 1)[:, :2].T  # the bits do not know that cell
+        layout = lay_out(SOLID, ARRAY, 7.0, 2.7, CLEARANCES, (rows, columns))
+        return register(connection, registration("mine", layout))
+
+    in_turn(engine, work)
+    thread.join(30)
+    assert len(tries) == 2
+    with reading(engine) as connection:
+        assert find_object(connection, "mine") is not None
+
+
+def test_a_writer_waits_no_longer_than_it_is_told(lab_url):
+    engine, hasty = open_database(lab_url), open_database(lab_url, wait_s=0.05)
+    with writing(engine):
+        with reading(hasty) as connection:  # readers go on
+            assert list_objects(connection) == ()
+        with pytest.raises(DatabaseError, match="keep the database locked"), writing(hasty):
+            pass
+    with writing(hasty):
+        pass

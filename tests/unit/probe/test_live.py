@@ -1,0 +1,186 @@
+"""The live view: what is shown, what the keys change, in terminals of any size."""
+
+import re
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from probe.calibration import calibration_from, even_load, expected_counts
+from probe.circuit import Electronics, fsr_of, read_sequence
+from probe.client import ClientStatistics
+from probe.command.live_state import BIAS_FRAMES, LiveState, next_free
+from probe.command.live_view import KEYS, SHADES, heat_map, line_of, rendered
+from probe.frame import frame_from
+from probe.protocol import IdentPacket
+from probe.recording.read import read_frames, read_recording
+
+COUNTS = ClientStatistics(frames=120, rate=99.9, lost=3, failed=1, reopenings=1)
+IDENT = IdentPacket(seq=0, t_us=0, settling_us=10.0, baud=1_000_000, sensor=2, name="FSR-uno")
+
+
+def frames_of(*images):
+    return [frame_from(image, t_ns=i * 10_000_000, seq=i) for i, image in enumerate(images)]
+
+
+def flat(value):
+    return np.full((16, 16), value)
+
+
+@pytest.fixture
+def state(tmp_path):
+    return LiveState("sim:", tmp_path)
+
+
+def shown(state, *, width=100, height=30, colours=False, ident=IDENT):
+    console = Console(width=width, height=height, color_system="truecolor" if colours else None,
+                      no_color=not colours, force_terminal=True)  # fmt: skip
+    with console.capture() as capture:
+        console.print(rendered(state, COUNTS, ident, height=height, colours=colours))
+    return capture.get()
+
+
+def test_the_newest_frame_is_shown_and_pause_holds_it(state):
+    assert state.image() is None
+    assert "waiting for frames" in shown(state)
+    state.take(frames_of(flat(10), flat(20)))
+    assert (state.image() == 20).all()
+    state.paused = True
+    state.take(frames_of(flat(900)))
+    assert (state.image() == 20).all()
+    assert "PAUSED" in shown(state)
+    assert state.scale == 32, "the scale of a sensor at rest does not blow up its noise"
+
+
+def test_the_scale_rises_at_once_and_falls_slowly(state):
+    state.take(frames_of(flat(1000)))
+    state.image()
+    assert state.scale == 1000
+    state.take(frames_of(flat(100)))
+    state.image()
+    assert 900 < state.scale < 1000
+
+
+def test_the_bias_is_the_mean_of_frames_and_comes_off_the_image(state):
+    state.toggle_bias()
+    assert state.taking_bias
+    noise = np.random.default_rng(2).integers(0, 5, (BIAS_FRAMES, 16, 16))
+    state.take(frames_of(*(100 + noise)))
+    assert not state.taking_bias
+    assert state.bias == pytest.approx(100 + noise.mean(axis=0))
+    state.take(frames_of(flat(150)))
+    assert state.image() == pytest.approx(50 - noise.mean(axis=0))
+    state.take(frames_of(flat(0)))
+    assert not state.image().any(), "no reading below zero"
+    state.toggle_bias()
+    assert (state.image() == 0).all()
+    assert state.notice == "bias off"
+
+
+def test_the_median_takes_a_single_tactel_away(state):
+    image = flat(10)
+    image[4, 4] = 900
+    state.take(frames_of(image))
+    state.median = True
+    assert (state.image() == 10).all()
+
+
+def test_newtons_with_a_calibration(state):
+    rng, board = np.random.default_rng(1), Electronics()
+    loads = {f: read_sequence(np.full((60, 16, 16), f / 256), board, fsr_of(16, 16), None, rng)[0]
+             for f in (0, 40, 100, 200, 400)}  # fmt: skip
+    given = [even_load(counts, f, name=str(f)) for f, counts in loads.items() if f]
+    state.calibration = calibration_from(loads[0], given, sensor="sim/0", made="2026-01-01")
+    state.take(frames_of(np.rint(expected_counts(flat(0.5), state.calibration))))
+    assert np.median(state.image()) == pytest.approx(0.5, rel=0.1)
+    text = shown(state)
+    assert re.search(r"peak +0\.\d\d N at \(", text)
+    assert "days old" in text
+    state.toggle_bias()
+    state.take(frames_of(*loads[0][:BIAS_FRAMES]))
+    assert state.bias is None, "a calibration has its own bias"
+    assert state.notice == "the bias is that of the calibration"
+    state.toggle_bias()
+    state.take(frames_of(*loads[40][:BIAS_FRAMES]))
+    assert "calibrate again" in state.notice
+
+
+def test_recordings_and_images_get_the_next_free_name(state, tmp_path):
+    for number in (1, 2):
+        state.toggle_recording("sim/0")
+        state.take(frames_of(flat(5), flat(6)))
+        assert f"REC live-00{number}.h5, 2 frames" in shown(state)
+        state.toggle_recording("sim/0")
+        assert state.notice == f"live-00{number}.h5: 2 frames"
+    assert read_recording(tmp_path / "live-002.h5").origin.sensor == "sim/0"
+    assert [int(f.counts[0, 0]) for f in read_frames(tmp_path / "live-001.h5")] == [5, 6]
+    state.save()
+    assert (np.load(tmp_path / "image-001.npy") == 6).all()
+    assert (tmp_path / "image-001.png").read_bytes().startswith(b"\x89PNG")
+    state.end_recording()  # without one
+    assert next_free(tmp_path, "image", ".png").name == "image-002.png"
+    names = sorted(path.name for path in tmp_path.iterdir())
+    assert names == ["image-001.npy", "image-001.png", "live-001.h5", "live-002.h5"]
+
+
+@pytest.mark.parametrize("colours", [True, False])
+@pytest.mark.parametrize("height", [8, 15, 22, 50])
+def test_the_view_fits_terminals_of_any_size(state, height, colours):
+    state.take(frames_of(np.arange(256).reshape(16, 16)))
+    state.notice = "the device went away; it is tried again for 30 s; " * 3
+    lines = shown(state, width=80, height=height, colours=colours).splitlines()
+    plain = [re.sub(r"\x1b\[[0-9;]*m", "", line) for line in lines]
+    if height >= 15:
+        assert len(lines) <= max(height, 18)
+    assert max(map(len, plain)) <= 80
+    text = "\n".join(plain)
+    assert "99.9 frames/s" in text
+    assert re.search(r"lost +3", text)
+    assert "the device went away" in text
+    assert KEYS in text
+    assert ("\x1b[" in "".join(lines)) or not colours
+
+
+def test_trouble_is_yellow_and_the_sensor_has_a_name(state):
+    state.take(frames_of(flat(3)))
+    text = shown(state, colours=True)
+    assert re.search(r"lost +\x1b\[0m\x1b\[33m3\x1b", text)
+    assert re.search(r"reboots +\x1b\[0m0", text)
+    assert "2 of FSR-uno, 10 bits" in text
+    assert "..." in shown(state, ident=None)
+
+
+def test_shades_rise_with_the_reading():
+    share = np.linspace(0, 1, 256).reshape(16, 16)
+    for small, rows, wide in ((False, 16, 32), (True, 8, 16)):
+        lines = ["".join(part.text for part in line)
+                 for line in heat_map(share, small=small, colours=False)]  # fmt: skip
+        assert [len(line) for line in lines] == [wide] * rows
+        shades = [SHADES.index(character) for character in "".join(lines)]
+        assert shades == sorted(shades)
+        assert shades[0] == 0
+        coloured = heat_map(share, small=small, colours=True)
+        assert len(coloured) == rows
+        assert sum(len(part.text) for part in coloured[0]) == wide
+        assert shades[-1] == len(SHADES) - 1, "no row is left out"
+    beyond = heat_map(np.full((16, 16), 7.0), small=False, colours=False)
+    assert beyond[0][0].text == SHADES[-1] * 32
+
+
+def test_colours_rise_in_brightness():
+    line = heat_map(np.linspace(0, 1, 64)[None], small=False, colours=True)[0]
+    light = []
+    for part in line:
+        r, g, b = part.style.bgcolor.triplet
+        light.append(0.2126 * r + 0.7152 * g + 0.0722 * b)
+    assert (np.diff(light) > 0).all()
+
+
+def test_one_line_where_there_is_no_terminal(state):
+    assert line_of(state, COUNTS) == "waiting for frames"
+    image = flat(1)
+    image[3, 12] = 77
+    state.take(frames_of(image))
+    assert line_of(state, COUNTS) == (
+        "frame 0  99.9/s  lost 3  failed 1  reboots 0  peak 77 counts at (3, 12)"
+    )

@@ -1,0 +1,281 @@
+"""The thesis's way of reading, whole: scans of faces of the thesis's profile, by touch alone."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from generator.pipeline import encode
+from generator.spec import read_specs
+from probe.arm.links import Arm
+from probe.contact.tabs import tabs
+from probe.contact.tips import Tips
+from probe.scan.kinesthetic import JointErrors, kinesthetic
+from probe.scan.places import surface_to_sensor, touch_at
+from probe.scan.raster import raster
+from probe.sensor import Sensor
+from probe.simulate.registered import registered_surface
+from recognizer.classical import Settings, read_classically
+from recognizer.classical_image import Merging, laid, merged, relative_poses
+from recognizer.classical_scan import read_scan, read_while_scanning
+from recognizer.filters import ImageError, tactile_image, touch_image
+from recognizer.lab import open_lab
+from recognizer.mosaic.planar import between, moved
+from recognizer.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, TOO_FEW
+from recognizer.skeleton.symbols import symbols
+
+SENSOR = Sensor()
+SET = """
+objects:
+- {name: Cube, shape: {cube: 80 mm}, profile: thesis}
+- {name: Prism, shape: {triangular_prism: {side: 90 mm, height: 80 mm}}, profile: thesis}
+"""
+OTHER = """
+name: Stranger
+shape: {cube: 80 mm}
+encoding: {family: prba, polynomial: "0x1655", rows: 63, columns: 65}
+symbols: {alphabet: thesis-2, pitch: 12 mm}
+"""
+
+
+def made(folder: Path, text: str) -> str:
+    (folder / "spec.yaml").write_text(text)
+    url = f"sqlite:///{folder / 'lab.db'}"
+    encode(read_specs([folder / "spec.yaml"]), folder=folder / "out", database=url, formats=())
+    return url
+
+
+@pytest.fixture(scope="module")
+def url(tmp_path_factory):
+    return made(tmp_path_factory.mktemp("lab"), SET)
+
+
+@pytest.fixture(scope="module")
+def lab(url):
+    return open_lab(url)
+
+
+class Scan:
+    """Touches of a face by an arm with backlash and noise, felt with defects."""
+
+    def __init__(self, url, name, face, seed, theta=0.0, force_n=80.0):
+        scene = registered_surface(url, name, face)
+        rng = np.random.default_rng(seed)
+        plan = raster([scene.region.starts], SENSOR, theta_rad=theta, least_cover=0.4)
+        middle = scene.centre_mm()
+        T_base_face = surface_to_sensor(300, 0, 0.2, 100) @ surface_to_sensor(*-middle, 0)
+        wanted = [T_base_face @ surface_to_sensor(x, y, theta) for x, y in plan.places_mm]
+        arm = kinesthetic(Arm(), wanted, JointErrors(), rng)
+        tips = Tips(lengths_mm=rng.normal(0, 0.03, (16, 16)))
+        gains = np.exp(rng.normal(0, 0.1, (16, 16)))
+        self.believed, self.readings, self.true = arm.believed, [], []
+        for T_base_sensor in arm.true:
+            touch = touch_at(np.linalg.inv(T_base_face) @ T_base_sensor, force_n)
+            felt = gains * tabs(scene.surface, SENSOR, touch, tips).forces_n
+            self.readings.append(np.maximum(felt + rng.normal(0, 0.02, (16, 16)), 0))
+            self.true.append([touch.x_mm, touch.y_mm, touch.theta_rad])
+        self.true = np.array(self.true)
+
+
+@pytest.fixture(scope="module")
+def scan(url):
+    return Scan(url, "Cube", "F2", seed=3)
+
+
+def off_mm(poses, true):
+    """Rms distance of merged touches from where they were, up to a common shift."""
+    away = (poses - between(true[0], true))[:, :2]
+    away -= away.mean(axis=0)
+    return float(np.sqrt((away**2).sum(axis=1).mean()))
+
+
+# --- merging ----------------------------------------------------------------------------
+
+
+def pattern(x, y):
+    return 2 + np.sin(0.45 * x + 0.3) * np.cos(0.35 * y) + np.sin(0.2 * x - 0.4 * y)
+
+
+def felt_at(pose):
+    at = moved(np.asarray(pose, float), SENSOR.centres_mm())
+    return pattern(at[..., 0], at[..., 1])
+
+
+def test_poses_in_any_frame_become_those_in_the_first_sensor_frame():
+    planar = np.array([[3.0, 4.0, 0.5], [9.0, 4.5, 0.52]])
+    spatial = np.array([surface_to_sensor(*pose, 7.0) for pose in planar])
+    tilted = np.eye(4)
+    tilted[:3, :3] = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]  # a wall
+    expected = between(planar[0], planar)
+    assert relative_poses(planar) == pytest.approx(expected)
+    assert relative_poses(tilted @ spatial) == pytest.approx(expected, abs=1e-9)
+    with pytest.raises(ImageError, match="shape"):
+        relative_poses(np.zeros((3, 2)))
+
+
+def test_touches_lie_where_they_were_felt():
+    poses = np.array([[0.0, 0, 0], [6.7, 0.3, 0.02], [6.9, -6.6, -0.01]])
+    found = merged(SENSOR, [felt_at(pose) for pose in poses], poses, Merging(placing="believed"))
+    image = found.image
+    assert image.step_mm == pytest.approx(SENSOR.pitch_mm / 4)
+    at = image.xy_mm(*np.indices(image.values.shape))
+    away = np.abs(image.values - pattern(at[..., 0], at[..., 1]))[image.defined]
+    assert away.max() < 0.25  # what straight lines between the tactels leave
+    assert np.sqrt((away**2).mean()) < 0.08
+    assert not image.defined.all()
+
+
+def test_products_find_steps_to_a_quarter_of_a_tactel():
+    quarter = SENSOR.pitch_mm / 4
+    believed = np.array([[0.0, 0, 0], [16 * quarter, 0, 0]])
+    blob = np.zeros((16, 16))
+    blob[6:9, 9:11] = 1.0
+    blob[10:12, 8:10] = 0.8
+    moved_blob = np.roll(blob, -4, axis=1)
+    wrong = np.array([[0, 0, 0], [2 * quarter, quarter, 0]])
+    found = merged(SENSOR, [blob, moved_blob], believed + wrong)
+    assert found.poses[1, :2] == pytest.approx([16 * quarter, 0.0], abs=1e-9)
+    assert found.corrected.tolist() == [False, True]
+
+
+def test_where_nothing_is_felt_in_common_the_belief_stays():
+    blob = np.zeros((16, 16))
+    blob[6:9, 0:2] = 1.0
+    poses = np.array([[0.0, 0, 0], [6.3, 0.2, 0]])
+    found = merged(SENSOR, [blob, np.roll(blob, 12, axis=1)], poses)
+    assert found.poses == pytest.approx(relative_poses(poses))
+    assert not found.corrected.any()
+
+
+def test_bad_tactels_are_filled_by_other_touches():
+    poses = np.array([[0.0, 0, 0], [6.7, 0, 0]])
+    trust = np.ones((16, 16))
+    trust[:, 9] = 0
+    readings = [np.where(trust > 0, felt_at(pose), np.nan) for pose in poses]
+    found = merged(SENSOR, readings, poses, Merging(placing="believed"), trust)
+    at = found.image.xy_mm(*np.indices(found.image.values.shape))
+    inner = (np.abs(at[..., 0] - 2.4) < 0.5) & (np.abs(at[..., 1]) < 10)
+    assert found.image.defined[inner].all()
+    assert np.abs(found.image.values - pattern(at[..., 0], at[..., 1]))[inner].max() < 0.3
+
+
+def test_touches_without_poses_are_refused():
+    with pytest.raises(ImageError, match="2 touches with 1 poses"):
+        merged(SENSOR, [np.zeros((16, 16))] * 2, np.zeros((1, 3)))
+
+
+def test_image_of_one_touch_is_the_magnified_touch():
+    image = touch_image(SENSOR, felt_at([0, 0, 0]))
+    found = laid(SENSOR, [image], np.zeros((1, 3)))
+    place = found.xy_mm(*np.indices(found.values.shape))
+    middle = np.abs(place).max(axis=-1) < 5
+    assert np.abs(found.values - pattern(place[..., 0], place[..., 1]))[middle].max() < 0.25
+
+
+def test_bounded_errors_do_not_add_up(scan):
+    errors = {
+        placing: off_mm(
+            merged(SENSOR, scan.readings, scan.believed, Merging(placing=placing)).poses, scan.true
+        )
+        for placing in ("product", "bounded", "believed")
+    }
+    assert errors["product"] < 1.6 * SENSOR.pitch_mm
+    assert errors["bounded"] < 0.5 * SENSOR.pitch_mm
+    assert errors["believed"] < 0.3 * SENSOR.pitch_mm  # this arm is better than quarter steps
+
+
+# --- reading ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("placing", ["product", "bounded"])
+def test_a_scan_names_object_face_and_place(lab, scan, placing):
+    found = read_scan(lab, SENSOR, scan.readings, scan.believed, merging=Merging(placing=placing))
+    answer = found.recognition
+    assert (answer.object, answer.face) == ("Cube", "F2")
+    assert found.reading.grid.window.shape == (6, 6)
+    x, y, theta = scan.true[-1]
+    assert math.dist(answer.T_face_probe[:2, 3], (x, y)) < 3.0
+    turned = math.atan2(answer.T_face_probe[1, 0], answer.T_face_probe[0, 0])
+    assert abs(math.remainder(turned - theta, math.tau)) < math.radians(2)
+    assert answer.margin > 10
+    face = next(
+        encoded
+        for encoded in map(lab.encodings[0].face, range(len(lab.encodings[0].faces)))
+        if (encoded.object, encoded.face) == ("Cube", "F2")
+    )
+    at = moved(scan.true[0], np.array([[s.x_mm, s.y_mm] for s in found.reading.symbols]))
+    right = wrong = 0
+    for centre, label in zip(face.centres_mm, face.labels, strict=True):
+        near = np.linalg.norm(at - centre, axis=1) < 4
+        named = {found.reading.symbols[k].label for k in np.flatnonzero(near)} - {-1}
+        right += label in named
+        wrong += bool(named) and label not in named
+    assert wrong == 0
+    assert right >= 28
+
+
+def test_a_turned_scan_of_a_triangle(url, lab):
+    scan = Scan(url, "Prism", "F1", seed=4, theta=0.35)
+    found = read_scan(lab, SENSOR, scan.readings, scan.believed, merging=Merging(placing="bounded"))
+    if found.recognition:
+        assert (found.recognition.object, found.recognition.face) == ("Prism", "F1")
+        assert math.dist(found.recognition.T_face_probe[:2, 3], scan.true[-1, :2]) < 3
+    else:
+        assert found.recognition.reason in (TOO_FEW, AMBIGUOUS, NOT_ENCODED)
+    assert len(found.reading.grid.members) >= 12
+
+
+@pytest.mark.parametrize("conversion", ["likelihood", "good tuple", "exact"])
+def test_every_conversion_reads_the_window(lab, scan, conversion):
+    image = merged(SENSOR, scan.readings, scan.believed, Merging(placing="believed")).image
+    answer = read_classically(lab, image, Settings(conversion=conversion)).recognition
+    assert (answer.object, answer.face) in {("Cube", "F2"), (None, None)}
+    if conversion == "likelihood":
+        assert answer.object == "Cube"
+
+
+def test_an_answer_comes_before_the_scan_is_over_and_never_a_wrong_one(lab, scan):
+    first = None
+    merging = Merging(placing="bounded")
+    for found in read_while_scanning(
+        lab, SENSOR, scan.readings, scan.believed, merging=merging, every=15
+    ):
+        if found.recognition:
+            assert (found.recognition.object, found.recognition.face) == ("Cube", "F2")
+            first = first or len(found.merged.poses)
+    assert first is not None
+    assert 30 <= first <= len(scan.readings)
+
+
+def test_one_touch_of_this_profile_is_too_few(lab, scan):
+    found = read_scan(lab, SENSOR, scan.readings[44:45], scan.believed[44:45])
+    assert found.recognition.reason in (TOO_FEW, AMBIGUOUS)
+    assert not found.recognition
+
+
+def test_no_contact_and_blank_surfaces_are_told(lab):
+    empty = tactile_image(np.zeros((60, 60)), step_mm=0.4)
+    assert read_classically(lab, empty).recognition.reason == NO_CONTACT
+    rows, columns = np.indices((100, 100))
+    ridges = tactile_image(1.0 * (columns % 25 < 5), step_mm=0.4)
+    assert not read_classically(lab, ridges).recognition
+    plane = tactile_image(1.0 + rows / 50, step_mm=0.4)
+    assert not read_classically(lab, plane).recognition
+
+
+def test_an_object_of_another_lab_is_not_taken_for_one_of_ours(lab, tmp_path):
+    scan = Scan(made(tmp_path, OTHER), "Stranger", "F1", seed=5)
+    merging = Merging(placing="believed")
+    found = read_scan(lab, SENSOR, scan.readings, scan.believed, merging=merging)
+    assert len(found.reading.grid.members) > 24  # its symbols are read, and are none of ours
+    assert not found.recognition
+
+
+def test_symbols_of_a_face_are_read_as_the_database_has_them(lab, scan):
+    image = merged(SENSOR, scan.readings, scan.true, Merging(placing="believed")).image
+    encoding = lab.encodings[0]
+    found = symbols(image, encoding.alphabet, encoding.style)
+    named = [symbol for symbol in found if symbol.label >= 0]
+    assert len(named) >= 30
+    assert all(math.isfinite(symbol.theta_rad) for symbol in named)

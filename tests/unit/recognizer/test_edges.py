@@ -1,0 +1,276 @@
+"""Edges and corners: Hough, production rules, and the fit on simulated touches."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from probe.contact.contract import Touch
+from probe.contact.tabs import tabs
+from probe.contact.tips import Tips
+from probe.sensor import Overlay, Sensor
+from probe.surface.face import Face
+from probe.surface.polygon import polygon
+from recognizer.edges.find import Finding, classical_edges, face_edges, outline
+from recognizer.edges.hough import segments
+from recognizer.edges.line import meeting, through
+from recognizer.edges.points import EdgePoints, edge_points
+from recognizer.edges.pose import corner_poses
+from recognizer.edges.response import BLURS_MM, REACH_MM, felt_at, responses
+from recognizer.edges.syntax import fused, vertices
+from recognizer.filters import tactile_image, touch_image
+
+SENSOR = Sensor()
+SQUARE = np.array([[0.0, 0], [80, 0], [80, 80], [0, 80]])
+THESIS_MM = 1.52  # the thesis's largest error of an edge
+
+
+def on_line(angle, offset, along, rng, across=0.1):
+    n = np.array([math.cos(angle), math.sin(angle)])
+    t = np.array([n[1], -n[0]])
+    at = offset * n + np.asarray(along)[:, None] * t
+    at = at + rng.normal(0, across, len(along))[:, None] * n
+    return EdgePoints(at, np.tile(n, (len(at), 1)), np.ones(len(at)))
+
+
+def joined(*parts):
+    return EdgePoints(
+        *(np.concatenate([getattr(p, name) for p in parts]) for name in EdgePoints.__slots__)
+    )
+
+
+# --- points, lines, segments ------------------------------------------------------------
+
+
+def test_points_lie_on_the_step_of_an_image():
+    _, columns = np.indices((40, 40))
+    image = tactile_image(np.clip((columns - 12.3) / 3 + 0.5, 0, 1), step_mm=0.5)
+    points = edge_points(image)
+    assert len(points) == 40
+    assert points.at_mm[:, 0] == pytest.approx((12.3 - 19.5) * 0.5, abs=0.15)
+    assert points.normals == pytest.approx(np.tile([1.0, 0.0], (40, 1)), abs=1e-9)
+
+
+def test_no_points_in_nothing_and_beside_what_is_undefined():
+    assert len(edge_points(tactile_image(np.zeros((16, 16)), step_mm=1.0))) == 0
+    values, known = np.ones((16, 16)), np.ones((16, 16), bool)
+    values[:, :8], known[:, :8] = 0, False
+    assert len(edge_points(tactile_image(values, step_mm=1.0, defined=known))) == 0
+
+
+@pytest.mark.parametrize("degrees", range(-180, 180, 20))
+def test_line_through_points_and_its_covariance(degrees):
+    rng, angle = np.random.default_rng(degrees + 180), math.radians(degrees)
+    normed = []
+    for _ in range(40):
+        points = on_line(angle, 3.0, np.linspace(2, 14, 15), rng, 0.2)
+        edge = through(points.at_mm, points.normals, 0.05)
+        error = np.array([math.remainder(edge.angle_rad - angle, math.tau), edge.offset_mm - 3.0])
+        normed.append(error @ np.linalg.solve(edge.covariance, error))
+        way = edge.end_mm - edge.start_mm
+        assert edge.normal @ (-way[1], way[0]) > 0  # the face to the left
+    assert 0.8 < np.mean(normed) < 4.5
+
+
+def test_longest_segment_is_taken_first_and_noise_is_none():
+    rng = np.random.default_rng(1)
+    long = on_line(0.5, 4.0, np.linspace(-10, 10, 30), rng)
+    short = on_line(-1.2, -6.0, np.linspace(0, 6, 10), rng)
+    specks = EdgePoints(
+        rng.uniform(-12, 12, (12, 2)), rng.normal(0, 1, (12, 2)) * 0.1 + [0, 1], np.ones(12)
+    )
+    found = segments(joined(short, specks, long))
+    assert found[0].edge.angle_rad == pytest.approx(0.5, abs=0.02)
+    assert found[0].edge.offset_mm == pytest.approx(4.0, abs=0.1)
+    assert len(found[0].points) >= 29
+    assert found[1].edge.offset_mm == pytest.approx(-6.0, abs=0.2)
+    lengths = [segment.edge.length_mm for segment in found]
+    assert lengths == sorted(lengths, reverse=True)
+    assert segments(joined(short).chosen(np.arange(2))) == []
+
+
+def test_line_between_two_parallel_edges_is_none():
+    """Points whose slopes look against each other never share a line."""
+    rng = np.random.default_rng(2)
+    left = on_line(0.0, -3.0, np.linspace(-8, 8, 20), rng)
+    right = on_line(math.pi, -3.0, np.linspace(-8, 8, 20), rng)
+    found = segments(joined(left, right))
+    assert len(found) == 2
+    assert {round(abs(segment.edge.angle_rad), 1) for segment in found} == {0.0, 3.1}
+
+
+# --- production rules -------------------------------------------------------------------
+
+
+def test_pieces_that_run_on_are_one_edge_and_breaks_are_dropped():
+    rng = np.random.default_rng(3)
+    first = on_line(0.3, 2.0, np.linspace(-12, -4, 12), rng)
+    second = on_line(0.3, 2.0, np.linspace(2, 11, 12), rng)
+    stray = on_line(1.3, -7.0, np.linspace(0, 3, 5), rng)
+    pieces = segments(joined(first, second, stray))
+    assert len(pieces) == 3
+    (edge,) = fused(pieces)
+    assert edge.length_mm == pytest.approx(23, abs=0.5)
+    assert edge.points == 24
+
+
+def test_edges_that_turn_make_a_vertex_and_parallel_ones_none():
+    rng = np.random.default_rng(4)
+    below = on_line(math.pi / 2, -5.0, np.linspace(-9, 5, 20), rng, 0.02)
+    left = on_line(0.0, -6.0, np.linspace(-9, 5, 20), rng, 0.02)
+    edges = fused(segments(joined(below, left)))
+    (corner,) = vertices(edges)
+    assert corner.at_mm == pytest.approx([-6.0, -5.0], abs=0.1)
+    assert corner.opening_rad == pytest.approx(math.pi / 2, abs=0.02)
+    assert corner.second.angle_rad == pytest.approx(math.pi / 2, abs=0.02)  # leads away along x
+    assert corner.T_image_corner[:2, 0] == pytest.approx([1, 0], abs=0.02)
+    far = on_line(0.02, 8.0, np.linspace(-9, 5, 20), rng, 0.02)
+    assert meeting(edges[0], through(far.at_mm, far.normals, 0.1)) is None
+    assert meeting(edges[0], edges[0]) is None
+
+
+def test_corner_of_a_known_face_gives_the_pose():
+    T = np.eye(4)  # T_face_probe
+    c, s = math.cos(0.7), math.sin(0.7)
+    T[:2, :2], T[:2, 3] = [[c, -s], [s, c]], [76.0, 5.0]
+    back = np.linalg.inv(T)
+
+    def seen(a, b):
+        ends = np.array([[*a, 0, 1], [*b, 0, 1]], float) @ back.T
+        way = ends[1, :2] - ends[0, :2]
+        normal = np.array([-way[1], way[0]]) / np.linalg.norm(way)
+        return through(ends[:, :2], np.tile(normal, (2, 1)), 0.1)
+
+    corner = meeting(seen((80, 0), (80, 12)), seen((70, 0), (80, 0)))
+    poses = corner_poses(corner, [SQUARE])
+    assert len(poses) == 4  # a square's corners are alike
+    right = next(pose for pose in poses if pose.vertex == 1)
+    assert right.T_face_probe == pytest.approx(T, abs=1e-9)
+    assert np.linalg.eigvalsh(right.covariance).min() > 0
+    assert len(corner_poses(corner, [np.array([[0, 0], [90, 0], [45, 77.9]])])) == 0
+
+
+# --- response ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["tab", "pad"])
+def test_response_rises_from_nothing_to_all(kind):
+    table = responses(Sensor(overlay=Overlay(kind=kind)))
+    assert len(table) == len(BLURS_MM)
+    assert (np.diff(table, axis=1) > -1e-12).all()
+    for row in table:
+        assert felt_at(row, np.array([-REACH_MM - 1, REACH_MM + 1])) == pytest.approx(
+            [0, 1], abs=1e-4
+        )
+    sharp = felt_at(table[0], np.array([-0.5, 0.0, 0.5]))
+    assert 0 < sharp[0] < 0.4 < sharp[1] < 0.66 < sharp[2]
+
+
+# --- simulated touches ------------------------------------------------------------------
+
+
+def touches(loop, places, rng, gain=0.1, noise=0.02, length=0.03):
+    """Readings of a sensor with defects on a blank face."""
+    face = Face(None, polygon([np.asarray(loop, float)]))
+    for x, y in places:
+        touch = Touch(x, y, rng.uniform(-math.pi, math.pi), rng.uniform(30, 110),
+                      *rng.normal(0, 0.01, 2))  # fmt: skip
+        tips = Tips(lengths_mm=rng.normal(0, length, (16, 16)))
+        felt = tabs(face, SENSOR, touch, tips).forces_n * np.exp(rng.normal(0, gain, (16, 16)))
+        yield touch, touch_image(SENSOR, np.maximum(felt + rng.normal(0, noise, (16, 16)), 0))
+
+
+def truth(touch, a, b):
+    """Angle and offset of the edge from a to b, face to the left, in the sensor frame."""
+    way = np.subtract(b, a) / np.linalg.norm(np.subtract(b, a))
+    normal = np.array([-way[1], way[0]])
+    angle = math.atan2(normal[1], normal[0]) - touch.theta_rad
+    return angle, float(normal @ (np.asarray(a, float) - (touch.x_mm, touch.y_mm)))
+
+
+def worst_mm(edge, angle, offset):
+    n = np.array([math.cos(angle), math.sin(angle)])
+    return max(abs(float(n @ end) - offset) for end in (edge.start_mm, edge.end_mm))
+
+
+def test_an_edge_is_found_to_a_fraction_of_the_thesis_error():
+    rng = np.random.default_rng(5)
+    places = zip(rng.uniform(-5, 8, 20), rng.uniform(25, 55, 20), strict=True)
+    classical, ours, inside = [], [], 0
+    for touch, image in touches(SQUARE, places, rng):
+        angle, offset = truth(touch, (0, 80), (0, 0))
+        rough = classical_edges(image)
+        classical.append(min(worst_mm(edge, angle, offset) for edge in rough))
+        edges = face_edges(image, SENSOR)
+        if not edges:
+            continue
+        ours.append(worst_mm(edges[0], angle, offset))
+        error = np.array(
+            [math.remainder(edges[0].angle_rad - angle, math.tau), edges[0].offset_mm - offset]
+        )
+        inside += error @ np.linalg.solve(edges[0].covariance, error) < 9.2  # 99 %
+    assert len(ours) >= 18
+    assert np.sqrt(np.mean(np.square(ours))) < THESIS_MM / 6
+    assert np.median(ours) < THESIS_MM / 12
+    assert inside >= 0.85 * len(ours)
+    assert max(classical) < THESIS_MM
+
+
+def test_a_corner_is_found_with_both_edges():
+    rng = np.random.default_rng(6)
+    places = itertools.product((2.0, 5.0, 8.0), (2.5, 5.5, 8.5))
+    errors = []
+    for touch, image in touches(SQUARE, places, rng):
+        found = outline(image, SENSOR)
+        if len(found.corners) != 1:
+            continue
+        corner = found.corners[0]
+        assert corner.opening_rad == pytest.approx(math.pi / 2, abs=0.2)
+        c, s = math.cos(touch.theta_rad), math.sin(touch.theta_rad)
+        at = (-c * touch.x_mm - s * touch.y_mm, s * touch.x_mm - c * touch.y_mm)
+        errors.append(math.dist(at, corner.at_mm))
+        first = corner_poses(corner, [SQUARE])
+        nearest = min(math.dist(p.T_face_probe[:2, 3], (touch.x_mm, touch.y_mm)) for p in first)
+        assert nearest == pytest.approx(errors[-1], abs=0.6)
+    assert len(errors) >= 7
+    assert np.median(errors) < 0.3
+
+
+def test_where_the_face_goes_round_a_corner_both_sides_of_it_are_felt():
+    loop = [[0, 0], [80, 0], [80, 40], [40, 40], [40, 80], [0, 80]]
+    rng = np.random.default_rng(7)
+    found = 0
+    for touch, image in touches(loop, [(37, 37), (36, 40), (39, 36), (38, 38)], rng):
+        view = outline(image, SENSOR)
+        at = touch.on_surface(SENSOR.centres_mm())
+        on_face = ~((at[..., 0] > 40) & (at[..., 1] > 40))
+        if view.corners:
+            assert view.corners[0].opening_rad == pytest.approx(1.5 * math.pi, abs=0.3)
+            assert (view.inside == on_face).mean() > 0.95
+            found += 1
+    assert found >= 2
+
+
+@pytest.mark.parametrize("level", [0.0, 5.0])
+def test_no_edge_in_an_even_image(level):
+    image = touch_image(SENSOR, np.full((16, 16), level))
+    assert face_edges(image, SENSOR) == ()
+    assert outline(image, SENSOR).corners == ()
+
+
+def test_no_edge_where_the_face_reaches_everywhere():
+    rng = np.random.default_rng(8)
+    for _, image in touches(SQUARE, [(40, 40), (30, 50), (50, 35)], rng):
+        assert face_edges(image, SENSOR) == ()
+
+
+def test_dead_tactels_are_left_out():
+    rng = np.random.default_rng(9)
+    ((touch, image),) = touches(SQUARE, [(3, 40)], rng)
+    values, trust = image.values.copy(), np.ones((16, 16))
+    for r, c in rng.integers(0, 16, (6, 2)):
+        values[r, c], trust[r, c] = 0.0, 0.0
+    edge = face_edges(touch_image(SENSOR, values, trust), SENSOR)[0]
+    assert worst_mm(edge, *truth(touch, (0, 80), (0, 0))) < 0.5
+    assert classical_edges(touch_image(SENSOR, values, trust), Finding(median=False))

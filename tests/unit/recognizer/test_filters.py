@@ -1,0 +1,121 @@
+"""Bias, median, magnification, Sobel: against hand-made images and scipy."""
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from probe.sensor import Sensor
+from recognizer.filters import (
+    ImageError,
+    magnified,
+    median,
+    sobel,
+    tactile_image,
+    touch_image,
+    unbiased,
+)
+from recognizer.mosaic.product import magnified as by_convolution
+
+
+def noise(seed=0, shape=(16, 16)):
+    return np.random.default_rng(seed).uniform(0, 1, shape)
+
+
+def test_frame_has_x_along_columns_and_y_against_rows():
+    sensor = Sensor()
+    image = touch_image(sensor, noise())
+    assert image.xy_mm(*np.indices((16, 16))) == pytest.approx(sensor.centres_mm(), abs=1e-12)
+    fine = magnified(image)
+    assert fine.xy_mm(0, 0) == pytest.approx(image.xy_mm(0, 0))
+    assert fine.xy_mm(60, 60) == pytest.approx(image.xy_mm(15, 15))
+
+
+def test_values_are_copied_and_read_only():
+    given = noise()
+    image = tactile_image(given, step_mm=1.0)
+    given[0, 0] = 7
+    assert image.values[0, 0] != 7
+    with pytest.raises(ValueError, match="read-only"):
+        image.values[0, 0] = 1
+
+
+@pytest.mark.parametrize(
+    ("values", "kwargs", "match"),
+    [
+        (np.zeros(5), {"step_mm": 1}, "shape"),
+        (np.zeros((4, 4)), {"step_mm": 0}, "step"),
+        (np.zeros((4, 4)), {"step_mm": 1, "defined": np.ones((3, 4))}, "mask"),
+        (np.full((4, 4), np.nan), {"step_mm": 1}, r"16 readings.*\(0, 0\)"),
+    ],
+)
+def test_no_image_is_refused(values, kwargs, match):
+    with pytest.raises(ImageError, match=match):
+        tactile_image(values, **kwargs)
+
+
+def test_nan_where_undefined_stays_outside():
+    values, known = noise(), np.ones((16, 16), bool)
+    values[3, 4], known[3, 4] = np.nan, False
+    image = tactile_image(values, step_mm=1.0, defined=known)
+    for made in (unbiased(image), median(image), magnified(image)):
+        assert np.isfinite(made.values).all()
+    # beside the hole counts what is left
+    assert magnified(image).values[12, 19] == pytest.approx(values[3, 5])
+    assert not magnified(image).defined[12, 16]
+
+
+def test_bias_is_what_is_read_without_force():
+    image = tactile_image(100 + np.pad(noise(shape=(4, 4)) * 50, 6), step_mm=1.0)
+    over = unbiased(image)
+    assert over.values.min() == 0
+    assert over.values[0, 0] == 0
+    assert over.values.max() == pytest.approx(image.values.max() - 100)
+    assert unbiased(image, 120.0).values.max() == pytest.approx(image.values.max() - 120)
+
+
+def test_median_is_that_of_the_neighbourhood():
+    values = noise(1)
+    expected = ndimage.median_filter(values, 3, mode="nearest")
+    assert np.array_equal(median(tactile_image(values, step_mm=1.0)).values, expected)
+
+
+def test_median_over_holes_is_that_of_what_is_known():
+    values, known = noise(2), np.random.default_rng(3).random((16, 16)) > 0.3
+    found = median(tactile_image(values, step_mm=1.0, defined=known)).values
+    padded = np.pad(np.where(known, values, np.nan), 1, mode="edge")
+    for r, c in np.argwhere(known):
+        assert found[r, c] == pytest.approx(np.nanmedian(padded[r : r + 3, c : c + 3]))
+
+
+def test_median_takes_spikes_and_keeps_edges_but_erases_thin_lines():
+    step = np.zeros((16, 16))
+    step[:, 8:] = 1
+    spiked = step.copy()
+    spiked[4, 3] = 9
+    assert np.array_equal(median(tactile_image(spiked, step_mm=1.0)).values, step)
+    line = np.zeros((16, 16))
+    line[:, 8] = 1
+    assert not median(tactile_image(line, step_mm=1.0)).values.any()
+    with pytest.raises(ImageError, match="erases lines"):
+        median(tactile_image(line, step_mm=1.0), thinnest_mm=1.5)
+
+
+def test_magnification_is_the_thesis_convolution():
+    """Zeros between the tactels and H, twice; the last three rows and columns are beyond."""
+    values = noise(4)
+    fine = magnified(tactile_image(values, step_mm=1.0))
+    assert fine.values.shape == (61, 61)
+    assert fine.step_mm == 0.25
+    assert fine.values == pytest.approx(by_convolution(values)[:61, :61], abs=1e-12)
+
+
+def test_sobel_gives_slopes_in_the_image_frame():
+    rows, columns = np.indices((12, 12))
+    image = tactile_image(3 * columns - 5 * rows, step_mm=0.5)
+    x, y = sobel(image)
+    assert x[1:-1, 1:-1] == pytest.approx(np.full((10, 10), 6.0))
+    assert y[1:-1, 1:-1] == pytest.approx(np.full((10, 10), 10.0))
+    values = noise(5)
+    x, y = sobel(tactile_image(values, step_mm=1.0))
+    assert x == pytest.approx(ndimage.sobel(values, axis=1, mode="nearest") / 8)
+    assert y == pytest.approx(-ndimage.sobel(values, axis=0, mode="nearest") / 8)
