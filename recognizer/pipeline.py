@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import Sensor
+from recognizer.belief import Support, Thresholds, shown_at, support
 from recognizer.lab import Encoding, Lab
 from recognizer.locate import Place, place_scores, places
 from recognizer.pose import face_covariance, face_pose, inside_mm
@@ -44,18 +45,6 @@ Array = NDArray[np.float64]
 
 #: For touches that the first try does not answer.
 THOROUGH = Settings(candidates=24, finalists=6)
-
-
-@dataclass(frozen=True, slots=True)
-class Thresholds:
-    """When an answer is given."""
-
-    margin: float = 12.0  #: nats over the best other place
-    surprise: float = 6.0  #: nats over symbols of no registered place
-    noise: float = 0.4  #: standard deviation of psi that may stay unexplained
-    rim_mm: float = 2.0  #: how far the sensor's centre may lie beyond the face
-    places: int = 4  #: of every lattice that are verified
-    verify_steps: int = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,10 +83,16 @@ def reader_for(
 class Reading:
     """A place that was verified."""
 
+    image: Image
+    template: Template
     encoding: Encoding
     place: Place
     fit: Fit
     score: float  #: log-likelihood of the image, nats
+
+    def support(self) -> Support:
+        """Return what speaks for it."""
+        return support(self.image, self.template, self.encoding, self.fit, self.place, self.score)
 
 
 def recognise(reader: Reader, signal: Signal, seq: int = 0) -> Recognition:
@@ -124,17 +119,6 @@ def _readings(reader: Reader, signal: Signal, settings: Settings) -> list[Readin
     return sorted(readings, key=lambda reading: -reading.score)
 
 
-def unplaced(encoding: Encoding, fit: Fit) -> float:
-    """Return the log-likelihood of an image that shows symbols of no registered place.
-
-    Every cell shows any symbol, or none, with the same probability; the prior of a place is
-    one over their number.
-    """
-    options = encoding.array.order + 1
-    each = np.log(np.exp(fit.scores).sum(axis=1)) - math.log(options)
-    return float(each.sum()) + fit.value + math.log(len(encoding.keys))
-
-
 def _verified(
     reader: Reader, image: Image, encoding: Encoding, template: Template, found: tuple[Fit, ...]
 ) -> list[Reading]:
@@ -144,19 +128,15 @@ def _verified(
         return []
     starts = [found[place.fit] for place in candidates]
     lattices = started(
-        np.array([[fit.x_mm, fit.y_mm, fit.theta_rad, *fit.nuisance] for fit in starts]),
+        np.array([fit.pose for fit in starts]),
         np.array([fit.gain for fit in starts]),
     )
 
     def shown(cells: NDArray[np.int64]) -> NDArray[np.int64]:
-        labels = np.empty(cells.shape[:2], np.int64)
-        for b, place in enumerate(candidates):
-            held_by, label = encoding.at(
-                (place.row - cells[b, :, 1]) % encoding.array.rows,
-                (place.column + cells[b, :, 0]) % encoding.array.columns,
-            )
-            labels[b] = np.where(held_by == place.face, label, -1)
-        return labels
+        labels = np.stack(
+            [shown_at(encoding, place, cells[b]) for b, place in enumerate(candidates)]
+        )
+        return np.where(labels == encoding.array.order, -1, labels)
 
     fitted = refined(
         image,
@@ -173,7 +153,7 @@ def _verified(
         fair = [again[b] for b, other in enumerate(candidates) if other.fit == place.fit]
         scores = [place_scores(encoding, fit, place) for fit in fair]
         best = int(np.argmax(scores))
-        readings.append(Reading(encoding, place, fair[best], scores[best]))
+        readings.append(Reading(image, template, encoding, place, fair[best], scores[best]))
     return readings
 
 
@@ -189,11 +169,11 @@ def _answer(reader: Reader, readings: list[Reading], seq: int) -> Recognition:
         face = other.encoding.face(other.place.face)
         runner_up = RunnerUp(face.object, face.face, _index(other))
     limits = reader.thresholds
-    if (
-        best.score - unplaced(best.encoding, best.fit) < limits.surprise
-        or best.fit.noise > limits.noise
-    ):
+    found = best.support()
+    if not found.holds(limits):
         return refused(seq, NOT_ENCODED, margin=margin, runner_up=runner_up)
+    if found.cells < limits.cells:
+        return refused(seq, TOO_FEW, margin=margin, runner_up=runner_up)
     if margin < limits.margin:
         return refused(seq, AMBIGUOUS, margin=margin, runner_up=runner_up)
     face = best.encoding.face(best.place.face)

@@ -13,9 +13,10 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import Connection, and_, bindparam, insert, select, update
+from sqlalchemy import Connection, and_, bindparam, select, update
 
 from generator.database import tables
+from generator.database.rows import insert_rows
 
 Cells = tuple[NDArray[np.int64], NDArray[np.int64]]  #: rows (n,) and columns (n,)
 
@@ -98,8 +99,7 @@ def _write(connection: Connection, array_id: int, cells: Cells, *, taken: bool) 
             occupancy.tile_column == bindparam("at_column"),
         )
         connection.execute(update(tables.occupancy).where(this_tile), old)
-    if new:
-        connection.execute(insert(tables.occupancy), new)
+    insert_rows(connection, tables.occupancy, new)
 
 
 def _read(

@@ -105,15 +105,22 @@ def print_files(
         Least distance between two parts, mm.
     """
     printed = [_printed(part) for part in parts]
-    return tuple(
-        PrintFile(
-            plate,
-            _package({_MODEL: _components(title, printed, plate)}),
-            _package(
-                {_MODEL: _volumes(title, printed, plate), _CONFIG: _volume_settings(printed, plate)}
-            ),
-        )
-        for plate in arranged([part.size for part in printed], bed_mm, gap_mm)
+    plates = arranged([part.size for part in printed], bed_mm, gap_mm)
+    return tuple(_plate(title, printed, plate) for plate in plates)
+
+
+def print_file(title: str, parts: Sequence[Part], plate: Plate) -> PrintFile:
+    """Return the 3MF files of one plate; its places count `parts`, which are all on it."""
+    return _plate(title, [_printed(part) for part in parts], plate)
+
+
+def _plate(title: str, printed: Sequence[_Printed], plate: Plate) -> PrintFile:
+    return PrintFile(
+        plate,
+        _package({_MODEL: _components(title, printed, plate)}),
+        _package(
+            {_MODEL: _volumes(title, printed, plate), _CONFIG: _volume_settings(printed, plate)}
+        ),
     )
 
 

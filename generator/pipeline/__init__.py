@@ -2,11 +2,17 @@
 
 ::
 
-    plan.py    what the stages need of one spec
-    files.py   layout -> parts -> staged files
-    encode.py  one object, one transaction; several objects, one run
+    plan.py     what the stages need of one spec
+    place.py    cells for it: those it has, or free ones
+    files.py    layout -> parts -> staged files
+    make.py     one object, one transaction
+    sets.py     several objects, in parallel; what was made before is skipped
+    plates.py   the set on the printer's bed: plates, overview, packing list
+    encode.py   one run
+    made.py     what came of it
 """
 
-from generator.pipeline.encode import Encoded, Made, encode
+from generator.pipeline.encode import encode
+from generator.pipeline.made import Encoded, Made
 
 __all__ = ["Encoded", "Made", "encode"]

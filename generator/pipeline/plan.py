@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -44,9 +45,21 @@ class Plan:
         """The spec that this plan comes from."""
         return self.located.spec
 
+    @property
+    def meaning(self) -> dict[str, Any]:
+        """What is registered as the spec: equal values mean the same object."""
+        return self.spec.meaning
 
-def planned(located: Located) -> Plan:
+
+def planned(located: Located, solid: Polyhedron | None = None) -> Plan:
     """Return the plan of one object.
+
+    Parameters
+    ----------
+    located
+        Its spec.
+    solid
+        Its shape, where it does not come from the spec.
 
     Raises
     ------
@@ -58,7 +71,7 @@ def planned(located: Located) -> Plan:
     with blaming(located, "print.printer"):
         printer = printer_named(spec.printer)
     with blaming(located, "shape"):
-        polyhedron = _polyhedron(spec.shape)
+        polyhedron = _polyhedron(spec.shape) if solid is None else solid
     with blaming(located, "encoding, profile"):
         array = array_from(spec.encoding)
     with blaming(located, "symbols.alphabet, encoding.alphabet, profile"):

@@ -93,9 +93,19 @@ def read_tree(path: Path) -> Tree:
     SpecError
         The file is missing, too large, too deep, not UTF-8, not YAML, or empty.
     """
-    text = read_text(path)
-    source = Source.of(str(path), text)
-    reader = _Reader(source, path.parent)
+    return tree_of(read_text(path), str(path), path.parent)
+
+
+def tree_of(text: str, name: str, folder: Path) -> Tree:
+    """Read YAML text; `name` stands in messages, file names in it are relative to `folder`.
+
+    Raises
+    ------
+    SpecError
+        As for `read_tree`.
+    """
+    source = Source.of(name, text)
+    reader = _Reader(source, folder)
     try:
         return reader.tree(yaml.parse(text, Loader=yaml.SafeLoader))
     except yaml.YAMLError as error:

@@ -24,6 +24,7 @@ class Located:
 
     spec: ObjectSpec
     tree: Tree = field(repr=False)
+    origin: str = ""  #: name of the file that was given, without its suffix; files of a set bear it
 
 
 def locate(located: Located, path: str = "") -> str:

@@ -91,6 +91,10 @@ class SpecError(GeneratorError):
         cause = first.cause + (f" (and {more} more)" if more else "")
         super().__init__(cause, fix=first.fix, place=first.place)
 
+    def __reduce__(self) -> tuple[type[SpecError], tuple[tuple[Problem, ...]]]:
+        """Return how another process sends the error here."""
+        return type(self), (self.problems,)
+
     def __str__(self) -> str:
         """Return all problems as they are printed."""
         return "\n\n".join(str(problem) for problem in self.problems)

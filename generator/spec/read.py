@@ -54,7 +54,8 @@ def read_specs(paths: Sequence[Path | str], *, database: str | None = None) -> t
             try:
                 settings = ObjectSettings.model_validate(tree.value)
                 if len(found) + settings.copies <= OBJECTS_MAX:
-                    found += [Located(spec, tree) for spec in resolved(settings, tree)]
+                    origin = Path(path).stem
+                    found += [Located(spec, tree, origin) for spec in resolved(settings, tree)]
                 else:
                     problems.append(_too_many(tree))
             except ValidationError as error:

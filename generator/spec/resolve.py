@@ -35,13 +35,15 @@ from generator.spec.profile import (
     defaults_of_profile,
 )
 from generator.spec.resolve_shape import Refuse, resolved_shape
-from generator.spec.resolved import ObjectSpec
-from generator.spec.settings import ObjectSettings
+from generator.spec.resolved import ObjectSpec, ShapeSpec
+from generator.spec.settings import NamedSettings, ObjectSettings
 
 WALL_STROKES = 2  # least wall, in narrowest strokes of the printer
 
 
-def resolved(settings: ObjectSettings, tree: Tree) -> tuple[ObjectSpec, ...]:
+def resolved(
+    settings: NamedSettings, tree: Tree, solid: ShapeSpec | None = None
+) -> tuple[ObjectSpec, ...]:
     """Return the object, or its copies, with all settings resolved.
 
     Parameters
@@ -50,6 +52,8 @@ def resolved(settings: ObjectSettings, tree: Tree) -> tuple[ObjectSpec, ...]:
         One object as it was read.
     tree
         Where its settings stand.
+    solid
+        Its shape, where the settings hold none.
 
     Returns
     -------
@@ -66,7 +70,9 @@ def resolved(settings: ObjectSettings, tree: Tree) -> tuple[ObjectSpec, ...]:
     def refuse(path: str, cause: str, fix: str) -> None:
         problems.append(Problem(cause, fix, mark_of(tree, path)))
 
-    shape = resolved_shape(settings.shape, tree, refuse)
+    shape = solid
+    if isinstance(settings, ObjectSettings):
+        shape = resolved_shape(settings.shape, tree, refuse)
     encoding, order = _array(settings, refuse)
     if settings.encoding is None or order is None:
         defaults = defaults_of_profile(settings.profile or DEFAULT_PROFILE)
@@ -117,7 +123,7 @@ def _folder_name(name: str) -> str:
     return re.sub(r"\s+", "-", name.lower())
 
 
-def _style(settings: ObjectSettings, defaults: SymbolDefaults) -> SymbolStyle:
+def _style(settings: NamedSettings, defaults: SymbolDefaults) -> SymbolStyle:
     """Return how symbols are embossed; the stroke follows the pitch and the alphabet."""
     symbols = settings.symbols
     pitch = symbols.pitch or defaults.pitch_mm
@@ -168,7 +174,7 @@ def _refuse_order(alphabet: Alphabet, order: int, refuse: Refuse) -> None:
     refuse("symbols.alphabet, encoding, profile", cause, fix)
 
 
-def _array(settings: ObjectSettings, refuse: Refuse) -> tuple[dict[str, Any], int | None]:
+def _array(settings: NamedSettings, refuse: Refuse) -> tuple[dict[str, Any], int | None]:
     """Return the complete definition of the array, and its number of symbols."""
     if settings.encoding is None:
         return _profile_definition(settings.profile or DEFAULT_PROFILE)

@@ -27,9 +27,10 @@ class ShapeSpec:
     polyhedron                                    vertices: [[x, y, z], ...],
                                                   faces: [[loop, hole, ...], ...]
     file                                          sha256 (of the content of `file`)
+    solid                                         sha256 (of the faces of a solid from a script)
     ============================================  ===============================================
 
-    All but `file` are those that the functions of `generator.polyhedron.shapes.SHAPES` take.
+    All but `file` and `solid` are those that the functions of `generator.polyhedron.shapes.SHAPES` take.
     """
 
     kind: str

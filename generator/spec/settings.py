@@ -134,11 +134,16 @@ class Defaults(Block):
     output: Output = Output()
 
 
-class ObjectSettings(Defaults):
-    """An object to emboss."""
+class NamedSettings(Defaults):
+    """An object whose shape is given otherwise."""
 
     name: ObjectName
     """Name in the database and of the files."""
+
+
+class ObjectSettings(NamedSettings):
+    """An object to emboss."""
+
     shape: Annotated[Shape, BeforeValidator(shape_block)]
 
 

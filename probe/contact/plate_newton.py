@@ -116,14 +116,17 @@ def _at(problem: Problem, a: Array, v: Array) -> State:
 
 def _resting(problem: Problem, state: State, tolerance: float) -> bool:
     """Tell whether what is left of the forces is below tolerance or rounding."""
-    turned = float((problem.K * np.abs(state.a)).max())
+    # Three numbers are sooner done without arrays.
+    moved: list[float] = [abs(a) for a in state.a.tolist()]
+    turned = max(k * a for k, a in zip(problem.K.tolist(), moved, strict=True))
     # No lever is longer than 1, so the sum of forces bounds all three.
-    scale = max(float(state.force.sum()), turned, float(np.abs(problem.f).max()))
+    scale = max(float(state.force.sum()), turned, *map(abs, problem.f.tolist()))
     # A tip in touch lies no deeper than the plate went, so that bounds what was rounded.
     stiffness = float(state.tangent.sum())
-    floor = 8 * EPS * (2 * stiffness * float(np.abs(state.a).sum()) + turned)
-    left = max(float(np.abs(state.gradient).max()), float(np.abs(state.unbalance).max(initial=0.0)))
-    return left <= tolerance * scale + floor
+    allowed: float = tolerance * scale + 8 * EPS * (2 * stiffness * sum(moved) + turned)
+    if not all(abs(left) <= allowed for left in state.gradient.tolist()):
+        return False
+    return float(np.abs(state.unbalance).max(initial=0.0)) <= allowed
 
 
 def _step(problem: Problem, state: State) -> tuple[Array, Array]:
@@ -145,17 +148,19 @@ def _step(problem: Problem, state: State) -> tuple[Array, Array]:
 
 def _solved(system: Array, wanted: Array) -> Array:
     """Solve the scaled system; where it is singular go down the null space, if that is down."""
-    size = system.diagonal()
-    largest = max(float(size.max()), 1e-300)
-    scale = 1 / np.sqrt(np.where(size > 1e-30 * largest, size, largest))
-    scaled = system * scale * scale[:, None]
-    right = scale * wanted
-    quick = _eliminated(scaled.tolist(), right.tolist())
+    rows = system.tolist()
+    size = [row[i] for i, row in enumerate(rows)]
+    largest = max(*size, 1e-300)
+    scale = [1 / math.sqrt(own if own > 1e-30 * largest else largest) for own in size]
+    scaled = [[v * a * b for v, b in zip(row, scale, strict=True)]
+              for row, a in zip(rows, scale, strict=True)]  # fmt: skip
+    right = [w * a for w, a in zip(wanted.tolist(), scale, strict=True)]
+    quick = _eliminated([row[:] for row in scaled], right[:])
     if quick is not None:
-        return np.asarray(scale * np.array(quick))
+        return np.array([v * a for v, a in zip(quick, scale, strict=True)])
     values, vectors = np.linalg.eigh(scaled)
     regular = values > _SINGULAR * max(float(values[-1]), 1e-300)
-    along = right @ vectors
+    along = np.array(right) @ vectors
     if not regular.all() and np.abs(along[~regular]).max() > 1e-9 * np.abs(along).max():
         return np.asarray(scale * (vectors[:, ~regular] @ along[~regular]))
     return np.asarray(scale * (vectors[:, regular] @ (along[regular] / values[regular])))

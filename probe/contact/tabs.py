@@ -6,12 +6,15 @@ neo-Hookean column; the plate comes to rest by `plate`.
 
 The law of a tip is `tab_law`'s. Where the surface is a step, the share that it covers is a
 count of points: in x and y the force moves in small steps, finer with more points. Forces act
-at the points, so a tab that is pressed on one side turns the plate.
+at the points, so a tab that is pressed on one side turns the plate. Where most of the force
+goes through strokes that one or two points of a tip meet by chance, the tips are asked more
+finely, and strokes too thin for the finest pattern are refused.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,7 +60,7 @@ def tabs(surface: Surface, sensor: Sensor, touch: Touch, tips: Tips | None = Non
     ContactError
         For an overlay that is no tabs, nothing under the sensor, a plate that tips or comes to
         rest at a tilt that is not small, a force that is negative or no number, heights that
-        are no numbers.
+        are no numbers, strokes too thin for any pattern.
     """
     overlay = sensor.overlay
     checked_tabs(overlay)
@@ -68,7 +71,8 @@ def tabs(surface: Surface, sensor: Sensor, touch: Touch, tips: Tips | None = Non
         return Contact(
             np.zeros(shape), math.inf, touch.tilt_x_rad, touch.tilt_y_rad, "tabs", iterations=0
         )
-    points, drop = tip_points(sensor, tips or _PLAIN)
+    tips = tips or _PLAIN
+    points, drop = tip_points(sensor, tips)
     heights = asked(surface, touch, points) - drop
     stiffness = min(touch.wrist.tilt_x_nmm_rad, touch.wrist.tilt_y_nmm_rad)
     if touch.force_n * sensor.reach_mm > _HOPELESS_RAD * stiffness > 0:
@@ -77,6 +81,16 @@ def tabs(surface: Surface, sensor: Sensor, touch: Touch, tips: Tips | None = Non
         _standing(rest(points.reshape(-1, 2), heights.ravel(), law, load).pose, _HOPELESS_RAD)
     found, forces = settled(points, heights, overlay, load)
     _standing(found.pose, STEEPEST_RAD)
+    if by_chance := _met_by_chance(heights, forces, overlay):
+        finer = next((q for q in _FINER if q > tips.points), None)
+        if finer:
+            return tabs(surface, sensor, touch, replace(tips, points=finer))
+        if by_chance >= _MANY:
+            raise ContactError(
+                f"strokes too thin for {tips.points} points on each tip: {by_chance} tabs met "
+                f"them with {_CHANCE} at most",
+                fix="give wider strokes; printed ones have 0.1 mm or more",
+            )
     return Contact(
         forces.reshape(shape),
         found.pose.z_mm,
@@ -95,6 +109,22 @@ def _standing(pose: Pose, steepest_rad: float) -> None:
             f"beyond {math.degrees(STEEPEST_RAD):.3g}",
             fix="move the sensor, press with less force, or take a stiffer wrist",
         )
+
+
+def _met_by_chance(heights_mm: Array, forces_n: Array, overlay: Overlay) -> int:
+    """Return how many tabs meet the surface at a point or two that stand out of their tips.
+
+    None, unless they bear much of the force. To stand out is to be higher than the rest of the
+    tip by more than points are apart: what is less steep than 45 degrees does not.
+    """
+    bearing = np.flatnonzero(forces_n)
+    q = heights_mm.shape[1]
+    apart = overlay.tab_diameter_mm / 2 * math.sqrt(math.pi / q)
+    tips = heights_mm.take(bearing, axis=0)
+    near = np.count_nonzero(tips > tips.max(axis=1, keepdims=True) - apart, axis=1)
+    few = near <= min(_CHANCE, q // 7)
+    borne = float(forces_n[bearing[few]].sum())
+    return int(np.count_nonzero(few)) if borne > _MUCH * float(forces_n.sum()) else 0
 
 
 def asked(surface: Surface, touch: Touch, points_mm: Array) -> Array:
@@ -156,5 +186,9 @@ def settled(
 
 
 _PLAIN = Tips()
+_FINER = (61, 217, 817)  # points on a tip, for thin strokes
+_CHANCE = 2  # points of a tip that may meet a stroke by chance
+_MUCH = 0.25  # of the force
+_MANY = 4  # tabs; fewer are on a corner, which is sharp for any pattern
 _HOPELESS_RAD = 10.0
 _MARGIN = 0.1  # of the foreseen depth, further down which points are still computed

@@ -65,7 +65,7 @@ def _level_depth(heights: Array, law: NeoHooke, force_n: float) -> float:
     mean = np.cumsum(below) / many
     stretch = np.maximum(1 - (below - mean) / length, 1e-6)
     stress = 3 * force_n / (float(law.stiffness) * length)
-    k = max(int(np.searchsorted(many * (stretch**-2 - stretch), stress)) - 1, 0)
+    k = max(int(np.searchsorted(many * (1 / (stretch * stretch) - stretch), stress)) - 1, 0)
     return float(mean[k]) + length * (1 - _stretch(stress / float(many[k])))
 
 

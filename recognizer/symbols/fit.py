@@ -62,6 +62,11 @@ class Fit:
     value: float  #: log-likelihood of the image with every cell at its best, nats
     covariance: Array  #: (3, 3) of x, y (mm) and theta (rad)
 
+    @property
+    def pose(self) -> Array:
+        """Return (7,) of `refine.Lattices`."""
+        return np.array([self.x_mm, self.y_mm, self.theta_rad, *self.nuisance])
+
 
 def fits(image: Image, template: Template, bank: Bank, settings: Settings) -> tuple[Fit, ...]:
     """Return the likeliest lattices of an image, best first; none if nothing is pressed."""

@@ -287,6 +287,29 @@ def _plateau(image: Image, at: Lattices) -> Array:
     return np.asarray(np.exp(at.gain[:, :1]) * np.maximum(plain, least))
 
 
+def explained_share(
+    image: Image, template: Template, pose: Array, gain: Array, shown: Shown
+) -> float:
+    """Return the share of the variance of psi that given symbols explain where they stand.
+
+    It is less than 0 where they explain nothing.
+
+    Parameters
+    ----------
+    pose, gain
+        (7,) and (4,) of `Lattices`.
+    """
+    felt = felt_under(image, gain[None])
+    cells, offsets = cells_and_offsets(image, pose[None], template.pitch_mm)
+    tables = tables_at(template, offsets, pose[None], felt)
+    labels = shown(cells)
+    values, seen = _labelled(tables, labels, felt)[0, :, 0], felt.psi[0]
+    trust = image.trust * (labels[0] >= 0)
+    mean = (trust * seen).sum() / max(trust.sum(), 1e-12)
+    whole = float((trust * (seen - mean) ** 2).sum())
+    return 1.0 - float((trust * (seen - values) ** 2).sum()) / max(whole, 1e-12)
+
+
 def started(pose: Array, gain: Array) -> Lattices:
     """Return candidates of which nothing is known but pose (b, 3 or 7) and gain (b, 4)."""
     pose = np.pad(pose, ((0, 0), (0, _POSE - pose.shape[1])))
@@ -300,7 +323,7 @@ def chosen(cells: NDArray[np.int64], tables: Floats, scores: Array, felt: Felt) 
 
 
 def tables_at(template: Template, offsets: Array, pose: Array, felt: Felt) -> Floats:
-    """Return templates (b, n, q, 6) at offsets, for the width, cross-talk, exponent and gain fitted."""
+    """Return templates (b, n, q, 6) at offsets, for what is fitted of form and gain."""
     tables = template.at(offsets)
     by = pose[:, 3:6].astype(np.float32)[:, None, :, None]
     tables[..., 0] += (tables[..., 3:] @ by)[..., 0]

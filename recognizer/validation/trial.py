@@ -28,6 +28,7 @@ from recognizer.recognition import Recognition
 from recognizer.signal import signal_of
 from recognizer.validation.levels import LEVELS, read
 from recognizer.validation.surfaces import FOREIGN, worn
+from recognizer.validation.written import worn_away, written_surface
 
 Array = NDArray[np.float64]
 
@@ -52,6 +53,7 @@ class Plan:
     force_n: tuple[float, float] = (20.0, 120.0)
     tilt_rad: float = math.radians(2.0)
     worn: float = 0.2
+    files: bool = False  #: touch the written STL files, not what the database says of them
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,11 +106,15 @@ def drawn(plan: Plan, number: int, reader: Reader) -> Drawn:
             touch = _anywhere(rng, ranges)
         else:
             face = encoding.face(int(rng.integers(len(encoding.faces))))
-            scene = _scene(plan.database, face.object, face.face)
-            touch = _on(scene, plan.kind, rng, ranges)
+            scene = scene_of(plan.database, face.object, face.face, plan.files)
+            most = _inmost(plan.database, face.object, face.face, plan.files)
+            touch = _on(scene, plan.kind, most, rng, ranges)
             surface = scene.surface
             if plan.kind == "worn" and isinstance(surface, Face):
                 surface = worn(surface, plan.worn, rng)
+            elif plan.kind == "worn":
+                pitch = encoding.style.pitch_mm
+                surface = worn_away(surface, face, pitch, plan.worn, rng)
         try:
             counts, _ = read(surface, reader.sensor, touch, level, rng)
         except ContactError:
@@ -171,11 +177,14 @@ def judged(plan: Plan, number: int, found: Drawn, answer: Recognition, seconds: 
 
 
 @lru_cache(maxsize=512)
-def _scene(database: str, object_name: str, face: str) -> Scene:
+def scene_of(database: str, object_name: str, face: str, files: bool) -> Scene:
+    """Return a face as it was written, or as the database says that it is."""
+    if files:
+        return written_surface(database, object_name, face)
     return registered_surface(database, object_name, face)
 
 
-def _on(scene: Scene, kind: str, rng: np.random.Generator, ranges: Touches) -> Touch:
+def _on(scene: Scene, kind: str, most: float, rng: np.random.Generator, ranges: Touches) -> Touch:
     """Draw a touch of a face; where a face is too small for its kind, anywhere on it."""
     if kind == "corner":
         touch = next(random_touches(scene.region, rng, ranges))
@@ -184,7 +193,6 @@ def _on(scene: Scene, kind: str, rng: np.random.Generator, ranges: Touches) -> T
         by = INSIDE_MM * rng.random() / max(float(np.hypot(*towards)), INSIDE_MM)
         at = corner + towards * by
         return _moved(touch, float(at[0]), float(at[1]))
-    most = _inmost(scene)
     if kind == "edge":
         for touch in random_touches(scene.region, rng, ranges):
             if scene.region.distance_mm(np.array([[touch.x_mm, touch.y_mm]]))[0] < INSIDE_MM:
@@ -201,8 +209,9 @@ def _moved(touch: Touch, x: float, y: float) -> Touch:
 
 
 @lru_cache(maxsize=512)
-def _inmost(scene: Scene) -> float:
+def _inmost(database: str, object_name: str, face: str, files: bool) -> float:
     """Return how far the inmost point of a face lies from its edges, mm, nearly."""
+    scene = scene_of(database, object_name, face, files)
     low, high = scene.region.box_mm
     x, y = (low + (high - low) * np.linspace(0, 1, 64)[:, None]).T
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)

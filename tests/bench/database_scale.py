@@ -168,8 +168,8 @@ def run(url, how, steps):
     engine = open_database(url)
     where, have = spots(), 0
     print(
-        f"{'objects':>8} {'faces':>8} {'cells':>9} {'place s':>9} {'CPU s':>9} {'taken ms':>9} {'look ms':>9} "
-        f"{'+open ms':>9} {'list s':>8} {'corner':>8} {'array':>8}"
+        f"{'objects':>8} {'faces':>8} {'cells':>9} {'place s':>9} {'CPU s':>9} {'taken ms':>9} "
+        f"{'look ms':>9} {'+open ms':>9} {'list s':>8} {'corner':>8} {'array':>8}"
     )
     for want in steps:
         began = time.perf_counter()
@@ -203,10 +203,8 @@ def main() -> int:
             print(f"{path.stat().st_size / 1e6:.0f} MB")
         return 0
     script = Path(__file__).parents[1] / "postgres.py"
-    server = subprocess.Popen(
-        [sys.executable, script, "--durable"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )  # fmt: skip
-    with server:
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, script, "--durable"], text=True, **pipes) as server:
         run(server.stdout.readline().strip(), chosen.fill, sorted(chosen.objects))
     return 0
 

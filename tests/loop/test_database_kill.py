@@ -18,7 +18,7 @@ from generator.database.read import list_objects, read_layout
 from generator.database.transaction import reading, writing
 
 # One process loads everything and forks a writer per line that it reads, so that a kill
-# costs no start-up. A line: what to do, and the number of the writer.
+# costs no start-up. A line: the database, the first and the number of objects, symbols a face.
 WRITERS = """
 import os, sys
 import numpy as np
@@ -33,9 +33,8 @@ from generator.polyhedron.shapes import cube
 
 array = PROFILES["large"].array()
 solid = cube(60.0)
-url = sys.argv[1]
 
-def write(name, symbols):
+def write(url, name, symbols):
     # The first cells that are free, as a layout would choose them: a race on purpose.
     with writing(open_database(url)) as connection:
         taken_rows, taken_columns = occupied(connection, find_array(connection, array))
@@ -54,11 +53,12 @@ def write(name, symbols):
 
 print("ready", flush=True)
 while line := sys.stdin.readline():
-    first, count, symbols = map(int, line.split())
+    url, *numbers = line.split()
+    first, count, symbols = map(int, numbers)
     writer = os.fork()
     if writer == 0:
         for number in range(first, first + count):
-            write(f"object {number}", symbols)
+            write(url, f"object {number}", symbols)
         os._exit(0)
     print(writer, flush=True)
     sys.stdin.readline()  # until asked, an ended writer keeps its number
@@ -70,16 +70,16 @@ while line := sys.stdin.readline():
 class Writers:
     """A process that forks writers."""
 
-    def __init__(self, database):
+    def __init__(self):
         environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
         self.process = subprocess.Popen(
-            [sys.executable, "-c", WRITERS, str(database)],
+            [sys.executable, "-c", WRITERS],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment,
         )  # fmt: skip
         assert self.process.stdout.readline() == "ready\n"
 
-    def start(self, first, count, symbols):
-        self.process.stdin.write(f"{first} {count} {symbols}\n")
+    def start(self, url, first, count, symbols):
+        self.process.stdin.write(f"{url} {first} {count} {symbols}\n")
         self.process.stdin.flush()
         return int(self.process.stdout.readline())
 
@@ -94,17 +94,17 @@ class Writers:
         self.process.wait(timeout=30)
 
 
-@pytest.fixture
-def writers_on():
-    running = []
-
-    def start(database):
-        running.append(Writers(database))
-        return running[-1]
-
-    yield start
-    for writers in running:
+@pytest.fixture(scope="module")
+def pair():
+    both = Writers(), Writers()
+    yield both
+    for writers in both:
         writers.close()
+
+
+@pytest.fixture
+def writers(pair):
+    return pair[0]
 
 
 def whole_objects(url):
@@ -130,50 +130,45 @@ def whole_objects(url):
     return {entry.name: entry.symbols for entry in entries}
 
 
-@pytest.mark.parametrize("engine", ["sqlite", "postgresql"])
-def test_a_writer_killed_at_any_moment_leaves_all_or_nothing(new_database, engine, writers_on):
-    url = new_database(engine)
-    writers = writers_on(url)
-    symbols = 600  # per face: large enough that rows reach the file before the commit
+def test_a_writer_killed_at_any_moment_leaves_all_or_nothing(lab_url, writers):
+    symbols = 200  # per face: a transaction long enough to be hit in its middle
     start = time.perf_counter()
-    writers.start(0, 1, symbols)
+    writers.start(lab_url, 0, 1, symbols)
     assert writers.status() == 0
     duration = time.perf_counter() - start
     expected = {"object 0"}
-    moments = random.Random(6).sample(range(1000), 12)
+    moments = random.Random(6).sample(range(1000), 10)
     for number, moment in enumerate(moments, start=1):
-        writer = writers.start(number, 1, symbols)
+        writer = writers.start(lab_url, number, 1, symbols)
         time.sleep(duration * 1.1 * moment / 1000)
         os.kill(writer, signal.SIGKILL)
         finished = writers.status() == 0
-        found = whole_objects(url)
+        found = whole_objects(lab_url)
         assert set(found.values()) <= {6 * symbols}
         new = set(found) - expected
         assert new == {f"object {number}"} if finished else new <= {f"object {number}"}
         assert expected <= set(found)
         expected = set(found)
     # After all that the database takes objects as ever.
-    writers.start(99, 1, 10)
+    writers.start(lab_url, 99, 1, 10)
     assert writers.status() == 0
-    assert "object 99" in whole_objects(url)
+    assert "object 99" in whole_objects(lab_url)
 
 
 @pytest.mark.parametrize("engine", ["sqlite", "postgresql"])
-def test_a_kill_while_the_database_is_made_leaves_it_usable(new_database, engine, writers_on):
+def test_a_kill_while_the_database_is_made_leaves_it_usable(new_database, engine, writers):
     for moment in range(5):
         url = new_database(engine)
-        writers = writers_on(url)
-        writer = writers.start(0, 1, 1)
+        writer = writers.start(url, 0, 1, 1)
         time.sleep(0.004 * moment)
         os.kill(writer, signal.SIGKILL)
         writers.status()
         assert set(whole_objects(url)) <= {"object 0"}
 
 
-def test_writers_at_once_never_share_a_cell(lab_url, writers_on):
-    pair = [writers_on(lab_url), writers_on(lab_url)]
+def test_writers_at_once_never_share_a_cell(lab_url, pair):
     for number, writers in enumerate(pair):
-        writers.start(100 * number, 6, 30)
+        writers.start(lab_url, 100 * number, 6, 30)
     assert [writers.status() for writers in pair] == [0, 0]
     assert len(whole_objects(lab_url)) == 12
     with reading(open_database(lab_url)) as connection:

@@ -79,14 +79,14 @@ def registrations(draw):
     )  # fmt: skip
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=30)
 @given(registration=registrations())
 def test_everything_comes_back_bit_for_bit(database_on, registration):
     with database_on("sqlite") as url:
         comes_back(open_database(url), registration)
 
 
-@settings(deadline=None, max_examples=12)
+@settings(deadline=None, max_examples=8)
 @given(registration=registrations())
 def test_everything_comes_back_bit_for_bit_from_a_server(database_on, registration):
     with database_on("postgresql") as url:
@@ -140,14 +140,14 @@ def small(name, first, count):
     )  # fmt: skip
 
 
-@settings(deadline=None, max_examples=25)
+@settings(deadline=None, max_examples=20)
 @given(steps=steps)
 def test_objects_never_share_a_cell(database_on, steps):
     with database_on("sqlite") as url:
         shares_no_cell(open_database(url), steps)
 
 
-@settings(deadline=None, max_examples=8)
+@settings(deadline=None, max_examples=5)
 @given(steps=steps)
 def test_objects_on_a_server_never_share_a_cell(database_on, steps):
     with database_on("postgresql") as url:

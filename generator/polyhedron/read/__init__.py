@@ -19,12 +19,8 @@ from generator.polyhedron.winged import Polyhedron, polyhedron
 
 LARGEST_BYTES = 64 * 2**20
 
-READERS: dict[str, Callable[[bytes, str], Soup]] = {
-    ".stl": read_stl,
-    ".obj": read_obj,
-    ".step": read_step,
-    ".stp": read_step,
-}
+MESHES: dict[str, Callable[[bytes, str], Soup]] = {".stl": read_stl, ".obj": read_obj}
+READERS = (*MESHES, ".step", ".stp")
 
 
 def read_shape(path: str | Path) -> Polyhedron:
@@ -57,11 +53,14 @@ def read_shape(path: str | Path) -> Polyhedron:
             fix=f"save it as one of {known}",
             place=place,
         )
-    soup = READERS[suffix](_content(file, place), place)
     try:
-        vertices, faces = merged(soup)
-        return polyhedron("file", vertices, faces)
+        content = _content(file, place)
+        if suffix not in MESHES:
+            return read_step(content, place)
+        return polyhedron("file", *merged(MESHES[suffix](content, place)))
     except ShapeError as error:
+        if error.place.startswith(place):
+            raise
         where = f"{place}, {error.place}" if error.place else place
         raise ShapeError(error.cause, fix=error.fix, place=where) from None
 

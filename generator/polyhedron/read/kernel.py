@@ -43,31 +43,42 @@ def _read(model: str) -> dict[str, Any]:
             fix='run: pip install "encoded-objects[cad]", or save the model as STL',
         ) from None
     try:
-        return _faces(_solid(model))
+        return described(_model(model))
     except OCP.Standard.Standard_Failure as error:
         reason = str(error).strip().splitlines()
         cause = f"the CAD kernel cannot read it: {reason[0] if reason else 'no reason given'}"
         raise ShapeError(cause, fix=AGAIN) from None
 
 
-def _solid(model: str) -> Any:
-    from OCP.IFSelect import IFSelect_RetDone
-    from OCP.STEPControl import STEPControl_Reader
+def described(shape: Any) -> dict[str, Any]:
+    """Return the faces of the one solid in a shape of the kernel, mm.
+
+    Raises
+    ------
+    ShapeError
+        No solid, several, or faces that cannot be read.
+    """
     from OCP.TopAbs import TopAbs_SOLID
 
-    reader = STEPControl_Reader()
-    if reader.ReadFile(model) != IFSelect_RetDone:
-        raise ShapeError("the CAD kernel finds no STEP data in it", fix=AGAIN)
-    reader.TransferRoots()
-    shape = reader.OneShape()
-    solids = [] if shape.IsNull() else _explored(shape, TopAbs_SOLID)
+    solids = [] if shape is None or shape.IsNull() else _explored(shape, TopAbs_SOLID)
     if len(solids) != 1:
         found = f"{len(solids)} solids" if solids else "no solid, at most surfaces"
         raise ShapeError(
             f"it holds {found}; one is needed",
             fix="join them into one solid, or save each in a file of its own",
         )
-    return solids[0]
+    return _faces(solids[0])
+
+
+def _model(model: str) -> Any:
+    from OCP.IFSelect import IFSelect_RetDone
+    from OCP.STEPControl import STEPControl_Reader
+
+    reader = STEPControl_Reader()
+    if reader.ReadFile(model) != IFSelect_RetDone:
+        raise ShapeError("the CAD kernel finds no STEP data in it", fix=AGAIN)
+    reader.TransferRoots()
+    return reader.OneShape()
 
 
 def _faces(solid: Any) -> dict[str, Any]:

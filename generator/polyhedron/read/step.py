@@ -1,4 +1,4 @@
-"""STEP: bytes -> planar faces in mm, through the CAD kernel in a process of its own."""
+"""STEP: bytes -> polyhedron in mm, through the CAD kernel in a process of its own."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ from typing import Any
 import numpy as np
 
 from generator.errors import ShapeError
-from generator.polyhedron.read.soup import Soup, soup_of_loops
+from generator.polyhedron.read.merge import merged
+from generator.polyhedron.read.soup import soup_of_loops
+from generator.polyhedron.winged import Polyhedron, polyhedron
 
 LONGEST_S = 300.0
 KERNEL = "generator.polyhedron.read.kernel"
@@ -22,8 +24,8 @@ _AGAIN = "export the model again; the file may be cut off or damaged"
 _START, _END = b"ISO-10303-21;", b"END-ISO-10303-21;"
 
 
-def read_step(content: bytes, place: str) -> Soup:
-    """Return the faces of the one solid in a STEP file; `place` names it in messages.
+def read_step(content: bytes, place: str) -> Polyhedron:
+    """Return the one solid in a STEP file; `place` names it in messages.
 
     The file's unit is honoured. The kernel (`kernel.py`) is never loaded into this process:
     it can crash on a damaged file, and weighs 300 MB.
@@ -44,8 +46,14 @@ def read_step(content: bytes, place: str) -> Soup:
     found = _ask_kernel(content, place)
     if "cause" in found:
         raise ShapeError(found["cause"], fix=found["fix"], place=place)
+    return polyhedron_of(found, place, "file")
+
+
+def polyhedron_of(found: dict[str, Any], place: str, kind: str) -> Polyhedron:
+    """Return the solid that the kernel describes (`kernel.described`)."""
     points = np.array(found["points"], dtype=np.float64).reshape(-1, 3)
-    return soup_of_loops(points, found["faces"], place)
+    vertices, faces = merged(soup_of_loops(points, found["faces"], place))
+    return polyhedron(kind, vertices, faces)
 
 
 def _ask_kernel(content: bytes, place: str) -> dict[str, Any]:

@@ -1,7 +1,9 @@
 """`encode-object list | show | retire | export | import` as people run them."""
 
+import contextlib
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -15,16 +17,26 @@ CUBE = "name: {name}\nshape: {{cube: {edge} mm}}\noutput: {{formats: stl}}\n"
 ENTRY = "import sys; from generator.command import main; main()"
 
 
-@pytest.fixture(autouse=True)
-def _in_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "160")
-
-
 def make(name, database="lab.db", edge=30):
     spec = Path(f"{name}.yaml")
     spec.write_text(CUBE.format(name=name, edge=edge))
-    assert run([str(spec), "--database", database, "-o", f"out/{database}/{name}"]) == 0
+    assert run([str(spec), "--database", database, "-o", f"out/{name}"]) == 0
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A folder with a database of one object, and its files."""
+    folder = tmp_path_factory.mktemp("made")
+    with contextlib.chdir(folder):
+        make("Cube")
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def _in_folder(made, tmp_path, monkeypatch):
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "160")
 
 
 def said(capsys, *arguments, code=0):
@@ -37,7 +49,6 @@ def said(capsys, *arguments, code=0):
 
 
 def test_show_names_faces_cells_files_and_origin(capsys):
-    make("Cube")
     value = said(capsys, "show", "Cube")
     assert (value["name"], value["shape"], value["symbols"]) == ("Cube", "cube", 96)
     assert [face["name"] for face in value["faces"]] == ["F1", "F2", "F3", "F4", "F5", "F6"]
@@ -55,8 +66,7 @@ def test_show_names_faces_cells_files_and_origin(capsys):
 
 
 def test_show_tells_missing_and_changed_files(capsys):
-    make("Cube")
-    first, second, third, *_ = sorted(Path("out/lab.db/Cube").glob("*.stl"))
+    first, second, third, *_ = sorted(Path("out/Cube").glob("*.stl"))
     first.unlink()
     second.write_bytes(second.read_bytes() + b"x")
     third.unlink()
@@ -75,45 +85,44 @@ def test_show_tells_missing_and_changed_files(capsys):
 
 
 def test_retired_objects_are_listed_as_such_and_keep_their_cells(capsys):
-    make("One")
-    make("Two")
-    one = said(capsys, "show", "One")["faces"]
-    assert said(capsys, "retire", "One")["retired"][0]["retired_utc"]
-    listed = said(capsys, "list")["objects"]
-    assert [entry["retired_utc"] is not None for entry in listed] == [True, False]
+    assert run(["list"]) == 0
+    assert "retired" not in capsys.readouterr().out
+    assert said(capsys, "retire", "Cube")["retired"][0]["retired_utc"]
     assert run(["list"]) == 0
     assert "retired (UTC)" in capsys.readouterr().out
-    assert run(["One.yaml"]) == 4
-    assert "'One' was retired" in capsys.readouterr().err
-    make("Three")
-    taken = {tuple(cell[:2]) for face in one for cell in face["cells"]}
-    new = said(capsys, "show", "Three")["faces"]
-    assert not taken & {tuple(cell[:2]) for face in new for cell in face["cells"]}
-    assert run(["retire", "One", "--undo"]) == 0
-    assert capsys.readouterr().out == "One: restored; its 96 cells were taken all the time\n"
-    assert run(["One.yaml"]) == 0
-    assert said(capsys, "list")["objects"][0]["retired_utc"] is None
+    for options in ([], ["--replace"], ["--dry-run"]):
+        assert run(["Cube.yaml", *options]) == 4
+        assert "'Cube' was retired" in capsys.readouterr().err
+    make("Another")
+    faces = [said(capsys, "show", name)["faces"] for name in ("Cube", "Another")]
+    old, new = ({tuple(cell[:2]) for face in each for cell in face["cells"]} for each in faces)
+    assert not old & new
+    listed = said(capsys, "list")["objects"]
+    assert [entry["retired_utc"] is not None for entry in listed] == [False, True]
+    capsys.readouterr()
+    assert run(["retire", "Cube", "--undo"]) == 0
+    assert capsys.readouterr().out == "Cube: restored; its 96 cells were taken all the time\n"
+    assert run(["Cube.yaml"]) == 0
+    assert said(capsys, "show", "Cube")["retired_utc"] is None
 
 
 def test_cells_are_freed_only_when_that_is_confirmed(capsys):
-    make("One")
     capsys.readouterr()
-    assert run(["retire", "One", "--free"]) == 2  # stdin is no terminal here
+    assert run(["retire", "Cube", "--free"]) == 2  # stdin is no terminal here
     assert "confirm it with --yes" in capsys.readouterr().err
-    assert run(["retire", "One", "--free", "--undo"]) == 2
+    assert run(["retire", "Cube", "--free", "--undo"]) == 2
     assert len(said(capsys, "list")["objects"]) == 1
-    assert run(["retire", "One", "--free", "--yes"]) == 0
-    assert capsys.readouterr().out == "One: removed; its 96 cells are free again\n"
+    assert run(["retire", "Cube", "--free", "--yes"]) == 0
+    assert capsys.readouterr().out == "Cube: removed; its 96 cells are free again\n"
     assert said(capsys, "list")["objects"] == []
 
 
 @pytest.mark.parametrize(("answer", "left"), [("n", 1), ("y", 0)])
 def test_a_person_is_asked_before_cells_are_freed(answer, left, capsys):
-    make("One")
     ours, theirs = os.openpty()
     os.write(ours, answer.encode() + b"\n")
     done = subprocess.run(
-        [sys.executable, "-c", ENTRY, "retire", "One", "--free"],
+        [sys.executable, "-c", ENTRY, "retire", "Cube", "--free"],
         stdin=theirs, capture_output=True, text=True, timeout=60,
     )  # fmt: skip
     os.close(ours)
@@ -124,8 +133,7 @@ def test_a_person_is_asked_before_cells_are_freed(answer, left, capsys):
 
 
 def test_all_named_objects_are_retired_or_none(capsys):
-    make("One")
-    assert run(["retire", "One", "Ball"]) == 4
+    assert run(["retire", "Cube", "Ball"]) == 4
     assert "no object is called 'Ball'" in capsys.readouterr().err
     assert said(capsys, "list")["objects"][0]["retired_utc"] is None
     for command in ("show", "retire", "export"):
@@ -135,8 +143,8 @@ def test_all_named_objects_are_retired_or_none(capsys):
 
 
 def test_labs_exchange_objects(capsys):
-    make("Cube", "a.db")
-    make("Other", "b.db", edge=40)
+    Path("lab.db").rename("a.db")
+    make("Other", "b.db", edge=32)
     value = said(capsys, "export", "for-b.db", "--database", "a.db")
     assert value == {"exported": ["Cube"], "file": "for-b.db", "database": "sqlite:///a.db"}
     assert run(["export", "for-b.db", "--database", "a.db"]) == 4
@@ -167,8 +175,7 @@ def test_labs_exchange_objects(capsys):
 
 def test_the_commands_run_on_a_server(capsys, database_on):
     with database_on("postgresql") as url:
-        make("Cube", "a.db")
-        assert run(["export", "x.db", "--database", "a.db"]) == 0
+        assert run(["export", "x.db"]) == 0
         assert said(capsys, "import", "x.db", "--database", url)["imported"] == ["Cube"]
         make("Cube", url)  # the same cells again
         assert said(capsys, "show", "Cube", "--database", url)["files"][0]["state"] == "ok"

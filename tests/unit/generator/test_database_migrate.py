@@ -178,44 +178,49 @@ def test_no_copy_no_migration(first_file, monkeypatch):
     assert os.listdir(first_file.parent) == ["lab.db"]
 
 
-KILLED = """
-import os, signal, sys
-from generator.database.migrations import v2
-from generator.database.open import open_database
-done = v2.upgrade
-def upgrade(operations):
-    done(operations)
-    if sys.argv[2] == "kill":
+def forked(action):
+    """Run an action in a process of its own, forked from this one; return its number."""
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            action()
+            code = 0
+        finally:
+            os._exit(code)
+    return child
+
+
+def test_a_migration_killed_before_its_commit_leaves_the_old_version(first_version, monkeypatch):
+    done = v2.upgrade
+
+    def killing(operations):
+        done(operations)
         os.kill(os.getpid(), signal.SIGKILL)
-v2.upgrade = upgrade
-sys.stdin.readline()
-open_database(sys.argv[1])
-"""
 
-
-def started(url, how):
-    return subprocess.Popen(
-        [sys.executable, "-c", KILLED, url, how], stdin=subprocess.PIPE, stderr=subprocess.PIPE
-    )
-
-
-def test_a_migration_killed_before_its_commit_leaves_the_old_version(first_version):
-    killed = started(first_version, "kill")
-    killed.communicate(b"go\n", timeout=60)
-    assert killed.returncode == -signal.SIGKILL
+    with monkeypatch.context() as patched:
+        patched.setattr(v2, "upgrade", killing)
+        _, status = os.waitpid(forked(lambda: open_database(first_version)), 0)
+    assert os.WTERMSIG(status) == signal.SIGKILL
     with reading(open_database(first_version)) as connection:  # migrates at last
         assert [entry.name for entry in list_objects(connection)] == NAMES
         assert len(occupied(connection, 1)[0]) == 176
 
 
-def test_many_may_open_an_older_database_at_once(first_version):
-    several = [started(first_version, "live") for _ in range(3)]
-    for process in several:
-        process.stdin.write(b"go\n")
-        process.stdin.flush()
-    said = [process.communicate(timeout=60)[1].decode() for process in several]
-    assert [process.returncode for process in several] == [0, 0, 0]
-    assert sum("brought from schema version 1" in text for text in said) == 1
+def test_many_may_open_an_older_database_at_once(first_version, monkeypatch):
+    done = v2.upgrade
+    upgraded, note = os.pipe()
+
+    def noting(operations):
+        done(operations)
+        os.write(note, b"1")
+
+    monkeypatch.setattr(v2, "upgrade", noting)
+    several = [forked(lambda: open_database(first_version)) for _ in range(3)]
+    assert [os.waitpid(child, 0)[1] for child in several] == [0, 0, 0]
+    os.close(note)
+    assert os.read(upgraded, 100) == b"1"
+    os.close(upgraded)
     if "://" not in first_version:
         assert sorted(os.listdir(Path(first_version).parent)) == ["lab.db", "lab.v1.db"]
 

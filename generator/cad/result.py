@@ -1,0 +1,89 @@
+"""An encoded solid -> solids of build123d or cadquery, for scripts to go on with.
+
+The parts go through the STEP text that is written for them, so a script gets exactly what
+the files hold: planar faces, one valid solid a part. mm, in the frame of the solid that was
+encoded, where the panels of an object stand assembled.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from generator.cad.encode import EncodedSolid
+from generator.errors import GeneratorError, SolidError
+from generator.export.step import step_chunks
+from generator.solid import Part
+
+
+def to_build123d(result: EncodedSolid) -> Any:
+    """Return a `build123d.Compound` with one labelled `Solid` for each part.
+
+    Raises
+    ------
+    GeneratorError
+        build123d is not installed.
+    """
+    try:
+        from build123d import Compound, Solid
+    except ImportError as error:
+        raise _missing("build123d", error) from error
+    solids = []
+    for part in result.parts:
+        solid = Solid(_kernel_solid(part))
+        solid.label = part.name
+        solids.append(solid)
+    return Compound(label=result.name, children=solids)
+
+
+def to_cadquery(result: EncodedSolid) -> Any:
+    """Return a `cadquery.Assembly` with one named child for each part.
+
+    Raises
+    ------
+    GeneratorError
+        cadquery is not installed.
+    """
+    try:
+        from cadquery import Assembly, Solid
+    except ImportError as error:
+        raise _missing("cadquery", error) from error
+    assembly = Assembly(name=result.name)
+    for part in result.parts:
+        assembly.add(Solid(_kernel_solid(part)), name=part.name)
+    return assembly
+
+
+def _kernel_solid(part: Part) -> Any:
+    """Return a part as the kernel's solid, in the object frame."""
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
+    from OCP.gp import gp_Trsf
+    from OCP.IFSelect import IFSelect_RetDone
+    from OCP.STEPControl import STEPControl_Reader
+    from OCP.TopAbs import TopAbs_SOLID
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopoDS import TopoDS
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "part.step"
+        with path.open("wb") as file:
+            file.writelines(step_chunks(part))
+        reader = STEPControl_Reader()
+        done = reader.ReadFile(str(path)) == IFSelect_RetDone
+    if done:
+        reader.TransferRoots()
+        explorer = TopExp_Explorer(reader.OneShape(), TopAbs_SOLID)
+        done = explorer.More()
+    if not done:
+        raise SolidError("the CAD kernel does not read the part back", place=part.name)
+    motion = gp_Trsf()
+    motion.SetValues(*part.T_object_part[:3].ravel().tolist())
+    moved = BRepBuilderAPI_Transform(explorer.Current(), motion, True).Shape()
+    return TopoDS.Solid_s(moved)
+
+
+def _missing(library: str, error: ImportError) -> GeneratorError:
+    return GeneratorError(
+        f"{library} is not installed ({error})", fix='run: pip install "encoded-objects[cad]"'
+    )

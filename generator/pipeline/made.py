@@ -1,0 +1,61 @@
+"""What a run made, as values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from generator.layout.placement import Layout
+from generator.pipeline.plan import Plan
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """One object that was made, or would be."""
+
+    name: str
+    faces: int
+    symbols: int
+    places: int  #: how many places of it can be told apart by touch
+    parts: int
+    files: tuple[Path, ...]
+    warnings: tuple[str, ...]
+    reused: bool  #: registered before, so the same cells again
+    skipped: bool = False  #: registered before, and all its files stand unchanged
+
+
+@dataclass(frozen=True, slots=True)
+class Encoded:
+    """What one run made."""
+
+    objects: tuple[Made, ...]
+    database: str
+    rows: int  #: of the array
+    columns: int
+    used_cells: int  #: of the array, by all objects in the database
+    seconds: float
+    set_files: tuple[Path, ...] = ()  #: of a set: its plates, overview and packing list
+
+
+def made_of(
+    plan: Plan,
+    layout: Layout,
+    parts: int,
+    warnings: tuple[str, ...],
+    files: tuple[Path, ...],
+    *,
+    reused: bool,
+    skipped: bool = False,
+) -> Made:
+    """Return what is told of an object."""
+    return Made(
+        name=plan.spec.name,
+        faces=len(plan.polyhedron.faces),
+        symbols=sum(len(face.labels) for face in layout.faces),
+        places=sum(face.places for face in layout.faces),
+        parts=parts,
+        files=files,
+        warnings=(*plan.polyhedron.notes, *layout.warnings, *warnings),
+        reused=reused,
+        skipped=skipped,
+    )

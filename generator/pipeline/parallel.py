@@ -1,0 +1,110 @@
+"""Independent tasks in processes of their own, in order, with progress.
+
+Few tasks run here: a process costs about a second until it has loaded what it needs.
+Processes start afresh (spawn), because the libraries for triangles and algebra have threads
+that a forked copy would wait for. They end with the process that started them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import multiprocessing.connection
+import os
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from typing import Any, ClassVar, Generic, TypeVar
+
+from sqlalchemy import Engine
+
+from generator.database.open import open_database
+from generator.pipeline.progress import Progress
+
+Result = TypeVar("Result")
+
+FEW = 4  #: fewer tasks are done in this process
+
+
+@dataclass(frozen=True, slots=True)
+class Task(Generic[Result]):
+    """A call that another process can make: a function of a module and plain values."""
+
+    what: str  #: for the progress
+    work: Callable[..., Result]
+    arguments: tuple[Any, ...]
+
+    def done(self) -> Result:
+        """Do it."""
+        return self.work(*self.arguments)
+
+
+class Engines:
+    """The databases that this process has opened, by URL."""
+
+    _open: ClassVar[dict[str, Engine]] = {}
+
+    @classmethod
+    def open(cls, url: str) -> Engine:
+        """Return the open database, opened the first time it is asked for."""
+        if url not in cls._open:
+            cls._open[url] = open_database(url)
+        return cls._open[url]
+
+    @classmethod
+    def close(cls) -> None:
+        """Let all of them go."""
+        while cls._open:
+            cls._open.popitem()[1].dispose()
+
+
+def done_by(tasks: Sequence[Task[Result]], jobs: int | None, progress: Progress) -> list[Result]:
+    """Return the results of the tasks in their order.
+
+    Parameters
+    ----------
+    tasks
+        Independent of each other.
+    jobs
+        Processes; None for one on each processor that we may use.
+
+    Raises
+    ------
+    Exception
+        That of the first task, in their order, that failed; tasks not begun by then are left.
+    """
+    workers = min(jobs or len(os.sched_getaffinity(0)), len(tasks))
+    if workers <= 1 or (jobs is None and len(tasks) < FEW):
+        results = []
+        with contextlib.closing(Engines):
+            for number, task in enumerate(tasks):
+                progress(task.what, number / len(tasks))
+                results.append(task.done())
+        return results
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_end_with_parent)
+    futures: list[Future[Result]] = []
+    try:
+        futures = [pool.submit(task.done) for task in tasks]
+        what = {future: task.what for future, task in zip(futures, tasks, strict=True)}
+        for number, future in enumerate(as_completed(futures), 1):
+            if future.exception() is not None:
+                break
+            progress(what[future], number / len(tasks))
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+    failed = [f for f in futures if not f.cancelled() and f.exception() is not None]
+    return [future.result() for future in failed[:1] or futures]
+
+
+def _end_with_parent() -> None:
+    """Leave when the process that started this one has gone, even by a signal."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_wait_for, args=(parent.sentinel,), daemon=True).start()
+
+
+def _wait_for(sentinel: int) -> None:
+    multiprocessing.connection.wait([sentinel])
+    os._exit(1)

@@ -1,0 +1,192 @@
+"""A set on the printer's bed: plates, a labelled overview, a packing list.
+
+Objects with their layouts -> `SET-plate-1.3mf`, `SET-plate-1-prusaslicer.3mf`, ...,
+`SET-overview.pdf`, `SET-packing.csv`. Objects for one printer share its plates. The packing list
+is made each time; where it is what stands there already, and all plates are there, they stay.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from generator.export.atomic import Staging
+from generator.export.bed import Plate, arranged
+from generator.export.overview import overview_pdf
+from generator.export.packing import Packed, packing_csv
+from generator.export.threemf import PrintFile, print_file
+from generator.layout.placement import Layout
+from generator.pipeline.files import parts_of
+from generator.pipeline.parallel import Task, done_by
+from generator.pipeline.plan import Plan
+from generator.pipeline.progress import Progress, within
+from generator.printers import printer_named
+from generator.solid import Part, box
+
+
+@dataclass(frozen=True, slots=True)
+class SetObject:
+    """One object of a set, as it was made."""
+
+    plan: Plan
+    layout: Layout
+    formats: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Measured:
+    """One part and the room it takes."""
+
+    number: int  #: of the object
+    name: str
+    size_mm: tuple[float, float, float]
+    symbols: int
+
+
+@dataclass(frozen=True, slots=True)
+class _SetPlate:
+    """One plate, and the parts that its places count."""
+
+    printer: str
+    plate: Plate
+    parts: tuple[_Measured, ...]
+
+
+def written_set(
+    objects: Sequence[SetObject], folder: Path, jobs: int | None, progress: Progress
+) -> tuple[Path, ...]:
+    """Write the files of a set; return their paths.
+
+    Raises
+    ------
+    GeneratorError
+        A file cannot be written.
+    """
+    name = _name(objects)
+    tasks = [
+        Task(f"measuring {one.plan.spec.name}", _measured, (number, one.plan, one.layout))
+        for number, one in enumerate(objects)
+    ]
+    measured = done_by(tasks, 1, within(progress, 0.0, 0.3))
+    plates = _plates(objects, [part for parts in measured for part in parts])
+    packed = [_packed(objects, plate, number) for number, plate in enumerate(plates, 1)]
+    rows = sorted((row for some in packed for row in some), key=lambda row: row.order)
+    listed = packing_csv(rows)
+    with_models = any("3mf" in one.formats for one in objects)
+    models = [
+        f"{name}-plate-{number}{kind}.3mf"
+        for number in range(1, len(plates) + 1)
+        for kind in ("", "-prusaslicer")
+        if with_models
+    ]
+    names = [f"{name}-packing.csv", f"{name}-overview.pdf", *models]
+    if _unchanged(folder, names, listed):
+        return tuple(folder / each for each in names)
+    with Staging(folder) as staging:
+        if with_models:
+            contents = done_by(
+                [
+                    Task(f"plate {number}", _plate_files, _plate_task(objects, name, plate))
+                    for number, plate in enumerate(plates, 1)
+                ],
+                jobs,
+                within(progress, 0.3, 0.9),
+            )
+            for number, content in enumerate(contents, 1):
+                staging.write(f"{name}-plate-{number}.3mf", content.content)
+                staging.write(f"{name}-plate-{number}-prusaslicer.3mf", content.prusaslicer)
+        progress("drawing the overview", 0.9)
+        beds = [printer_named(plate.printer).bed_mm for plate in plates]
+        staging.write(f"{name}-overview.pdf", overview_pdf(name, packed, beds))
+        staging.write(f"{name}-packing.csv", listed)  # last: it says that the others are there
+        staging.commit()
+    return tuple(folder / each for each in names)
+
+
+def _name(objects: Sequence[SetObject]) -> str:
+    """Return what the files of the set are called: as the spec file that it comes from."""
+    names = {one.plan.located.origin for one in objects}
+    return names.pop() if len(names) == 1 and all(names) else "set"
+
+
+def _measured(number: int, plan: Plan, layout: Layout) -> list[_Measured]:
+    """Return the parts of one object with their sizes."""
+    found = []
+    for part in parts_of(plan, layout)[0]:
+        low, high = box(part)
+        x, y, z = (high - low).tolist()
+        symbols = sum(len(e.labels) for e in part.embossings if e.face is not None)
+        found.append(_Measured(number, part.name, (x, y, z), symbols))
+    return found
+
+
+def _plates(objects: Sequence[SetObject], parts: Sequence[_Measured]) -> list[_SetPlate]:
+    """Arrange all parts, printer by printer."""
+    plates: list[_SetPlate] = []
+    printers = dict.fromkeys(one.plan.printer.name for one in objects)
+    for printer in printers:
+        own = tuple(p for p in parts if objects[p.number].plan.printer.name == printer)
+        sizes = [part.size_mm[:2] for part in own]
+        for plate in arranged(sizes, printer_named(printer).bed_mm):
+            plates.append(_SetPlate(printer, plate, own))
+    return plates
+
+
+def _packed(objects: Sequence[SetObject], plate: _SetPlate, number: int) -> list[Packed]:
+    rows = []
+    for place in plate.plate.places:
+        part = plate.parts[place.part]
+        rows.append(
+            Packed(
+                order=(part.number, place.part),
+                object=objects[part.number].plan.spec.name,
+                part=part.name,
+                plate=number,
+                printer=plate.printer,
+                place=place,
+                size_mm=part.size_mm,
+                symbols=part.symbols,
+                fits=plate.plate.fits,
+            )
+        )
+    return rows
+
+
+def _plate_task(
+    objects: Sequence[SetObject], title: str, plate: _SetPlate
+) -> tuple[str, list[tuple[Plan, Layout, list[str]]], Plate]:
+    """Return what `_plate_files` needs: the objects on a plate, and the plate of them alone."""
+    places = plate.plate.places
+    numbers = dict.fromkeys(plate.parts[place.part].number for place in places)
+    wanted: list[tuple[Plan, Layout, list[str]]] = []
+    position: dict[str, int] = {}
+    for number in numbers:
+        names = [p.name for p in (plate.parts[q.part] for q in places) if p.number == number]
+        position |= {name: len(position) + k for k, name in enumerate(names)}
+        wanted.append((objects[number].plan, objects[number].layout, names))
+    moved = tuple(
+        dataclasses.replace(place, part=position[plate.parts[place.part].name]) for place in places
+    )
+    return title, wanted, Plate(moved, plate.plate.overhang_mm)
+
+
+def _plate_files(
+    title: str, objects: list[tuple[Plan, Layout, list[str]]], plate: Plate
+) -> PrintFile:
+    """Build the parts of one plate and return its 3MF files."""
+    parts: list[Part] = []
+    for plan, layout, names in objects:
+        by_name = {part.name: part for part in parts_of(plan, layout)[0]}
+        parts += [by_name[name] for name in names]
+    return print_file(title, parts, plate)
+
+
+def _unchanged(folder: Path, names: Sequence[str], listed: bytes) -> bool:
+    """Whether all files of the set are there, and the packing list is the same."""
+    try:
+        same = (folder / names[0]).read_bytes() == listed
+    except OSError:
+        return False
+    return same and all((folder / name).is_file() for name in names)

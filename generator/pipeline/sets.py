@@ -1,0 +1,144 @@
+"""Several objects that share one array: placed together, made in parallel, resumed where ended.
+
+All places are chosen first, each beside the ones before it; then every process builds and
+registers objects of its own (`make.made_at`). An object that is registered from the same
+spec, with all its files in place and unchanged, is skipped: the same command again finishes
+what was interrupted.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from sqlalchemy import Connection, Engine
+
+from generator.database.part_state import part_state
+from generator.database.read import find_object, read_layout, read_parts
+from generator.database.register import require_in_use
+from generator.database.transaction import reading
+from generator.layout.placement import Layout
+from generator.pipeline.made import Made, made_of
+from generator.pipeline.make import Order, Product, made_at
+from generator.pipeline.parallel import Engines, Task, done_by
+from generator.pipeline.place import Placed, placed
+from generator.pipeline.plates import SetObject, written_set
+from generator.pipeline.progress import Progress, within
+
+
+def made_as_set(
+    engine: Engine,
+    url: str,
+    orders: Sequence[Order],
+    folder: Path,
+    jobs: int | None,
+    progress: Progress,
+) -> tuple[list[Made], tuple[Path, ...]]:
+    """Make the objects of a set and what belongs to it as a whole.
+
+    Parameters
+    ----------
+    engine, url
+        The database; processes open it for themselves.
+    orders
+        The objects, on one array.
+    folder
+        For plates, overview and packing list.
+    jobs
+        Processes; None for one on each processor, if there is enough to do.
+
+    Returns
+    -------
+    What was made of each object in the order of `orders`, and the files of the set.
+
+    Raises
+    ------
+    GeneratorError
+        Of the first object that cannot be made; others may be made already.
+    """
+    products: list[Product | None] = [None] * len(orders)
+    tasks: list[Task[Product]] = []
+    numbers: list[int] = []
+    new: list[Layout] = []
+    with reading(engine) as connection:
+        for number, order in enumerate(orders):
+            name = order.plan.spec.name
+            if (skipped := _intact(connection, order)) is not None:
+                products[number] = skipped
+                progress(f"{name} is there, with all its files: skipped", 0.0)
+                continue
+            progress(f"placing {name}", 0.1 * number / len(orders))
+            place = placed(connection, order.plan, order.replace, new)
+            if not place.reused:
+                new.append(place.layout)
+            numbers.append(number)
+            tasks.append(Task(f"making {name}", _make, (url, order, place)))
+    found = done_by(tasks, jobs, within(progress, 0.1, 0.8))
+    for number, product in zip(numbers, found, strict=True):
+        products[number] = product
+    done = [product for product in products if product is not None]
+    objects = [
+        SetObject(order.plan, product.placed.layout, order.formats)
+        for order, product in zip(orders, done, strict=True)
+    ]
+    files = written_set(objects, folder, jobs, within(progress, 0.8, 1.0))
+    return [product.made for product in done], files
+
+
+def set_folder(orders: Sequence[Order], folder: Path | None) -> Path:
+    """Return where the files of the set go: `folder`, or what the objects' folders share."""
+    if folder is not None:
+        return folder
+    common = Path(os.path.commonpath([order.folder.absolute() for order in orders]))
+    if common == Path(common.anchor):  # objects on different disks
+        return orders[0].folder
+    return Path(os.path.relpath(common)) if common.is_relative_to(Path.cwd()) else common
+
+
+def _make(url: str, order: Order, place: Placed) -> Product:
+    """Make one object; runs in any process."""
+    return made_at(Engines.open(url), order, place)
+
+
+def _intact(connection: Connection, order: Order) -> Product | None:
+    """Return the object if it is registered from the same spec and all its files stand."""
+    plan, url = order.plan, connection.engine.url
+    known = find_object(connection, plan.spec.name)
+    if known is None or not known.same_spec(plan.meaning):
+        return None
+    require_in_use(connection, known)
+    stem, files = order.folder / plan.spec.name, []
+    states = [part_state(url, part) for part in read_parts(connection, known.object_id)]
+    states = [state for state in states if state.part.format in order.formats]
+    for kind in {"step", "stl"} & set(order.formats):
+        if not any(state.part.format == kind for state in states):
+            return None
+    here = order.folder.absolute()
+    if any(state.state != "ok" or state.path.parent != here for state in states):
+        return None
+    files += [state.path for state in states]
+    others = [f"{stem}.png", f"{stem}-array.svg"]
+    if "glb" in order.formats:
+        others.append(f"{stem}.glb")
+    if "3mf" in order.formats:
+        plates = sorted(order.folder.glob(f"{_literal(plan.spec.name)}-plate-*.3mf"))
+        others += map(str, plates or [Path(f"{stem}.3mf"), Path(f"{stem}-prusaslicer.3mf")])
+    if not all(os.path.isfile(other) for other in others):
+        return None
+    layout = read_layout(connection, plan.spec.name)
+    made = made_of(
+        plan,
+        layout,
+        len({state.part.name for state in states}),
+        (),
+        tuple(files) + tuple(map(Path, others)),
+        reused=True,
+        skipped=True,
+    )
+    return Product(made, Placed(layout, 0, reused=True, replaces=False))
+
+
+def _literal(name: str) -> str:
+    """Return a name with what `glob` would take as a pattern put in brackets."""
+    return "".join(f"[{c}]" if c in "*?[" else c for c in name)

@@ -1,0 +1,67 @@
+"""A spec from a Python script: the settings of a YAML file as plain values, without a shape.
+
+The values are written as YAML and read as a file is, so that a script and a file understand
+the same words and get the same messages; the place is `encode():line:column`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import ValidationError
+
+from generator.spec.document import tree_of
+from generator.spec.explain import explained
+from generator.spec.located import Located
+from generator.spec.problem import Problem, SpecError
+from generator.spec.resolve import resolved
+from generator.spec.resolved import ShapeSpec
+from generator.spec.settings import NamedSettings
+
+SOURCE = "encode()"  #: how messages call the script's values
+
+
+def spec_of(settings: Mapping[str, Any], shape: ShapeSpec) -> Located:
+    """Return the spec of one object.
+
+    Parameters
+    ----------
+    settings
+        As in a spec file: name, profile, symbols, print, output, ...; None means not given.
+    shape
+        What the object is.
+
+    Raises
+    ------
+    SpecError
+        Every setting that is unknown, out of range or does not go with the others.
+    """
+    try:
+        text = yaml.safe_dump(_plain(settings), sort_keys=False, allow_unicode=True)
+    except yaml.YAMLError as error:
+        fix = "give numbers, texts, lists and dicts of them, as in a spec file"
+        cause = f"a setting is not a plain value: {error}"
+        raise SpecError([Problem(cause, fix, file=SOURCE)]) from None
+    tree = tree_of(text, SOURCE, Path())
+    if tree.problems:
+        raise SpecError(tree.problems)
+    try:
+        read = NamedSettings.model_validate(tree.value)
+    except ValidationError as error:
+        raise SpecError(explained(error, tree, NamedSettings)) from None
+    if read.copies != 1:
+        fix = "call encode once for each copy, with a name of its own"
+        raise SpecError([Problem("one solid is encoded at a time", fix, tree.key_mark(("copies",)))])
+    return Located(resolved(read, tree, shape)[0], tree)
+
+
+def _plain(value: Any) -> Any:
+    """Return settings without those that are None; paths as text, tuples as lists."""
+    if isinstance(value, Mapping):
+        return {key: _plain(inner) for key, inner in value.items() if inner is not None}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    return str(value) if isinstance(value, Path) else value

@@ -1,0 +1,143 @@
+"""What presses on top of a pad, out of what arrives at its base, as far as it can be known.
+
+Forces on the tactels under a pad (N) -> forces on the pad's top over each tactel (N). A wave
+of pressure arrives at the base as B(q h) (`layer_kernel`); at the tactels' Nyquist frequency
+of 0.61 (h = 1 mm), 0.185 (2 mm), 0.0065 (4 mm, nu = .4999). To invert that is to grow the noise
+by its inverse, so
+
+- below `LEAST` at Nyquist (h >= 4 mm at the usual pitch) it is refused;
+- above, forces f >= 0 are sought for which |K f - m|^2 + (sigma/tau)^2 |f|^2 is least: K is
+  the layer's blur from tactel to tactel, m the readings, sigma their noise, tau the root mean
+  square of m. What lies under the noise is left out, not invented, and its extent is told.
+
+Nothing pulls on a pad, so f >= 0 is no assumption. What arrives beyond the matrix counts for the
+outermost tactels, as in `layer_influence`. Thesis 4.2.
+
+References
+----------
+C. L. Lawson, R. J. Hanson, Solving Least Squares Problems, 1974, chapters 23 and 25.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from probe.contact.layer_influence import Influence, influence
+from probe.contact.layer_kernel import base_ratio
+from probe.errors import ContactError
+from probe.sensor import Sensor
+
+Array = NDArray[np.float64]
+
+LEAST = 0.01  #: share of a wave at the tactels' Nyquist frequency that must arrive
+CELLS = 4  #: of the layer, per tactel: finer than the blur
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Deblurred:
+    """What presses on the top of the pad."""
+
+    forces_n: Array  #: (rows, columns) over each tactel, >= 0
+    noise_n: float  #: standard deviation of one of them, root mean square
+    resolved: int  #: directions of the image that stand above the noise, of rows times columns
+    arrives: float  #: share of a wave at the tactels' Nyquist frequency that the pad passes
+
+
+def deblurred(forces_n: ArrayLike, sensor: Sensor, *, noise_n: float) -> Deblurred:
+    """Return the forces on top of the pad.
+
+    Parameters
+    ----------
+    forces_n
+        (rows, columns) force on each tactel, N.
+    sensor
+        Its overlay must be a pad.
+    noise_n
+        Standard deviation of one reading, N; 0 takes readings and blur as exact.
+
+    Raises
+    ------
+    ContactError
+        When the overlay is no pad, or one that passes too little; for readings or a noise that
+        are no numbers.
+    """
+    grid = influence(sensor, CELLS)  # refuses what is no pad
+    read = np.asarray(forces_n, dtype=np.float64)
+    shape = (sensor.rows, sensor.columns)
+    if read.shape != shape or not np.isfinite(read).all():
+        raise ContactError(
+            f"readings of shape {read.shape}, finite numbers of {shape} are needed",
+            fix="give the force on each tactel, rows from the top",
+        )
+    if not 0 <= noise_n < math.inf:
+        raise ContactError(
+            f"a noise of {noise_n:g} N", fix="give the standard deviation of one reading, >= 0"
+        )
+    arrives = arriving(sensor)
+    if arrives < LEAST:
+        raise ContactError(
+            f"a pad of {sensor.overlay.height_mm:g} mm passes {arrives:.2g} of a wave that is two "
+            f"tactels long, {LEAST:g} is needed: its blur cannot be inverted without noise "
+            "drowning the image",
+            fix=f"take a pad of at most {math.floor(100 * thickest_mm(sensor)) / 100:g} mm, tabs, "
+            "or the image as it is",
+        )
+    blur, strengths = _blurred(grid)
+    level = math.sqrt(float(np.mean(np.square(read))))
+    if level == 0:
+        return Deblurred(np.zeros(shape), 0.0, 0, arrives)
+    share = noise_n / level
+    kept = strengths / (np.square(strengths) + share**2)
+    return Deblurred(
+        _pressing(blur, read.ravel(), share).reshape(shape),
+        noise_n * math.sqrt(float(np.mean(np.square(kept)))),
+        int(np.count_nonzero(strengths > share)),
+        arrives,
+    )
+
+
+def arriving(sensor: Sensor) -> float:
+    """Return the share of a wave two tactels long that arrives at the base of the pad."""
+    s = math.pi / sensor.pitch_mm * sensor.overlay.height_mm
+    return float(base_ratio(np.array(s), sensor.overlay.poisson))
+
+
+def thickest_mm(sensor: Sensor) -> float:
+    """Return the height of the highest pad of the sensor's material that can be deblurred."""
+    from scipy.optimize import brentq
+
+    # At s = 8 half of LEAST arrives, at any Poisson's ratio.
+    s = brentq(lambda s: float(base_ratio(np.array(s), sensor.overlay.poisson)) - LEAST, 0.0, 8.0)
+    return float(s) * sensor.pitch_mm / math.pi
+
+
+def _pressing(blur: Array, read: Array, share: float) -> Array:
+    from scipy.optimize import nnls
+
+    if share == 0:
+        return np.asarray(nnls(blur, read)[0])
+    system = np.concatenate([blur, share * np.eye(len(read))])
+    return np.asarray(nnls(system, np.concatenate([read, np.zeros(len(read))]))[0])
+
+
+@lru_cache(maxsize=4)
+def _blurred(grid: Influence) -> tuple[Array, Array]:
+    """Return the blur (n, n) from tactel to tactel, and its singular values (n,)."""
+    n = grid.cells_per_tactel
+    rows, columns = grid.sensor.rows, grid.sensor.columns
+    blur = np.empty((rows * columns, rows * columns))
+    for tactel, (row, column) in enumerate(np.ndindex(rows, columns)):
+        pressure = np.zeros((grid.rows, grid.columns))
+        pressure[1 + row * n : 1 + (row + 1) * n, 1 + column * n : 1 + (column + 1) * n] = (
+            1 / (n * grid.dx_mm) ** 2
+        )
+        blur[:, tactel] = grid.base_forces_n(pressure).ravel()
+    strengths: Array = np.asarray(np.linalg.svd(blur, compute_uv=False), np.float64)
+    blur.setflags(write=False)
+    strengths.setflags(write=False)
+    return blur, strengths

@@ -1,0 +1,119 @@
+"""What a simulated probe feels, beat by beat: it rests, comes down, holds, and lifts.
+
+Touch on a face -> forces of a few steps down -> counts at the board's rate. The film
+remembers (hysteresis, creep), and the board is noisy, as in `probe.simulate`. Nothing is
+computed at rest but noise. Thesis 4.2.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import count
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.circuit import QUIET, Electronics, Noise, State, fsr_of, read_counts
+from probe.contact.contract import Touch
+from probe.contact.press import press
+from probe.frame import Frame, frame_from
+from probe.sensor import Sensor
+from probe.simulate.scene import Scene
+from recognizer.bench.errors import BenchError
+
+Array = NDArray[np.float64]
+
+STEPS = (0.25, 0.6)  #: shares of the force on the way down, a beat each
+APART_S = 0.08  #: between two touches
+LARGEST_N = 400.0
+
+
+@dataclass(frozen=True, slots=True)
+class Manner:
+    """How the simulated probe is built and moves."""
+
+    rate: float = 100.0  #: frames per second
+    noise: str = "typical"  #: or quiet
+    hold_s: float = 2.0  #: how long a touch lasts
+    seed: int = 0
+
+
+class Beats:
+    """The probe's state; `touch`, `load` and `lift` may be called from any thread."""
+
+    def __init__(self, sensor: Sensor, manner: Manner) -> None:
+        self.sensor, self.manner = sensor, manner
+        noise = QUIET if manner.noise == "quiet" else Noise()
+        self._board = Electronics(noise=noise, frame_s=1 / manner.rate)
+        self._rest = np.zeros((sensor.rows, sensor.columns))
+        self._turn = threading.Lock()
+        self._coming: list[tuple[int, Array]] = []  #: beats to stay at these forces
+        self._now = self._rest
+
+    def touch(self, scene: Scene, touch: Touch) -> None:
+        """Come down on a surface, hold, and lift.
+
+        Raises
+        ------
+        ContactError
+            When the touch has no equilibrium.
+        BenchError
+            For a force that no operator would use.
+        """
+        if not 0 < touch.force_n <= LARGEST_N:
+            raise BenchError(
+                f"a force of {touch.force_n:g} N", fix=f"give more than 0, at most {LARGEST_N:g} N"
+            )
+        full = press(scene.surface, self.sensor, touch).forces_n
+        down = [
+            press(scene.surface, self.sensor, replace(touch, force_n=touch.force_n * s)).forces_n
+            for s in STEPS
+        ]
+        held = self._beats(self.manner.hold_s)
+        steps = [(1, forces) for forces in down]
+        self._play([*steps, (held, full), *reversed(steps), (1, self._rest)])
+
+    def load(self, newtons: float) -> None:
+        """Put an even load on, in newtons; 0 takes it off. It stays.
+
+        Raises
+        ------
+        BenchError
+            For what is no load.
+        """
+        if not 0 <= newtons <= 10 * LARGEST_N:
+            raise BenchError(f"a load of {newtons:g} N", fix=f"give 0 to {10 * LARGEST_N:g} N")
+        self._play([(1, np.full(self._rest.shape, newtons / self._rest.size))])
+
+    def lift(self) -> None:
+        """Lift at once."""
+        self._play([(1, self._rest)])
+
+    def frames(self) -> Iterator[Frame]:
+        """Yield frames without end, numbered and timed from 0."""
+        rng = np.random.default_rng(self.manner.seed)
+        fsr = fsr_of(self.sensor.rows, self.sensor.columns)
+        state: State | None = None
+        for seq in count():
+            counts, state = read_counts(self._beat(), self._board, fsr, state, rng)
+            yield frame_from(counts, t_ns=round(seq * 1e9 / self.manner.rate), seq=seq)
+
+    def _beats(self, seconds: float) -> int:
+        return max(1, round(seconds * self.manner.rate))
+
+    def _play(self, coming: list[tuple[int, Array]]) -> None:
+        with self._turn:
+            if self._now.any() and len(coming) > 1:
+                coming = [(self._beats(APART_S), self._rest), *coming]
+            self._coming = coming
+
+    def _beat(self) -> Array:
+        with self._turn:
+            if self._coming:
+                left, self._now = self._coming[0]
+                self._coming[0] = (left - 1, self._now)
+                if left <= 1:
+                    self._coming.pop(0)
+            return self._now

@@ -1,0 +1,86 @@
+"""The newest of every topic, for any number of pages.
+
+Threads publish, pages wait. A page that is slow misses what was replaced meanwhile, and costs
+nobody else anything: nothing is queued. Topics are texts (JSON) or pictures that are made for
+the page that asks.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import threading
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+
+class Picture(Protocol):
+    """A frame or a mosaic, as bytes in the way that a page wants it."""
+
+    def as_bytes(self, wish: str, /) -> bytes:
+        """Return the message for a page that wants this filter."""
+        ...
+
+
+@dataclass(slots=True, eq=False)
+class Reader:
+    """One page: what it has seen, and the filter that it wants."""
+
+    wish: str = "bias-free"
+    seen: dict[str, int] = field(default_factory=dict)
+    news: asyncio.Event = field(default_factory=asyncio.Event)
+
+
+class Bulletin:
+    """The board; `publish` from any thread, the rest on the server's loop."""
+
+    def __init__(self) -> None:
+        self._topics: dict[str, tuple[int, str | Picture]] = {}
+        self._turn = threading.Lock()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._waking = False
+        self.readers: set[Reader] = set()
+        self._number = 0
+
+    def attach(self, loop: asyncio.AbstractEventLoop | None) -> None:
+        """Wake pages on this loop from now on; None: it has ended."""
+        with self._turn:
+            self._loop = loop
+
+    def publish(self, topic: str, content: dict[str, Any] | Picture) -> None:
+        """Replace a topic."""
+        if isinstance(content, dict):
+            told: str | Picture = json.dumps({"topic": topic, **content}, allow_nan=False)
+        else:
+            told = content
+        with self._turn:
+            self._number += 1
+            self._topics[topic] = (self._number, told)
+            if self._loop is not None and not self._waking:
+                self._waking = True
+                self._loop.call_soon_threadsafe(self._wake)
+
+    def newest(self, topic: str) -> str | Picture | None:
+        """Return what a topic says now."""
+        with self._turn:
+            return self._topics.get(topic, (0, None))[1]
+
+    def news(self, reader: Reader) -> list[str | bytes]:
+        """Return what a page has not seen yet, oldest first."""
+        with self._turn:
+            fresh = sorted(
+                (number, topic, content)
+                for topic, (number, content) in self._topics.items()
+                if number > reader.seen.get(topic, 0)
+            )
+        reader.seen.update({topic: number for number, topic, _ in fresh})
+        return [
+            content if isinstance(content, str) else content.as_bytes(reader.wish)
+            for _, _, content in fresh
+        ]
+
+    def _wake(self) -> None:
+        with self._turn:
+            self._waking = False
+        for reader in self.readers:
+            reader.news.set()

@@ -1,0 +1,93 @@
+"""`open-bench`: serve the page, here by default.
+
+Exit codes: 0 ended by the operator, 2 bad input, 3 device, 4 database. Nothing heavy is
+imported before it is needed.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, NoReturn
+
+import typer
+
+HELP = """See the part, the touch and the answer in a web page.
+
+Try it without a probe: [bold]open-bench --database lab.db[/], open the page, click on the part.
+"""
+EPILOG = "Exit codes: 0 ended, 2 bad input, 3 device, 4 database."
+LAB = "lab.db"
+
+app = typer.Typer(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run `open-bench` and leave with its exit code."""
+    from generator.errors import GeneratorError
+    from probe.errors import ProbeError
+    from recognizer.errors import RecognizerError
+
+    usage_error: type[Exception] = typer.BadParameter.__mro__[1]
+    try:
+        code = app(list(sys.argv[1:] if arguments is None else arguments),
+                   prog_name="open-bench", standalone_mode=False)  # fmt: skip
+    except typer.Exit as leaving:
+        code = leaving.exit_code
+    except (GeneratorError, ProbeError, RecognizerError) as error:
+        sys.stderr.write(f"open-bench: error: {error.cause}\n")
+        if error.fix:
+            sys.stderr.write(f"  fix: {error.fix}\n")
+        code = error.exit_code
+    except usage_error as error:
+        told = getattr(error, "format_message", error.__str__)()
+        sys.stderr.write(f"open-bench: error: {told}\n  fix: see open-bench --help\n")
+        code = 2
+    sys.exit(int(code or 0))
+
+
+@app.command(help=HELP, epilog=EPILOG)
+def bench(
+    port: Annotated[
+        str, typer.Option(metavar="URL", show_default=False,
+                          help="Of the probe: serial:///dev/ttyACM0, sim:, file:touch.h5, or "
+                               "touch: for a simulated one that comes down where you click "
+                               "(default)."),
+    ] = "",
+    database: Annotated[
+        str, typer.Option(metavar="URL", help="Of the objects: lab.db, sqlite:///lab.db, "
+                                              "postgresql://host/name."),
+    ] = LAB,
+    web_port: Annotated[int, typer.Option(min=0, max=65535, help="0: any free one.")] = 8080,
+    host: Annotated[
+        str, typer.Option(help="Address to listen on. One that others reach asks for a token.")
+    ] = "127.0.0.1",
+    token: Annotated[
+        str, typer.Option(envvar="OPEN_BENCH_TOKEN", show_default=False,
+                          help="Token that pages need; made anew by default where one is needed."),
+    ] = "",
+    folder: Annotated[
+        Path, typer.Option(metavar="DIR", help="For recordings and calibrations.")
+    ] = Path("recordings"),
+    parts: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", show_default=False,
+                     help="Where printed parts may be downloaded from; the database's folder by "
+                          "default."),
+    ] = None,
+    overlay: Annotated[str, typer.Option(help="Of the sensor: tab or pad.")] = "tab",
+) -> int:  # fmt: skip
+    """Serve the bench."""
+    from recognizer.bench.serve import Asked, serve
+
+    return serve(Asked(port, database, web_port, host, token, folder, parts, overlay))
+
+
+if __name__ == "__main__":
+    main()

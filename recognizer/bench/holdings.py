@@ -1,0 +1,71 @@
+"""What the database holds, as requests: objects, the array, files of the parts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from fastapi import APIRouter
+from fastapi.responses import FileResponse
+
+from generator.database.open import open_database
+from generator.database.read import existing, read_parts
+from generator.database.transaction import reading
+from recognizer.bench.errors import UnknownError
+from recognizer.bench.files import part_to_send
+from recognizer.bench.scenes import encodings_told, map_told, object_told, objects_told
+from recognizer.bench.session import Session
+
+
+def holdings_routes(session: Session, parts: Path | None) -> APIRouter:
+    """Return the routes; files are sent from the folder `parts` alone."""
+    routes = APIRouter(prefix="/api")
+
+    def engine() -> Any:
+        if not session.database:
+            raise UnknownError("no database is open", fix="start with --database lab.db")
+        return open_database(session.database, writable=False)
+
+    @routes.get("/objects")
+    def objects() -> dict[str, Any]:
+        if not session.database:
+            return {"objects": []}
+        with reading(engine()) as connection:
+            return {"objects": objects_told(connection)}
+
+    @routes.get("/objects/{name}")
+    def one(name: str) -> dict[str, Any]:
+        with reading(engine()) as connection:
+            return object_told(connection, name)
+
+    @routes.get("/objects/{name}/parts/{number}")
+    def part(name: str, number: int) -> FileResponse:
+        with reading(engine()) as connection:
+            known = read_parts(connection, existing(connection, name).object_id)
+        if not 0 <= number < len(known):
+            raise UnknownError(f"{name} has no part {number}", fix=f"it has {len(known)}")
+        path = part_to_send(session.database, parts, known[number])
+        return FileResponse(path, filename=path.name, media_type="application/octet-stream")
+
+    @routes.get("/lab")
+    def lab() -> dict[str, Any]:
+        reader = session.reading.reader
+        return {"encodings": [] if reader is None else encodings_told(reader.lab)}
+
+    @routes.post("/lab")
+    def reload() -> dict[str, Any]:
+        session.reading.reload()
+        if session.simulation is not None:
+            session.simulation.forget()
+        return {"reloading": True}
+
+    @routes.get("/map/{number}")
+    def array(number: int) -> dict[str, Any]:
+        reader = session.reading.reader
+        known = () if reader is None else reader.lab.encodings
+        if not 0 <= number < len(known):
+            raise UnknownError(f"there is no array {number}", fix=f"there are {len(known)}")
+        with reading(engine()) as connection:
+            return map_told(connection, known[number])
+
+    return routes

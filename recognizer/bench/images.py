@@ -1,0 +1,43 @@
+"""A frame as the page shows it: raw, bias-free, median, or Sobel. Thesis 4.3.
+
+Each filter works on the result of the one before it, as the thesis's does.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.sensor import Sensor
+from recognizer.filters import median, sobel, touch_image, unbiased
+
+Array = NDArray[np.float64]
+
+FILTERS = ("raw", "bias-free", "median", "sobel")
+
+
+def filtered(readings: Array, sensor: Sensor, wish: str, bias: Array | None = None) -> Array:
+    """Return an image through a filter.
+
+    Parameters
+    ----------
+    readings
+        (rows, columns) counts or newtons.
+    wish
+        One of `FILTERS`.
+    bias
+        (rows, columns) reading at rest; the lowest twentieth of the image if not given.
+
+    Returns
+    -------
+    (rows, columns) in the same unit; Sobel: its slope per mm.
+    """
+    if wish == "raw":
+        return readings
+    image = unbiased(touch_image(sensor, readings), bias)
+    if wish == "bias-free":
+        return image.values
+    image = median(image)
+    if wish == "median":
+        return image.values
+    return np.hypot(*sobel(image))

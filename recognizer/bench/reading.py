@@ -1,0 +1,187 @@
+"""Touch -> answer -> mosaic, in a thread of its own: the newest frame wins.
+
+A frame is read when `Watch` says so; its answer is published at once, then the first answered
+frame of a touch goes into the mosaic of its face. Thesis 4.3, 6.3.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import OrderedDict
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.errors import GeneratorError
+from probe.calibration import Calibration, calibrated
+from probe.errors import ProbeError
+from probe.frame import Frame
+from probe.sensor import Sensor
+from recognizer.bench.bulletin import Bulletin
+from recognizer.bench.message import MosaicPicture, mosaic_picture
+from recognizer.bench.telling import told
+from recognizer.bench.watch import Watch
+from recognizer.errors import RecognizerError
+from recognizer.lab import open_lab
+from recognizer.mosaic.grow import added
+from recognizer.mosaic.mosaic import Mosaic, no_touches
+from recognizer.mosaic.touch import PlacedTouch, decoded_place
+from recognizer.pipeline import Reader, reader_for, recognise
+from recognizer.recognition import Recognition
+from recognizer.signal import Signal, signal_of
+
+LEAST_N = 0.05  #: of the strongest tactels, for a contact
+FACES = 24  #: mosaics that are kept
+TOUCHES = 300  #: of one mosaic
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Offered:
+    """A frame with what belongs to it."""
+
+    frame: Frame
+    calibration: Calibration | None
+    received_ms: float
+
+
+class Reading:
+    """The thread. `offer`, `reload` and `clear` may be called from any other."""
+
+    def __init__(self, database: str, sensor: Sensor, bulletin: Bulletin) -> None:
+        self.database, self.sensor = database, sensor
+        self.reader: Reader | None = None
+        self._bulletin = bulletin
+        self._news = threading.Condition()
+        self._offered: Offered | None = None
+        self._stop = self._reload = False
+        self._watch = Watch()
+        self._answers = 0
+        self._mosaics: OrderedDict[tuple[str, str], Mosaic] = OrderedDict()
+        self._grown = 0  #: touch that went into a mosaic last
+        self._contact = False
+        self._thread = threading.Thread(target=self._run, name="reading", daemon=True)
+        self._thread.start()
+
+    def offer(self, offered: Offered) -> None:
+        """Put a frame in the place of the one that waits."""
+        with self._news:
+            self._offered = offered
+            self._news.notify()
+
+    def reload(self) -> None:
+        """Read the database again."""
+        with self._news:
+            self._reload = True
+            self._news.notify()
+
+    def clear(self) -> None:
+        """Forget the mosaics."""
+        with self._news:
+            self._mosaics.clear()
+        image = no_touches(self.sensor).image
+        self._bulletin.publish("mosaic-of", {"object": None, "face": None, "touches": 0})
+        self._bulletin.publish("mosaic", mosaic_picture(image, 0))
+
+    def close(self) -> None:
+        """End the thread."""
+        with self._news:
+            self._stop = True
+            self._news.notify()
+        self._thread.join()
+
+    def _run(self) -> None:
+        self._prepare()
+        while True:
+            with self._news:
+                self._news.wait_for(lambda: self._offered or self._stop or self._reload)
+                offered, self._offered = self._offered, None
+                reload_, self._reload = self._reload, False
+                if self._stop:
+                    return
+            if reload_:
+                self._prepare()
+            if offered is not None:
+                self._look(offered)
+
+    def _prepare(self) -> None:
+        if not self.database:
+            self._tell("off", cause="no database is open", fix="start with --database lab.db")
+            return
+        self._tell("preparing")
+        try:
+            self.reader = reader_for(open_lab(self.database), self.sensor)
+        except (GeneratorError, RecognizerError) as error:
+            self.reader = None
+            self._tell("off", cause=error.cause, fix=error.fix)
+            return
+        self._tell("ready")
+
+    def _tell(self, state: str, **more: Any) -> None:
+        self._bulletin.publish("reader", {"state": state, **more})
+
+    def _look(self, offered: Offered) -> None:
+        signal = _signal(offered)
+        if signal.contact != self._contact:
+            self._contact = signal.contact
+            self._bulletin.publish("contact", {"contact": signal.contact})
+        now_s = time.monotonic()
+        due = self._watch.due(signal.forces, contact=signal.contact, now_s=now_s)
+        if not due or self.reader is None:
+            return
+        answer = recognise(self.reader, signal, offered.frame.seq)
+        done_s = time.monotonic()
+        self._watch.read(signal.forces, answered=bool(answer), now_s=done_s)
+        self._answers += 1
+        self._bulletin.publish(
+            "answer",
+            told(answer, self.reader.lab, self.sensor)
+            | {
+                "touch": self._watch.touches,
+                "read": self._answers,
+                "read_ms": round(1e3 * (done_s - now_s), 1),
+                "received_ms": offered.received_ms,
+                "answered_ms": time.time() * 1e3,
+            },
+        )
+        if answer and self._grown != self._watch.touches:
+            self._grow(answer, signal)
+
+    def _grow(self, answer: Recognition, signal: Signal) -> None:
+        place = decoded_place(answer)
+        if place is None or answer.object is None or answer.face is None:
+            return
+        self._grown = self._watch.touches
+        key = (answer.object, answer.face)
+        with self._news:
+            mosaic = self._mosaics.get(key) or no_touches(self.sensor)
+        if len(mosaic) < TOUCHES:
+            mosaic = added(mosaic, PlacedTouch(signal, decoded=place, seq=answer.seq))
+        with self._news:
+            self._mosaics[key] = mosaic
+            self._mosaics.move_to_end(key)
+            while len(self._mosaics) > FACES:
+                self._mosaics.popitem(last=False)
+        self._bulletin.publish(
+            "mosaic-of",
+            {"object": key[0], "face": key[1], "touches": len(mosaic), "most": TOUCHES},
+        )
+        self._bulletin.publish("mosaic", self.picture(mosaic))
+
+    def picture(self, mosaic: Mosaic) -> MosaicPicture:
+        """Return a mosaic for the pages."""
+        return mosaic_picture(mosaic.image, len(mosaic))
+
+
+def _signal(offered: Offered) -> Signal:
+    counts: NDArray[np.float64] = offered.frame.counts.astype(np.float64)
+    if offered.calibration is None:
+        return signal_of(counts)
+    try:
+        found = calibrated(counts, offered.calibration)
+    except ProbeError:  # another sensor's readings: beyond the board's range
+        return signal_of(counts)
+    trust = 1.0 - found.bad.astype(np.float64)
+    return signal_of(found.values, trust=trust, floor=0.0, least=LEAST_N, newtons=True)

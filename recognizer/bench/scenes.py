@@ -1,0 +1,158 @@
+"""Registered objects, arrays and alphabets as JSON, for the page to draw.
+
+An object is its faces (triangles, outlines, pose in the object) and its symbols (label and
+place on their face); how a symbol of each label looks is sent once. An array is the cells that
+objects hold, whatever its size: what nobody holds is not sent. mm, rad. Thesis 6.3.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import Connection, select
+
+from generator.database import tables
+from generator.database.read import list_objects, read_object
+from generator.database.registered import RegisteredObject
+from probe.surface.solids import filled, symbol_triangles
+from probe.surface.symbols import Relief, embossed
+from recognizer.lab import Encoding, Lab
+
+DIGITS = 4  #: after the point, of mm: a tenth of a micrometre
+
+
+def objects_told(connection: Connection) -> list[dict[str, Any]]:
+    """Return the list of objects."""
+    return [
+        {
+            "name": entry.name,
+            "type": entry.object_type,
+            "faces": entry.number_of_faces,
+            "symbols": entry.symbols,
+            "profile": entry.profile,
+            "array": [entry.rows, entry.columns],
+            "pitch_mm": entry.pitch_mm,
+            "registered": entry.utc,
+            "retired": bool(entry.retired_utc),
+        }
+        for entry in list_objects(connection)
+    ]
+
+
+def object_told(connection: Connection, name: str) -> dict[str, Any]:
+    """Return an object as solid and symbols.
+
+    Raises
+    ------
+    DatabaseError
+        When no object has this name.
+    """
+    held = read_object(connection, name)
+    return {
+        "name": held.entry.name,
+        "type": held.entry.object_type,
+        "profile": held.entry.profile,
+        "registered": held.entry.utc,
+        "pitch_mm": held.style.pitch_mm,
+        "height_mm": held.style.height_mm,
+        "faces": [_face(held, number) for number in range(len(held.faces))],
+        "glyphs": _glyphs(held),
+        "parts": [
+            {"number": i, "name": part.name, "format": part.format}
+            for i, part in enumerate(held.parts)
+        ],
+    }
+
+
+def _face(held: RegisteredObject, number: int) -> dict[str, Any]:
+    face, cells = held.faces[number], held.layout.faces[number]
+    triangles = filled(face.polygon_mm)
+    return {
+        "name": face.name,
+        "T_object_face": _listed(face.T_object_face, 9),
+        "loops": [_listed(loop) for loop in face.polygon_mm],
+        "triangles": triangles.tolist(),
+        "turn": 0.0 if face.placement is None else -face.placement.rotation_rad,
+        "blank": face.placement is None,
+        "labels": cells.labels.tolist(),
+        "centres": _listed(cells.centres_mm),
+    }
+
+
+def _glyphs(held: RegisteredObject) -> list[list[float]]:
+    """Return the triangles of every label's symbol, corner after corner."""
+    style = held.style
+    relief = Relief(style.height_mm, style.stroke_mm, style.draft_rad, style.chamfer_mm)
+    glyphs = held.alphabet["glyphs"]
+    strokes = tuple(tuple((tuple(a), tuple(b)) for a, b in glyph["strokes"]) for glyph in glyphs)
+    symbols = embossed(strokes, held.alphabet["reach"] * style.pitch_mm, relief)
+    return [
+        np.round(symbol_triangles(symbols, label), DIGITS).ravel().tolist()
+        for label in range(len(strokes))
+    ]
+
+
+def encodings_told(lab: Lab) -> list[dict[str, Any]]:
+    """Return the arrays with the strokes of their alphabets, mm in the symbol's axes."""
+    return [
+        {
+            "rows": encoding.array.rows,
+            "columns": encoding.array.columns,
+            "alphabet": encoding.alphabet.name,
+            "pitch_mm": encoding.style.pitch_mm,
+            "stroke_mm": encoding.style.stroke_mm,
+            "cells": len(encoding.keys),
+            "objects": len(encoding.names),
+            "strokes": [
+                [[[float(v) * unit for v in node] for node in stroke] for stroke in glyph.strokes]
+                for glyph in encoding.alphabet.glyphs
+            ],
+        }
+        for encoding in lab.encodings
+        for unit in (encoding.alphabet.reach * encoding.style.pitch_mm,)
+    ]
+
+
+def map_told(connection: Connection, encoding: Encoding) -> dict[str, Any]:
+    """Return the cells of an array that objects hold, face by face."""
+    columns = np.uint64(encoding.array.columns)
+    owners, labels = encoding.owners[:-1], encoding.labels[:-1]
+    order = np.argsort(owners, kind="stable")
+    bounds = np.searchsorted(owners[order], np.arange(len(encoding.faces) + 1))
+    names = _face_names(connection)
+    faces = []
+    for number, (object_id, face_id) in enumerate(encoding.faces.tolist()):
+        mine = order[bounds[number] : bounds[number + 1]]
+        rows, columns_at = np.divmod(encoding.keys[mine], columns)
+        faces.append(
+            {
+                "object": encoding.names[object_id],
+                "face": names[object_id].get(face_id, ""),
+                "rows": rows.tolist(),
+                "columns": columns_at.tolist(),
+                "labels": labels[mine].tolist(),
+            }
+        )
+    return {
+        "rows": encoding.array.rows,
+        "columns": encoding.array.columns,
+        "order": encoding.alphabet.order,
+        "faces": faces,
+    }
+
+
+def _face_names(connection: Connection) -> dict[int, dict[int, str]]:
+    found: dict[int, dict[int, str]] = defaultdict(dict)
+    faces = tables.faces.c
+    for object_id, face_id, name in connection.execute(
+        select(faces.object_id, faces.face_id, faces.name)
+    ):
+        found[object_id][face_id] = name
+    return found
+
+
+def _listed(values: NDArray[np.float64], digits: int = DIGITS) -> Any:
+    return np.round(values, digits).tolist()

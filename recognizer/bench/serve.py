@@ -1,0 +1,126 @@
+"""From the command's options to a server that runs: session, routes, guard, uvicorn."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import socket
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import uvicorn
+
+from generator.database.open import database_exists
+from generator.errors import DatabaseError
+from probe.errors import ProbeError
+from probe.sensor import Overlay, Sensor
+from recognizer.bench.app import Bench, app_for
+from recognizer.bench.bulletin import Bulletin
+from recognizer.bench.errors import BenchError
+from recognizer.bench.files import part_folder
+from recognizer.bench.guard import Guard, is_loopback, rules_for
+from recognizer.bench.session import Session
+
+SOFTWARE = ("touch:", "Simulated probe: click on the part")
+FIRMWARE = ("touch:?firmware=avr", "Simulated probe, through the firmware")
+PATTERN = ("sim:", "Moving pattern")
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """The options of `open-bench`."""
+
+    port: str
+    database: str
+    web_port: int
+    host: str
+    token: str
+    folder: Path
+    parts: Path | None
+    overlay: str
+
+
+def serve(asked: Asked) -> int:
+    """Serve until interrupted; returns the exit code.
+
+    Raises
+    ------
+    BenchError, DatabaseError, ProbeError
+        When an option cannot be met.
+    """
+    if asked.overlay not in ("tab", "pad"):
+        raise BenchError(f"an overlay {asked.overlay!r}", fix="give tab or pad")
+    database = _database(asked.database)
+    token = asked.token or ("" if is_loopback(asked.host) else secrets.token_urlsafe(18))
+    line = _listening(asked.host, asked.web_port)
+    bulletin = Bulletin()
+    sensor = Sensor(overlay=Overlay(kind="pad" if asked.overlay == "pad" else "tab"))
+    session = Session(database, asked.folder, sensor, bulletin)
+    try:
+        _begin(session, asked.port)
+        parts = asked.parts if asked.parts or not database else part_folder(database)
+        bench = Bench(session, bulletin, parts and parts.resolve(), _ports(asked.port, database))
+        config = uvicorn.Config(
+            Guard(app_for(bench), rules_for(asked.host, token)),
+            log_level="warning", access_log=False, server_header=False,
+            ws_max_size=4096, ws_per_message_deflate=False, ws_ping_interval=20.0,
+            timeout_graceful_shutdown=2, limit_concurrency=512,
+        )  # fmt: skip
+        server = uvicorn.Server(config)
+        sys.stdout.write(_address(asked.host, line.getsockname()[1], token) + "\n")
+        sys.stdout.flush()
+        server.run(sockets=[line])
+    finally:
+        session.close()
+        line.close()
+    return 0
+
+
+def _begin(session: Session, port: str) -> None:
+    """Open the port that was asked for, or else the simulated probe."""
+    if port:
+        session.open(port)
+    elif session.database:
+        session.open(SOFTWARE[0])
+
+
+def _database(url: str) -> str:
+    """Return the database, or nothing if none was named and the usual one is not there."""
+    try:
+        if database_exists(url):
+            return url
+    except DatabaseError:
+        if url != "lab.db":
+            raise
+    if url == "lab.db":
+        sys.stderr.write("open-bench: there is no lab.db here; images are shown, not recognised\n")
+        return ""
+    raise DatabaseError(
+        "there is no such database", fix="register an object with encode-object first", place=url
+    )
+
+
+def _ports(port: str, database: str) -> tuple[tuple[str, str], ...]:
+    always = (SOFTWARE, FIRMWARE) if database else ()
+    return ((port, port), *always, PATTERN) if port and port != "touch:" else (*always, PATTERN)
+
+
+def _listening(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    line = socket.socket(family, socket.SOCK_STREAM)
+    line.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        line.bind((host, port))
+    except OSError as error:
+        line.close()
+        raise ProbeError(
+            f"cannot listen on {host} port {port}: {os.strerror(error.errno or 0)}",
+            fix="give another --web-port; 0 takes any free one",
+        ) from error
+    return line
+
+
+def _address(host: str, port: int, token: str) -> str:
+    shown = f"[{host}]" if ":" in host else host
+    return f"open-bench: http://{shown}:{port}/" + (f"?token={token}" if token else "")

@@ -1,0 +1,166 @@
+"""A probe that comes down on a registered part where it is told.
+
+    touch:                        in software
+    touch:?firmware=avr           through the probe's own firmware on an emulated processor
+
+Options: rate (frames a second, 100), noise (typical, quiet), hold (s, 2), seed. Either way it
+is a device on a serial line, which can be unplugged, and its frames say nothing of where it
+stands.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections import OrderedDict
+from contextlib import ExitStack
+from urllib.parse import parse_qsl
+
+from probe.contact.contract import Touch
+from probe.errors import ProbeError
+from probe.port.emulated import emulated_probe
+from probe.port.simulated import FULL_COUNTS, FULL_MV
+from probe.sensor import Sensor
+from probe.simulate.registered import registered_surface
+from probe.simulate.scene import Scene
+from recognizer.bench.beats import Beats, Manner
+from recognizer.bench.errors import BenchError
+from recognizer.bench.line import SoftwareLine
+
+SCHEME = "touch:"
+SCENES = 32  #: surfaces that are kept
+_OPTIONS = ("firmware", "rate", "noise", "hold", "seed")
+
+
+class TouchProbe:
+    """The simulated probe, running; `url` is its serial line.
+
+    Parameters
+    ----------
+    url
+        See the module.
+    database
+        Whose objects it touches.
+    sensor
+        What it is.
+
+    Raises
+    ------
+    BenchError
+        When an option is unknown or no number.
+    PortError
+        When the emulator cannot be built.
+    """
+
+    def __init__(self, url: str, database: str, sensor: Sensor) -> None:
+        firmware, manner = _manner(url)
+        self.database = database
+        self.firmware = firmware
+        self._beats = Beats(sensor, manner)
+        self._scenes: OrderedDict[tuple[str, str], Scene] = OrderedDict()
+        self._turn = threading.Lock()
+        self._closed = threading.Event()
+        with ExitStack() as stack:
+            if firmware:
+                self._emulator = stack.enter_context(emulated_probe())
+                self.url = self._emulator.url
+                thread = threading.Thread(target=self._show, name="images", daemon=True)
+                stack.callback(thread.join)
+                stack.callback(self._closed.set)
+                thread.start()
+            else:
+                self._line = SoftwareLine(self._beats.frames(), "simulated")
+                self.url = self._line.url
+                stack.callback(self._line.close)
+            self._stack = stack.pop_all()
+
+    def touch(
+        self, object_name: str, face: str, x_mm: float, y_mm: float, theta_deg: float,
+        force_n: float,
+    ) -> None:  # fmt: skip
+        """Touch a face at (x, y), face frame.
+
+        Raises
+        ------
+        SurfaceError, ContactError, BenchError
+            When there is no such face, or no such touch.
+        """
+        if not all(map(math.isfinite, (x_mm, y_mm, theta_deg, force_n))):
+            raise BenchError("a touch at what is no number", fix="give mm, degrees and N")
+        touch = Touch(x_mm, y_mm, math.radians(theta_deg), force_n)
+        with self._turn:
+            self._beats.touch(self._scene(object_name, face), touch)
+
+    def load(self, newtons: float) -> None:
+        """Put an even load on; see `Beats.load`."""
+        self._beats.load(newtons)
+
+    def lift(self) -> None:
+        """Lift at once."""
+        self._beats.lift()
+
+    def unplug(self, seconds: float) -> None:
+        """Pull the plug, and put it in again after so many seconds."""
+        if not 0 < seconds <= 60:
+            raise BenchError(f"unplugged for {seconds:g} s", fix="give up to 60 s")
+        if self.firmware:
+            self._emulator.fault(f"unplug {seconds:g}")
+        else:
+            self._line.unplug(seconds)
+
+    def forget(self) -> None:
+        """Read the surfaces from the database again."""
+        with self._turn:
+            self._scenes.clear()
+
+    def close(self) -> None:
+        """End the simulation; the port is gone."""
+        self._stack.close()
+
+    def _scene(self, object_name: str, face: str) -> Scene:
+        key = (object_name, face)
+        if key not in self._scenes:
+            self._scenes[key] = registered_surface(self.database, object_name, face)
+        self._scenes.move_to_end(key)
+        while len(self._scenes) > SCENES:
+            self._scenes.popitem(last=False)
+        return self._scenes[key]
+
+    def _show(self) -> None:
+        period_s = 1 / self._beats.manner.rate
+        for frame in self._beats.frames():
+            try:
+                self._emulator.show(frame.counts * (FULL_MV / FULL_COUNTS))
+            except ProbeError:  # the emulator ended; its port is gone, and whoever reads it told
+                return
+            if self._closed.wait(period_s):
+                return
+
+
+def _manner(url: str) -> tuple[bool, Manner]:
+    """Read the options of a URL: whether by firmware, and how the probe moves."""
+    _, _, query = url.removeprefix(SCHEME).partition("?")
+    given = dict(parse_qsl(query, keep_blank_values=True))
+    unknown = sorted(set(given) - set(_OPTIONS))
+    firmware, noise = given.get("firmware", ""), given.get("noise", "typical")
+    if unknown or firmware not in ("", "avr") or noise not in ("typical", "quiet"):
+        raise BenchError(
+            f"the simulated probe cannot be had with {query}",
+            fix=f"its options are {', '.join(_OPTIONS)}; firmware=avr, noise=typical or quiet",
+            place=url,
+        )
+    numbers = {}
+    for name, (default, low, high) in _RANGES.items():
+        try:
+            value = float(given.get(name, default))
+        except ValueError:
+            value = math.nan
+        if not low <= value <= high:
+            raise BenchError(f"{name}={given[name]!r}", fix=f"give {low:g} to {high:g}", place=url)
+        numbers[name] = value
+    return bool(firmware), Manner(
+        rate=numbers["rate"], noise=noise, hold_s=numbers["hold"], seed=int(numbers["seed"])
+    )
+
+
+_RANGES = {"rate": (100.0, 1.0, 500.0), "hold": (2.0, 0.1, 3600.0), "seed": (0.0, 0.0, 2.0**31)}

@@ -1,0 +1,90 @@
+"""Answers as the page gets them: what was read, what was seen, and which window it was.
+
+Recognition + Lab -> JSON: the plain values of `Recognition.as_json`, the symbols of the face
+that lie under the sensor (sensor frame), and the sensor's outline on the array.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.sensor import Sensor
+from recognizer.lab import EncodedFace, Encoding, Lab
+from recognizer.recognition import Recognition
+
+Array = NDArray[np.float64]
+
+#: What the operator can do about a touch that is not answered.
+ADVICE = {
+    "no contact": "nothing is touched",
+    "too few symbols": "press harder, or move further onto the face",
+    "ambiguous": "two places look alike here; touch a little beside it",
+    "not an encoded surface": "no registered symbols are felt; is the object in this database?",
+    "outside every face": "the sensor's centre lies beyond the face; move inwards",
+}
+
+
+def told(recognition: Recognition, lab: Lab, sensor: Sensor) -> dict[str, Any]:
+    """Return an answer for the page."""
+    answer = recognition.as_json()
+    margin = recognition.margin
+    answer["margin"] = None if margin is None or math.isinf(margin) else round(margin, 2)
+    answer["alone"] = margin is not None and math.isinf(margin)
+    answer["advice"] = ADVICE.get(recognition.reason, "")
+    answer["noise"] = None if recognition.noise is None else round(recognition.noise, 3)
+    pose = recognition.T_face_probe
+    found = _face(lab, recognition)
+    if pose is None or found is None or recognition.covariance is None:
+        return answer | {"place": None, "symbols": [], "window": None}
+    number, encoding, face = found
+    theta = math.atan2(pose[1, 0], pose[0, 0])
+    spread = np.sqrt(np.diag(recognition.covariance))
+    return answer | {
+        "place": {
+            "x_mm": round(float(pose[0, 3]), 3),
+            "y_mm": round(float(pose[1, 3]), 3),
+            "theta_deg": round(math.degrees(theta), 2),
+            "sigma_mm": round(float(spread[:2].max()), 3),
+            "sigma_deg": round(math.degrees(float(spread[2])), 3),
+        },
+        "symbols": _seen(encoding, face, sensor, pose),
+        "turn": round(-face.rotation_rad - theta, 5),
+        "window": {"encoding": number, "corners": _corners(encoding, face, sensor, pose)},
+    }
+
+
+def _face(lab: Lab, recognition: Recognition) -> tuple[int, Encoding, EncodedFace] | None:
+    for number, encoding in enumerate(lab.encodings):
+        for face in encoding.known.values():
+            if (face.object, face.face) == (recognition.object, recognition.face):
+                return number, encoding, face
+    return None
+
+
+def _seen(encoding: Encoding, face: EncodedFace, sensor: Sensor, pose: Array) -> list[list[float]]:
+    """Return row, column, label, x and y (sensor frame, mm) of the symbols in view."""
+    at = (face.centres_mm - pose[:2, 3]) @ pose[:2, :2]
+    half = np.array(sensor.half_mm) + encoding.style.pitch_mm / 2
+    near = np.flatnonzero((np.abs(at) < half).all(axis=1))
+    return [
+        [int(face.rows[k]), int(face.columns[k]), int(face.labels[k]),
+         round(float(at[k, 0]), 3), round(float(at[k, 1]), 3)]
+        for k in near.tolist()
+    ]  # fmt: skip
+
+
+def _corners(
+    encoding: Encoding, face: EncodedFace, sensor: Sensor, pose: Array
+) -> list[list[float]]:
+    """Return the sensor's corners on the array, as rows and columns (not wrapped)."""
+    w, h = sensor.half_mm
+    corners = np.array([(-w, h), (w, h), (w, -h), (-w, -h)]) @ pose[:2, :2].T + pose[:2, 3]
+    away = (corners - face.centres_mm[0]) / encoding.style.pitch_mm
+    c, s = math.cos(face.rotation_rad), math.sin(face.rotation_rad)
+    u, v = c * away[:, 0] - s * away[:, 1], s * away[:, 0] + c * away[:, 1]
+    rows, columns = face.rows[0] + 0.5 - v, face.columns[0] + 0.5 + u
+    return [[round(float(r), 3), round(float(q), 3)] for r, q in zip(rows, columns, strict=True)]

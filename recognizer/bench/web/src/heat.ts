@@ -1,0 +1,79 @@
+/** The heat map with the symbols that were found, and the scale under it. */
+
+import { TABLE, gradient } from "./colours";
+import { element, say } from "./dom";
+import type { Answer, Encoding, Frame, Sensor } from "./types";
+
+const LEAST = { counts: 24, newtons: 0.2 };
+const HELD = 0.985; // of the scale is left after each painting
+
+export class Heat {
+  private readonly canvas = element<HTMLCanvasElement>("heat");
+  private readonly ink = this.canvas.getContext("2d")!;
+  private readonly small = new OffscreenCanvas(16, 16);
+  private readonly dots = this.small.getContext("2d")!;
+  private readonly pixels = this.dots.createImageData(16, 16);
+  private spoken = 0;
+  top = 0;
+  answer: Answer | null = null;
+  encodings: Encoding[] = [];
+  symbols = true;
+
+  constructor(private readonly sensor: Sensor) {
+    element("scale-bar").style.background = gradient();
+  }
+
+  paint(frame: Frame): void {
+    this.top = Math.max(frame.largest, this.top * HELD, frame.newtons ? LEAST.newtons : LEAST.counts);
+    const { data } = this.pixels;
+    for (let i = 0; i < 256; i++) {
+      const colour = 3 * Math.min(255, Math.max(0, Math.round((frame.values[i]! / this.top) * 255)));
+      data[4 * i] = TABLE[colour]!;
+      data[4 * i + 1] = TABLE[colour + 1]!;
+      data[4 * i + 2] = TABLE[colour + 2]!;
+      data[4 * i + 3] = 255;
+    }
+    this.dots.putImageData(this.pixels, 0, 0);
+    const { width, height } = this.canvas;
+    this.ink.imageSmoothingEnabled = false;
+    this.ink.drawImage(this.small, 0, 0, width, height);
+    if (this.symbols && this.answer) this.draw(this.answer);
+    this.speak(frame);
+  }
+
+  /** Symbols as strokes, the sensor's axes: x right, y up. */
+  private draw(answer: Answer): void {
+    const encoding = answer.window && this.encodings[answer.window.encoding];
+    if (!encoding) return;
+    const ink = this.ink, unit = this.canvas.width / (this.sensor.columns * this.sensor.pitch_mm);
+    const turn = answer.turn ?? 0;
+    for (const [width, colour] of [[5, "rgb(0 0 0 / .55)"], [2, "#fff"]] as const) {
+      ink.lineWidth = width;
+      ink.strokeStyle = colour;
+      ink.lineCap = "round";
+      for (const [, , label, x, y] of answer.symbols) {
+        ink.save();
+        ink.translate(this.canvas.width / 2 + x * unit, this.canvas.height / 2 - y * unit);
+        ink.rotate(-turn);
+        ink.scale(unit, -unit);
+        ink.beginPath();
+        for (const [a, b] of encoding.strokes[label] ?? []) {
+          ink.moveTo(a[0], a[1]);
+          ink.lineTo(b[0], b[1]);
+        }
+        ink.restore();
+        ink.stroke();
+      }
+    }
+  }
+
+  private speak(frame: Frame): void {
+    const now = performance.now();
+    if (now - this.spoken < 1000) return;
+    this.spoken = now;
+    const unit = frame.newtons ? "N" : "counts", digits = frame.newtons ? 2 : 0;
+    say(element("scale"), `0 to ${this.top.toFixed(digits)} ${unit}`);
+    this.canvas.setAttribute("aria-label",
+      `Heat map of the 16 by 16 readings, largest ${frame.largest.toFixed(digits)} ${unit}`);
+  }
+}

@@ -1,0 +1,231 @@
+/** The part with its embossed faces, the recognised face lit, the probe standing on it. */
+
+import {
+  BoxGeometry, BufferAttribute, BufferGeometry, Color, DoubleSide, EdgesGeometry, Float32BufferAttribute, Group,
+  InstancedMesh, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshLambertMaterial, Object3D, Raycaster,
+  RingGeometry, Sphere, Vector2, Vector3,
+} from "three";
+import { element, isDark } from "./dom";
+import { Stage } from "./stage";
+import type { Answer, Matrix, ObjectShape, Sensor } from "./types";
+
+const STILL_PX = 5; // farther, a press of the button is a turn and no click
+
+export interface Place { face: string; x_mm: number; y_mm: number }
+
+export class Part {
+  private readonly stage = new Stage(element<HTMLCanvasElement>("part"));
+  private readonly probe: Group;
+  private readonly ring: Mesh;
+  private held: Group | null = null;
+  private faces: Mesh | null = null;
+  private faceOf: Uint16Array = new Uint16Array(0);
+  private symbols: { mesh: InstancedMesh; faces: Uint16Array }[] = [];
+  private edges: LineBasicMaterial | null = null;
+  private lit = -1;
+  shape: ObjectShape | null = null;
+
+  constructor(sensor: Sensor, private readonly touched: (place: Place) => void) {
+    this.probe = probeOf(sensor);
+    this.ring = new Mesh(new RingGeometry(1.6, 2.3, 32),
+      new MeshLambertMaterial({ color: 0xd97a00, side: DoubleSide, depthTest: false }));
+    this.ring.renderOrder = 2;
+    this.probe.visible = this.ring.visible = false;
+    this.stage.scene.add(this.probe, this.ring);
+    this.listen();
+  }
+
+  theme(): void {
+    this.colour();
+    this.stage.theme();
+  }
+
+  show(shape: ObjectShape): void {
+    this.clear();
+    this.shape = shape;
+    const held = new Group();
+    this.faces = this.facesOf(shape);
+    this.edges = new LineBasicMaterial();
+    held.add(this.faces, new LineSegments(outlinesOf(shape), this.edges));
+    this.symbols = symbolsOf(shape);
+    held.add(...this.symbols.map((one) => one.mesh));
+    this.held = held;
+    this.stage.scene.add(held);
+    const ball = new Sphere();
+    this.faces.geometry.computeBoundingSphere();
+    ball.copy(this.faces.geometry.boundingSphere!);
+    this.stage.look(ball.center, ball.radius, new Vector3(0.55, -1, 0.6));
+    this.lit = -1;
+    this.colour();
+  }
+
+  /** Light the recognised face and stand the probe on it; null: nothing is known. */
+  tell(answer: Answer | null, contact: boolean): void {
+    const here = answer !== null && answer.object !== null && answer.object === this.shape?.name;
+    const lit = here ? this.shape!.faces.findIndex((face) => face.name === answer.face) : -1;
+    if (lit !== this.lit) {
+      this.lit = lit;
+      this.colour();
+    }
+    this.ring.visible = false;
+    this.probe.visible = here && answer.T_object_probe !== null;
+    if (this.probe.visible) {
+      const stands = matrixOf(answer!.T_object_probe!);
+      if (!contact) stands.multiply(new Matrix4().makeTranslation(0, 0, 8));
+      this.probe.matrix.copy(stands);
+      this.probe.matrixWorldNeedsUpdate = true;
+    }
+    this.stage.draw();
+  }
+
+  get litFace(): string { return this.shape?.faces[this.lit]?.name ?? ""; }
+
+  /** Turn the part so that a face is seen. */
+  face(name: string): void {
+    const face = this.shape?.faces.find((one) => one.name === name);
+    if (!face || !this.faces) return;
+    const T = matrixOf(face.T_object_face);
+    const out = new Vector3().setFromMatrixColumn(T, 2), up = new Vector3().setFromMatrixColumn(T, 1);
+    const now = this.stage.camera.position.clone().sub(this.stage.target).normalize();
+    if (now.dot(out) > 0.35) return;
+    const ball = this.faces.geometry.boundingSphere!;
+    this.stage.look(ball.center.clone(), ball.radius, out.addScaledVector(up, 0.35).add(new Vector3(0.3, -0.2, 0.25)));
+  }
+
+  private facesOf(shape: ObjectShape): Mesh {
+    const corners: number[] = [], faceOf: number[] = [];
+    shape.faces.forEach((face, number) => {
+      const T = matrixOf(face.T_object_face), points = face.loops.flat();
+      for (const triangle of face.triangles) {
+        for (const k of triangle) corners.push(...new Vector3(points[k]![0], points[k]![1], 0).applyMatrix4(T).toArray());
+        faceOf.push(number);
+      }
+    });
+    const geometry = new BufferGeometry();
+    geometry.setAttribute("position", new Float32BufferAttribute(corners, 3));
+    geometry.setAttribute("color", new BufferAttribute(new Float32Array(corners.length), 3));
+    geometry.computeVertexNormals();
+    this.faceOf = Uint16Array.from(faceOf);
+    const material = new MeshLambertMaterial({
+      vertexColors: true, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1,
+    });
+    return new Mesh(geometry, material);
+  }
+
+  private colour(): void {
+    if (!this.faces || !this.edges) return;
+    const dark = isDark();
+    const plain = new Color(dark ? 0x4c5867 : 0xd5dce4), lit = new Color(dark ? 0xb06d14 : 0xf4b45f);
+    const symbol = new Color(dark ? 0x8d9bac : 0x8fa1b3), litSymbol = new Color(dark ? 0xffc46f : 0xb25f00);
+    const colours = this.faces.geometry.getAttribute("color");
+    this.faceOf.forEach((face, triangle) => {
+      const { r, g, b } = face === this.lit ? lit : plain;
+      for (let k = 0; k < 3; k++) colours.setXYZ(3 * triangle + k, r, g, b);
+    });
+    colours.needsUpdate = true;
+    for (const { mesh, faces } of this.symbols) {
+      faces.forEach((face, i) => mesh.setColorAt(i, face === this.lit ? litSymbol : symbol));
+      if (mesh.instanceColor) mesh.instanceColor.needsUpdate = true;
+    }
+    this.edges.color.set(dark ? 0x0d1116 : 0x7d8a99);
+    this.stage.draw();
+  }
+
+  private clear(): void {
+    if (!this.held) return;
+    this.stage.scene.remove(this.held);
+    this.held.traverse((one: Object3D) => {
+      if (one instanceof Mesh || one instanceof LineSegments) one.geometry.dispose();
+    });
+  }
+
+  private listen(): void {
+    const canvas = this.stage.canvas;
+    let down: [number, number] | null = null;
+    canvas.addEventListener("pointerdown", (event) => { down = event.button === 0 ? [event.clientX, event.clientY] : null; });
+    canvas.addEventListener("pointerup", (event) => {
+      if (down && Math.hypot(event.clientX - down[0], event.clientY - down[1]) < STILL_PX) {
+        const box = canvas.getBoundingClientRect();
+        this.pick((event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height);
+      }
+      down = null;
+    });
+    canvas.addEventListener("keydown", (event) => {
+      if (event.key === "Enter") this.pick(0.5, 0.5);
+    });
+  }
+
+  /** Touch what is seen at a place of the canvas, 0 ... 1 from its upper left corner. */
+  private pick(across: number, down: number): void {
+    if (!this.faces || !this.shape) return;
+    const ray = new Raycaster();
+    this.stage.camera.updateMatrixWorld();
+    ray.setFromCamera(new Vector2(2 * across - 1, 1 - 2 * down), this.stage.camera);
+    const hit = ray.intersectObject(this.faces)[0];
+    const face = hit && this.shape.faces[this.faceOf[hit.faceIndex!]!];
+    if (!hit || !face) return;
+    const T = matrixOf(face.T_object_face), at = hit.point.clone().applyMatrix4(T.clone().invert());
+    this.ring.matrixAutoUpdate = false;
+    this.ring.matrix.copy(T).multiply(new Matrix4().makeTranslation(at.x, at.y, this.shape.height_mm + 0.2));
+    this.ring.visible = true;
+    this.stage.draw();
+    this.touched({ face: face.name, x_mm: at.x, y_mm: at.y });
+  }
+}
+
+function matrixOf(rows: Matrix): Matrix4 {
+  return new Matrix4().fromArray(rows.flat()).transpose();
+}
+
+function outlinesOf(shape: ObjectShape): BufferGeometry {
+  const corners: number[] = [];
+  for (const face of shape.faces) {
+    const T = matrixOf(face.T_object_face);
+    for (const loop of face.loops) loop.forEach((a, i) => {
+      const b = loop[(i + 1) % loop.length]!;
+      for (const p of [a, b]) corners.push(...new Vector3(p[0], p[1], 0).applyMatrix4(T).toArray());
+    });
+  }
+  return new BufferGeometry().setAttribute("position", new Float32BufferAttribute(corners, 3));
+}
+
+/** One mesh per label, an instance per symbol. */
+function symbolsOf(shape: ObjectShape): { mesh: InstancedMesh; faces: Uint16Array }[] {
+  return shape.glyphs.flatMap((corners, label) => {
+    const places: Matrix4[] = [], faces: number[] = [];
+    shape.faces.forEach((face, number) => {
+      const T = matrixOf(face.T_object_face), turn = new Matrix4().makeRotationZ(face.turn);
+      face.labels.forEach((one, i) => {
+        if (one !== label) return;
+        const [x, y] = face.centres[i]!;
+        places.push(T.clone().multiply(new Matrix4().makeTranslation(x, y, 0)).multiply(turn));
+        faces.push(number);
+      });
+    });
+    if (!places.length) return [];
+    const geometry = new BufferGeometry().setAttribute("position", new Float32BufferAttribute(corners, 3));
+    geometry.computeVertexNormals();
+    const mesh = new InstancedMesh(geometry, new MeshLambertMaterial(), places.length);
+    places.forEach((place, i) => mesh.setMatrixAt(i, place));
+    return [{ mesh, faces: Uint16Array.from(faces) }];
+  });
+}
+
+/** The probe in the sensor frame: overlay, board, and a dot at the upper left tactel. */
+function probeOf(sensor: Sensor): Group {
+  const side = sensor.columns * sensor.pitch_mm, group = new Group();
+  const box = (w: number, h: number, from: number, to: number, colour: number, opacity: number): void => {
+    const geometry = new BoxGeometry(w, h, to - from).translate(0, 0, (from + to) / 2);
+    const material = new MeshLambertMaterial({ color: colour, transparent: opacity < 1, opacity, depthWrite: opacity === 1 });
+    group.add(new Mesh(geometry, material));
+    const line = new LineBasicMaterial({ color: 0x0f6c8c });
+    group.add(new LineSegments(new EdgesGeometry(geometry), line));
+  };
+  box(side, side, 0, sensor.overlay_mm, 0x2a9d8f, 0.35);
+  box(side + 5, side + 5, sensor.overlay_mm, sensor.overlay_mm + 3, 0x0f6c8c, 0.45);
+  const dot = new Mesh(new BoxGeometry(2.4, 2.4, 1), new MeshLambertMaterial({ color: 0xffffff }));
+  dot.position.set(-side / 2 + 1.5, side / 2 - 1.5, sensor.overlay_mm + 3.3);
+  group.add(dot);
+  group.matrixAutoUpdate = false;
+  return group;
+}

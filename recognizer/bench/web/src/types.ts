@@ -1,0 +1,89 @@
+/** What the server says; see recognizer/bench. mm, radians unless the name says degrees. */
+
+export type Matrix = number[][];
+
+export interface Sensor { rows: number; columns: number; pitch_mm: number; overlay: string; overlay_mm: number }
+
+export interface BenchInfo {
+  ports: { url: string; label: string }[];
+  database: string;
+  folder: string;
+  filters: string[];
+  sensor: Sensor;
+  margin: number;
+}
+
+export interface Feed {
+  state: "none" | "waiting" | "live" | "gone" | "replay";
+  cause?: string; fix?: string; device?: string; sensor?: number | null;
+  rate?: number; frames?: number; lost?: number; damaged?: number; late?: number; restarts?: number; returns?: number;
+  at?: number; seconds?: number; playing?: boolean; speed?: number;
+}
+
+export interface GuideStep {
+  step: number; steps: number; newtons: number; ask: string; reading: boolean; done: boolean; felt: string[];
+}
+
+export interface Status {
+  topic: "status";
+  port: string; feed: Feed; simulated: boolean;
+  calibration: { name: string; made: string; age: string; bad: number; warning: string } | null;
+  bias: "none" | "taking" | "taken";
+  recording: { name: string; frames: number } | null;
+  guide: GuideStep | null;
+  recordings: string[]; calibrations: string[];
+  notices: { number: number; text: string }[];
+  pages: number;
+}
+
+export interface Answer {
+  topic: "answer";
+  seq: number; object: string | null; face: string | null; index: [number, number] | null;
+  T_face_probe: Matrix | null; T_object_probe: Matrix | null;
+  margin: number | null; alone: boolean; noise: number | null;
+  runner_up: { object: string; face: string; index: [number, number] } | null;
+  reason: string; advice: string;
+  place: { x_mm: number; y_mm: number; theta_deg: number; sigma_mm: number; sigma_deg: number } | null;
+  symbols: [number, number, number, number, number][];
+  turn?: number;
+  window: { encoding: number; corners: [number, number][] } | null;
+  touch: number; read: number; read_ms: number; received_ms: number; answered_ms: number;
+}
+
+export interface MosaicOf { topic: "mosaic-of"; object: string | null; face: string | null; touches: number }
+export interface ReaderState { topic: "reader"; state: "preparing" | "ready" | "off"; cause?: string; fix?: string }
+export interface ContactState { topic: "contact"; contact: boolean }
+export type Told = Status | Answer | MosaicOf | ReaderState | ContactState;
+
+export interface Frame {
+  newtons: boolean; filter: number; seq: number; time_s: number; received_ms: number;
+  largest: number; sum: number; values: Float32Array;
+}
+
+export interface MosaicImage {
+  rows: number; columns: number; touches: number; step_mm: number; corner_mm: [number, number];
+  largest: number; values: Uint8Array;
+}
+
+export interface FaceShape {
+  name: string; T_object_face: Matrix; loops: [number, number][][]; triangles: [number, number, number][];
+  turn: number; blank: boolean; labels: number[]; centres: [number, number][];
+}
+
+export interface ObjectShape {
+  name: string; type: string; profile: string; registered: string; pitch_mm: number; height_mm: number;
+  faces: FaceShape[]; glyphs: number[][];
+  parts: { number: number; name: string; format: string }[];
+}
+
+export interface ObjectEntry { name: string; type: string; faces: number; symbols: number; retired: boolean }
+
+export interface Encoding {
+  rows: number; columns: number; alphabet: string; pitch_mm: number; stroke_mm: number; cells: number;
+  objects: number; strokes: [[number, number], [number, number]][][];
+}
+
+export interface ArrayMap {
+  rows: number; columns: number; order: number;
+  faces: { object: string; face: string; rows: number[]; columns: number[]; labels: number[] }[];
+}

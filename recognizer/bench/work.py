@@ -1,0 +1,229 @@
+"""What can be done at the bench, as requests.
+
+Port, sensor, bias, record, replay, calibrate, and what the simulated probe shall do. Bodies
+are JSON; unknown names in them are refused.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from fastapi import APIRouter, Request, Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from probe.errors import RecordingError
+from probe.port.listing import list_ports
+from probe.recording.read import read_recording
+from recognizer.bench.errors import BenchError, UnknownError
+from recognizer.bench.files import checked_name, named
+from recognizer.bench.images import FILTERS
+from recognizer.bench.session import Session
+
+Ports = tuple[tuple[str, str], ...]
+
+
+class _Body(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Port(_Body):
+    """Which port to read; empty: none."""
+
+    url: str = Field(max_length=400)
+    sensor: int | None = Field(default=None, ge=0, le=7)
+
+
+class Selected(_Body):
+    """Which sensor of the board."""
+
+    sensor: int = Field(ge=0, le=7)
+
+
+class Switch(_Body):
+    """On or off."""
+
+    on: bool
+
+
+class Replay(_Body):
+    """A recording to play, or what to do on its time line."""
+
+    name: str = Field(default="", max_length=200)
+    playing: bool | None = None
+    speed: float | None = Field(default=None, allow_inf_nan=False)
+    at_s: float | None = Field(default=None, allow_inf_nan=False)
+
+
+class Touched(_Body):
+    """Where the simulated probe shall come down: face frame."""
+
+    object: str = Field(max_length=200)
+    face: str = Field(max_length=200)
+    x_mm: float = Field(allow_inf_nan=False)
+    y_mm: float = Field(allow_inf_nan=False)
+    theta_deg: float = Field(default=0.0, allow_inf_nan=False)
+    force_n: float = Field(default=80.0, allow_inf_nan=False)
+
+
+class Loaded(_Body):
+    """An even load on the simulated probe."""
+
+    newtons: float = Field(allow_inf_nan=False)
+
+
+class Unplugged(_Body):
+    """How long the simulated probe is away."""
+
+    seconds: float = Field(allow_inf_nan=False)
+
+
+class Calibrating(_Body):
+    """A step of a calibration."""
+
+    do: Literal["begin", "read", "again", "finish", "cancel", "use"]
+    newtons: list[float] = Field(default_factory=list, max_length=64)
+    seconds: float = Field(default=3.0, allow_inf_nan=False)
+    simulated_board: bool = False
+    name: str = Field(default="", max_length=200)
+
+
+def work_routes(session: Session, ports: Ports) -> APIRouter:
+    """Return the routes."""
+    routes = APIRouter(prefix="/api")
+
+    def offered() -> list[dict[str, Any]]:
+        there = [(entry.url, f"{entry.device} {entry.vendor} {entry.product}".strip())
+                 for entry in list_ports()]  # fmt: skip
+        return [{"url": url, "label": label} for url, label in dict([*ports, *there]).items()]
+
+    @routes.get("/bench")
+    def bench() -> dict[str, Any]:
+        sensor = session.sensor
+        return {
+            "ports": offered(),
+            "database": session.database,
+            "folder": str(session.folder),
+            "filters": FILTERS,
+            "sensor": {
+                "rows": sensor.rows,
+                "columns": sensor.columns,
+                "pitch_mm": sensor.pitch_mm,
+                "overlay": sensor.overlay.kind,
+                "overlay_mm": sensor.overlay.height_mm,
+            },
+            "margin": 12.0 if session.reading.reader is None
+            else session.reading.reader.thresholds.margin,
+        }  # fmt: skip
+
+    @routes.post("/port")
+    def port(body: Port) -> dict[str, Any]:
+        if body.url and body.url not in {entry["url"] for entry in offered()}:
+            raise UnknownError(
+                f"{body.url[:80]} is none of the ports that are offered",
+                fix="choose one from the list, or start open-bench with --port",
+            )
+        session.open(body.url, body.sensor)
+        return session.told()
+
+    @routes.post("/sensor")
+    def sensor(body: Selected) -> dict[str, Any]:
+        session.select(body.sensor)
+        return session.told()
+
+    @routes.post("/bias")
+    def bias(body: Switch) -> dict[str, Any]:
+        session.bias(on=body.on)
+        return session.told()
+
+    @routes.post("/record")
+    def record(body: Switch) -> dict[str, Any]:
+        session.record(on=body.on)
+        return session.told()
+
+    @routes.post("/replay")
+    def replay(body: Replay) -> dict[str, Any]:
+        if body.name:
+            session.replay(body.name)
+        else:
+            session.timeline().play(playing=body.playing, speed=body.speed, at_s=body.at_s)
+        return session.told()
+
+    @routes.get("/timeline")
+    def timeline() -> dict[str, Any]:
+        feed = session.timeline()
+        return {"seconds": feed.seconds, "strength": feed.overview()}
+
+    @routes.post("/touch")
+    def touch(body: Touched) -> dict[str, Any]:
+        session.simulated().touch(
+            body.object, body.face, body.x_mm, body.y_mm, body.theta_deg, body.force_n
+        )
+        return {"touched": True}
+
+    @routes.post("/load")
+    def load(body: Loaded) -> dict[str, Any]:
+        session.simulated().load(body.newtons)
+        return {"newtons": body.newtons}
+
+    @routes.post("/unplug")
+    def unplug(body: Unplugged) -> dict[str, Any]:
+        session.simulated().unplug(body.seconds)
+        return {"seconds": body.seconds}
+
+    @routes.post("/calibration")
+    def calibration(body: Calibrating) -> dict[str, Any]:
+        if body.do == "begin":
+            session.calibrate(body.newtons, body.seconds, simulated_board=body.simulated_board)
+        elif body.do == "finish":
+            return session.finish_calibration()
+        elif body.do == "cancel":
+            session.cancel_calibration()
+        elif body.do == "use":
+            session.use_calibration(body.name)
+        else:
+            with session.guide() as guide:
+                guide.read() if body.do == "read" else guide.again()
+        return session.told()
+
+    @routes.post("/mosaic")
+    def mosaic() -> dict[str, Any]:
+        session.reading.clear()
+        return {"cleared": True}
+
+    @routes.get("/recordings/{name}")
+    def recording(name: str) -> Response:
+        from fastapi.responses import FileResponse
+
+        path = named(session.folder, name, ".h5")
+        return FileResponse(path, filename=name, media_type="application/x-hdf5")
+
+    @routes.post("/recordings")
+    async def upload(name: str, request: Request) -> dict[str, Any]:
+        path = session.folder / checked_name(name, ".h5")
+        if path.exists():
+            raise BenchError(f"there is a recording {name} already", fix="give another name")
+        body = await request.body()  # bounded by the guard
+        session.folder.mkdir(parents=True, exist_ok=True)
+        draft = path.with_name(f".{path.stem}.part.h5")
+        try:
+            draft.write_bytes(body)
+            frames = len(read_recording(draft))
+            draft.rename(path)
+        except RecordingError as error:
+            raise RecordingError(error.cause, fix=error.fix, place=name) from error
+        finally:
+            draft.unlink(missing_ok=True)
+        return {"name": name, "frames": frames}
+
+    @routes.get("/frame.csv")
+    def frame() -> Response:
+        newest, values, unit = session.newest()
+        rows = "".join(",".join(f"{value:g}" for value in row) + "\r\n" for row in values)
+        name = f"frame-{newest.seq}-{unit}.csv"
+        return Response(
+            rows,
+            media_type="text/csv",
+            headers={"content-disposition": f'attachment; filename="{name}"'},
+        )
+
+    return routes

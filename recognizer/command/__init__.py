@@ -1,0 +1,94 @@
+"""`recognize-object RECORDING|--port URL`: which object, which face, where, and how sure.
+
+::
+
+    __init__.py   what an error or an interruption means for the exit code
+    app           options
+    source        recording or port -> touches, the sensor, its calibration
+    answers       touches -> answers, printed as they come
+    placed        the object in the robot's base
+    report        answers and errors as text and as JSON
+
+Results go to stdout, progress and messages to stderr. Exit codes: 0 recognised, 1 nothing
+recognised, or ran but failed, 2 bad input, 3 device, 4 database, 130 interrupted. Nothing heavy is
+imported before it is needed: `recognize-object --help` loads no numpy, database or HDF5 library.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from types import FrameType
+from typing import NoReturn
+
+FAILED, BAD_INPUT, INTERRUPTED = 1, 2, 130
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run `recognize-object` and leave with its exit code."""
+    signal.signal(signal.SIGTERM, _end)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a name the terminal cannot show
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        code = run(given)
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        sys.stderr.write("\nrecognize-object: interrupted\n")
+        code = INTERRUPTED
+    except BrokenPipeError:  # the reader of our output has gone, as in `| head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = FAILED
+    sys.exit(code)
+
+
+def run(arguments: list[str]) -> int:
+    """Run the command; returns its exit code. Errors are reported, not raised."""
+    from typer import BadParameter, Exit
+
+    from generator.errors import GeneratorError
+    from probe.errors import ProbeError
+    from recognizer.command import report
+    from recognizer.command.app import app
+    from recognizer.errors import RecognizerError
+
+    usage_error: type[Exception] = BadParameter.__mro__[1]  # of every misused option
+    as_json = "--json" in arguments
+    try:
+        action = app(arguments or ["--help"], prog_name="recognize-object", standalone_mode=False)
+        code = action() if callable(action) else int(action or 0)
+        return code if arguments else BAD_INPUT
+    except Exit as leaving:
+        return leaving.exit_code
+    except (ProbeError, RecognizerError, GeneratorError) as error:
+        report.error(error, as_json=as_json)
+        return error.exit_code
+    except usage_error as error:
+        told = _misuse(error)
+        fix = "see recognize-object --help"
+        report.error(RecognizerError(told, fix=fix), as_json=as_json)
+        return BAD_INPUT
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        what = f"cannot write '{error.filename}'" if error.filename else "cannot write"
+        cause = f"{what}: {error.strerror or error}"
+        fix = "check folder, space and rights"
+        report.error(RecognizerError(cause, fix=fix), as_json=as_json)
+        return FAILED
+
+
+def _misuse(error: Exception) -> str:
+    """Return what is wrong with an option, with the option's name."""
+    if getattr(error, "param", None) is None:  # a message of our own, which names it
+        return str(getattr(error, "message", error))
+    told = str(getattr(error, "format_message", error.__str__)())
+    return told.replace("Invalid value for ", "").removesuffix(".")
+
+
+def _end(number: int, _frame: FrameType | None) -> NoReturn:
+    """Leave on a request to end, so that what is open is closed."""
+    sys.exit(128 + number)

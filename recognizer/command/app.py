@@ -1,0 +1,134 @@
+"""The options of `recognize-object`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+HELP = """Say which object was touched, which face, where, and how sure.
+
+RECORDING is any HDF5 file with /frames (N, 16, 16). Try it without a probe: \
+[bold]probe-sensor simulate lab.db#Cube/F1 -o touch.h5[/], then \
+[bold]recognize-object touch.h5[/].
+"""
+EPILOG = """Exit codes: 0 recognised, 1 nothing recognised, 2 bad input, 3 device, 4 database, \
+130 interrupted.
+"""
+URLS = "serial:///dev/ttyACM0?baud=1000000, sim:lab.db#Cube/F1, file:touch.h5"
+
+app = typer.Typer(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+@app.command(help=HELP, epilog=EPILOG)
+def recognize(
+    recording: Annotated[
+        Path | None, typer.Argument(metavar="RECORDING", show_default=False,
+                                    help="A recording; or give --port."),
+    ] = None,
+    port: Annotated[
+        str, typer.Option(metavar="URL", show_default=False, help=f"Read a port: {URLS}."),
+    ] = "",
+    database: Annotated[
+        str, typer.Option(metavar="URL", help="The lab's database."),
+    ] = "lab.db",
+    follow: Annotated[
+        bool, typer.Option("--follow", help="Keep reading the port, until Ctrl-C; without it "
+                                            "the next touch is read."),
+    ] = False,
+    every: Annotated[
+        bool, typer.Option("--every", help="Every frame by itself, not every touch."),
+    ] = False,
+    most: Annotated[
+        int | None, typer.Option("--touches", metavar="N", min=1, show_default=False,
+                                 help="End after so many touches."),
+    ] = None,
+    overlay: Annotated[
+        str, typer.Option(metavar="tab|pad", show_default=False,
+                          help="Elastic overlay; as recording or port tell, tab by default."),
+    ] = "",
+    calibration: Annotated[
+        Path | None, typer.Option(metavar="FILE", show_default=False,
+                                  help="The sensor's calibration; the one that the recording "
+                                       "names is found beside it."),
+    ] = None,
+    sensor: Annotated[
+        int | None, typer.Option(metavar="0...7", min=0, max=7, show_default=False,
+                                 help="Which of the probe's sensors to read at a port."),
+    ] = None,
+    live: Annotated[
+        bool, typer.Option("--live", help="Also a recording that is still being written."),
+    ] = False,
+    joints: Annotated[
+        str, typer.Option(metavar="Q1,...,Q5", show_default=False,
+                          help="Joint angles of the arm, degrees: with the wrist's readings they "
+                               "place the object in the robot's base. A pose in the recording "
+                               "does so too."),
+    ] = "",
+    joint_error: Annotated[
+        float, typer.Option(metavar="DEGREES", min=0.0, help="Standard deviation of each."),
+    ] = 0.1,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="PNG", show_default=False,
+                                  help="Draw each touch with its symbols, the window on the "
+                                       "array, and the object with the probe on it. Several "
+                                       "touches: PNG-SEQ; --follow: the newest."),
+    ] = None,
+    replace: Annotated[
+        bool, typer.Option("--replace", help="Replace pictures that are there."),
+    ] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="One JSON list on stdout; with --follow one object a "
+                                          "line."),
+    ] = False,
+    version: Annotated[
+        bool, typer.Option("--version", help="Say which version this is."),
+    ] = False,
+) -> Callable[[], int]:  # fmt: skip
+    """Read touches; `HELP` is what people see."""
+    if version:
+        from recognizer.command import report
+
+        report.version(as_json=as_json)
+        raise typer.Exit
+    if (recording is None) == (not port):
+        both = "both RECORDING and --port were given" if port else "nothing to read"
+        raise typer.BadParameter(f"{both}; give a recording or --port URL")
+    if follow and not port:
+        raise typer.BadParameter("--follow needs --port; a file is played by --port file:FILE")
+    if overlay not in ("", "tab", "pad"):
+        raise typer.BadParameter(f"--overlay {overlay}: give tab or pad")
+    angles = _angles(joints)
+
+    def action() -> int:
+        from recognizer.command.answers import Asked, recognize_touches
+
+        return recognize_touches(
+            Asked(
+                recording=recording, port=port, database=database, follow=follow, every=every,
+                most=most, overlay=overlay, calibration=calibration, sensor=sensor, live=live,
+                joints_deg=angles, joint_error_deg=joint_error, plot=plot, replace=replace,
+                as_json=as_json,
+            )
+        )  # fmt: skip
+
+    return action
+
+
+def _angles(text: str) -> tuple[float, ...] | None:
+    if not text:
+        return None
+    try:
+        angles = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        angles = ()
+    if len(angles) != 5 or not all(abs(angle) <= 360 for angle in angles):
+        raise typer.BadParameter(f"--joints {text}: give five angles in degrees, as 0,-30,60,0,0")
+    return angles

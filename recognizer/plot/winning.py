@@ -1,0 +1,86 @@
+"""The lattice that explains a touch best, and the symbols that are on it.
+
+A touch -> Winning: pose of the lattice under the sensor, and for every cell in view the symbol
+that the database holds there and whether it is felt. A touch that is not answered has one too.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recognizer.lab import EncodedFace, Encoding
+from recognizer.locate import Place
+from recognizer.pipeline import Reader, Reading, _answer, _readings
+from recognizer.signal import Signal
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+CLEARLY = 3.0  #: nats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Winning:
+    """The best reading of a touch."""
+
+    encoding: Encoding
+    place: Place
+    face: EncodedFace
+    x_mm: float  #: a sensor point s lies at R(theta) s + (x, y) on the lattice
+    y_mm: float
+    theta_rad: float
+    cells: Ints  #: (m, 2) column and upward row of the lattice
+    registered: Ints  #: (m,) symbol that the face holds there; -1: none
+    felt: NDArray[np.bool_]  #: (m,) whether nothing else is clearly likelier there
+
+    def on_sensor(self, points_mm: Array) -> Array:
+        """Return points (..., 2) of the lattice in the sensor frame, mm."""
+        c, s = math.cos(self.theta_rad), math.sin(self.theta_rad)
+        away = points_mm - (self.x_mm, self.y_mm)
+        turned: Array = away @ np.array([[c, -s], [s, c]])
+        return turned
+
+    def on_lattice(self, points_mm: Array) -> Array:
+        """Return points (..., 2) of the sensor in the lattice frame, mm."""
+        c, s = math.cos(self.theta_rad), math.sin(self.theta_rad)
+        turned: Array = points_mm @ np.array([[c, s], [-s, c]]) + (self.x_mm, self.y_mm)
+        return turned
+
+
+def winning(reader: Reader, signal: Signal) -> Winning | None:
+    """Return the best reading of a touch; None where no symbol is seen."""
+    best = _best(reader, signal)
+    if best is None:
+        return None
+    encoding, place, fit = best.encoding, best.place, best.fit
+    array = encoding.array
+    held_by, label = encoding.at(
+        (place.row - fit.cells[:, 1]) % array.rows, (place.column + fit.cells[:, 0]) % array.columns
+    )
+    registered = np.where(held_by == place.face, label, -1).astype(np.int64)  # -1: last score
+    return Winning(
+        encoding=encoding,
+        place=place,
+        face=encoding.face(place.face),
+        x_mm=fit.x_mm,
+        y_mm=fit.y_mm,
+        theta_rad=fit.theta_rad,
+        cells=fit.cells,
+        registered=registered,
+        felt=fit.scores[np.arange(len(registered)), registered] > -CLEARLY,
+    )
+
+
+def _best(reader: Reader, signal: Signal) -> Reading | None:
+    """Return the reading that `recognise` judges."""
+    if not signal.contact:
+        return None
+    readings = _readings(reader, signal, reader.settings)
+    if not _answer(reader, readings, 0):
+        again = _readings(reader, signal, reader.thorough)
+        readings = again if _answer(reader, again, 0) else readings
+    return readings[0] if readings else None

@@ -1,0 +1,13 @@
+"""A scan of overlapping touches read by the joint fit: object, face and pose. Thesis 4.3, 6.3.
+
+Where one touch shows too few symbols, the touches of a scan show enough. Each of them is fitted
+by itself; arm and mosaic say which cells are the same; what all touches say of a cell is added
+up, and the sum is located like a single touch.
+
+settings    when touches agree and how much they may say
+views       touch -> the few lattices that it may show, and where the touch stands
+lattice     views -> the lattice of the plane that most of them agree with
+composite   what they say of each cell, summed into one fit
+answer      composites -> places of the database -> Recognition
+grow        one touch more: `begun`, `extended`, `read_scan`
+"""

@@ -1,0 +1,180 @@
+"""Composites -> places of the database -> Recognition. Thesis 6.3.
+
+A composite is located as the fit of one touch is (`recognizer.locate`), places being listed by
+its most telling cells and compared by all of them. The pose of the last touch is fitted once
+more with the symbols that the database holds there. The conditions of an answer are those of
+`recognizer.belief`, on all cells together; what a composite may contradict grows with its size.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recognizer.belief import CLEARLY, WHOLE, shown_at, unplaced
+from recognizer.lab import Encoding
+from recognizer.locate import Place, place_scores, places
+from recognizer.pipeline import Reader
+from recognizer.pose import face_covariance, face_pose, inside_mm
+from recognizer.recognition import (
+    AMBIGUOUS,
+    NOT_ENCODED,
+    OUTSIDE,
+    TOO_FEW,
+    Recognition,
+    RunnerUp,
+    refused,
+)
+from recognizer.scan.composite import Composite
+from recognizer.scan.settings import ScanSettings
+from recognizer.symbols.fit import Fit, scored
+from recognizer.symbols.refine import Image, explained_share, refined, started
+from recognizer.symbols.template import Template
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+HOPELESS = 40.0  #: nats by which a lattice is worse than a place, so that it need not be located
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Located:
+    """A place of a composite."""
+
+    encoding: Encoding
+    composite: Composite
+    place: Place
+    fit: Fit  #: of the composite, with the pose of the last touch
+    score: float  #: log-likelihood of all touches, nats
+    explained: float = math.nan  #: share of the last image's variance; NaN: not asked
+
+    @property
+    def index(self) -> tuple[int, int]:
+        """Row and column of the array's cell under the sensor's centre."""
+        pitch, array = self.encoding.style.pitch_mm, self.encoding.array
+        i, j = math.floor(self.fit.x_mm / pitch), math.floor(self.fit.y_mm / pitch)
+        return (self.place.row - j) % array.rows, (self.place.column + i) % array.columns
+
+    def same(self, other: Located) -> bool:
+        """Whether two say the same place, up to a cell's rounding."""
+        if self.encoding is not other.encoding or self.place.face != other.place.face:
+            return False
+        (ra, ca), (rb, cb) = self.index, other.index
+        array = self.encoding.array
+        return (ra - rb + 1) % array.rows <= 2 and (ca - cb + 1) % array.columns <= 2
+
+
+def located(
+    encoding: Encoding, composites: Sequence[Composite], limits: ScanSettings
+) -> list[Located]:
+    """Return the likeliest places of composites of one encoding."""
+    found: list[Located] = []
+    for each in composites[: limits.located]:
+        fit = each.fit
+        if found and fit.value < max(item.score for item in found) - HOPELESS:
+            break
+        told = np.median(-fit.scores, axis=1)
+        telling = np.sort(np.argsort(-told, kind="stable")[: limits.telling])
+        listed = replace(
+            fit, cells=fit.cells[telling], scores=fit.scores[telling], seen=fit.seen[telling]
+        )
+        for place in places(encoding, (listed,), limits.places):
+            score = place_scores(encoding, fit, place)
+            found.append(Located(encoding, each, replace(place, score=score), fit, score))
+    return found
+
+
+def posed(
+    reader: Reader, image: Image, template: Template, found: Located, limits: ScanSettings
+) -> Located:
+    """Return a place whose last touch was fitted again with the symbols that belong there."""
+    encoding, place, fit = found.encoding, found.place, found.fit
+    order = encoding.array.order
+    worn = fit.cells[_worn(encoding, fit, place)]
+
+    def shown(cells: Ints) -> Ints:
+        labels = shown_at(encoding, place, cells.reshape(-1, 2)).reshape(cells.shape[:-1])
+        gone = (cells[..., None, :] == worn).all(axis=-1).any(axis=-1)
+        return np.where(gone | (labels == order), -1, labels).astype(np.int64)
+
+    start = started(fit.pose[None], fit.gain[None])
+    lattices = refined(image, template, start, steps=limits.verify_steps, shown=shown)
+    again = scored(image, template, lattices, reader.settings)[0]
+    finer = replace(
+        fit,
+        x_mm=again.x_mm,
+        y_mm=again.y_mm,
+        theta_rad=again.theta_rad,
+        nuisance=again.nuisance,
+        gain=again.gain,
+        noise=again.noise,
+        covariance=again.covariance,
+    )
+    share = explained_share(image, template, finer.pose, finer.gain, shown)
+    return replace(found, fit=finer, explained=share)
+
+
+def answered(
+    reader: Reader, found: Sequence[Located], limits: ScanSettings, seq: int
+) -> Recognition:
+    """Return the answer; `found` is sorted, the best place first and posed."""
+    if not found:
+        return refused(seq, TOO_FEW)
+    best = found[0]
+    other = next((item for item in found[1:] if not best.same(item)), None)
+    margin = math.inf if other is None else best.score - other.score
+    runner_up = None
+    if other is not None:
+        face = other.encoding.face(other.place.face)
+        runner_up = RunnerUp(face.object, face.face, other.index)
+    reason = _doubt(reader, best, margin, limits)
+    face = best.encoding.face(best.place.face)
+    pose = face_pose(best.encoding, face, best.place, best.fit)
+    outside = inside_mm(face, float(pose[0, 3]), float(pose[1, 3])) < -reader.thresholds.rim_mm
+    if reason or outside:
+        return refused(seq, reason or OUTSIDE, margin=margin, runner_up=runner_up)
+    return Recognition(
+        seq=seq,
+        object=face.object,
+        face=face.face,
+        index=best.index,
+        T_face_probe=pose,
+        T_object_probe=face.T_object_face @ pose,
+        covariance=face_covariance(face, best.fit.covariance),
+        margin=margin,
+        runner_up=runner_up,
+        reason="",
+        noise=best.fit.noise,
+    )
+
+
+def _doubt(reader: Reader, best: Located, margin: float, limits: ScanSettings) -> str:
+    """Return why the best place may not be believed; nothing if it may."""
+    encoding, fit, place = best.encoding, best.fit, best.place
+    order = encoding.array.order
+    held = shown_at(encoding, place, fit.cells)
+    worn = _worn(encoding, fit, place)
+    own = fit.scores[np.arange(len(held)), held]
+    against = np.where(worn, 0.0, fit.scores[:, :order].max(axis=1) - own)
+    seen = (fit.seen >= WHOLE) & (held < order) & ~worn
+    chance = unplaced(encoding, fit)
+    if fit.value - chance < reader.thresholds.surprise:
+        return TOO_FEW  # if every cell agreed fully it would be no surprise either
+    if best.score - chance < reader.thresholds.surprise:
+        return NOT_ENCODED
+    if (against > CLEARLY).sum() > max(reader.thresholds.contradicted, limits.wrong * seen.sum()):
+        return NOT_ENCODED
+    if seen.sum() < reader.thresholds.cells:
+        return TOO_FEW
+    return AMBIGUOUS if margin < reader.thresholds.margin else ""
+
+
+def _worn(encoding: Encoding, fit: Fit, place: Place) -> NDArray[np.bool_]:
+    """Return which cells (m,) hold a symbol that is not felt at all."""
+    held, order = shown_at(encoding, place, fit.cells), encoding.array.order
+    own = fit.scores[np.arange(len(held)), held]
+    return np.asarray((held < order) & (fit.scores[:, order] > own))

@@ -1,0 +1,180 @@
+"""One touch more, or all at once: scan + touch -> scan, with an answer each time. Thesis 6.3."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recognizer.mosaic.touch import PlacedTouch
+from recognizer.pipeline import Reader
+from recognizer.recognition import NO_CONTACT, NOT_ENCODED, TOO_FEW, Recognition, refused
+from recognizer.scan.answer import Located, answered, located, posed
+from recognizer.scan.composite import Composite, composite, expected_fit
+from recognizer.scan.lattice import PlaneLattice, agreed, alike, expected_at, seeded
+from recognizer.scan.settings import ScanSettings
+from recognizer.scan.views import Stands, Views, fits_of, stands_of, views_of
+from recognizer.symbols.fit import Fit
+from recognizer.symbols.pressing import pressing_of
+from recognizer.symbols.refine import Image, image_of
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scan:
+    """The touches of one face so far and what they say together; `extended` returns the next."""
+
+    reader: Reader
+    settings: ScanSettings
+    touches: tuple[PlacedTouch, ...]  #: those with contact
+    stands: Stands | None
+    fits: tuple[tuple[tuple[Fit, ...], ...], ...]  #: of each encoding, of each touch
+    lattices: tuple[tuple[PlaneLattice, ...], ...]  #: of each encoding, best first
+    astray: int  #: touches in a row that agree with nothing that the others say
+    leading: Located | None  #: the likeliest place, whether it is the answer or not
+    recognition: Recognition  #: of the probe's pose at the last touch
+
+
+def begun(reader: Reader, settings: ScanSettings | None = None) -> Scan:
+    """Return a scan without touches."""
+    none = tuple(() for _ in reader.prepared)
+    limits = settings or ScanSettings()
+    return Scan(reader, limits, (), None, none, none, 0, None, refused(0, TOO_FEW))
+
+
+def read_scan(
+    reader: Reader, touches: Iterable[PlacedTouch], settings: ScanSettings | None = None
+) -> Recognition:
+    """Return which object and face a scan has touched, and where the probe stands at its end.
+
+    Parameters
+    ----------
+    reader
+        Of the lab and the sensor.
+    touches
+        Of one face, in their order, each with what the arm believes of its place, or with the
+        step from the one before.
+
+    Raises
+    ------
+    MosaicError
+        Another sensor's image, or a touch that hangs on nothing.
+
+    Examples
+    --------
+    >>> answer = read_scan(reader, touches)  # doctest: +SKIP
+    >>> answer.object, answer.face  # doctest: +SKIP
+    ('Cube', 'F1')
+    """
+    scan = begun(reader, settings)
+    for touch in touches:
+        scan = extended(scan, touch)
+    return scan.recognition
+
+
+def extended(scan: Scan, touch: PlacedTouch) -> Scan:
+    """Return a scan with one touch more.
+
+    A touch that feels nothing is answered by that reason and not kept.
+
+    Raises
+    ------
+    MosaicError
+        Another sensor's image, or a touch that hangs on nothing.
+    """
+    reader, limits = scan.reader, scan.settings
+    if not touch.signal.contact:
+        return replace(scan, recognition=refused(touch.seq, NO_CONTACT))
+    touches = (*scan.touches, replace(touch, decoded=None))
+    finest = min(encoding.style.pitch_mm for encoding in reader.lab.encodings)
+    stands = stands_of(reader, touches, scan.stands, limits.loose * finest)
+    trusts = [float(each.signal.trust.sum()) for each in touches]
+    fits, lattices, found, images = [], [], [], []
+    for k, (encoding, template, bank) in enumerate(reader.prepared):
+        image = _image(reader, touch, encoding.style.height_mm)
+        near = _near(scan.lattices[k][: limits.guided], stands)
+        new = fits_of(image, template, bank, reader.settings, near)
+        each = (*scan.fits[k], tuple(f for f in new if f.noise <= limits.noise))
+        sums = _composites(
+            views_of(each, trusts), stands, scan.lattices[k], encoding.style.pitch_mm, limits
+        )
+        fits.append(each)
+        lattices.append(tuple(item.agreement.lattice for item in sums))
+        found += located(encoding, sums, limits)
+        images.append(image)
+    found.sort(key=lambda item: -item.score)
+    answer = answered(reader, found, limits, touch.seq)
+    agrees = bool(found) and bool(found[0].composite.agreement.chosen[-1] >= 0)
+    if answer:
+        found[0], agrees = _posed(reader, images, found[0], stands, limits)
+        answer = answered(reader, found, limits, touch.seq)
+    astray = 0 if agrees else scan.astray + 1
+    if answer and astray > limits.patience:
+        answer = refused(touch.seq, NOT_ENCODED, margin=answer.margin)
+    return Scan(
+        reader=reader,
+        settings=limits,
+        touches=touches,
+        stands=stands,
+        fits=tuple(fits),
+        lattices=tuple(lattices),
+        astray=astray,
+        leading=found[0] if found else None,
+        recognition=answer,
+    )
+
+
+def _posed(
+    reader: Reader, images: list[Image], best: Located, stands: Stands, limits: ScanSettings
+) -> tuple[Located, bool]:
+    """Return a place with the pose of the last touch, and whether that touch agrees with it."""
+    if best.composite.agreement.chosen[-1] >= 0:
+        k = next(n for n, each in enumerate(reader.prepared) if each[0] is best.encoding)
+        finer = posed(reader, images[k], reader.prepared[k][1], best, limits)
+        if finer.explained >= reader.thresholds.explained:
+            return finer, True
+    return replace(best, fit=expected_fit(best.composite, stands)), False
+
+
+def _image(reader: Reader, touch: PlacedTouch, height_mm: float) -> Image:
+    signal = touch.signal
+    pressing = pressing_of(reader.sensor, height_mm)
+    return image_of(reader.sensor, signal.forces, signal.trust, pressing, newtons=signal.newtons)
+
+
+def _near(lattices: tuple[PlaneLattice, ...], stands: Stands) -> Array:
+    """Return where (k, 3) lattices lead to expect the last touch."""
+    at = [expected_at(each, stands.poses[-1], stands.covariances[-1])[0] for each in lattices]
+    return np.array(at).reshape(-1, 3)
+
+
+def _composites(
+    views: Views,
+    stands: Stands,
+    before: tuple[PlaneLattice, ...],
+    pitch_mm: float,
+    limits: ScanSettings,
+) -> list[Composite]:
+    """Return the sums of the lattices that were followed and of those of the last touch."""
+    last = len(stands.poses) - 1
+    every = [agreed(views, stands, each, pitch_mm, limits) for each in before]
+    known = {int(agreement.chosen[last]) for agreement in every[:1]}
+    for view in np.flatnonzero(views.touch == last).tolist():
+        if view not in known:
+            every.append(agreed(views, stands, seeded(views, stands, view), pitch_mm, limits))
+    every.sort(key=lambda agreement: -agreement.score)
+    distinct: list[PlaneLattice] = []
+    sums: list[Composite] = []
+    for agreement in every:
+        if any(alike(agreement.lattice, other, stands.poses[last], pitch_mm) for other in distinct):
+            continue
+        distinct.append(agreement.lattice)
+        summed = composite(views, stands, agreement, pitch_mm, limits)
+        if summed is not None:
+            sums.append(summed)
+        if len(distinct) == limits.lattices:
+            break
+    return sorted(sums, key=lambda item: -item.fit.value)

@@ -1,0 +1,31 @@
+"""When touches of a scan agree, and how much each of them may say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class ScanSettings:
+    """Limits of a scan; nats are log-likelihoods."""
+
+    left_out: float = 10.0  #: nats that a touch costs which agrees with no lattice
+    shift_margin: float = 6.0  #: nats between the likeliest integer shift of a touch and the next
+    look: float = 6.0  #: nats that one touch can say about one cell
+    alike: float = 0.25  #: correlation of what touches say about one cell: at most 1/alike looks
+    contradicts: float = 14.0  #: nats that a touch may contradict all others before it is left out
+    noise: float = 0.4  #: standard deviation of psi beyond which a touch shows no symbols
+    wrong: float = 0.05  #: share of the cells that may clearly speak for another symbol
+    floor_mm: float = 0.25  #: of places, beyond what is believed of them
+    floor_rad: float = 0.01  #: of turns
+    scale: float = 0.01  #: of the print, less 1: places drift apart with their distance
+    loose: float = (
+        0.25  #: pitches of uncertainty from which the mosaic is asked where touches stand
+    )
+    lattices: int = 6  #: of the plane that are followed
+    located: int = 3  #: of them that are looked up
+    guided: int = 2  #: of them that a touch is fitted with if its own fits do not agree
+    telling: int = 16  #: cells by which places are listed
+    places: int = 6  #: of every lattice that are compared by all cells
+    patience: int = 3  #: touches in a row that may agree with nothing while others are believed
+    verify_steps: int = 3  #: of the last touch's pose, with the symbols that the database holds

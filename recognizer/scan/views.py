@@ -1,0 +1,146 @@
+"""Touch -> the few lattices that it may show; touches -> where they stand. Thesis 4.3, 6.2.
+
+Poses (3,) are x, y (mm) and theta (rad). The plane is the arm's, in which touches are believed
+to stand; a view's lattice has its own origin, whole pitches from that of any other view.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recognizer.mosaic.grow import added
+from recognizer.mosaic.mosaic import Mosaic, MosaicSettings, no_touches
+from recognizer.mosaic.planar import wrapped
+from recognizer.mosaic.touch import PlacedTouch
+from recognizer.pipeline import Reader
+from recognizer.symbols.fit import Fit, Settings, fits, scored
+from recognizer.symbols.refine import Image, first_gain, refined, started
+from recognizer.symbols.search import Bank
+from recognizer.symbols.template import Template
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+LEAST_RAD, MOST_MM = 1e-5, 3.0  #: standard deviations of poses that are believed
+SAME_MM, SAME_RAD = 0.3, 0.03  #: by which two fits of a touch are one
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stands:
+    """Where touches stand in the plane."""
+
+    poses: Array  #: (n, 3) T_plane_touch
+    covariances: Array  #: (n, 3, 3)
+    mosaic: Mosaic | None  #: None as long as the arm is enough
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Views:
+    """All lattices that touches may show, one after the other: m views of n touches."""
+
+    fits: tuple[Fit, ...]
+    touch: Ints  #: (m,)
+    poses: Array  #: (m, 3) T_lattice_touch
+    covariances: Array  #: (m, 3, 3)
+    losses: Array  #: (m,) nats against the best view of the touch, 0 or less
+    values: Array  #: (n,) nats of the best view of each touch; 0 for a touch without one
+
+
+def stands_of(
+    reader: Reader, touches: Sequence[PlacedTouch], before: Stands | None, loose_mm: float
+) -> Stands:
+    """Return where touches stand, the last one being new.
+
+    The mosaic is asked from the first touch on whose place is uncertain by more than `loose_mm`.
+    """
+    last = touches[-1]
+    mosaic = None if before is None else before.mosaic
+    sure = last.believed is not None and _widest(last.believed.covariance) <= loose_mm
+    if mosaic is None and sure and last.believed is not None:
+        pose, covariance = last.believed.pose[None], last.believed.covariance[None]
+        if before is None:
+            return Stands(pose, covariance, None)
+        poses = np.concatenate([before.poses, pose])
+        return Stands(poses, np.concatenate([before.covariances, covariance]), None)
+    if mosaic is None:
+        pitch = min(encoding.style.pitch_mm for encoding in reader.lab.encodings)
+        mosaic = no_touches(reader.sensor, MosaicSettings(period_mm=pitch))
+        for touch in touches[:-1]:
+            mosaic = added(mosaic, touch)
+    mosaic = added(mosaic, last)
+    return Stands(mosaic.poses, mosaic.covariances, mosaic)
+
+
+def _widest(covariance: Array) -> float:
+    return math.sqrt(float(np.linalg.eigvalsh(covariance[:2, :2])[-1]))
+
+
+def fits_of(
+    image: Image, template: Template, bank: Bank, settings: Settings, near: Array
+) -> tuple[Fit, ...]:
+    """Return the likeliest lattices of an image, and those that lie near given ones.
+
+    The latter leave more unexplained, and so say less of each cell, if the image shows what
+    neither of them knows, such as the edge of a face.
+
+    Parameters
+    ----------
+    near
+        (k, 3) T_lattice_touch that other touches lead to expect.
+    """
+    found = fits(image, template, bank, settings)
+    gain = found[0].gain if found else first_gain(image, template.ink)
+    expected = [pose for pose in near if not any(_same(pose, f, template.pitch_mm) for f in found)]
+    if gain is None or not expected:
+        return found
+    starts = started(np.array(expected), np.repeat(gain[None], len(expected), axis=0))
+    lattices = refined(image, template, starts, steps=settings.final_steps)
+    for fit in scored(image, template, lattices, settings):
+        pose = np.array([fit.x_mm, fit.y_mm, fit.theta_rad])
+        if not any(_same(pose, other, template.pitch_mm) for other in found):
+            found = (*found, fit)
+    return found
+
+
+def views_of(found: Sequence[tuple[Fit, ...]], trusts: Sequence[float]) -> Views:
+    """Return the views of touches from the fits of each, and from how many tactels they have.
+
+    A fit's value does not say how likely its noise is; here that is put in, so that fits and
+    encodings, each with a noise of its own, can be compared. Fits that do not say where they
+    lie are left out.
+    """
+    kept = [tuple(fit for fit in each if _told(fit.covariance)) for each in found]
+    every = tuple(fit for each in kept for fit in each)
+    touch = np.repeat(np.arange(len(kept)), [len(each) for each in kept])
+    values = np.array([fit.value for fit in every])
+    values -= np.array(trusts)[touch] * np.log([fit.noise for fit in every])
+    best = np.full(len(kept), -np.inf)
+    np.maximum.at(best, touch, values)
+    return Views(
+        fits=every,
+        touch=touch,
+        poses=np.array([[f.x_mm, f.y_mm, f.theta_rad] for f in every]).reshape(-1, 3),
+        covariances=np.array([f.covariance for f in every]).reshape(-1, 3, 3),
+        losses=values - best[touch],
+        values=np.where(np.isfinite(best), best, 0.0),
+    )
+
+
+def _told(covariance: Array) -> bool:
+    """Whether a covariance is one: finite, and no direction known too well to be true."""
+    if not np.isfinite(covariance).all():
+        return False
+    lowest = np.linalg.eigvalsh(covariance)[0]
+    return bool(lowest > LEAST_RAD**2 and max(covariance[0, 0], covariance[1, 1]) < MOST_MM**2)
+
+
+def _same(pose: Array, fit: Fit, pitch_mm: float) -> bool:
+    """Whether a lattice is that of a fit, whole pitches apart."""
+    away = pose - (fit.x_mm, fit.y_mm, fit.theta_rad)
+    at = away[:2] - np.rint(away[:2] / pitch_mm) * pitch_mm
+    return math.hypot(*at) < SAME_MM and abs(float(wrapped(away[2]))) < SAME_RAD

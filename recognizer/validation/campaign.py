@@ -1,0 +1,190 @@
+"""What is asked: how many touches, of which kinds and levels, and how each is drawn.
+
+Campaign + number -> Plan. Kind and level of a touch come from its number alone, as the touch
+itself does (`trial`), so that no way of sharing the work can change a result. A campaign
+has several series: the touches, and for the picture of error against run time a few touches
+again by readers that spend more or less.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from recognizer.pipeline import THOROUGH, Reader
+from recognizer.symbols.fit import Settings
+from recognizer.validation.errors import ValidationError
+from recognizer.validation.levels import LEVELS
+from recognizer.validation.surfaces import FOREIGN
+from recognizer.validation.trial import Plan
+
+SHARD = 1000  #: touches in a file
+PIECE = 25  #: touches that a worker takes at once
+TOUCHES = "touches"  #: name of the series that is counted
+BLANK, STRANGE = "blank", "foreign"
+ON_FACES = ("face", "edge", "corner", "worn")
+
+Shares = tuple[tuple[str, float], ...]
+
+#: Kinds of touches and their shares. `foreign` is any of `surfaces.FOREIGN` but the blank one.
+KINDS: Shares = (
+    ("face", 0.55),
+    ("edge", 0.10),
+    ("corner", 0.05),
+    ("worn", 0.10),
+    (BLANK, 0.05),
+    (STRANGE, 0.15),
+)
+LEVEL_SHARES: Shares = (("low", 0.1), ("typical", 0.4), ("hard", 0.2), ("mismatch", 0.3))
+
+#: Readers of the picture of error against run time: candidates, steps, finalists, final steps.
+READERS: dict[str, tuple[int, int, int, int]] = {
+    "least": (1, 1, 1, 1),
+    "few": (2, 2, 1, 3),
+    "fewer steps": (4, 2, 2, 3),
+    "more candidates": (12, 4, 4, 6),
+    "most": (24, 6, 8, 10),
+}
+AS_IS = "as it is"  #: the reader with the settings that it has
+
+
+@dataclass(frozen=True, slots=True)
+class Campaign:
+    """Everything that decides the results, but for the set itself."""
+
+    touches: int
+    seed: int = 1
+    kinds: Shares = KINDS
+    levels: Shares = LEVEL_SHARES
+    overlay: str = "tab"
+    files: bool = True  #: touch the written STL files
+    study: int = 0  #: touches of every reader of `READERS`; 0: no study
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """Numbers 0 ... touches - 1, drawn from shares and read by one reader."""
+
+    name: str
+    touches: int
+    kinds: Shares
+    levels: Shares
+    reader: str = AS_IS
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Piece:
+    """Touches first ... last - 1 of a series."""
+
+    series: str
+    first: int
+    last: int
+
+
+def series_of(campaign: Campaign) -> tuple[Series, ...]:
+    """Return the touches, and the series of the study if there is one."""
+    found = [Series(TOUCHES, campaign.touches, campaign.kinds, campaign.levels)]
+    if campaign.study:
+        for name in (AS_IS, *READERS):
+            label = f"reader-{name.replace(' ', '-')}"
+            found.append(Series(label, campaign.study, (("face", 1.0),), campaign.levels, name))
+    return tuple(found)
+
+
+def shards_of(series: Series) -> int:
+    """Return into how many files a series goes."""
+    return math.ceil(series.touches / SHARD)
+
+
+def pieces_of(series: Series, shard: int) -> Iterator[Piece]:
+    """Yield the pieces of a shard."""
+    end = min((shard + 1) * SHARD, series.touches)
+    for first in range(shard * SHARD, end, PIECE):
+        yield Piece(series.name, first, min(first + PIECE, end))
+
+
+def plan_of(campaign: Campaign, series: Series, database: str, number: int) -> tuple[str, Plan]:
+    """Return the kind of a touch as `kinds` names it, and the plan that draws it."""
+    rng = np.random.default_rng([campaign.seed, number, 1])
+    kind, level = _drawn(series.kinds, rng), _drawn(series.levels, rng)
+    surface = kind
+    if kind == STRANGE:
+        strange = [name for name in FOREIGN if name != BLANK]
+        surface = strange[int(rng.integers(len(strange)))]
+    plan = Plan(database, campaign.seed, level, surface, files=campaign.files)
+    return kind, plan
+
+
+def reader_with(reader: Reader, name: str) -> Reader:
+    """Return a reader that spends as `READERS` says, and no second try beyond it."""
+    if name == AS_IS:
+        return reader
+    candidates, steps, finalists, final_steps = READERS[name]
+    asked: dict[str, int] = {
+        "candidates": candidates,
+        "steps": steps,
+        "finalists": finalists,
+        "final_steps": final_steps,
+    }
+    settings = replace(reader.settings, **asked)
+    return replace(reader, settings=settings, thorough=settings)
+
+
+def settings_of(name: str) -> dict[str, int]:
+    """Return what a reader of the study spends, as the report names it."""
+    given = Settings()
+    if name == AS_IS:
+        values = (given.candidates, given.steps, given.finalists, given.final_steps)
+    else:
+        values = READERS[name]
+    named = dict(zip(("candidates", "steps", "finalists", "final steps"), values, strict=True))
+    return named | ({"second try": THOROUGH.candidates} if name == AS_IS else {})
+
+
+def shares_of(text: str, allowed: Mapping[str, object] | tuple[str, ...], option: str) -> Shares:
+    """Read `face=2,edge` from an option: names with their weights, 1 where none is given.
+
+    Raises
+    ------
+    ValidationError
+        For a name that is not allowed, or weights that are no shares.
+    """
+    found: dict[str, float] = {}
+    for item in filter(None, (part.strip() for part in text.split(","))):
+        name, _, weight = (part.strip() for part in item.partition("="))
+        if name not in allowed or name in found:
+            what = "stands twice" if name in found else "is not known"
+            raise ValidationError(
+                f"'{name}' {what}", fix=f"allowed are {', '.join(allowed)}", place=option
+            )
+        try:
+            found[name] = float(weight) if weight else 1.0
+        except ValueError:
+            found[name] = math.nan
+        if not 0 <= found[name] < math.inf:
+            raise ValidationError(
+                f"the share of {name} is '{weight}'", fix="give 0 or more", place=option
+            )
+    total = sum(found.values())
+    if not total > 0:
+        raise ValidationError("nothing is left to draw", fix="give one share above 0", place=option)
+    return tuple((name, value / total) for name, value in found.items() if value > 0)
+
+
+def kinds_of(text: str) -> Shares:
+    """Read the shares of `--kinds`."""
+    return shares_of(text, tuple(name for name, _ in KINDS), "--kinds")
+
+
+def levels_of(text: str) -> Shares:
+    """Read the shares of `--levels`."""
+    return shares_of(text, LEVELS, "--levels")
+
+
+def _drawn(shares: Shares, rng: np.random.Generator) -> str:
+    ends = np.cumsum([share for _, share in shares])
+    place = int(np.searchsorted(ends, rng.random() * ends[-1], side="right"))
+    return shares[min(place, len(shares) - 1)][0]

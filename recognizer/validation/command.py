@@ -1,0 +1,268 @@
+"""`validate-set`: touch a set in simulation, read it, and say how far the answers can be trusted.
+
+::
+
+    validate-set SPEC.yaml...          make the set, touch it, report
+    validate-set compare A B           two runs side by side
+    validate-set repeat DIR NUMBER     one touch again, with pictures of each stage
+    validate-set report DIR            the report anew from the touches that are there
+
+Results go to stdout, progress and messages to stderr. Exit codes: 0 done, 1 ran but failed
+(`--fail-under`, or a worker was lost), 2 bad input, 4 database, 130 interrupted. Nothing
+heavy is imported before it is needed.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import FrameType
+from typing import Annotated, NoReturn
+
+import typer
+
+BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130
+TOOLS = ("compare", "repeat", "report")
+HELP = """Touch a set of objects in simulation, read every touch, and report how far the answers \
+can be trusted.
+
+The parts are made from the specs, the written files are touched, and the answers are compared \
+with the truth, which the reader never sees. DIR gets report.html, results.json and \
+trials.parquet.
+"""
+EPILOG = """Exit codes: 0 done, 1 ran but failed, 2 bad input, 4 database, 130 interrupted.
+
+More commands, each with --help:
+
+[bold]validate-set compare[/] A B           two runs side by side
+
+[bold]validate-set repeat[/] DIR NUMBER     one touch again, with pictures of each stage
+
+[bold]validate-set report[/] DIR            the report anew from the touches that are there
+"""
+
+Action = Callable[[], int]
+Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, also for errors.")]
+_SETTINGS = {"help_option_names": ["-h", "--help"]}
+
+app = typer.Typer(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings=_SETTINGS,
+)
+tools = typer.Typer(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings=_SETTINGS,
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run `validate-set` and leave with its exit code."""
+    for library in ("OMP", "OPENBLAS", "MKL"):  # work is shared by touches, not within one
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+    signal.signal(signal.SIGTERM, _end)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        code = run(given)
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        sys.stderr.write("\nvalidate-set: interrupted; go on with --resume\n")
+        code = INTERRUPTED
+    except BrokenPipeError:  # the reader of our output has gone, as in `| head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = FAILED
+    sys.exit(code)
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command; returns its exit code. Errors are reported, not raised."""
+    from generator.errors import GeneratorError
+    from probe.errors import ProbeError
+    from recognizer.errors import RecognizerError
+    from recognizer.validation import told
+
+    usage_error: type[Exception] = typer.BadParameter.__mro__[1]  # of every misused option
+    as_json = "--json" in arguments
+    chosen = tools if arguments[:1] and arguments[0] in TOOLS else app
+    try:
+        asked = arguments or ["--help"]
+        action = chosen(asked, prog_name="validate-set", standalone_mode=False)
+        code = action() if callable(action) else int(action or 0)
+        return code if arguments else BAD_INPUT
+    except typer.Exit as leaving:
+        return leaving.exit_code
+    except (RecognizerError, ProbeError, GeneratorError) as error:
+        told.error(type(error).__name__, error.cause, error.fix, error.place, error.exit_code,
+                   as_json=as_json)  # fmt: skip
+        return error.exit_code
+    except usage_error as error:
+        cause = str(getattr(error, "format_message", error.__str__)()).removesuffix(".")
+        told.error("UsageError", cause, "see validate-set --help", "", BAD_INPUT, as_json=as_json)
+        return BAD_INPUT
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        what = f"cannot write '{error.filename}'" if error.filename else "cannot write"
+        cause = f"{what}: {error.strerror or error}"
+        told.error("OSError", cause, "check folder, space and rights", "", FAILED, as_json=as_json)
+        return FAILED
+
+
+@app.command(help=HELP, epilog=EPILOG)
+def validate(
+    specs: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="SPEC.yaml...", show_default=False,
+                       help="What is made and touched; none: what --database holds."),
+    ] = None,
+    touches: Annotated[
+        int | None, typer.Option(min=1, show_default=False, help="How many touches; 1000."),
+    ] = None,
+    folder: Annotated[
+        Path, typer.Option("-o", "--output", metavar="DIR", help="Folder of the run."),
+    ] = Path("validation"),
+    database: Annotated[
+        str, typer.Option(metavar="URL", show_default=False,
+                          help="Where the set is registered; DIR/lab.db if left out."),
+    ] = "",
+    kinds: Annotated[
+        str, typer.Option(metavar="LIST", show_default=False,
+                          help="Kinds of touches and their shares: face, edge, corner, worn, "
+                               "blank, foreign; as face=3,edge."),
+    ] = "",
+    levels: Annotated[
+        str, typer.Option("--levels", "--noise", metavar="LIST", show_default=False,
+                          help="Levels of noise and their shares: low, typical, hard, mismatch."),
+    ] = "",
+    overlay: Annotated[
+        str, typer.Option(metavar="tab|pad", show_default=False, help="Elastic overlay; tab."),
+    ] = "",
+    surfaces: Annotated[
+        str, typer.Option(metavar="files|database", show_default=False,
+                          help="What is touched: the written STL files, or the registered faces; "
+                               "files."),
+    ] = "",
+    study: Annotated[
+        int | None, typer.Option(min=0, show_default=False,
+                                 help="Touches of each reader in the picture of error against run "
+                                      "time; a hundredth of --touches. 0: no such pictures."),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, show_default=False, help="Of all that is drawn; 1."),
+    ] = None,
+    processes: Annotated[
+        int, typer.Option("-j", "--jobs", min=1, help="Processes on this machine."),
+    ] = 1,
+    cluster: Annotated[
+        str, typer.Option(metavar="tcp://HOST:PORT", show_default=False,
+                          help="A dask scheduler whose workers do the work."),
+    ] = "",
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the run in DIR."),
+    ] = False,
+    fail_under: Annotated[
+        float | None, typer.Option(min=0.0, max=100.0, show_default=False, metavar="PERCENT",
+                                   help="Exit code 1 if a touch is answered wrong, or fewer of "
+                                        "those that show enough symbols are answered right."),
+    ] = None,
+    as_json: Json = False,
+    version: Annotated[bool, typer.Option("--version", help="Say which version this is.")] = False,
+) -> Action:  # fmt: skip
+    """Read the options of `validate-set SPEC.yaml...`; `HELP` is what people see."""
+
+    def action() -> int:
+        from recognizer.validation import told
+        from recognizer.validation.complete import Wishes, validate_set
+
+        if version:
+            told.version(as_json=as_json)
+            return 0
+        wishes = Wishes(touches, seed, kinds, levels, overlay, surfaces, study)
+        with told.progress_bar() as bar:
+            summary = validate_set(
+                folder, wishes, list(specs or ()), database,
+                processes=processes, cluster=cluster, resume=resume, told=bar,
+            )  # fmt: skip
+        told.summary(summary, folder, as_json=as_json)
+        return summary.exit_code(fail_under)
+
+    return action
+
+
+@tools.command()
+def compare(
+    first: Annotated[Path, typer.Argument(metavar="A", help="Folder of a run.")],
+    second: Annotated[Path, typer.Argument(metavar="B", help="Folder of another run.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE.html", show_default=False,
+                                  help="Page to write."),
+    ] = None,
+    as_json: Json = False,
+) -> Action:  # fmt: skip
+    """Show two runs side by side: what became better, worse, or is the same within chance."""
+
+    def action() -> int:
+        from recognizer.validation import told
+        from recognizer.validation.compare import compared
+
+        told.comparison(compared(first, second, output), output, as_json=as_json)
+        return 0
+
+    return action
+
+
+@tools.command()
+def repeat(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a run.")],
+    number: Annotated[int, typer.Argument(min=0, help="Number of the touch.")],
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", show_default=False,
+                                  help="Pictures of each stage: .png, .svg or .pdf."),
+    ] = None,
+    as_json: Json = False,
+) -> Action:  # fmt: skip
+    """Do one touch again: surface, counts, fitted symbols, answer and truth."""
+
+    def action() -> int:
+        from recognizer.validation import told
+        from recognizer.validation.repeat import repeated
+
+        told.repetition(repeated(folder, number, plot), plot, as_json=as_json)
+        return 0
+
+    return action
+
+
+@tools.command()
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a run that is done.")],
+    as_json: Json = False,
+) -> Action:  # fmt: skip
+    """Write results and report anew from the touches that are there."""
+
+    def action() -> int:
+        from recognizer.validation import told
+        from recognizer.validation.complete import report_anew
+
+        told.summary(report_anew(folder), folder, as_json=as_json)
+        return 0
+
+    return action
+
+
+def _end(number: int, _frame: FrameType | None) -> NoReturn:
+    """Leave on a request to end, so that what is open is closed."""
+    sys.exit(128 + number)
+
+
+if __name__ == "__main__":
+    main()

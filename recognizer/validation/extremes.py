@@ -1,0 +1,165 @@
+"""Stiff and extreme scenes: each gives a finite answer in balance, or is refused by name.
+
+Scenes for the contact models of both overlays, and images for the reader. An answer of a
+contact model passes if every force is finite and not negative and their sum is the load to
+within `BALANCE`; an image passes if the reader answers nothing, and raises nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.contact.contract import Touch, WristStiffness
+from probe.contact.press import press
+from probe.errors import ProbeError
+from probe.sensor import Overlay, Sensor
+from probe.surface.contract import Surface
+from probe.surface.indenters import Cross, Plate, Rough, Strip, TiltedPlane
+from recognizer.pipeline import Reader, recognise
+from recognizer.signal import signal_of
+from recognizer.validation.statistics import rounded
+
+BALANCE = 1e-6  #: of the load
+FINITE, REFUSED, NO_ANSWER = "finite", "refused", "no answer"
+EITHER = "finite or refused"
+
+_HERE = Touch(x_mm=0.0, y_mm=0.0, theta_rad=0.3, force_n=80.0)
+_FREE = WristStiffness(0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What is pressed, and what must come of it."""
+
+    name: str
+    surface: Surface
+    touch: Touch = _HERE
+    expected: str = FINITE
+    overlay: Callable[[Overlay], Overlay] = lambda overlay: overlay
+
+
+class _NoNumber:
+    top_mm = 0.0
+
+    def heights_mm(self, points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return no number anywhere."""
+        return np.full(len(points_mm), math.nan)
+
+
+def _poisson(value: float) -> Callable[[Overlay], Overlay]:
+    return lambda overlay: replace(overlay, poisson=value)
+
+
+def _young(value: float) -> Callable[[Overlay], Overlay]:
+    return lambda overlay: replace(overlay, young_mpa=value)
+
+
+def _height(value: float) -> Callable[[Overlay], Overlay]:
+    return lambda overlay: replace(overlay, height_mm=value)
+
+
+_CROSS = Cross(floor_mm=-1.0)
+SCENES: tuple[Scene, ...] = (
+    Scene("no force: an image of zeros", _CROSS, replace(_HERE, force_n=0.0)),
+    Scene("force 1e-9 N", _CROSS, replace(_HERE, force_n=1e-9)),
+    Scene("force 10,000 N", _CROSS, replace(_HERE, force_n=1e4), EITHER),
+    Scene("incompressible, nu = 0.5", _CROSS, overlay=_poisson(0.5)),
+    Scene("nu = 0.3", _CROSS, overlay=_poisson(0.3)),
+    Scene("soft, E = 0.001 MPa", _CROSS, replace(_HERE, force_n=0.05), overlay=_young(1e-3)),
+    Scene("hard, E = 10,000 MPa", _CROSS, overlay=_young(1e4)),
+    Scene("overlay 0.2 mm thin", _CROSS, overlay=_height(0.2)),
+    Scene("overlay 20 mm thick", _CROSS, overlay=_height(20.0)),
+    Scene("wrist free to turn", _CROSS, replace(_HERE, wrist=_FREE)),
+    Scene("wrist 1e9 N mm/rad", _CROSS, replace(_HERE, wrist=WristStiffness(1e9, 1e9))),
+    Scene("tilt 20 degrees on a plate", Plate(), replace(_HERE, tilt_x_rad=math.radians(20))),
+    Scene("plane that rises 1 mm a mm", TiltedPlane(1.0, 0.0)),
+    Scene("stroke of 0.02 mm", Strip(0.02), replace(_HERE, force_n=1.0)),
+    Scene("cliff through the centre", Strip(200.0), replace(_HERE, x_mm=100.0)),
+    Scene("rough, 0.5 mm", Rough(1, 0.5, 4.0)),
+    Scene("1,000 km away", Plate(), replace(_HERE, x_mm=1e9)),
+    Scene("tips: centre beyond the edge, wrist free", Strip(200.0),
+          replace(_HERE, x_mm=110.0, wrist=_FREE), REFUSED),
+    Scene("nothing under the sensor", Strip(2.0), replace(_HERE, x_mm=100.0), REFUSED),
+    Scene("heights that are no numbers", _NoNumber(), expected=REFUSED),
+    Scene("force that is no number", _CROSS, replace(_HERE, force_n=math.nan), REFUSED),
+    Scene("negative force", _CROSS, replace(_HERE, force_n=-1.0), REFUSED),
+    Scene("place that is no number", _CROSS, replace(_HERE, x_mm=math.inf), REFUSED),
+)  # fmt: skip
+
+
+def pressed() -> Iterator[dict[str, Any]]:
+    """Press every scene with both overlays; yield what came of it, and whether it passes."""
+    for kind in ("tab", "pad"):
+        plain = Overlay(kind="pad" if kind == "pad" else "tab")
+        for scene in SCENES:
+            sensor = Sensor(overlay=scene.overlay(plain))
+            outcome, told, balance = _press(scene, sensor)
+            close = balance is None or balance <= BALANCE
+            yield {
+                "part": f"contact, {kind}",
+                "case": scene.name,
+                "expected": scene.expected,
+                "outcome": outcome,
+                "told": told,
+                "out_of_balance": None if close else rounded(balance or 0.0, 2),
+                "passes": outcome in scene.expected and close,
+            }
+
+
+def _press(scene: Scene, sensor: Sensor) -> tuple[str, str, float | None]:
+    """Return what came of a scene, in words, and how far the forces are out of balance."""
+    try:
+        contact = press(scene.surface, sensor, scene.touch)
+    except ProbeError as error:
+        return REFUSED, error.cause, None
+    forces, load = contact.forces_n, scene.touch.force_n
+    if not np.isfinite(forces).all() or forces.min() < -BALANCE * load:
+        return "no finite answer", "", None
+    off = abs(float(forces.sum()) - load) / max(load, 1e-30)
+    return FINITE, contact.level, off
+
+
+def _images(shape: tuple[int, int]) -> Iterator[tuple[str, NDArray[np.float64]]]:
+    rng = np.random.default_rng(1)
+    image = np.zeros(shape)
+    yield "reads nothing", image
+    yield "every tactel at its limit", np.full(shape, 1023.0)
+    yield "noise alone, 3 counts", 8 + 3 * rng.standard_normal(shape)
+    spike = image.copy()
+    spike[5, 7] = 1023
+    yield "one tactel alone", spike
+    yield "gradient", np.add.outer(np.arange(shape[0]), np.arange(shape[1])) * 30.0
+    rows = image.copy()
+    rows[::2] = 800
+    yield "every other row dead", rows
+    yield "random counts", rng.uniform(0, 1023, shape)
+    yield "counts of 1e12", rng.uniform(0, 1e12, shape)
+
+
+def read_images(reader: Reader) -> Iterator[dict[str, Any]]:
+    """Show the reader strange images; yield what came of each, and whether it passes."""
+    shape = (reader.sensor.rows, reader.sensor.columns)
+    for name, image in _images(shape):
+        answer = recognise(reader, signal_of(image))
+        outcome = FINITE if answer else NO_ANSWER
+        told = f"{answer.object}/{answer.face}" if answer else answer.reason
+        yield {
+            "part": "reader",
+            "case": name,
+            "expected": NO_ANSWER,
+            "outcome": outcome,
+            "told": told,
+            "out_of_balance": None,
+            "passes": not answer,
+        }
+
+
+def extremes(reader: Reader) -> list[dict[str, Any]]:
+    """Return the table of stiff and extreme cases."""
+    return [*pressed(), *read_images(reader)]

@@ -1,0 +1,126 @@
+"""What a scene did not need, and what leaving it out saved.
+
+Each line says what one touch looks at, out of how much, and the CPU time of both. Counts go
+to the results, times to the times.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from generator.database.open import open_database
+from generator.database.read import list_objects, read_object
+from generator.database.transaction import reading
+from probe.contact.press import LEVELS, level_for, table
+from probe.contact.tips import Tips, tip_points
+from recognizer.pipeline import Reader
+from recognizer.validation.precision import Study
+from recognizer.validation.trial import Plan, drawn
+
+OBJECTS = 20  #: read to know what reading all would take
+REPEATS = 5
+
+
+def left_out(reader: Reader, plan: Plan, readers: Study) -> Study:
+    """Return what was left out for a touch of a registered face.
+
+    Parameters
+    ----------
+    reader
+        That reads the touches.
+    plan
+        Of kind `face`; its touch 0 is the example.
+    readers
+        The study of readers; its first is the reader as it is, its last spends most.
+    """
+    study = Study()
+    _objects(study, reader)
+    _heights(study, plan, reader)
+    _levels(study, reader)
+    _cells(study, reader)
+    if readers.counted:
+        _add(study, "effort of the reader: the likeliest candidates, more where that does not "
+             "answer", readers.counted[0]["settings"]["candidates"],
+             readers.counted[-1]["settings"]["candidates"], "candidates",
+             readers.spent[0], readers.spent[-1])  # fmt: skip
+    return study
+
+
+def _objects(study: Study, reader: Reader) -> None:
+    """Objects read from the database: that whose cells were met."""
+    with reading(open_database(reader.lab.url, writable=False)) as connection:
+        names = [entry.name for entry in list_objects(connection)]
+        spent = [_spent(partial(read_object, connection, name), 1) for name in names[:OBJECTS]]
+    one = float(np.median(spent))
+    _add(study, "objects read from the database: the one that is touched", 1, len(names),
+         "objects", one, one * len(names))  # fmt: skip
+
+
+def _heights(study: Study, plan: Plan, reader: Reader) -> None:
+    """Heights asked: under the tips, not of the whole face."""
+    found = drawn(plan, 0, reader)
+    if found.scene is None:
+        return
+    points = tip_points(reader.sensor, Tips())[0].reshape(-1, 2)
+    under = found.touch.on_surface(points)
+    low, high = found.scene.region.box_mm
+    sensor_area = 4 * reader.sensor.half_mm[0] * reader.sensor.half_mm[1]
+    step = float(np.sqrt(sensor_area / len(under)))
+    x, y = (np.arange(a, b, step) for a, b in zip(low, high, strict=True))
+    whole = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    surface = found.scene.surface
+    surface.heights_mm(under)
+    _add(study, "heights asked of the surface: under the tips", len(under), len(whole), "points",
+         _spent(lambda: surface.heights_mm(under)),
+         _spent(lambda: surface.heights_mm(whole)))  # fmt: skip
+
+
+def _levels(study: Study, reader: Reader) -> None:
+    """Points or cells of the contact model: as many as its error needs."""
+    kind = reader.sensor.overlay.kind
+    chosen = level_for(reader.sensor)
+    lines = {line.level: line for line in table()[kind]}
+    finest = [level for level in LEVELS[kind] if level in lines][-1]
+    _add(study, f"fineness of the contact model: {chosen} holds the error, {finest} is the finest",
+         LEVELS[kind].index(chosen) + 1, len(lines), "levels", lines[chosen].ms,
+         lines[finest].ms)  # fmt: skip
+
+
+def _cells(study: Study, reader: Reader) -> None:
+    """Cells weighed: those that are registered, not all of the array."""
+    for encoding in reader.lab.encodings:
+        cells = encoding.array.rows * encoding.array.columns
+        _add(study, f"places weighed: registered cells of {encoding.array.rows} x "
+             f"{encoding.array.columns}", len(encoding.keys), cells, "cells", None, None)  # fmt: skip
+
+
+def _add(
+    study: Study,
+    what: str,
+    needed: int,
+    of: int,
+    unit: str,
+    ms: float | None,
+    whole_ms: float | None,
+) -> None:
+    study.counted.append({"what": what, "needed": needed, "of": of, "unit": unit})
+    study.spent += [_kept(ms), _kept(whole_ms)]
+
+
+def _kept(ms: float | None) -> Any:
+    return None if ms is None else float(f"{ms:.3g}")
+
+
+def _spent(work: Callable[[], object], repeats: int = REPEATS) -> float:
+    """Return the median CPU time of something, ms."""
+    times = []
+    for _ in range(repeats):
+        start = time.process_time()
+        work()
+        times.append(1e3 * (time.process_time() - start))
+    return float(np.median(times))

@@ -1,0 +1,124 @@
+"""The set that is validated: made from specs by `encode-object`, or what a database holds.
+
+Specs -> parts and database -> URL and digest. The command runs as a process of its own:
+nothing of the making is known here but its database and its files.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from generator.database.open import open_database
+from generator.database.read import list_objects, read_parts
+from generator.database.transaction import reading
+from generator.errors import DatabaseError
+from recognizer.validation.errors import SetError
+
+PARTS, LAB = "parts", "lab.db"
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """An object of the set, as provenance names it."""
+
+    name: str
+    spec_sha256: str
+    faces: int
+    symbols: int
+    array: str  #: profile and size
+    pitch_mm: float
+
+
+def make_parts(specs: list[Path], folder: Path, database: str) -> None:
+    """Write the STL parts of specs, and register them.
+
+    Parameters
+    ----------
+    specs
+        Files for `encode-object`.
+    folder
+        Where the parts go.
+    database
+        Where they are registered; what is registered already is written again, the same.
+
+    Raises
+    ------
+    SetError
+        What `encode-object` says, with its exit code.
+    """
+    command = [sys.executable, "-c", "from generator.command import main; main()"]
+    command += [*map(str, specs), "-o", str(folder), "--database", database]
+    command += ["--format", "stl", "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
+    if done.returncode:
+        cause, fix, place = _told(done.stdout, done.stderr)
+        raise SetError(f"encode-object: {cause}", fix=fix, place=place, exit_code=done.returncode)
+
+
+def members_of(database: str) -> tuple[Member, ...]:
+    """Return the objects of a database.
+
+    Raises
+    ------
+    SetError
+        It cannot be read.
+    """
+    try:
+        with reading(open_database(database, writable=False)) as connection:
+            entries = list_objects(connection)
+    except DatabaseError as error:
+        raise SetError(error.cause, fix=error.fix, place=error.place or database) from error
+    return tuple(
+        Member(
+            name=entry.name,
+            spec_sha256=entry.spec_hash,
+            faces=entry.number_of_faces,
+            symbols=entry.symbols,
+            array=f"{entry.profile} {entry.rows}x{entry.columns}",
+            pitch_mm=entry.pitch_mm,
+        )
+        for entry in entries
+    )
+
+
+def set_digest(database: str) -> str:
+    """Return a sha256 of what is touched and read: specs, arrays, styles and files.
+
+    Raises
+    ------
+    SetError
+        The database cannot be read.
+    """
+    try:
+        with reading(open_database(database, writable=False)) as connection:
+            held: list[Any] = [
+                [
+                    entry.name,
+                    entry.spec_hash,
+                    entry.symbols,
+                    [[part.name, part.sha256] for part in read_parts(connection, entry.object_id)],
+                ]
+                for entry in list_objects(connection)
+            ]
+    except DatabaseError as error:
+        raise SetError(error.cause, fix=error.fix, place=error.place or database) from error
+    return hashlib.sha256(json.dumps(held).encode()).hexdigest()
+
+
+def _told(stdout: str, stderr: str) -> tuple[str, str, str]:
+    """Return cause, fix and place of the first problem that `encode-object` reports."""
+    try:
+        first = json.loads(stdout)["error"]["problems"][0]
+    except (ValueError, KeyError, IndexError):
+        lines = (stderr or stdout).strip().splitlines()
+        return (lines[-1] if lines else "it failed"), "", ""
+    where = ":".join(
+        str(first[key]) for key in ("file", "line", "column") if first.get(key) is not None
+    )
+    return str(first.get("cause", "it failed")), str(first.get("fix") or ""), where

@@ -1,0 +1,252 @@
+"""All rows of a run -> what the report and `results.json` say. No time, no place, no machine.
+
+The order is that of the report: verdict, kinds and levels, confusion, pose, what accuracy
+depends on, margins, the worst touches. `precision`, `extremes` and `left_out` add theirs.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recognizer.validation.campaign import ON_FACES, STRANGE
+from recognizer.validation.levels import LEVELS
+from recognizer.validation.statistics import (
+    calibration,
+    quantiles_of,
+    rms,
+    rounded,
+    share_of,
+)
+from recognizer.validation.trial import REJECTED, RIGHT, WRONG
+
+Columns = dict[str, Any]
+Mask = NDArray[np.bool_]
+
+#: Bounds of what is validated (design): name, whether a share must be at least or a size at most.
+ANSWERED, RMS_MM, RMS_DEG = 0.995, 0.1, 0.3
+STRONG = "mismatch"
+WORST = 20
+QUANTILES = (0.5, 0.9, 0.99, 1.0)
+
+#: Edges of the bins of what accuracy is shown against, and the unit.
+BINS: dict[str, tuple[str, list[float]]] = {
+    "force_n": ("N", [20, 40, 60, 80, 100, 120]),
+    "tilt_deg": ("degrees", [0, 0.5, 1, 1.5, 2]),
+    "edge_mm": ("mm", [0, 3, 6, 9, 12, 15, 20, 30, 60]),
+    "symbols": ("symbols", [0, 2, 4, 6, 8, 10, 12, 14, 16, 20, 30, 60]),
+}
+
+
+def results_of(rows: Columns) -> dict[str, Any]:
+    """Return the results of all touches.
+
+    Parameters
+    ----------
+    rows
+        Columns of `rows.COLUMNS`, in the order of the numbers.
+    """
+    verdicts, kinds, levels = rows["verdict"], rows["kind"], rows["level"]
+    whole = _isin(kinds, [kind for kind in ON_FACES if kind != "worn"])
+    fair = np.asarray(rows["enough"], bool)
+    inside = kinds == "face"
+    everything = np.ones(len(kinds), bool)
+    return {
+        "totals": line_of(rows, everything),
+        "enough": line_of(rows, fair),
+        "verdict": _verdict(rows, fair),
+        "kinds": [
+            {
+                "kind": kind,
+                "surface": surface,
+                **line_of(rows, (kinds == kind) & _at(rows, surface)),
+            }
+            for kind, surface in _kinds(rows)
+        ],
+        "levels": [
+            {"level": level, **line_of(rows, (levels == level) & fair)}
+            for level in LEVELS
+            if (levels == level).any()
+        ],
+        "objects": _confusion(rows, _isin(kinds, list(ON_FACES))),
+        "reasons": dict(sorted(Counter(rows["reason"][verdicts == REJECTED].tolist()).items())),
+        "pose": _pose(rows),
+        "against": {
+            name: {
+                "unit": unit,
+                "bins": _binned(rows, name, edges, inside if name in _INSIDE else whole),
+            }
+            for name, (unit, edges) in BINS.items()
+        },
+        "margins": _margins(rows),
+        "worst": _worst(rows, fair),
+    }
+
+
+_INSIDE = ("force_n", "tilt_deg")  # shown for touches inside faces; the others for whole faces
+
+
+def _at(rows: Columns, surface: str) -> Mask:
+    found: Mask = np.ones(len(rows["kind"]), bool) if not surface else rows["surface"] == surface
+    return found
+
+
+def _isin(values: Any, names: list[str]) -> Mask:
+    return np.array([value in names for value in values], bool)
+
+
+def _kinds(rows: Columns) -> list[tuple[str, str]]:
+    """Return every kind, foreign ones also by surface."""
+    found = []
+    for kind in dict.fromkeys((*ON_FACES, "blank", STRANGE)):
+        here = rows["kind"] == kind
+        if here.any():
+            found.append((kind, ""))
+        if kind == STRANGE:
+            found += [(kind, name) for name in sorted(set(rows["surface"][here]))]
+    return found
+
+
+def line_of(rows: Columns, where: Mask) -> dict[str, Any]:
+    """Return counts, shares and pose errors of some touches."""
+    verdicts = rows["verdict"][where]
+    right = where & (rows["verdict"] == RIGHT)
+    count = {name: int((verdicts == name).sum()) for name in (RIGHT, WRONG, REJECTED)}
+    return {
+        "touches": len(verdicts),
+        **count,
+        "answered": share_of(count[RIGHT] + count[WRONG], len(verdicts)),
+        "wrongly": share_of(count[WRONG], len(verdicts)),
+        "rms_mm": rms(rows["error_mm"][right]),
+        "rms_deg": rms(rows["error_deg"][right]),
+    }
+
+
+def _verdict(rows: Columns, fair: Mask) -> list[dict[str, Any]]:
+    """Return each bound, what was found, and whether it holds."""
+    everything = line_of(rows, np.ones(len(fair), bool))
+    expected = line_of(rows, fair)
+    strong = rows["level"] == STRONG
+    hard = line_of(rows, fair & strong) if (fair & strong).any() else expected
+    under = "under strong mismatch" if (fair & strong).any() else "all levels"
+    answered = expected["answered"]
+    checks = [
+        ("wrong answers, all touches", everything["wrongly"], "=", 0.0, ""),
+        ("answered, of touches that show enough symbols", answered, ">=", ANSWERED, ""),
+        (f"pose, rms, {under}", hard["rms_mm"], "<=", RMS_MM, "mm"),
+        (f"turn, rms, {under}", hard["rms_deg"], "<=", RMS_DEG, "degrees"),
+    ]
+    found = []
+    for name, value, sign, bound, unit in checks:
+        size = value["share"] if isinstance(value, dict) else value
+        holds = size is not None and (size >= bound if sign == ">=" else size <= bound)
+        shown = value if isinstance(value, dict) else {"value": value}
+        line = {"name": name, "sign": sign, "bound": bound, "unit": unit, "holds": holds}
+        found.append(line | shown)
+    return found
+
+
+def _confusion(rows: Columns, on_face: Mask) -> dict[str, Any]:
+    """Return who was taken for whom: objects as a matrix, faces as the pairs that occurred."""
+    names = sorted(set(rows["object"][on_face].tolist()))
+    answers = [str(answer).rpartition("/")[0] for answer in rows["answer"]]
+    place = {name: i for i, name in enumerate(names)}
+    matrix = np.zeros((len(names), len(names) + 1), int)
+    for i in np.flatnonzero(on_face).tolist():
+        matrix[place[rows["object"][i]], place.get(answers[i], len(names))] += 1
+    faces: dict[tuple[str, str], Counter[str]] = {}
+    confused: Counter[tuple[str, str]] = Counter()
+    for i in np.flatnonzero(on_face).tolist():
+        key = (rows["object"][i], rows["face"][i])
+        faces.setdefault(key, Counter())[rows["verdict"][i]] += 1
+        if rows["verdict"][i] == WRONG:
+            confused[f"{key[0]}/{key[1]}", rows["answer"][i]] += 1
+    for i in np.flatnonzero(~on_face & (rows["verdict"] == WRONG)).tolist():
+        confused[rows["surface"][i], rows["answer"][i]] += 1
+    return {
+        "names": names,
+        "matrix": matrix.tolist(),
+        "faces": [
+            {"object": a, "face": b, **{v: count[v] for v in (RIGHT, WRONG, REJECTED)}}
+            for (a, b), count in sorted(faces.items())
+        ],
+        "confused": [
+            {"touched": a, "answered": b, "count": n} for (a, b), n in sorted(confused.items())
+        ],
+    }
+
+
+def _pose(rows: Columns) -> dict[str, Any]:
+    """Return the distribution of pose errors, and how honest the covariance is."""
+    right = rows["verdict"] == RIGHT
+    found: dict[str, Any] = {"right": int(right.sum()), "quantiles": list(QUANTILES)}
+    found["error_mm"] = quantiles_of(rows["error_mm"][right], QUANTILES)
+    found["error_deg"] = quantiles_of(np.abs(rows["error_deg"][right]), QUANTILES)
+    found["calibration"] = calibration(rows["chi2"][right])
+    found["by_level"] = [
+        {
+            "level": level,
+            "touches": int(here.sum()),
+            "rms_mm": rms(rows["error_mm"][here]),
+            "rms_deg": rms(rows["error_deg"][here]),
+            "inside_95": calibration(rows["chi2"][here])[2],
+        }
+        for level in LEVELS
+        if (here := right & (rows["level"] == level)).any()
+    ]
+    return found
+
+
+def _binned(rows: Columns, name: str, edges: list[float], where: Mask) -> list[dict[str, Any]]:
+    found = []
+    last = edges[-2]
+    for low, high in pairwise(edges):
+        values = rows[name]
+        inside = where & (values >= low) & ((values < high) | (low == last) & (values <= high))
+        if inside.any():
+            found.append({"low": low, "high": high, **line_of(rows, inside)})
+    return found
+
+
+def _margins(rows: Columns) -> dict[str, Any]:
+    """Return the distribution of the margins of right, wrong and refused answers."""
+    at = (0.01, 0.1, 0.5, 0.9)
+    found: dict[str, Any] = {"quantiles": list(at)}
+    for verdict in (RIGHT, WRONG, REJECTED):
+        margins = rows["margin"][rows["verdict"] == verdict]
+        finite = margins[np.isfinite(margins)]
+        found[verdict] = {
+            "touches": len(margins),
+            "weighed": len(finite),
+            "margin": quantiles_of(finite, at),
+        }
+    return found
+
+
+def _worst(rows: Columns, fair: Mask) -> list[dict[str, Any]]:
+    """Return the worst touches: wrong ones; then unanswered and farthest off, one by one."""
+    verdict, error = rows["verdict"], np.nan_to_num(rows["error_mm"])
+    wrong = np.flatnonzero(verdict == WRONG)
+    unanswered = np.flatnonzero(fair & (verdict == REJECTED))
+    unanswered = unanswered[np.argsort(-rows["symbols"][unanswered], kind="stable")]
+    right = np.flatnonzero(verdict == RIGHT)
+    far = right[np.argsort(-error[right], kind="stable")]
+    chosen = wrong.tolist()[:WORST]
+    for pair in range(WORST):
+        chosen += [*unanswered[pair : pair + 1].tolist(), *far[pair : pair + 1].tolist()]
+    keep = ("number", "kind", "surface", "level", "object", "face", "symbols", "verdict",
+            "reason", "answer", "force_n", "tilt_deg", "edge_mm", "error_mm", "error_deg",
+            "margin")  # fmt: skip
+    return [{name: _plain(rows[name][i]) for name in keep} for i in chosen[:WORST]]
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as JSON has it: null for what is no number."""
+    plain = value.item() if hasattr(value, "item") else value
+    if isinstance(plain, float):
+        return rounded(plain) if np.isfinite(plain) else None
+    return plain

@@ -1,0 +1,81 @@
+"""One Parquet file for a thousand touches, written whole or not at all.
+
+Rows -> `shards/<series>/00000.parquet`, CPU times -> `times/<series>/00000.parquet`. A file
+appears under its name by a rename after its bytes are on the disk, the times first: where
+the shard is, it is done. Other tools read them as they are.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from recognizer.validation.campaign import SHARD, Series, shards_of
+from recognizer.validation.rows import COLUMNS, Row, Time
+
+SHARDS, TIMES = "shards", "times"
+_TYPES = {"text": pa.string(), "whole": pa.int64(), "truth": pa.bool_()}
+SCHEMA = pa.schema(
+    [
+        (name, pa.float64() if isinstance(what, int) else _TYPES[what])
+        for name, what in COLUMNS.items()
+    ]
+)
+TIME_SCHEMA = pa.schema(
+    [("number", pa.int64()), ("drawing", pa.float64()), ("reading", pa.float64())]
+)
+_UNDONE = ".writing"
+
+
+def shard_file(folder: Path, series: str, shard: int, what: str = SHARDS) -> Path:
+    """Return where a shard, or its times, are kept."""
+    return folder / what / series / f"{shard:05d}.parquet"
+
+
+def write_shard(
+    folder: Path, series: str, shard: int, rows: Iterable[Row], times: Iterable[Time]
+) -> None:
+    """Write a shard and its times, in the order of the touches' numbers."""
+    ordered = sorted(rows, key=lambda row: row["number"])
+    spent = sorted(times, key=lambda time: time.number)
+    names = [field.name for field in fields(Time)]
+    columns = {name: [getattr(time, name) for time in spent] for name in names}
+    write_table(pa.table(columns, schema=TIME_SCHEMA), shard_file(folder, series, shard, TIMES))
+    write_table(pa.Table.from_pylist(ordered, schema=SCHEMA), shard_file(folder, series, shard))
+
+
+def write_table(table: pa.Table, path: Path) -> None:
+    """Write a table under a name that it gets when all of it is on the disk."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    undone = path.with_name(path.name + _UNDONE)
+    with open(undone, "wb") as file:
+        pq.write_table(table, file, compression="zstd", row_group_size=100 * SHARD)
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(undone, path)
+
+
+def done_shards(folder: Path, series: Series) -> set[int]:
+    """Return which shards of a series are there."""
+    return {
+        shard
+        for shard in range(shards_of(series))
+        if shard_file(folder, series.name, shard).exists()
+    }
+
+
+def read_series(folder: Path, series: Series, what: str = SHARDS) -> pa.Table:
+    """Return all rows, or all times, of a series that is done."""
+    files = [shard_file(folder, series.name, shard, what) for shard in range(shards_of(series))]
+    return pa.concat_tables([pq.read_table(file) for file in files]).combine_chunks()
+
+
+def columns_of(table: pa.Table) -> dict[str, Any]:
+    """Return the columns of a table as arrays; texts as arrays of objects."""
+    return {name: table.column(name).to_numpy() for name in table.column_names}

@@ -1,0 +1,98 @@
+"""What a worker does with a piece: touch, read, compare. The same anywhere.
+
+Work + Piece -> Touched. A worker prepares its reader once and keeps it; it refuses when it
+runs other code or sees another set than the one that asked.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from recognizer.lab import open_lab
+from recognizer.pipeline import Reader, reader_for
+from recognizer.validation.campaign import Campaign, Piece, plan_of, reader_with, series_of
+from recognizer.validation.errors import WorkersError
+from recognizer.validation.made import set_digest
+from recognizer.validation.rows import Row, Time, row_of, seen_of
+from recognizer.validation.trial import sensor_of, trial
+
+PACKAGES = ("generator", "decoder", "probe", "recognizer")
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """What all pieces share."""
+
+    campaign: Campaign
+    database: str  #: as the workers find it
+    set_digest: str
+    code_digest: str
+
+
+@dataclass(frozen=True, slots=True)
+class Touched:
+    """A piece that is done."""
+
+    piece: Piece
+    rows: tuple[Row, ...]
+    times: tuple[Time, ...]
+
+
+#: Takes work and pieces, yields what is done in any order. `workers`, `cluster`.
+Workers = Callable[[Work, Iterable[Piece]], Iterator[Touched]]
+
+
+def touch(work: Work, piece: Piece) -> Touched:
+    """Return what became of the touches of a piece.
+
+    Raises
+    ------
+    WorkersError
+        The code or the set is not the one that was asked for.
+    """
+    reader = prepared(work)
+    series = next(s for s in series_of(work.campaign) if s.name == piece.series)
+    reading = reader_with(reader, series.reader)
+    rows, times = [], []
+    for number in range(piece.first, piece.last):
+        kind, plan = plan_of(work.campaign, series, work.database, number)
+        start = time.process_time()
+        found = trial(plan, number, reading)
+        spent = time.process_time() - start
+        seen = seen_of(reader.lab, reader.sensor, found)
+        rows.append(row_of(found, kind, seen))
+        times.append(Time(number, round(spent - found.seconds, 6), round(found.seconds, 6)))
+    return Touched(piece, tuple(rows), tuple(times))
+
+
+@lru_cache(maxsize=1)
+def prepared(work: Work) -> Reader:
+    """Return the reader of a campaign; checks that it is of the same code and set."""
+    if work.code_digest != code_digest():
+        raise WorkersError(
+            "a worker runs another version of this software",
+            fix="install the same version on all machines",
+        )
+    if work.set_digest != set_digest(work.database):
+        raise WorkersError(
+            f"a worker sees another set under {work.database}",
+            fix="let all machines share the folder, or give a PostgreSQL database",
+        )
+    return reader_for(open_lab(work.database), sensor_of(work.campaign.overlay))
+
+
+@lru_cache(maxsize=1)
+def code_digest() -> str:
+    """Return the sha256 of the source of all packages."""
+    digest = hashlib.sha256()
+    root = Path(__file__).parents[2]
+    for package in PACKAGES:
+        for path in sorted((root / package).rglob("*.py")):
+            digest.update(path.relative_to(root).as_posix().encode() + b"\0")
+            digest.update(path.read_bytes() + b"\0")
+    return digest.hexdigest()

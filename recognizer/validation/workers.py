@@ -1,0 +1,102 @@
+"""Who does the work: this process, or several on this machine.
+
+A pool that loses a process (out of memory, killed) is made anew and given what is not done,
+at most `LOSSES` times without a piece done between. Workers leave interrupts to the
+process that started them, and end when it is gone.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from functools import partial
+from multiprocessing import active_children, connection, get_context, parent_process
+
+from recognizer.validation.campaign import Piece
+from recognizer.validation.errors import WorkersError
+from recognizer.validation.work import Touched, Work, Workers, touch
+
+LOSSES = 3  #: pools in a row that break before they have done anything
+
+
+def workers_of(processes: int, cluster: str = "") -> Workers:
+    """Return who does the work: a cluster, several processes, or this one."""
+    if cluster:
+        from recognizer.validation.cluster import on_cluster
+
+        return partial(on_cluster, cluster)
+    return here if processes == 1 else partial(in_processes, processes)
+
+
+def here(work: Work, pieces: Iterable[Piece]) -> Iterator[Touched]:
+    """Do one piece after another."""
+    for piece in pieces:
+        yield touch(work, piece)
+
+
+def in_processes(processes: int, work: Work, pieces: Iterable[Piece]) -> Iterator[Touched]:
+    """Do pieces in several processes at a time.
+
+    Raises
+    ------
+    WorkersError
+        Processes were lost again and again.
+    """
+    left = list(pieces)
+    lost = 0
+    while left:
+        before = len(left)
+        try:
+            for done in _pooled(processes, work, left):
+                left.remove(done.piece)
+                yield done
+        except BrokenProcessPool as error:
+            lost = lost + 1 if len(left) == before else 1
+            if lost > LOSSES:
+                raise WorkersError(
+                    f"processes are lost, {LOSSES + 1} times in a row",
+                    fix="see whether the memory suffices, take a smaller -j, go on with --resume",
+                ) from error
+
+
+def _pooled(processes: int, work: Work, pieces: list[Piece]) -> Iterator[Touched]:
+    # Begun anew rather than forked: no open database and no thread is taken over.
+    pool = ProcessPoolExecutor(processes, get_context("spawn"), initializer=_begin)
+    try:
+        waiting = [pool.submit(touch, work, piece) for piece in pieces]
+        yield from _as_done(waiting)
+    except BaseException:
+        for process in active_children():
+            process.terminate()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _as_done(waiting: list[Future[Touched]]) -> Iterator[Touched]:
+    """Yield what is done, as it is done; an interrupt comes through at once."""
+    left = set(waiting)
+    while left:
+        done, left = wait(left, timeout=1.0, return_when=FIRST_COMPLETED)
+        for future in done:
+            yield future.result()
+
+
+def _begin() -> None:
+    """Prepare a worker."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    parent = parent_process()
+    if parent is not None:
+        end: Callable[[], None] = partial(_end_with, parent.sentinel)
+        threading.Thread(target=end, daemon=True).start()
+
+
+def _end_with(sentinel: int) -> None:
+    """Leave as soon as the process that started this one is gone."""
+    connection.wait([sentinel])
+    os._exit(1)

@@ -1,0 +1,185 @@
+"""Stiff and extreme cases that belong to no single module; `docs/contact.md` lists all sixteen."""
+
+import math
+import re
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from generator.alphabet.known import alphabet_named
+from generator.alphabet.outline import SymbolStyle, outlines
+from generator.array.profiles import profile
+from generator.export.step import step_chunks
+from generator.export.stl import stl_chunks
+from generator.layout.layout import lay_out
+from generator.polyhedron.shapes import cube
+from generator.polyhedron.winged import polyhedron
+from generator.printers import printer_named
+from generator.solid.panels import panels
+from generator.solid.triangulate import triangles
+from probe.contact.contract import Touch, WristStiffness
+from probe.contact.press import LEVELS, press
+from probe.contact.tabs import tabs
+from probe.errors import ContactError
+from probe.sensor import Overlay, Sensor
+from probe.surface.face import endless
+from probe.surface.indenters import HalfPlane, Plate, Strip
+from probe.surface.polygon import polygon
+from recognizer.mosaic.pair import registered
+from recognizer.mosaic.patch import patch_of
+from recognizer.mosaic.planar import composed
+from recognizer.signal import signal_of
+
+SENSORS = {kind: Sensor(overlay=Overlay(kind=kind)) for kind in ("tab", "pad")}
+TAB = SENSORS["tab"]
+P = TAB.pitch_mm
+GLYPHS = (
+    (((-1, 1), (-1, -1)), ((-1, -1), (1, -1))),
+    (((1, -1), (-1, -1)), ((-1, -1), (-1, 0)), ((-1, 0), (0, 1)), ((0, -1), (0, 0))),
+    (((-1, -1), (0, -1)), ((0, -1), (0, 0)), ((0, 0), (1, 1)), ((0, 0), (-1, 0))),
+    (((-1, 1), (-1, -1)), ((-1, -1), (1, -1)), ((1, -1), (1, 1))),
+)
+EVERY_LEVEL = [
+    (kind, level) for kind, levels in LEVELS.items() for level in levels if level != "elements"
+]
+
+
+@pytest.mark.parametrize(("kind", "level"), EVERY_LEVEL)
+def test_case_5_no_force_is_no_image_and_a_free_plate_off_its_ground_tips(kind, level):
+    """Matter under x <= -2 mm alone: the centre of pressure lies outside the hull."""
+    sensor = SENSORS[kind]
+    assert not press(Plate(), sensor, Touch(0, 0, 0, 0.0), accuracy=level).forces_n.any()
+    if level == "footprint":  # knows of no moments
+        return
+    with pytest.raises(ContactError, match="tips"):
+        free = Touch(2.0, 0, 0, 5.0, wrist=WristStiffness(0.0, 0.0))
+        press(HalfPlane(), sensor, free, accuracy=level)
+
+
+@pytest.mark.parametrize(("kind", "level"), EVERY_LEVEL)
+@pytest.mark.parametrize("width", [0.01, 0.05, 0.2])
+@pytest.mark.parametrize("x", [0.0, P / 2, 0.31])
+def test_case_6_thin_strokes_are_felt_or_refused_at_every_level(kind, level, width, x):
+    """Where between two tactels the stroke stands does not matter."""
+    try:
+        found = press(Strip(width), SENSORS[kind], Touch(x, 0, 0.02, 1.0), accuracy=level)
+    except ContactError as refused:
+        assert refused.fix
+        return
+    assert found.forces_n.sum() == pytest.approx(1.0, rel=1e-5)
+    assert found.forces_n[:, 6:10].sum() > 0.8
+
+
+def test_case_8_slivers_and_squares_of_a_simulated_face():
+    """The probe's own polygons: no interior point rejected, no sliver at 1000 mm misjudged."""
+    rng = np.random.default_rng(8)
+    square = polygon([[(0, 0), (80, 0), (80, 80), (0, 80)]])
+    points = rng.uniform(1e-3, 79.999, (20_000, 2))
+    assert square.contains(points).all()
+    assert not square.contains(points + [80, 0]).any()
+    turn = np.array([[math.cos(0.3), -math.sin(0.3)], [math.sin(0.3), math.cos(0.3)]])
+    sliver = np.array([(0, 0), (80, 0), (80, 0.008), (0, 0.008)]) @ turn.T + 1000
+    points = rng.uniform((-1, -0.008), (81, 0.016), (500, 2)) @ turn.T + 1000
+    ring = [tuple(map(Fraction, corner)) for corner in sliver.tolist()]
+    sides = list(zip(ring, [*ring[1:], ring[0]], strict=True))
+    exact = [
+        all((b[0] - a[0]) * (y - a[1]) >= (b[1] - a[1]) * (x - a[0]) for a, b in sides)
+        for x, y in (map(Fraction, point) for point in points.tolist())
+    ]
+    assert 0.2 < np.mean(exact) < 0.5
+    assert polygon([sliver]).contains(points).tolist() == exact
+
+
+@pytest.fixture(scope="module")
+def far_panel():
+    """A panel of a cube whose corner stands at (1000, 1000, 1000) mm."""
+    near = cube(36.0)
+    far = polyhedron(near.vertices + 1000.0, [face.loops[0] for face in near.faces])
+    tiers = outlines(alphabet_named("dense-4"), SymbolStyle(chamfer_mm=0.0))
+    half = max(float(np.abs(ring).max()) for symbol in tiers for ring in symbol.rings[0])
+    clearances = [[np.full(len(loop), 1.0) for loop in face.loops] for face in far.faces]
+    nothing = np.zeros(0, np.int64)
+    layout = lay_out(far, profile().array(), 7.0, half, clearances, (nothing, nothing))
+    return panels(far, layout, tiers, 3.0, printer_named("fdm-0.4"), name="Far").parts[0]
+
+
+def test_case_10_a_file_in_its_own_frame_keeps_the_facets(far_panel):
+    """In 32-bit floats facets of 2 um and up turn by < 1e-3 degrees; at 1000 mm by far more."""
+    mesh = triangles(far_panel)
+    assert np.abs(mesh.vertices).max() < 40
+    assert np.abs(far_panel.T_object_part[:3, 3]).max() > 900
+    kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    written = b"".join(stl_chunks(mesh))[84:]
+    corners = np.frombuffer(written, kind)["corners"].astype(float)
+    true = mesh.vertices[mesh.triangles]
+    assert turned_degrees(corners, true).max() < 1e-3
+    at_place = (true + 1000).astype(np.float32).astype(float)
+    assert turned_degrees(at_place, true).max() > 1e-2
+
+
+def turned_degrees(corners, true):
+    a, b = (np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]) for c in (corners, true))
+    across = np.linalg.norm(np.cross(a, b), axis=1)
+    return np.degrees(np.arctan2(across, np.einsum("ij,ij->i", a, b)))
+
+
+def test_case_16_step_tolerance_is_far_below_the_part(far_panel):
+    """1e-6 of the part's size at most, and coordinates written finer than that."""
+    text = b"".join(step_chunks(far_panel)).decode("ascii")
+    (tolerance,) = map(float, re.findall(r"LENGTH_MEASURE\(([^)]+)\),#\d+,'distance_acc", text))
+    assert tolerance <= 1e-6 * np.ptp(far_panel.vertices, axis=0).max()
+    points = np.array(
+        [
+            [float(number) for number in point.split(",")]
+            for point in re.findall(r"CARTESIAN_POINT\('',\(([^)]+)\)\)", text)
+        ]
+    )
+    for vertex in far_panel.vertices:
+        assert np.abs(points - vertex).max(axis=1).min() <= tolerance / 100
+
+
+def raw_product(a, b, believed, reach):
+    """Return the shift (tactels, x and y) of the largest sum of products over the overlap."""
+
+    def score(right, up):
+        first = a[max(0, -up) : 16 - max(0, up), max(0, right) : 16 - max(0, -right)]
+        second = b[max(0, up) : 16 - max(0, -up), max(0, -right) : 16 - max(0, right)]
+        return float((first * second).sum())
+
+    x, y = (round(float(value)) for value in believed)
+    shifts = [(x + i, y + j) for i in range(-reach, reach + 1) for j in range(-reach, reach + 1)]
+    return np.array(max(shifts, key=lambda shift: score(*shift)))
+
+
+@pytest.mark.parametrize("scene", ["clean", "gradient", "offset", "saturated"])
+def test_case_12_raw_products_fail_where_registration_does_not(scene):
+    """75 % overlap, believed to +-1 tactel; wrong: by more than a tactel. At most 1 % may be."""
+    rng = np.random.default_rng(12)
+    faces = [endless(rng.integers(0, 4, (23, 25)), GLYPHS) for _ in range(2)]
+
+    def felt(face, pose):
+        forces = tabs(face, TAB, Touch(*pose, 80.0)).forces_n
+        forces = np.maximum(forces + rng.normal(0, 0.02, (16, 16)), 0)
+        if scene == "gradient":
+            forces = forces * np.linspace(0.1, 1.9, 16)
+        if scene == "offset":
+            forces = forces + forces[forces > 0.1].mean()
+        return np.minimum(forces, 0.3) if scene == "saturated" else forces
+
+    raw_wrong, wrong, answered, pairs = 0, 0, 0, 20
+    spread = np.diag([P**2, P**2, math.radians(0.5) ** 2])
+    for pair in range(pairs):
+        place = np.array([*rng.uniform(20, 120, 2), rng.uniform(0, 2 * math.pi)])
+        true = np.array([4.25 * P * rng.choice([-1, 1]), 0.3 * P, 0.0])
+        believed = true + np.array([*rng.uniform(-P, P, 2), 0.0])
+        images = [felt(faces[pair % 2], at) for at in (place, composed(place, true))]
+        shift = raw_product(*images, believed[:2] / P, 4)
+        raw_wrong += math.hypot(*(shift - true[:2] / P)) > 1
+        patches = [patch_of(TAB, signal_of(image, floor=0.0, least=0.1)) for image in images]
+        found = registered(*patches, believed, spread, period_mm=7.0)
+        answered += bool(found)
+        wrong += bool(found) and math.hypot(*(found.pose - true)[:2]) > P
+    assert raw_wrong >= 0.2 * pairs
+    assert wrong == 0
+    assert answered >= 0.95 * pairs

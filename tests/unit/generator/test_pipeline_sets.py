@@ -1,0 +1,185 @@
+"""Sets: in parallel, resumable, with plates, overview and packing list."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from generator.database.open import open_database
+from generator.database.read import read_layout
+from generator.database.transaction import reading
+from generator.errors import DatabaseError
+from generator.pipeline import encode
+from generator.pipeline.make import Order, made_at, made_under_lock
+from generator.pipeline.parallel import Task, done_by
+from generator.pipeline.place import placed
+from generator.pipeline.plan import planned
+from generator.pipeline.progress import silent
+from generator.spec import SpecError, read_specs
+
+SET = """\
+output: {formats: [stl]}
+objects:
+  - {name: A, shape: {cube: 30 mm}}
+  - {name: B, shape: {box: [30, 35, 30]}}
+  - {name: C, shape: {tetrahedron: 55 mm}, print: {printer: fdm-0.25}}
+"""
+
+
+def specs(folder: Path, text: str = SET):
+    file = folder / "lab-set.yaml"
+    file.write_text(text)
+    return read_specs([file])
+
+
+def run(folder: Path, text: str = SET, **options):
+    url = f"sqlite:///{folder / 'lab.db'}"
+    return encode(specs(folder, text), folder=folder / "out", database=url, **options)
+
+
+def digests(folder: Path) -> dict[str, str]:
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {
+        str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in files
+    }
+
+
+def rows(folder: Path) -> list[dict[str, str]]:
+    text = (folder / "out" / "lab-set-packing.csv").read_text()
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+@pytest.fixture(scope="module")
+def once(tmp_path_factory: pytest.TempPathFactory):
+    """A set that was made here, with its database."""
+    folder = tmp_path_factory.mktemp("set")
+    return folder, run(folder, jobs=1, formats=("stl", "3mf"))
+
+
+@pytest.fixture
+def there(once, tmp_path: Path) -> Path:
+    """A copy of it."""
+    shutil.copytree(once[0], tmp_path, dirs_exist_ok=True)
+    return tmp_path
+
+
+def test_processes_make_the_same_files_on_the_same_cells(once, tmp_path):
+    one = once[1]
+    two = run(tmp_path, jobs=2, formats=("stl", "3mf"))
+    assert digests(once[0] / "out") == digests(tmp_path / "out")
+    assert one.used_cells == two.used_cells == sum(made.symbols for made in one.objects)
+    assert [made.name for made in two.objects] == ["A", "B", "C"]
+
+
+def test_the_next_run_makes_only_what_is_missing_or_changed(there):
+    before = digests(there / "out")
+    (there / "out" / "B" / "B-F2.stl").write_bytes(b"damaged")
+    (there / "out" / "lab-set-overview.pdf").unlink()
+    said = []
+    again = run(there, jobs=1, formats=("stl", "3mf"), progress=lambda what, _: said.append(what))
+    assert [made.skipped for made in again.objects] == [True, False, True]
+    assert all(made.reused for made in again.objects)
+    assert "A is there, with all its files: skipped" in said
+    assert digests(there / "out") == before
+
+
+@pytest.mark.parametrize("lost", ["A.png", "A-array.svg", "A-F1.stl", "A-prusaslicer.3mf"])
+def test_an_object_without_one_of_its_files_is_not_skipped(there, lost):
+    (there / "out" / "A" / lost).unlink()
+    again = run(there, jobs=1, formats=("stl", "3mf"))
+    assert [made.skipped for made in again.objects] == [False, True, True]
+    assert (there / "out" / "A" / lost).is_file()
+
+
+def test_a_changed_spec_in_a_set_is_refused_and_the_rest_stays(there):
+    before = digests(there / "out")
+    changed = SET.replace("cube: 30 mm", "cube: 35 mm")
+    with pytest.raises(DatabaseError, match="another spec"):
+        run(there, changed, jobs=1)
+    assert digests(there / "out") == before
+    replaced = run(there, changed, jobs=1, replace=True)
+    assert [made.reused for made in replaced.objects] == [False, True, True]
+
+
+def test_every_part_has_a_place_of_its_own_on_its_printers_bed(once):
+    folder, result = once
+    listed = rows(folder)
+    assert len(listed) == sum(made.parts for made in result.objects) == 16
+    assert [row["part"] for row in listed[:6]] == [f"A-F{k}" for k in range(1, 7)]
+    assert {row["printer"] for row in listed if row["object"] == "C"} == {"fdm-0.25"}
+    plates = {row["plate"]: row["printer"] for row in listed}
+    names = {"lab-set-packing.csv", "lab-set-overview.pdf"}
+    for plate in plates:
+        names |= {f"lab-set-plate-{plate}.3mf", f"lab-set-plate-{plate}-prusaslicer.3mf"}
+        boxes = np.array(
+            [
+                [float(row[key]) for key in ("x_mm", "y_mm", "width_mm", "depth_mm")]
+                for row in listed
+                if row["plate"] == plate
+            ]
+        )
+        low, high = boxes[:, :2], boxes[:, :2] + boxes[:, 2:]
+        assert (low >= -0.05).all()
+        assert (high <= np.array([250.05, 210.05])).all()
+        for k in range(len(boxes)):
+            apart = ((high[k] <= low) | (high <= low[k])).any(axis=1)
+            assert apart.sum() == len(boxes) - 1
+    assert {path.name for path in result.set_files} == names
+    assert sum(int(row["symbols"]) for row in listed) == sum(m.symbols for m in result.objects)
+
+
+def test_the_overview_is_a_pdf_without_a_date(once):
+    content = (once[0] / "out" / "lab-set-overview.pdf").read_bytes()
+    assert content.startswith(b"%PDF-")
+    assert b"/CreationDate" not in content
+    pages = content.count(b"/Type /Page\n") + content.count(b"/Type /Page ")
+    assert pages == 1 + len({row["plate"] for row in rows(once[0])})
+
+
+def test_who_loses_his_cells_to_another_writer_places_anew(tmp_path):
+    located = specs(tmp_path)
+    url = f"sqlite:///{tmp_path / 'lab.db'}"
+    engine = open_database(url)
+    orders = [Order(planned(one), tmp_path / one.spec.name, ("stl",)) for one in located[:2]]
+    with reading(engine) as connection:
+        chosen = [placed(connection, order.plan, replace=False) for order in orders]
+    first = made_at(engine, orders[0], chosen[0])
+    second = made_at(engine, orders[1], chosen[1])  # both chose the same corner
+    assert first.placed is chosen[0]
+    assert second.placed is not chosen[1]
+    cells = []
+    with reading(engine) as connection:
+        for name in "AB":
+            for face in read_layout(connection, name).faces:
+                cells += zip(face.rows.tolist(), face.columns.tolist(), strict=True)
+    assert len(set(cells)) == len(cells) == first.made.symbols + second.made.symbols
+
+
+def test_an_object_that_another_writer_made_meanwhile_keeps_its_cells(tmp_path):
+    located = specs(tmp_path)
+    engine = open_database(f"sqlite:///{tmp_path / 'lab.db'}")
+    orders = [Order(planned(one), tmp_path / one.spec.name, ("stl",)) for one in located[:2]]
+    made_under_lock(engine, orders[1])  # moves what is free
+    with reading(engine) as connection:
+        chosen = placed(connection, orders[0].plan, replace=False)
+    other = made_under_lock(engine, orders[0])
+    mine = made_at(engine, orders[0], chosen)
+    assert mine.made.reused
+    assert mine.made.symbols == other.made.symbols
+
+
+def test_errors_come_back_from_other_processes(tmp_path):
+    with pytest.raises(SpecError) as caught:
+        read_specs([tmp_path / "none.yaml"])
+    error = SpecError(caught.value.problems).__reduce__()
+    assert str(error[0](*error[1])) == str(caught.value)
+    tasks = [Task(str(k), int, (text,)) for k, text in enumerate(["1", "x", "3", "y"])]
+    with pytest.raises(ValueError, match="'x'"):
+        done_by(tasks, 2, silent)

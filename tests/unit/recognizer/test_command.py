@@ -1,0 +1,350 @@
+"""`recognize-object` in one process: what it prints, writes, and refuses."""
+
+import json
+import math
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+from PIL import Image
+
+from generator.pipeline import encode
+from generator.spec import read_specs
+from probe.calibration import calibration_from, even_load, write_calibration
+from probe.circuit import Electronics, fsr_of, read_counts, read_sequence
+from probe.contact.contract import Touch
+from probe.contact.press import press
+from probe.frame import frame_from
+from probe.recording.record import Recorder
+from probe.sensor import Overlay, Sensor
+from probe.simulate.registered import registered_surface
+from probe.wrist.distances import counts_of, distances_at
+from probe.wrist.geometry import Wrist
+from recognizer.command import run
+
+SPEC = "name: Cube\nshape: {cube: 40 mm}\n"
+KEYS = {"seq", "object", "face", "index", "T_face_probe", "T_object_probe", "margin", "reason"}
+AT = Touch(20.0, 19.0, math.radians(25), 80.0)
+BESIDE = Touch(17.0, 22.0, math.radians(-60), 60.0)
+DEAD = (slice(3, 4), slice(2, 9))  # tactels of the calibrated sensor
+T_BASE_SENSOR = np.diag([1.0, -1.0, -1.0, 1.0])
+T_BASE_SENSOR[:3, 3] = 300, 50, 20
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory):
+    """A database with one object."""
+    folder = tmp_path_factory.mktemp("lab")
+    (folder / "cube.yaml").write_text(SPEC)
+    encode(
+        read_specs([folder / "cube.yaml"]), folder=folder / "out",
+        database=f"sqlite:///{folder / 'lab.db'}", formats=("stl",),
+    )  # fmt: skip
+    return folder
+
+
+def forces_of(lab, touch, overlay="tab", face="F1"):
+    scene = registered_surface(str(lab / "lab.db"), "Cube", face)
+    sensor = Sensor(overlay=Overlay(kind=overlay))
+    return press(scene.surface, sensor, touch).forces_n
+
+
+def recorded(path, images, *, wrist=None, pose=None, **named):
+    with Recorder(path, **named) as recorder:
+        for seq, counts in enumerate(images):
+            recorder.append(frame_from(counts, t_ns=seq * 4_545_455, seq=seq, wrist=wrist,
+                                       pose=pose))  # fmt: skip
+    return path
+
+
+@pytest.fixture(scope="module")
+def images(lab):
+    """Counts of two places."""
+    rng = np.random.default_rng(4)
+    forces = [forces_of(lab, touch) for touch in (AT, BESIDE)]
+    return [read_counts(f, Electronics(), fsr_of(16, 16), None, rng)[0] for f in forces]
+
+
+@pytest.fixture
+def asked(capsys, lab, monkeypatch):
+    """Run the command beside the database: code, stdout, stderr."""
+    monkeypatch.chdir(lab)
+
+    def ask(*words):
+        capsys.readouterr()
+        code = run([str(word) for word in words])
+        return code, *capsys.readouterr()
+
+    return ask
+
+
+def assert_at(entry, touch, face="F1", mm=0.15, degrees=0.6):
+    assert (entry["object"], entry["face"], entry["reason"]) == ("Cube", face, "")
+    assert math.hypot(entry["x_mm"] - touch.x_mm, entry["y_mm"] - touch.y_mm) < mm
+    assert entry["theta_deg"] == pytest.approx(math.degrees(touch.theta_rad), abs=degrees)
+
+
+def test_the_help_loads_nothing_heavy():
+    script = (
+        "import sys\n"
+        "import recognizer\n"
+        "from recognizer.command import run\n"
+        "codes = [run(words) for words in (['--help'], ['-h'], [], ['--follow', 'x.h5'])]\n"
+        "heavy = 'numpy scipy matplotlib h5py skimage sqlalchemy serial skfem'.split()\n"
+        "print([name for name in heavy if name in sys.modules], codes)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.splitlines()[-1] == "[] [0, 0, 2, 2]"
+    assert "Exit codes: 0 recognised, 1 nothing recognised, 2 bad input" in done.stdout
+
+
+def test_reading_loads_no_library_that_it_does_not_need(lab, images):
+    path = recorded(lab / "light.h5", images[:1])
+    script = (
+        "import sys\n"
+        "from recognizer.command import run\n"
+        f"code = run([{str(path)!r}, '--database', {str(lab / 'lab.db')!r}])\n"
+        "heavy = 'matplotlib skimage skfem serial build123d'.split()\n"
+        "print([name for name in heavy if name in sys.modules], code)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.splitlines()[-1] == "[] 0"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--json"], "nothing to read; give a recording or --port URL"),
+        (["a.h5", "--port", "sim:"], "both RECORDING and --port were given"),
+        (["a.h5", "--follow"], "--follow needs --port"),
+        (["a.h5", "--overlay", "wool"], "--overlay wool: give tab or pad"),
+        (["a.h5", "--joints", "1,2"], "--joints 1,2: give five angles"),
+        (["a.h5", "--joints", "1,2,3,4,nan"], "--joints 1,2,3,4,nan: give five angles"),
+        (["a.h5", "--touches", "0"], "'--touches': Input should be greater"),
+        (["a.h5", "--nope"], "No such option: --nope"),
+    ],
+)
+def test_a_misused_option_is_named(asked, words, said):
+    code, out, err = asked(*words)
+    if "--json" in words:
+        assert (code, json.loads(out)["error"]["cause"]) == (2, said)
+        return
+    assert (code, out) == (2, "")
+    assert f"error: {said}" in err
+    assert "fix: see recognize-object --help" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (["gone.h5"], 2, "gone.h5: error: there is no such recording"),
+        (["cube.yaml"], 2, "it is no HDF5 file"),
+        (["gone.h5", "--database", "gone.db"], 4, "this database does not exist"),
+        (["gone.h5", "--database", "cube.yaml"], 4, "error:"),
+        (["--port", "serial:///dev/nowhere"], 3, "there is no /dev/nowhere"),
+        (["--port", "smoke:"], 3, "error:"),
+        (["--port", "sim:lab.db#Cube/F1?overlay=wool"], 2, "overlay='wool'"),
+        (["gone.h5", "--plot", "a.pdf"], 2, "has to end in .png"),
+        (["--port", "sim:", "--calibration", "gone.json"], 2, "cannot be read"),
+    ],
+)
+def test_what_is_not_there(asked, words, code, said):
+    found, out, err = asked(*words)
+    assert (found, out) == (code, "")
+    assert said in err
+    assert "  fix: " in err
+    found, out, err = asked(*words, "--json")
+    assert (found, err) == (code, "")
+    assert json.loads(out)["error"]["exit_code"] == code
+
+
+def test_answers_as_lines_and_as_json(asked, lab, images):
+    path = recorded(lab / "two.h5", [images[0]] * 8 + [images[1]] * 8, sensor="simulated/tab")
+    code, out, err = asked(path)
+    assert code == 0
+    first, second = out.splitlines()
+    assert first.startswith("0: Cube/F1 at (")
+    assert "turned 25." in first or "turned 24." in first
+    assert second.startswith("8: Cube/F1 at (")
+    assert err == "2 touches, 2 recognised\n"
+    code, out, err = asked(path, "--json")
+    assert (code, err) == (0, "")
+    entries = json.loads(out)
+    assert set(entries[0]) >= KEYS
+    assert [(entry["seq"], entry["frames"]) for entry in entries] == [(0, 8), (8, 8)]
+    assert_at(entries[0], AT)
+    assert_at(entries[1], BESIDE)
+    pose = np.array(entries[0]["T_face_probe"])
+    assert pose[:2, 3] == pytest.approx((entries[0]["x_mm"], entries[0]["y_mm"]))
+    scene = registered_surface(str(lab / "lab.db"), "Cube", "F1")
+    assert np.array(entries[0]["T_object_probe"]) == pytest.approx(scene.T_object_surface @ pose)
+    assert entries[0]["T_robot_object"] is None
+    assert len(json.loads(asked(path, "--touches", 1, "--json")[1])) == 1
+    assert len(json.loads(asked(path, "--every", "--touches", 3, "--json")[1])) == 3
+
+
+def test_any_file_with_frames_is_read(asked, lab, images):
+    with h5py.File(lab / "others.h5", "w") as file:
+        file["frames"] = np.array([np.zeros((16, 16)), *images], np.uint16)
+    entries = json.loads(asked(lab / "others.h5", "--json")[1])
+    assert [entry["seq"] for entry in entries] == [1, 2]
+    assert_at(entries[1], BESIDE)
+
+
+def test_the_overlay_is_told_by_the_recording(asked, lab):
+    counts, _ = read_counts(forces_of(lab, AT, "pad", "F2"), Electronics(), fsr_of(16, 16), None,
+                            np.random.default_rng(4))  # fmt: skip
+    path = recorded(lab / "pad.h5", [counts], sensor="simulated/pad")
+    entry = json.loads(asked(path, "--json")[1])[0]
+    assert_at(entry, AT, "F2", mm=0.3, degrees=1.5)
+    asked_for = recorded(lab / "unknown.h5", [counts])
+    again = json.loads(asked(asked_for, "--overlay", "pad", "--json")[1])[0]
+    assert again == entry
+
+
+def test_nothing_to_recognise(asked, lab):
+    empty = recorded(lab / "empty.h5", [])
+    code, out, err = asked(empty)
+    assert (code, out, err) == (1, "", "no touch in 0 frames\n")
+    assert asked(empty, "--json") == (1, "[]\n", "")
+    assert (
+        asked(recorded(lab / "rest.h5", [np.full((16, 16), 4)] * 9))[2] == "no touch in 9 frames\n"
+    )
+    rest = json.loads(asked(lab / "rest.h5", "--every", "--json")[1])
+    assert {entry["reason"] for entry in rest} == {"no contact"}
+    assert len(rest) == 9
+
+
+def test_what_is_not_recognised_says_why_and_what_to_do(asked, lab):
+    half = np.zeros((16, 16))
+    half[:, :7] = 180  # a bare face up to its edge
+    path = recorded(lab / "bare.h5", [half] * 6)
+    code, out, _ = asked(path)
+    assert code == 1
+    assert out.startswith("0: not recognised: ")
+    assert "; " in out
+    entry = json.loads(asked(path, "--json")[1])[0]
+    assert entry["object"] is entry["face"] is entry["index"] is entry["T_face_probe"] is None
+    assert entry["reason"] in out
+
+
+@pytest.fixture(scope="module")
+def calibrated_touch(lab):
+    """A sensor with dead tactels, its calibration, and touches that name it."""
+    rng, board, fsr = np.random.default_rng(3), Electronics(), fsr_of(16, 16)
+    folder = lab / "calibrated"
+    folder.mkdir()
+
+    def read(forces, number):
+        counts, _ = read_sequence(np.stack([forces] * number), board, fsr, None, rng)
+        counts[:, *DEAD] = 700  # stuck: a reader that believed them would see a bar
+        return counts
+
+    loads = {f: read(np.full((16, 16), f / 256), 40) for f in (0, 40, 100, 200, 400)}
+    made = calibration_from(
+        loads[0], [even_load(loads[f], f, name=f"{f} N") for f in (40, 100, 200, 400)],
+        sensor="bench/0", made="2026-01-01", board=board,
+    )  # fmt: skip
+    assert made.bad[DEAD].all()
+    digest = write_calibration(made, folder / "bench.json")
+    touch = read(forces_of(lab, AT), 10)
+    recorded(folder / "touch.h5", touch, sensor="bench/0", calibration=digest)
+    return folder
+
+
+def test_the_calibration_that_a_recording_names_is_found(asked, calibrated_touch):
+    code, out, err = asked(calibrated_touch / "touch.h5", "--json")
+    assert (code, err) == (0, "")
+    assert_at(json.loads(out)[0], AT)
+    given = asked(calibrated_touch / "touch.h5", "--calibration", calibrated_touch / "bench.json",
+                  "--json")  # fmt: skip
+    assert given[1] == out
+
+
+def test_a_calibration_that_is_missing_or_another_one(asked, lab, calibrated_touch):
+    away = lab / "away"
+    away.mkdir()
+    (away / "touch.h5").write_bytes((calibrated_touch / "touch.h5").read_bytes())
+    (away / "other.json").write_text("{}")
+    _, _, err = asked(away / "touch.h5")
+    assert "which is not beside it: read as counts" in err
+    other = recorded(
+        lab / "other.h5", [np.zeros((16, 16))], sensor="bench/0", calibration="ab" * 32
+    )
+    code, _, err = asked(other, "--calibration", calibrated_touch / "bench.json")
+    assert code == 2
+    assert "made with calibration abababababab..." in err
+
+
+def test_the_object_in_the_robots_base(asked, lab, images):
+    path = recorded(lab / "posed.h5", images[:1], pose=T_BASE_SENSOR)
+    code, out, _ = asked(path)
+    assert code == 0
+    assert "object in the robot's base at (" in out
+    entry = json.loads(asked(path, "--json")[1])[0]
+    known = T_BASE_SENSOR @ np.linalg.inv(entry["T_object_probe"])
+    assert np.array(entry["T_robot_object"]) == pytest.approx(known)
+    assert np.linalg.eigvalsh(entry["robot_covariance"]).min() >= 0
+    wrist = Wrist()
+    hung = recorded(lab / "hung.h5", images[:1],
+                    wrist=counts_of(wrist, distances_at(wrist, 5.0, 0.0, 0.0)))  # fmt: skip
+    entry = json.loads(asked(hung, "--joints", "0,-30,60,-30,0", "--json")[1])[0]
+    assert np.array(entry["T_robot_object"]).shape == (4, 4)
+    code, out, err = asked(path, "--joints", "0,-30,60,-30,0")
+    assert code == 0
+    assert "robot" not in out
+    assert "the place in the robot's base is not known" in err
+    assert "end stops" in err
+
+
+def test_pictures(asked, lab, images):
+    path = recorded(lab / "drawn.h5", images)
+    assert asked(path, "--plot", lab / "one.png")[0] == 0
+    assert sorted(file.name for file in lab.glob("one*.png")) == ["one-0.png", "one-1.png"]
+    code, _, err = asked(path, "--touches", 1, "--plot", lab / "one.png")
+    assert code == 2
+    assert "one-0.png: error: the file is there already" in err.replace("one-1", "one-0")
+    assert "replace it with --replace" in err
+    assert asked(path, "--touches", 1, "--plot", lab / "one.png", "--replace")[0] == 0
+    assert (lab / "one.png").read_bytes() == (lab / "one-0.png").read_bytes()
+    with Image.open(lab / "one.png") as picture:
+        assert picture.size == (1500, 520)
+
+
+def test_the_symbols_of_the_picture_are_those_of_the_touch(lab, images):
+    from recognizer.lab import open_lab
+    from recognizer.pipeline import reader_for, recognise
+    from recognizer.plot.winning import winning
+    from recognizer.signal import signal_of
+
+    reader = reader_for(open_lab(str(lab / "lab.db")), Sensor())
+    signal = signal_of(images[0].astype(np.float64))
+    won, found = winning(reader, signal), recognise(reader, signal)
+    assert won.face.face == found.face
+    points = np.array([[0.0, 0.0], [3.0, -4.0]])
+    assert won.on_sensor(won.on_lattice(points)) == pytest.approx(points)
+    # a symbol's centre, from the lattice and from the face, seen by the sensor
+    seen = {}
+    for cell, label in zip(won.cells, won.registered, strict=True):
+        if label >= 0:
+            at = won.on_sensor((cell + 0.5) * won.encoding.style.pitch_mm)
+            seen[(won.place.row - cell[1], won.place.column + cell[0])] = (at, label)
+    T_probe_face = np.linalg.inv(found.T_face_probe)
+    near = 0
+    for row, column, label, centre in zip(
+        won.face.rows, won.face.columns, won.face.labels, won.face.centres_mm, strict=True
+    ):
+        if (row, column) in seen:
+            at, expected = seen[(row, column)]
+            assert at == pytest.approx((T_probe_face @ [*centre, 0, 1])[:2], abs=1e-6)
+            assert label == expected
+            near += 1
+    assert near >= 9
+    assert won.felt[won.registered >= 0].mean() > 0.8
+    assert winning(reader, signal_of(np.zeros((16, 16)))) is None

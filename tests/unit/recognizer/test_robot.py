@@ -1,0 +1,107 @@
+"""The object in the robot's base: where it was put, and the covariance against drawn errors."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from probe.arm.carried import SensorPose
+from probe.arm.links import Arm, forward
+from probe.errors import PoseError
+from probe.wrist.distances import counts_of, distances_at
+from probe.wrist.geometry import Wrist, gripper_to_plate, plate_to_sensor
+from recognizer.recognition import Recognition, refused
+from recognizer.robot import Seating, carried_pose, object_pose
+
+JOINTS = np.radians([20.0, -40.0, 70.0, -25.0, 15.0])
+PLANAR = np.array([[0.02, 0.004, 1e-4], [0.004, 0.01, -5e-5], [1e-4, -5e-5, 4e-5]])
+
+
+def pose_of(rotvec, at):
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_rotvec(rotvec).as_matrix()
+    T[:3, 3] = at
+    return T
+
+
+T_OBJECT_FACE = pose_of([0.3, 1.1, -0.4], [30.0, -20.0, 10.0])
+T_FACE_PROBE = pose_of([0.0, 0.0, 0.7], [22.0, 31.0, 1.0])
+
+
+def answer(T_face_probe=T_FACE_PROBE):
+    return Recognition(0, "Cube", "F1", (3, 4), T_face_probe, T_OBJECT_FACE @ T_face_probe,
+                       PLANAR, 30.0, None, "")  # fmt: skip
+
+
+def moved(T, error):
+    """A pose with an error of its origin and a small turn about it."""
+    turn = Rotation.from_rotvec(error[3:]) * Rotation.from_matrix(T[:3, :3])
+    return pose_of(turn.as_rotvec(), T[:3, 3] + error[:3])
+
+
+def test_the_object_is_found_where_it_stands():
+    T_base_object = pose_of([0.1, 0.2, 1.3], [350.0, 80.0, 20.0])
+    T_base_sensor = T_base_object @ T_OBJECT_FACE @ T_FACE_PROBE
+    placed = object_pose(answer(), SensorPose(T_base_sensor, np.zeros((6, 6))))
+    assert placed.T_robot_object == pytest.approx(T_base_object, abs=1e-9)
+
+
+def test_the_covariance_is_that_of_drawn_errors():
+    rng = np.random.default_rng(2)
+    root = rng.normal(0, 1, (6, 6)) * np.repeat([0.2, 0.002], 3)[:, None]
+    sensor = SensorPose(pose_of([0.4, -2.2, 0.6], [300.0, 50.0, 90.0]), root @ root.T)
+    seating = Seating(z_mm=0.4, tilt_rad=0.01)
+    placed = object_pose(answer(), sensor, seating)
+    number = 1500
+    errors = rng.multivariate_normal(np.zeros(6), sensor.covariance, number)
+    planar = rng.multivariate_normal(np.zeros(3), PLANAR, number)
+    drawn = np.empty((number, 6))
+    for k in range(number):
+        touch = np.zeros(6)
+        touch[[0, 1, 5]] = planar[k]
+        touch[2] = rng.normal(0, seating.z_mm)
+        touch[3:5] = rng.normal(0, seating.tilt_rad, 2)
+        true = moved(sensor.T_base_sensor, errors[k]) @ np.linalg.inv(
+            T_OBJECT_FACE @ moved(T_FACE_PROBE, touch)
+        )
+        drawn[k, :3] = true[:3, 3] - placed.T_robot_object[:3, 3]
+        turn = true[:3, :3] @ placed.T_robot_object[:3, :3].T
+        drawn[k, 3:] = Rotation.from_matrix(turn).as_rotvec()
+    whitened = np.linalg.solve(np.linalg.cholesky(placed.covariance), drawn.T)
+    assert np.cov(whitened) == pytest.approx(np.eye(6), abs=6 / math.sqrt(number))
+
+
+def test_a_joint_error_moves_the_object_as_its_covariance_says():
+    arm, wrist = Arm(), Wrist()
+    counts = counts_of(wrist, distances_at(wrist, 4.0, 0.01, -0.02))
+    errors = np.array([0.01, 0.0, 0.0, 0.0, 0.0])
+    at = carried_pose(arm, wrist, JOINTS, errors, counts)
+    turned = carried_pose(arm, wrist, JOINTS + errors, np.zeros(5), counts)
+    exact = Seating(0.0, 0.0)
+    known = answer()
+    placed, other = object_pose(known, at, exact), object_pose(known, turned, exact)
+    alone = object_pose(known, carried_pose(arm, wrist, JOINTS, np.zeros(5), counts), exact)
+    step = other.T_robot_object[:3, 3] - placed.T_robot_object[:3, 3]
+    grown = placed.covariance[:3, :3] - alone.covariance[:3, :3]
+    assert np.linalg.norm(step) > 1.0
+    assert grown == pytest.approx(np.outer(step, step), abs=0.02 * step @ step)
+
+
+def test_arm_and_wrist_carry_the_sensor():
+    arm, wrist = Arm(), Wrist()
+    counts = counts_of(wrist, distances_at(wrist, 5.0, 0.02, 0.03))
+    at = carried_pose(arm, wrist, JOINTS, np.full(5, 1e-3), counts)
+    from probe.wrist.distances import distances_mm, wrist_pose
+
+    hanging = wrist_pose(wrist, distances_mm(wrist, counts))
+    expected = forward(arm, JOINTS) @ gripper_to_plate(wrist, hanging) @ plate_to_sensor(wrist)
+    assert at.T_base_sensor == pytest.approx(expected, abs=1e-9)
+    assert (np.linalg.eigvalsh(at.covariance) > -1e-12).all()
+
+
+def test_what_is_not_known():
+    sensor = SensorPose(np.eye(4), np.zeros((6, 6)))
+    assert object_pose(refused(0, "ambiguous"), sensor) is None
+    with pytest.raises(PoseError, match="end stops"):
+        carried_pose(Arm(), Wrist(), JOINTS, np.zeros(5), [0, 0, 0, 0])

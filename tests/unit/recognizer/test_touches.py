@@ -1,0 +1,128 @@
+"""Films of frames are cut into touches by what can be seen in them."""
+
+import numpy as np
+import pytest
+
+from probe.frame import frame_from
+from recognizer.touches import Cutting, every_frame, touches
+
+RNG = np.random.default_rng(8)
+A, B, C = (np.where(RNG.random((16, 16)) < 0.35, RNG.uniform(60, 300, (16, 16)), 0.0)
+           for _ in range(3))  # fmt: skip
+REST = np.zeros((16, 16))
+CUT = Cutting()
+DOWN = np.linspace(0.1, 0.9, 9)
+
+
+def film(*images):
+    """Frames of images, with the noise of a reading and the background of a board."""
+    rng = np.random.default_rng(1)
+    for seq, image in enumerate(images):
+        counts = 3 + image * (1 + 0.02 * rng.standard_normal(image.shape))
+        pose = np.eye(4)
+        pose[0, 3] = seq
+        yield frame_from(np.rint(counts.clip(0, 1023)), t_ns=seq * 1000, seq=seq,
+                         wrist=[seq, 0, 0, 1], pose=pose)  # fmt: skip
+
+
+def pressed(image, hold=40):
+    """Images of a press: down, held, up, and away."""
+    return [image * x for x in DOWN] + [image] * hold + [image * x for x in DOWN[::-1]] + [REST] * 5
+
+
+def cut(*images, **named):
+    return list(touches(film(*images), **named))
+
+
+def test_a_press_is_one_touch_read_where_it_rests():
+    (touch,) = cut(*[REST] * 7, *pressed(A))
+    assert touch.seq == 7
+    assert touch.frames == CUT.enough
+    assert touch.t_ns >= (7 + len(DOWN)) * 1000 - 1000
+    assert touch.counts - 3 == pytest.approx(A, abs=0.02 * 300)
+    middle = touch.t_ns / 1000 + CUT.enough // 2
+    assert touch.pose[0, 3] == middle
+    assert touch.wrist[0] == pytest.approx(middle, abs=0.6)
+
+
+def test_every_press_is_a_touch_also_at_the_same_place():
+    assert len(cut(*pressed(A), *pressed(A), *pressed(B))) == 3
+
+
+def test_a_touch_is_told_as_soon_as_it_rests():
+    frames = film(*pressed(A, hold=500))
+    next(touches(frames))
+    assert next(frames).seq <= len(DOWN) + CUT.enough + 1
+
+
+def test_a_short_rest_is_read_when_the_contact_ends():
+    (touch,) = cut(*pressed(A, hold=CUT.few + 1))
+    assert CUT.few <= touch.frames <= CUT.few + 3
+    assert touch.counts - 3 == pytest.approx(A, rel=0.08, abs=6)
+
+
+def test_a_slow_press_is_not_read_before_it_rests():
+    rise = [A * x for x in np.linspace(0.1, 1.0, 300)]
+    (touch,) = cut(*rise, *[A] * 30)
+    assert touch.counts.sum() == pytest.approx((A + 3).sum(), rel=0.03)
+
+
+def test_pressing_harder_at_one_place_is_the_same_touch():
+    assert len(cut(*[A * 0.5] * 30, *[A] * 30, *[A * 0.7] * 30)) == 1
+
+
+def test_places_that_follow_each_other_without_a_rest_are_touches():
+    found = cut(*[A] * 30, *[B] * 30, *[C] * 30)
+    assert [touch.seq for touch in found] == [0, 30, 60]
+    for touch, image in zip(found, (A, B, C), strict=True):
+        assert np.corrcoef(touch.counts.ravel(), image.ravel())[0, 1] > 0.99
+
+
+def test_what_differs_on_the_way_down_is_no_touch_of_its_own():
+    edge = np.zeros((16, 16))
+    edge[:, :2] = 80  # a tilted probe feels its rim first
+    assert len(cut(edge, edge, *pressed(A))) == 1
+
+
+def test_images_that_do_not_follow_each_other_are_touches():
+    found = cut(A, B, C, A)
+    assert [(touch.seq, touch.frames) for touch in found] == [(0, 1), (1, 1), (2, 1), (3, 1)]
+    assert [touch.seq for touch in cut(REST, A, REST, B)] == [1, 3]
+
+
+def test_many_unlike_images_do_not_wait_for_the_end():
+    images = [A, B, C] * 100
+    frames = film(*images)
+    reading = touches(frames)
+    next(reading)
+    assert next(frames).seq <= CUT.fragments + 2
+    assert len(list(reading)) == len(images) - 1 - 1  # one frame was taken out here
+
+
+def test_a_slide_is_read_again_where_it_looks_otherwise():
+    steps = [np.roll(A, step, axis=1) for step in range(4) for _ in range(30)]
+    found = cut(*steps)
+    assert [touch.seq for touch in found] == [0, 30, 60, 90]
+
+
+def test_nothing_is_touched():
+    assert cut() == []
+    assert cut(*[REST] * 50) == []
+    spike = REST.copy()
+    spike[3, 3] = 500
+    assert cut(*[spike] * 50) == []
+
+
+def test_bad_tactels_are_no_contact():
+    stuck = REST.copy()
+    stuck[4] = 700
+    trust = np.where(stuck > 0, 0.0, 1.0)
+    assert len(cut(*[stuck] * 40)) == 1
+    assert cut(*[stuck] * 40, trust=trust) == []
+
+
+def test_frames_by_number():
+    images = [REST, A, A, B, B]
+    found = list(every_frame(film(*images), 2))
+    assert [(touch.seq, touch.frames) for touch in found] == [(0, 2), (2, 2), (4, 1)]
+    assert len(list(every_frame(film(*images)))) == 5
