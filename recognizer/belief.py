@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.lab import Encoding
-from recognizer.locate import Place
+from recognizer.locate import Place, shown_at
 from recognizer.symbols.fit import Fit
 from recognizer.symbols.refine import Image, explained_share
 from recognizer.symbols.template import Template
@@ -36,6 +36,8 @@ class Thresholds:
     margin: float = 10.0  #: nats over the best other place
     surprise: float = 4.0  #: nats over symbols of no registered place
     explained: float = 0.66  #: share of the image's variance
+    explained_by_many: float = 0.55  #: the same where `many` cells agree
+    many: int = 10
     cells: int = 4  #: that hold a symbol and are seen
     contradicted: int = 1  #: cells that speak `CLEARLY` for another symbol; `PLAINLY`: none
     rim_mm: float = 2.0  #: how far the sensor's centre may lie beyond the face
@@ -55,9 +57,10 @@ class Support:
 
     def holds(self, limits: Thresholds) -> bool:
         """Return whether an encoded surface is believed."""
+        few = self.cells < limits.many
         return (
             self.surprise >= limits.surprise
-            and self.explained >= limits.explained
+            and self.explained >= (limits.explained if few else limits.explained_by_many)
             and self.clear <= limits.contradicted
             and self.plain == 0
         )
@@ -99,15 +102,6 @@ def unplaced(encoding: Encoding, fit: Fit) -> float:
     options = encoding.array.order + 1
     each = np.log(np.exp(fit.scores).sum(axis=1)) - math.log(options)
     return float(each.sum()) + fit.value + math.log(len(encoding.keys))
-
-
-def shown_at(encoding: Encoding, place: Place, cells: Ints) -> Ints:
-    """Return the labels (m,) that cells (m, 2) of a lattice show at a place; `order` for none."""
-    array = encoding.array
-    held_by, label = encoding.at(
-        (place.row - cells[:, 1]) % array.rows, (place.column + cells[:, 0]) % array.columns
-    )
-    return np.where(held_by == place.face, label, array.order).astype(np.int64)
 
 
 def _within(cells: Ints, some: Ints) -> NDArray[np.bool_]:

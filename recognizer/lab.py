@@ -23,6 +23,7 @@ from generator.database.read import read_array, read_object, read_styles
 from generator.database.registered import RegisteredObject, RegisteredStyle
 from generator.database.transaction import reading
 from recognizer.errors import LabError
+from recognizer.windows import Windows, windows_of
 
 Ints = NDArray[np.int64]
 
@@ -58,6 +59,7 @@ class Encoding:
     faces: Ints  #: (f, 2) object and face number in the database
     names: dict[int, str]  #: of the objects, by their numbers
     engine: Engine
+    indexed: list[Windows] = field(default_factory=list)  #: filled by `windows`
     known: dict[int, EncodedFace] = field(default_factory=dict)
 
     def at(self, rows: Ints, columns: Ints) -> tuple[NDArray[np.int32], NDArray[np.int8]]:
@@ -70,6 +72,12 @@ class Encoding:
         held = self.keys[place] == wanted
         none = np.int32(-1)
         return np.where(held, self.owners[place], none), np.where(held, self.labels[place], none)
+
+    def windows(self) -> list[Windows]:
+        """Return the index of all small windows, made when it is first asked for."""
+        if not self.indexed:
+            self.indexed.extend(windows_of(self))
+        return self.indexed
 
     def face(self, number: int) -> EncodedFace:
         """Return a face by its number, from memory or from the database."""

@@ -22,7 +22,9 @@ Array = NDArray[np.float64]
 
 CAP = 8.0  #: nats that one cell can cost at most
 WORN = 4.0  #: nats that a symbol costs that is registered but not felt at all
-ANCHORS = 3  #: cells tried as the one that is surely registered
+ANCHORS = 3  #: cells tried as the one that is surely registered, where no window is seen whole
+WINDOWS = 4  #: whole windows that are looked up, the surest ones
+FIRST, FOLLOWED = 6, 512  #: after so many cells only so many candidates go on
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,16 +48,18 @@ def places(encoding: Encoding, fits: tuple[Fit, ...], keep: int) -> list[Place]:
 
 def place_scores(encoding: Encoding, fit: Fit, place: Place) -> float:
     """Return the log-likelihood of the image if the fit lies at this place, nats."""
-    scores = _worn(fit.scores)
-    values = _values(
-        encoding,
-        fit,
-        scores,
-        np.array([place.row]),
-        np.array([place.column]),
-        np.array([place.face], np.int32),
+    labels = shown_at(encoding, place, fit.cells)
+    scores = _worn(fit.scores)[np.arange(len(labels)), labels]
+    return float(scores.sum()) + fit.value
+
+
+def shown_at(encoding: Encoding, place: Place, cells: Ints) -> Ints:
+    """Return the labels (m,) that cells (m, 2) of a lattice show at a place; `order` for none."""
+    array = encoding.array
+    held_by, label = encoding.at(
+        (place.row - cells[:, 1]) % array.rows, (place.column + cells[:, 0]) % array.columns
     )
-    return float(values[0]) + fit.value
+    return np.where(held_by == place.face, label, array.order).astype(np.int64)
 
 
 def _worn(scores: Array) -> Array:
@@ -65,32 +69,77 @@ def _worn(scores: Array) -> Array:
 
 
 def _places_of(encoding: Encoding, fit: Fit, number: int, keep: int) -> list[Place]:
-    order = encoding.array.order
     scores = _worn(fit.scores)
+    found = _by_windows(encoding, fit)
+    if found is None:
+        found = _by_anchors(encoding, fit, scores)
+    rows, columns, owners = found
+    if len(rows) == 0:
+        return []
+    values = _values(encoding, fit, scores, rows, columns, owners)
+    best = np.argsort(-values, kind="stable")[:keep]
+    return [
+        Place(number, int(rows[k]), int(columns[k]), int(owners[k]), float(values[k]) + fit.value)
+        for k in best
+    ]
+
+
+def _by_windows(encoding: Encoding, fit: Fit) -> _Candidates | None:
+    """Return where (0, 0) can lie, from the surest whole windows; None if there is none."""
+    order = encoding.array.order
+    symbols = np.sort(fit.scores[:, :order], axis=1)
+    sure = np.minimum(symbols[:, -1] - symbols[:, -2], symbols[:, -1] - fit.scores[:, order])
+    labels = fit.scores[:, :order].argmax(axis=1)
+    named = {cell: n for n, cell in enumerate(map(tuple, fit.cells.tolist()))}
+    seen: list[tuple[float, int, list[int]]] = []
+    for k, index in enumerate(encoding.windows()):
+        down, right = index.shape
+        for i, j in named:
+            inside = [named.get((i + c, j - r)) for r in range(down) for c in range(right)]
+            cells = [n for n in inside if n is not None]
+            if len(cells) == len(inside) and (least := float(sure[cells].min())) > 0:
+                seen.append((least, k, cells))
+    if len(seen) < WINDOWS:
+        return None
+    found: list[Ints] = []
+    shifts: list[Ints] = []
+    for _, k, cells in sorted(seen, reverse=True)[:WINDOWS]:
+        weakest = min(cells, key=lambda n: float(sure[n]))
+        second = int(np.argsort(fit.scores[weakest, :order])[-2])
+        for other in (int(labels[weakest]), second):
+            code = 0
+            for n in cells:
+                code = code * order + (other if n == weakest else int(labels[n]))
+            at = encoding.windows()[k].at(code).astype(np.int64)
+            found.append(at)
+            shifts.append(np.tile(fit.cells[cells[0]], (len(at), 1)))
+    return _zeros(encoding, np.concatenate(found), np.concatenate(shifts))
+
+
+def _by_anchors(encoding: Encoding, fit: Fit, scores: Array) -> _Candidates:
+    """Return where (0, 0) can lie if one of the likeliest cells is a registered one."""
+    order = encoding.array.order
     told = scores[:, :order].max(axis=1) - scores[:, order]  # a symbol rather than none
     anchors = np.argsort(-told, kind="stable")[:ANCHORS]
-    best: dict[tuple[int, int, int], float] = {}
+    found: list[Ints] = [np.zeros(0, np.int64)]
+    shifts: list[Ints] = [np.zeros((0, 2), np.int64)]
     for anchor in anchors[told[anchors] > 0]:
-        rows, columns, owners = _candidates(encoding, fit, scores, int(anchor))
-        values = _values(encoding, fit, scores, rows, columns, owners)
-        for k in np.argsort(-values, kind="stable")[:keep]:
-            key = (int(rows[k]), int(columns[k]), int(owners[k]))
-            best[key] = float(values[k])
-    ranked = sorted(best.items(), key=lambda item: (-item[1], item[0]))[:keep]
-    return [Place(number, *key, value + fit.value) for key, value in ranked]
+        likely = scores[anchor, :order] > -CAP
+        at = np.flatnonzero(likely[encoding.labels[:-1]])
+        found.append(at)
+        shifts.append(np.tile(fit.cells[anchor], (len(at), 1)))
+    return _zeros(encoding, np.concatenate(found), np.concatenate(shifts))
 
 
-def _candidates(
-    encoding: Encoding, fit: Fit, scores: Array, anchor: int
-) -> tuple[Ints, Ints, NDArray[np.int32]]:
-    """Return where (0, 0) can lie (rows, columns) if `anchor` is a registered cell, and whose."""
+def _zeros(encoding: Encoding, at: Ints, cells: Ints) -> _Candidates:
+    """Return where (0, 0) lies, each place once, if cells (n, 2) are the registered ones `at`."""
     array = encoding.array
-    i, j = fit.cells[anchor].tolist()
-    likely = scores[anchor, : array.order] > -CAP
-    kept = np.flatnonzero(likely[encoding.labels[:-1]])
-    rows, columns = np.divmod(encoding.keys[kept], np.uint64(array.columns))
-    rows, columns = rows.astype(np.int64), columns.astype(np.int64)
-    return (rows + j) % array.rows, (columns - i) % array.columns, encoding.owners[kept]
+    rows, columns = np.divmod(encoding.keys[at], np.uint64(array.columns))
+    row = (rows.astype(np.int64) + cells[:, 1]) % array.rows
+    column = (columns.astype(np.int64) - cells[:, 0]) % array.columns
+    owners = encoding.owners[at]
+    _, once = np.unique(np.stack([row, column, owners.astype(np.int64)]), axis=1, return_index=True)
+    return row[once], column[once], owners[once]
 
 
 def _values(
@@ -101,10 +150,27 @@ def _values(
     columns: Ints,
     owners: NDArray[np.int32],
 ) -> Array:
-    """Return the log-likelihood of each candidate, 0 if every cell is at its best."""
+    """Return the log-likelihood of each candidate, 0 if every cell is at its best.
+
+    The surest cells come first; of many candidates only the best are followed to the end.
+    """
     array = encoding.array
+    spread = scores.max(axis=1) - scores.min(axis=1)
+    order = np.argsort(-spread * np.minimum(fit.seen, 12.0), kind="stable")
     total = np.zeros(len(rows))
-    for (i, j), cell in zip(fit.cells.tolist(), scores, strict=True):
-        held_by, label = encoding.at((rows - j) % array.rows, (columns + i) % array.columns)
-        total += cell[np.where(held_by == owners, label, array.order)]
+    kept = np.arange(len(rows))
+    for done, n in enumerate(order.tolist()):
+        if done == FIRST and len(kept) > FOLLOWED:
+            kept = np.argpartition(-total, FOLLOWED)[:FOLLOWED]
+            low = np.full(len(rows), -np.inf)
+            low[kept] = total[kept]
+            total = low
+        i, j = fit.cells[n].tolist()
+        held_by, label = encoding.at(
+            (rows[kept] - j) % array.rows, (columns[kept] + i) % array.columns
+        )
+        total[kept] += scores[n][np.where(held_by == owners[kept], label, array.order)]
     return total
+
+
+_Candidates = tuple[Ints, Ints, NDArray[np.int32]]

@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import Sensor
-from recognizer.belief import Support, Thresholds, shown_at, support
+from recognizer.belief import Support, Thresholds, support
 from recognizer.lab import Encoding, Lab
-from recognizer.locate import Place, place_scores, places
+from recognizer.locate import Place, place_scores, places, shown_at
 from recognizer.pose import face_covariance, face_pose, inside_mm
 from recognizer.recognition import (
     AMBIGUOUS,

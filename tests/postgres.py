@@ -21,17 +21,17 @@ import tempfile
 import time
 from pathlib import Path
 
+INSTALLED = Path("/usr/lib/postgresql")
 MISSING = "PostgreSQL's server is not installed: apt-get install postgresql"
 FAST = ("-F", "-c", "full_page_writes=off", "-c", "synchronous_commit=off")
 
 
 def programs() -> Path:
     """Return the folder of the newest installed server."""
-    found = [path.parent for path in Path("/usr/lib/postgresql").glob("*/bin/initdb")]
-    beside = shutil.which("initdb")
-    if not found and beside is None:
+    found = [path.parent for path in INSTALLED.glob("*/bin/initdb")]
+    if not found:
         sys.exit(MISSING)
-    return max(found, key=lambda p: int(p.parent.name)) if found else Path(beside).parent
+    return max(found, key=lambda folder: int(folder.parent.name))
 
 
 def free_port() -> int:
@@ -52,7 +52,7 @@ def main() -> int:
         os.chown(folder, server.pw_uid, server.pw_gid)
         user |= {"user": server.pw_uid, "group": server.pw_gid, "extra_groups": []}
     # Ctrl-C in the terminal is for the tests; the server ends when they close our input.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGINT, lambda *_: None)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     user["start_new_session"] = True
     port, data, log = free_port(), folder / "data", folder / "log"
@@ -88,7 +88,11 @@ def main() -> int:
     finally:
         if server is not None and server.poll() is None:
             server.send_signal(signal.SIGINT)  # ends at once, without waiting for clients
-            server.wait(timeout=60)
+            try:
+                server.wait(timeout=30)
+            except subprocess.TimeoutExpired:
+                server.kill()
+                server.wait()
         shutil.rmtree(folder, ignore_errors=True)
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rich.markup import escape
 
 from generator.command import report
+from generator.database.url import without_password
 
 if TYPE_CHECKING:
     from generator.database.carry import Carried
@@ -21,10 +22,14 @@ if TYPE_CHECKING:
 def listed(entries: Sequence[ObjectEntry], url: str, *, as_json: bool) -> None:
     """Say which objects a database holds."""
     if as_json:
-        report.write_json({"objects": [_entry_values(e) for e in entries], "database": url})
+        report.write_json(
+            {"objects": [_entry_values(e) for e in entries], "database": without_password(url)}
+        )
         return
     if not entries:
-        report.write(f"no objects in {url}; make one with: encode-object SPEC.yaml")
+        report.write(
+            f"no objects in {without_password(url)}; make one with: encode-object SPEC.yaml"
+        )
         return
     titles = ["object", "shape", "faces", "symbols", "array", "pitch", "registered (UTC)"]
     some_retired = any(entry.retired_utc for entry in entries)
@@ -40,7 +45,7 @@ def listed(entries: Sequence[ObjectEntry], url: str, *, as_json: bool) -> None:
 def shown(held: RegisteredObject, files: Sequence[PartState], url: str, *, as_json: bool) -> None:
     """Say all about one object."""
     if as_json:
-        report.write_json(_object_values(held, files) | {"database": url})
+        report.write_json(_object_values(held, files) | {"database": without_password(url)})
         return
     e, style, alphabet = held.entry, held.style, held.alphabet.get("name", "")
     lengths = f"height {style.height_mm:g}, stroke {style.stroke_mm:g}"
@@ -77,7 +82,9 @@ def shown(held: RegisteredObject, files: Sequence[PartState], url: str, *, as_js
 def retired(entries: Sequence[ObjectEntry], done: str, url: str, *, as_json: bool) -> None:
     """Say that objects were `removed`, `restored` or `retired`."""
     if as_json:
-        report.write_json({done: [_entry_values(e) for e in entries], "database": url})
+        report.write_json(
+            {done: [_entry_values(e) for e in entries], "database": without_password(url)}
+        )
         return
     cells = {
         "removed": "are free again",
@@ -101,10 +108,12 @@ def warning_before(entries: Sequence[ObjectEntry]) -> str:
 def exported(done: Carried, file: Path, url: str, *, as_json: bool) -> None:
     """Say what was exported, and what the other lab does with it."""
     if as_json:
-        report.write_json({"exported": list(done.copied), "file": str(file), "database": url})
+        report.write_json(
+            {"exported": list(done.copied), "file": str(file), "database": without_password(url)}
+        )
         return
     there = f"in the other lab: encode-object import {file.name}"
-    report.write(f"{_counted(done.copied)} of {url} exported to {file}; {there}")
+    report.write(f"{_counted(done.copied)} of {without_password(url)} exported to {file}; {there}")
 
 
 def imported(done: Carried, url: str, *, dry_run: bool, as_json: bool) -> None:
@@ -115,10 +124,12 @@ def imported(done: Carried, url: str, *, dry_run: bool, as_json: bool) -> None:
             "known": list(done.known),
             "refused": [{"name": r.name, "cause": r.cause, "fix": r.fix} for r in done.refused],
         }
-        report.write_json(values | {"dry_run": dry_run, "database": url})
+        report.write_json(values | {"dry_run": dry_run, "database": without_password(url)})
         return
     verb = "would be imported" if dry_run else "imported"
-    report.write("\n  ".join([f"{_counted(done.copied)} {verb} into {url}", *done.copied]))
+    report.write(
+        "\n  ".join([f"{_counted(done.copied)} {verb} into {without_password(url)}", *done.copied])
+    )
     if done.known:
         report.write(f"{_counted(done.known)} known already, left as they are")
     for each in done.refused:

@@ -109,7 +109,8 @@ def import_objects(
     engine_home = normal_url(url)
     if _same(home, engine_home):
         fix = "name the file that another lab exported"
-        raise DatabaseError("a database cannot be imported into itself", fix=fix, place=given)
+        cause = "a database cannot be imported into itself"
+        raise DatabaseError(cause, fix=fix, place=place_of(home))
     from_file = home.get_backend_name() == "sqlite"
     name = Path(home.database or "").name if from_file else place_of(home)
     origin = Origin(name, datetime.now(UTC).isoformat(timespec="seconds"))

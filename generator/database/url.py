@@ -47,6 +47,19 @@ def normal_url(url: str) -> URL:
     )
 
 
+def without_password(url: str) -> str:
+    """Return a database's address as it may be shown.
+
+    Examples
+    --------
+    >>> without_password("postgresql://lab:secret@host/objects")
+    'postgresql://lab:***@host/objects'
+    >>> without_password("sqlite:///lab.db")
+    'sqlite:///lab.db'
+    """
+    return make_url(url).render_as_string(hide_password=True)
+
+
 def part_file(url: URL, file: str) -> str:
     """Return how a database names a part's file: from its own folder, absolute on a server.
 

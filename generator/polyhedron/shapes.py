@@ -35,7 +35,7 @@ VERTEX_LETTERS = {"tetrahedron": "A", "box": "B", "cube": "C", "triangular_prism
 
 def cube(side: float) -> Polyhedron:
     """Return a cube: 8 vertices, F1 base, F2 front, F3 right, F4 back, F5 left, F6 top."""
-    _check_lengths("cube", side=side)
+    check_lengths("cube", side=side)
     return _prism("cube", _rectangle(side, side), side)
 
 
@@ -44,13 +44,13 @@ def box(size: Sequence[float]) -> Polyhedron:
     if isinstance(size, str) or not isinstance(size, Sequence) or len(size) != 3:
         raise ShapeError(f"box has three lengths, not {size!r}", fix="write [80 mm, 80 mm, 120 mm]")
     x, y, z = size
-    _check_lengths("box", x=x, y=y, z=z)
+    check_lengths("box", x=x, y=y, z=z)
     return _prism("box", _rectangle(x, y), z)
 
 
 def triangular_prism(side: float, height: float) -> Polyhedron:
     """Return a right prism over an equilateral triangle: F1 base, F2 to F4 sides, F5 top."""
-    _check_lengths("triangular_prism", side=side, height=height)
+    check_lengths("triangular_prism", side=side, height=height)
     return _prism("triangular_prism", _regular_polygon(3, side), height)
 
 
@@ -59,7 +59,7 @@ def prism(
 ) -> Polyhedron:
     """Return a right prism over a regular polygon given by its side or its circumradius."""
     side = _side("prism", sides, side, radius)
-    _check_lengths("prism", side=side, height=height)
+    check_lengths("prism", side=side, height=height)
     return _prism("prism", _regular_polygon(sides, side), height)
 
 
@@ -68,13 +68,13 @@ def pyramid(
 ) -> Polyhedron:
     """Return a right pyramid over a regular polygon given by its side or its circumradius."""
     side = _side("pyramid", sides, side, radius)
-    _check_lengths("pyramid", side=side, height=height)
+    check_lengths("pyramid", side=side, height=height)
     return _pyramid("pyramid", _regular_polygon(sides, side), height)
 
 
 def tetrahedron(side: float) -> Polyhedron:
     """Return a regular tetrahedron with edges of `side`: a pyramid of three sides, F1 its base."""
-    _check_lengths("tetrahedron", side=side)
+    check_lengths("tetrahedron", side=side)
     return _pyramid("tetrahedron", _regular_polygon(3, side), side * math.sqrt(2.0 / 3.0))
 
 
@@ -84,7 +84,7 @@ def octahedron(side: float) -> Polyhedron:
     Vertices: 1 to 4 on +x, +y, -x, -y, 5 on +z, 6 on -z. F1 to F4 are the upper faces from
     the quadrant x, y > 0 on, F5 to F8 the lower ones below them.
     """
-    _check_lengths("octahedron", side=side)
+    check_lengths("octahedron", side=side)
     r = side / math.sqrt(2.0)
     vertices = [(r, 0, 0), (0, r, 0), (-r, 0, 0), (0, -r, 0), (0, 0, r), (0, 0, -r)]
     upper = [(i, (i + 1) % 4, 4) for i in range(4)]
@@ -100,7 +100,7 @@ def dodecahedron(side: float) -> Polyhedron:
     to F12 lie towards (0, -, -), (0, -, +), (0, +, -), (0, +, +) and these turned to
     (-, -, 0) ... (+, +, 0), then (-, 0, -) ... (+, 0, +).
     """
-    _check_lengths("dodecahedron", side=side)
+    check_lengths("dodecahedron", side=side)
     golden = (1.0 + math.sqrt(5.0)) / 2.0
     a = side * golden / 2.0  # half the edge of the inscribed cube
     short, long = a / golden, a * golden
@@ -197,13 +197,13 @@ def _side(shape: str, sides: int, side: float | None, radius: float | None) -> f
     if side is not None and radius is None:
         return side
     if radius is not None and side is None:
-        _check_lengths(shape, radius=radius)
+        check_lengths(shape, radius=radius)
         return 2.0 * radius * math.sin(math.pi / sides)
     which = "both side and radius" if side is not None else "neither side nor radius"
     raise ShapeError(f"{shape} is given {which}", fix="give one of the two")
 
 
-def _check_lengths(shape: str, **lengths: float) -> None:
+def check_lengths(shape: str, **lengths: float) -> None:
     """Refuse lengths that are no lengths, out of range, or out of proportion."""
     for name, length in lengths.items():
         if isinstance(length, bool) or not isinstance(length, int | float | np.floating):

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from generator.errors import ShapeError
 from generator.polyhedron.check_edges import edge_problems, number_problems
 from generator.polyhedron.check_faces import crossing_problems, face_problems
+from generator.polyhedron.developable import Developable
 from generator.polyhedron.flatten import flattened
 from generator.polyhedron.polygon import signed_volume
 from generator.polyhedron.surface import (
@@ -69,6 +70,7 @@ class Polyhedron:
     faces: tuple[Face, ...]
     edges: tuple[WingedEdge, ...]
     notes: tuple[str, ...] = ()  #: what was changed to make the solid, for the person to read
+    surfaces: tuple[Developable, ...] = ()  #: round faces, each a run of `faces`
 
     @property
     def euler_characteristic(self) -> int:

@@ -30,7 +30,8 @@ class ShapeSpec:
     solid                                         sha256 (of the faces of a solid from a script)
     ============================================  ===============================================
 
-    All but `file` and `solid` are those that the functions of `generator.polyhedron.shapes.SHAPES` take.
+    All but `file` and `solid` are what the functions of `generator.polyhedron.shapes.SHAPES`
+    take.
     """
 
     kind: str

@@ -54,7 +54,9 @@ def spec_of(settings: Mapping[str, Any], shape: ShapeSpec) -> Located:
         raise SpecError(explained(error, tree, NamedSettings)) from None
     if read.copies != 1:
         fix = "call encode once for each copy, with a name of its own"
-        raise SpecError([Problem("one solid is encoded at a time", fix, tree.key_mark(("copies",)))])
+        raise SpecError(
+            [Problem("one solid is encoded at a time", fix, tree.key_mark(("copies",)))]
+        )
     return Located(resolved(read, tree, shape)[0], tree)
 
 

@@ -34,8 +34,8 @@ Array = NDArray[np.float64]
 
 STEEPEST_RAD = 0.35  #: tilts beyond are not small
 DEEPEST = 0.5  #: mean indentation, of the pad's height, beyond which strains are not small
-THINNEST = 1.5  #: points in touch per cell, on the mean, below which a cover is chance
-_FEW = 8  # cells in touch, from which on THINNEST is asked
+THINNEST = 1.5  #: points of a cell that meet a stroke, on the mean, below which that is chance
+_FEW = 2  # cells on a step, from which on THINNEST is asked; one may be a sharp corner
 _TURNED = 0.05  # of the indentation: what a turn may change across a cell
 _LEAST = 2e-3  # of a cell: indentations below are not resolved
 _PASSES = 25
@@ -145,12 +145,12 @@ def _settled(patch: Patch, grid: Influence, touch: Touch) -> tuple[Pressed, Pose
         enough = min(enough, _HELD_RAD) if held else min(enough, FARTHEST_RAD)
         if turn <= enough and not missed.any():
             _refuse_steep(pose)
-            _refuse_deep(pressed, sunk, touch)
             _refuse_thin(patch, pose, sunk.reshape(grid.rows, -1)[1:-1, 1:-1])
+            _refuse_deep(pressed, sunk, depth, touch)
             return pressed, pose
         floor = min(-depth, float((levels.left_out_mm - moved_mm)[missed].min(initial=0.0)))
     _refuse_steep(pose)
-    _refuse_deep(pressed, sunk, touch)
+    _refuse_deep(pressed, sunk, depth, touch)
     raise ContactError(
         f"the plate does not settle within {_PASSES} passes over the surface",
         fix="report the scene; a stiffer wrist helps",
@@ -200,7 +200,7 @@ def _refuse_steep(pose: Pose) -> None:
         )
 
 
-def _refuse_deep(pressed: Pressed, sunk_mm: Array, touch: Touch) -> None:
+def _refuse_deep(pressed: Pressed, sunk_mm: Array, deepest_mm: float, touch: Touch) -> None:
     """Refuse strains that are not small."""
     height = pressed.levels.grid.sensor.overlay.height_mm
     p = pressed.pressures
@@ -211,18 +211,30 @@ def _refuse_deep(pressed: Pressed, sunk_mm: Array, touch: Touch) -> None:
             f"mean, beyond {DEEPEST * height:g} mm strains are not small",
             fix="press with less force, on more of the surface, or take tabs",
         )
+    if deepest_mm > height:
+        raise ContactError(
+            f"{touch.force_n:g} N press the surface {deepest_mm:.3g} mm into a pad of "
+            f"{height:g} mm",
+            fix="press with less force, on more of the surface, or take tabs",
+        )
 
 
 def _refuse_thin(patch: Patch, pose: Pose, sunk_mm: Array) -> None:
-    """Refuse strokes whose cover is chance: hit by one point of a cell here and there."""
+    """Refuse strokes whose cover is chance: met by one point of a cell here and there.
+
+    Counted are cells in touch, and on a step: points of theirs stand out by more than points
+    are apart. What is less steep than 45 degrees is no step, however few points it touches.
+    """
+    samples = len(patch.heights_mm)
     free = pose.heights_mm(patch.centres_mm) + sunk_mm.ravel()
-    many = (patch.heights_mm > free[patch.cells]).sum(axis=0)
-    cells = int((many > 0).sum())
-    if cells >= _FEW and many.sum() < THINNEST * cells:
+    heights = patch.heights_mm[:, (patch.heights_mm > free[patch.cells]).any(axis=0)]
+    apart = patch.dx_mm / math.sqrt(samples)
+    many = np.count_nonzero(heights > heights.max(axis=0) - apart, axis=0)
+    many = many[many < samples]
+    if len(many) >= _FEW and many.sum() < THINNEST * len(many):
         raise ContactError(
-            f"of {len(patch.heights_mm)} points in a cell of {patch.dx_mm:.3g} mm only "
-            f"{many.sum() / cells:.2g} are in touch on the mean: the strokes are too thin to be "
-            "felt by their true width",
+            f"of {samples} points in a cell of {patch.dx_mm:.3g} mm only {many.mean():.2g} meet "
+            "the strokes, on the mean: they are too thin to be felt by their true width",
             fix="take more cells per tactel or more samples per cell, or a wider stroke",
         )
 

@@ -6,9 +6,9 @@ neo-Hookean column; the plate comes to rest by `plate`.
 
 The law of a tip is `tab_law`'s. Where the surface is a step, the share that it covers is a
 count of points: in x and y the force moves in small steps, finer with more points. Forces act
-at the points, so a tab that is pressed on one side turns the plate. Where most of the force
-goes through strokes that one or two points of a tip meet by chance, the tips are asked more
-finely, and strokes too thin for the finest pattern are refused.
+at the points, so a tab that is pressed on one side turns the plate. Where strokes are so thin that
+one or two points of a tip meet them by chance, the tips are asked more finely; strokes too thin
+for the finest pattern are refused.
 """
 
 from __future__ import annotations
@@ -112,19 +112,18 @@ def _standing(pose: Pose, steepest_rad: float) -> None:
 
 
 def _met_by_chance(heights_mm: Array, forces_n: Array, overlay: Overlay) -> int:
-    """Return how many tabs meet the surface at a point or two that stand out of their tips.
+    """Return how many tabs meet the surface with a point or two that stand out of their tips.
 
-    None, unless they bear much of the force. To stand out is to be higher than the rest of the
-    tip by more than points are apart: what is less steep than 45 degrees does not.
+    None, unless they are several, and the most of those that stand on a step. To stand out is to
+    be higher than the rest of the tip by more than points are apart: what is less steep than 45
+    degrees does not.
     """
-    bearing = np.flatnonzero(forces_n)
     q = heights_mm.shape[1]
     apart = overlay.tab_diameter_mm / 2 * math.sqrt(math.pi / q)
-    tips = heights_mm.take(bearing, axis=0)
+    tips = heights_mm.take(np.flatnonzero(forces_n), axis=0)
     near = np.count_nonzero(tips > tips.max(axis=1, keepdims=True) - apart, axis=1)
-    few = near <= min(_CHANCE, q // 7)
-    borne = float(forces_n[bearing[few]].sum())
-    return int(np.count_nonzero(few)) if borne > _MUCH * float(forces_n.sum()) else 0
+    few = int(np.count_nonzero(near <= min(_CHANCE, q // 7)))
+    return few if few > max(1, _MOST * np.count_nonzero(near < q)) else 0
 
 
 def asked(surface: Surface, touch: Touch, points_mm: Array) -> Array:
@@ -188,7 +187,7 @@ def settled(
 _PLAIN = Tips()
 _FINER = (61, 217, 817)  # points on a tip, for thin strokes
 _CHANCE = 2  # points of a tip that may meet a stroke by chance
-_MUCH = 0.25  # of the force
+_MOST = 0.5  # of the tabs on a step
 _MANY = 4  # tabs; fewer are on a corner, which is sharp for any pattern
 _HOPELESS_RAD = 10.0
 _MARGIN = 0.1  # of the foreseen depth, further down which points are still computed

@@ -1,15 +1,15 @@
 """What a simulated probe feels, beat by beat: it rests, comes down, holds, and lifts.
 
-Touch on a face -> forces of a few steps down -> counts at the board's rate. The film
-remembers (hysteresis, creep), and the board is noisy, as in `probe.simulate`. Nothing is
-computed at rest but noise. Thesis 4.2.
+Touch on a face -> forces -> counts at the board's rate. On the way down and up, two beats each,
+the forces are taken in proportion; the film remembers (hysteresis, creep), and the board is
+noisy, as in `probe.simulate`. Thesis 4.2.
 """
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import count
 
 import numpy as np
@@ -67,12 +67,8 @@ class Beats:
                 f"a force of {touch.force_n:g} N", fix=f"give more than 0, at most {LARGEST_N:g} N"
             )
         full = press(scene.surface, self.sensor, touch).forces_n
-        down = [
-            press(scene.surface, self.sensor, replace(touch, force_n=touch.force_n * s)).forces_n
-            for s in STEPS
-        ]
         held = self._beats(self.manner.hold_s)
-        steps = [(1, forces) for forces in down]
+        steps = [(1, share * full) for share in STEPS]
         self._play([*steps, (held, full), *reversed(steps), (1, self._rest)])
 
     def load(self, newtons: float) -> None:

@@ -27,6 +27,7 @@ RETRY_S = 1.0  #: after a probe went away for good
 SILENT_S = 0.6  #: without a frame a probe is gone
 AT_ONCE = 512  #: frames taken at a time
 POINTS = 800  #: of the time line's picture
+LONGEST = 2_000_000  #: frames of a recording that is played
 JUMP_S = 0.5  #: longer pauses in a recording are shortened to it
 
 
@@ -183,6 +184,11 @@ class ReplayFeed:
     def __init__(self, url: str, recording: Recording) -> None:
         self.url = url
         self.recording = recording
+        if len(recording) > LONGEST:
+            raise BenchError(
+                f"a recording of {len(recording):,} frames, {LONGEST:,} can be played",
+                fix="play a part of it",
+            )
         self._turn = threading.Lock()
         t_ns, self.strength = _read(recording)
         pauses = np.clip(np.diff(t_ns, prepend=t_ns[:1]) * 1e-9, 0.0, JUMP_S)

@@ -7,11 +7,14 @@ only where they lie in its folder.
 from __future__ import annotations
 
 import re
+import tempfile
 from pathlib import Path
 
 from generator.database.registered import RegisteredPart
 from generator.database.url import normal_url, part_path
-from recognizer.bench.errors import UnknownError
+from probe.errors import RecordingError
+from probe.recording.read import read_recording
+from recognizer.bench.errors import BenchError, UnknownError
 
 LISTED = 200  #: files of a kind that are offered
 
@@ -59,6 +62,33 @@ def listed(folder: Path, suffix: str) -> list[str]:
     ]
     dated = sorted((-path.stat().st_mtime, path.name) for path in found)
     return [name for _, name in dated[:LISTED]]
+
+
+def kept(folder: Path, name: str, content: bytes) -> int:
+    """Keep a recording that was sent in, if it is one; returns its frames.
+
+    Raises
+    ------
+    BenchError, UnknownError
+        When there is one of this name, or the name is none.
+    RecordingError
+        When it is no recording; nothing is kept.
+    """
+    path = folder / checked_name(name, ".h5")
+    if path.exists():
+        raise BenchError(f"there is a recording {name} already", fix="give another name")
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".coming-", dir=folder) as place:
+        draft = Path(place) / path.name
+        draft.write_bytes(content)
+        try:
+            recording = read_recording(draft)
+            for _ in recording.blocks():  # every value is looked at
+                pass
+        except RecordingError as error:
+            raise RecordingError(error.cause, fix=error.fix, place=name) from error
+        draft.rename(path)
+    return len(recording)
 
 
 def part_folder(database: str) -> Path | None:

@@ -17,6 +17,8 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
+from starlette.requests import ClientDisconnect
+
 Scope = MutableMapping[str, Any]
 Message = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[Message]]
@@ -96,11 +98,12 @@ class Guard:
         if token:
             await _let_in(send, token)
             return
-        bounded = _Bounded(receive, self._limit(scope))
+        bounded = _Bounded(receive, send, self._limit(scope))
         try:
-            await self._app(scope, bounded.receive, _with_headers(send))
-        except _TooLargeError:
-            await _say(send, 413, f"more than {bounded.limit:,} bytes", "send less")
+            await self._app(scope, bounded.receive, bounded.send)
+        except ClientDisconnect:
+            if not bounded.refused:
+                raise
 
     def _refusal(self, scope: Scope, headers: dict[bytes, str]) -> tuple[int, str, str] | None:
         host = headers.get(b"host", "")
@@ -144,22 +147,29 @@ class Guard:
         return self._rules.upload if uploading else self._rules.body
 
 
-class _TooLargeError(Exception):
-    """A body that goes beyond its limit."""
-
-
 class _Bounded:
-    """A body that ends with an error where its limit is."""
+    """A conversation whose body ends where its limit is, with the headers of every answer."""
 
-    def __init__(self, receive: Receive, limit: int) -> None:
-        self._receive, self.limit, self._came = receive, limit, 0
+    def __init__(self, receive: Receive, send: Send, limit: int) -> None:
+        self._receive, self._send, self._limit, self._came = receive, send, limit, 0
+        self.refused = False
 
     async def receive(self) -> Message:
         message = await self._receive()
         self._came += len(message.get("body", b""))
-        if self._came > self.limit:
-            raise _TooLargeError
-        return message
+        if self._came > self._limit and not self.refused:
+            self.refused = True
+            await _say(self._send, 413, f"more than {self._limit:,} bytes", "send less")
+        return {"type": "http.disconnect"} if self.refused else message
+
+    async def send(self, message: Message) -> None:
+        if self.refused:
+            return
+        if message["type"] == "http.response.start":
+            there = {name.lower() for name, _ in message.get("headers", [])}
+            more = [pair for pair in HEADERS if pair[0] not in there]
+            message["headers"] = [*message.get("headers", []), *more]
+        await self._send(message)
 
 
 def _is_host(host: str) -> bool:
@@ -178,17 +188,6 @@ def _cookies(headers: dict[bytes, str]) -> Iterable[str]:
     except CookieError:
         return []
     return [jar[COOKIE].value] if COOKIE in jar else []
-
-
-def _with_headers(send: Send) -> Send:
-    async def sent(message: Message) -> None:
-        if message["type"] == "http.response.start":
-            there = {name.lower() for name, _ in message.get("headers", [])}
-            more = [pair for pair in HEADERS if pair[0] not in there]
-            message["headers"] = [*message.get("headers", []), *more]
-        await send(message)
-
-    return sent
 
 
 async def _say(send: Send, status: int, cause: str, fix: str) -> None:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import secrets
+import signal
 import socket
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from types import FrameType
 
 import uvicorn
 
@@ -54,6 +56,7 @@ def serve(asked: Asked) -> int:
     database = _database(asked.database)
     token = asked.token or ("" if is_loopback(asked.host) else secrets.token_urlsafe(18))
     line = _listening(asked.host, asked.web_port)
+    signal.signal(signal.SIGTERM, _end)
     bulletin = Bulletin()
     sensor = Sensor(overlay=Overlay(kind="pad" if asked.overlay == "pad" else "tab"))
     session = Session(database, asked.folder, sensor, bulletin)
@@ -71,10 +74,17 @@ def serve(asked: Asked) -> int:
         sys.stdout.write(_address(asked.host, line.getsockname()[1], token) + "\n")
         sys.stdout.flush()
         server.run(sockets=[line])
+    except KeyboardInterrupt:  # how it is ended
+        sys.stderr.write("open-bench: ended\n")
     finally:
         session.close()
         line.close()
     return 0
+
+
+def _end(_number: int, _frame: FrameType | None) -> None:
+    """Take a request to end like that of the operator, so that what is open is closed."""
+    raise KeyboardInterrupt
 
 
 def _begin(session: Session, port: str) -> None:

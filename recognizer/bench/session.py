@@ -358,6 +358,7 @@ class Session:
         self._note(f"the bias is the mean of {BIAS_FRAMES} frames")
         if self._calibration is not None:
             self._warning = drift_of(self._calibration, frames).warning
+            self._note(self._warning or "the calibration still holds")
 
     def _use(self, calibration: Calibration, name: str) -> None:
         self._calibration, self._calibration_name, self._warning = calibration, name, ""

@@ -69,7 +69,7 @@ class TouchProbe:
                 stack.callback(self._closed.set)
                 thread.start()
             else:
-                self._line = SoftwareLine(self._beats.frames(), "simulated")
+                self._line = SoftwareLine(self._beats.frames(), "bench")
                 self.url = self._line.url
                 stack.callback(self._line.close)
             self._stack = stack.pop_all()

@@ -51,7 +51,9 @@ class Watch:
             self._since_s = now_s
             return False
         steady = _apart(forces, before) < STEADY
-        if not steady and now_s - self._since_s < RESTLESS_S:
+        if steady:
+            self._since_s = now_s
+        elif now_s - self._since_s < RESTLESS_S:
             return False
         if self._read is None or _apart(_shape(forces), _shape(self._read)) > CHANGED:
             return True
@@ -60,7 +62,7 @@ class Watch:
     def read(self, forces: Array, *, answered: bool, now_s: float) -> None:
         """Take note that a frame was read."""
         self._read, self._answered = forces, answered
-        self._read_s = self._since_s = now_s
+        self._read_s = now_s
 
 
 def _apart(a: Array, b: Array) -> float:

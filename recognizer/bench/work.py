@@ -9,13 +9,13 @@ from __future__ import annotations
 from typing import Any, Literal
 
 from fastapi import APIRouter, Request, Response
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import FileResponse
 from pydantic import BaseModel, ConfigDict, Field
 
-from probe.errors import RecordingError
 from probe.port.listing import list_ports
-from probe.recording.read import read_recording
-from recognizer.bench.errors import BenchError, UnknownError
-from recognizer.bench.files import checked_name, named
+from recognizer.bench.errors import UnknownError
+from recognizer.bench.files import kept, named
 from recognizer.bench.images import FILTERS
 from recognizer.bench.session import Session
 
@@ -192,27 +192,13 @@ def work_routes(session: Session, ports: Ports) -> APIRouter:
 
     @routes.get("/recordings/{name}")
     def recording(name: str) -> Response:
-        from fastapi.responses import FileResponse
-
         path = named(session.folder, name, ".h5")
         return FileResponse(path, filename=name, media_type="application/x-hdf5")
 
     @routes.post("/recordings")
     async def upload(name: str, request: Request) -> dict[str, Any]:
-        path = session.folder / checked_name(name, ".h5")
-        if path.exists():
-            raise BenchError(f"there is a recording {name} already", fix="give another name")
         body = await request.body()  # bounded by the guard
-        session.folder.mkdir(parents=True, exist_ok=True)
-        draft = path.with_name(f".{path.stem}.part.h5")
-        try:
-            draft.write_bytes(body)
-            frames = len(read_recording(draft))
-            draft.rename(path)
-        except RecordingError as error:
-            raise RecordingError(error.cause, fix=error.fix, place=name) from error
-        finally:
-            draft.unlink(missing_ok=True)
+        frames = await run_in_threadpool(kept, session.folder, name, body)
         return {"name": name, "frames": frames}
 
     @routes.get("/frame.csv")

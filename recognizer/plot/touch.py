@@ -44,6 +44,7 @@ def touch_picture(
     """
     won = winning(reader, signal)
     with page(path, WIDTH, HEIGHT) as figure:
+        figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 0.95))
         figure.suptitle(_title(found, T_robot_object))
         touched, window = (figure.add_subplot(1, 3, k) for k in (1, 2))
         solid = figure.add_subplot(1, 3, 3, projection="3d")

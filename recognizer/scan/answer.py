@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.belief import CLEARLY, WHOLE, shown_at, unplaced
+from recognizer.belief import CLEARLY, WHOLE, unplaced
 from recognizer.lab import Encoding
-from recognizer.locate import Place, place_scores, places
+from recognizer.locate import Place, place_scores, places, shown_at
 from recognizer.pipeline import Reader
 from recognizer.pose import face_covariance, face_pose, inside_mm
 from recognizer.recognition import (
@@ -37,8 +37,6 @@ from recognizer.symbols.template import Template
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-HOPELESS = 40.0  #: nats by which a lattice is worse than a place, so that it need not be located
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,8 +73,6 @@ def located(
     found: list[Located] = []
     for each in composites[: limits.located]:
         fit = each.fit
-        if found and fit.value < max(item.score for item in found) - HOPELESS:
-            break
         told = np.median(-fit.scores, axis=1)
         telling = np.sort(np.argsort(-told, kind="stable")[: limits.telling])
         listed = replace(

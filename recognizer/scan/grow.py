@@ -96,7 +96,8 @@ def extended(scan: Scan, touch: PlacedTouch) -> Scan:
     for k, (encoding, template, bank) in enumerate(reader.prepared):
         image = _image(reader, touch, encoding.style.height_mm)
         near = _near(scan.lattices[k][: limits.guided], stands)
-        new = fits_of(image, template, bank, reader.settings, near)
+        enough = limits.clean if scan.recognition and scan.astray == 0 else 0.0
+        new = fits_of(image, template, bank, reader.settings, near, enough)
         each = (*scan.fits[k], tuple(f for f in new if f.noise <= limits.noise))
         sums = _composites(
             views_of(each, trusts), stands, scan.lattices[k], encoding.style.pitch_mm, limits
@@ -177,4 +178,5 @@ def _composites(
             sums.append(summed)
         if len(distinct) == limits.lattices:
             break
-    return sorted(sums, key=lambda item: -item.fit.value)
+    sums.sort(key=lambda item: -item.fit.value)
+    return [item for item in sums if item.fit.value > sums[0].fit.value - limits.hopeless]

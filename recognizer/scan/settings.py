@@ -15,6 +15,7 @@ class ScanSettings:
     alike: float = 0.25  #: correlation of what touches say about one cell: at most 1/alike looks
     contradicts: float = 14.0  #: nats that a touch may contradict all others before it is left out
     noise: float = 0.4  #: standard deviation of psi beyond which a touch shows no symbols
+    clean: float = 0.15  #: noise of a touch whose symbols are where the answer says: not searched
     wrong: float = 0.05  #: share of the cells that may clearly speak for another symbol
     floor_mm: float = 0.25  #: of places, beyond what is believed of them
     floor_rad: float = 0.01  #: of turns
@@ -23,6 +24,7 @@ class ScanSettings:
         0.25  #: pitches of uncertainty from which the mosaic is asked where touches stand
     )
     lattices: int = 6  #: of the plane that are followed
+    hopeless: float = 40.0  #: nats by which they may be worse than the best of them
     located: int = 3  #: of them that are looked up
     guided: int = 2  #: of them that a touch is fitted with if its own fits do not agree
     telling: int = 16  #: cells by which places are listed

@@ -81,7 +81,12 @@ def _widest(covariance: Array) -> float:
 
 
 def fits_of(
-    image: Image, template: Template, bank: Bank, settings: Settings, near: Array
+    image: Image,
+    template: Template,
+    bank: Bank,
+    settings: Settings,
+    near: Array,
+    enough: float = 0.0,
 ) -> tuple[Fit, ...]:
     """Return the likeliest lattices of an image, and those that lie near given ones.
 
@@ -92,19 +97,36 @@ def fits_of(
     ----------
     near
         (k, 3) T_lattice_touch that other touches lead to expect.
+    enough
+        Noise of a fit near the first of these with which nothing else is looked for.
     """
+    if enough > 0 and len(near):
+        expected = _near(image, template, settings, near[:1], None)
+        if expected and expected[0].noise <= enough:
+            return expected
     found = fits(image, template, bank, settings)
-    gain = found[0].gain if found else first_gain(image, template.ink)
-    expected = [pose for pose in near if not any(_same(pose, f, template.pitch_mm) for f in found)]
-    if gain is None or not expected:
-        return found
-    starts = started(np.array(expected), np.repeat(gain[None], len(expected), axis=0))
-    lattices = refined(image, template, starts, steps=settings.final_steps)
-    for fit in scored(image, template, lattices, settings):
+    rest = [pose for pose in near if not any(_same(pose, f, template.pitch_mm) for f in found)]
+    for fit in _near(image, template, settings, np.array(rest).reshape(-1, 3), found):
         pose = np.array([fit.x_mm, fit.y_mm, fit.theta_rad])
         if not any(_same(pose, other, template.pitch_mm) for other in found):
             found = (*found, fit)
     return found
+
+
+def _near(
+    image: Image,
+    template: Template,
+    settings: Settings,
+    near: Array,
+    found: tuple[Fit, ...] | None,
+) -> tuple[Fit, ...]:
+    """Return the fits that are reached from given poses (k, 3)."""
+    gain = found[0].gain if found else first_gain(image, template.ink)
+    if gain is None or not len(near):
+        return ()
+    starts = started(near, np.repeat(gain[None], len(near), axis=0))
+    lattices = refined(image, template, starts, steps=settings.final_steps)
+    return scored(image, template, lattices, settings)
 
 
 def views_of(found: Sequence[tuple[Fit, ...]], trusts: Sequence[float]) -> Views:

@@ -28,6 +28,7 @@ USUAL = 0.25  #: depth of a usual touch, heights of the overlay, where the scale
 DAMPING = 0.01  #: of the first step
 LEAST_PRESS = 0.2  #: of a tactel where the plane presses little or not at all
 LEAST_GAIN = 0.12  #: of the largest over the sensor: below it a tactel tells nothing of symbols
+SETTLED = 0.5  #: nats by which a step may still change what is taken as found
 NOISE = 0.15  #: standard deviation of psi on a covered tactel, until it is known better
 LIMITS = np.array([1.2, 0.7, 0.4, 0.03])  #: of width, cross-talk, exponent - 1, scale - 1
 _AROUND = 5  # tactels, side of a neighbourhood
@@ -199,8 +200,11 @@ def refined(
             best, at_best = tried, seen
         else:
             better = seen.value > best.value
+            settled = bool((np.abs(seen.value - best.value) < SETTLED).all())
             best, at_best = _either(better, tried, best), _either(better, seen, at_best)
             damping = np.where(better, damping / 3, np.minimum(damping * 8, 1e6))
+            if settled:
+                break
         if step == steps:
             break
         trial = _moved(best, at_best, damping)

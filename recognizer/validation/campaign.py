@@ -21,7 +21,7 @@ from recognizer.validation.levels import LEVELS
 from recognizer.validation.surfaces import FOREIGN
 from recognizer.validation.trial import Plan
 
-SHARD = 1000  #: touches in a file
+SHARD = 1000  #: touches in a file, if nothing else is asked
 PIECE = 25  #: touches that a worker takes at once
 TOUCHES = "touches"  #: name of the series that is counted
 BLANK, STRANGE = "blank", "foreign"
@@ -62,6 +62,7 @@ class Campaign:
     overlay: str = "tab"
     files: bool = True  #: touch the written STL files
     study: int = 0  #: touches of every reader of `READERS`; 0: no study
+    shard: int = SHARD  #: touches in a file: at most so many are lost with a run
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +73,7 @@ class Series:
     touches: int
     kinds: Shares
     levels: Shares
+    shard: int
     reader: str = AS_IS
 
 
@@ -86,23 +88,26 @@ class Piece:
 
 def series_of(campaign: Campaign) -> tuple[Series, ...]:
     """Return the touches, and the series of the study if there is one."""
-    found = [Series(TOUCHES, campaign.touches, campaign.kinds, campaign.levels)]
+    found = [Series(TOUCHES, campaign.touches, campaign.kinds, campaign.levels, campaign.shard)]
     if campaign.study:
         for name in (AS_IS, *READERS):
             label = f"reader-{name.replace(' ', '-')}"
-            found.append(Series(label, campaign.study, (("face", 1.0),), campaign.levels, name))
+            kinds: Shares = (("face", 1.0),)
+            found.append(
+                Series(label, campaign.study, kinds, campaign.levels, campaign.shard, name)
+            )
     return tuple(found)
 
 
 def shards_of(series: Series) -> int:
     """Return into how many files a series goes."""
-    return math.ceil(series.touches / SHARD)
+    return math.ceil(series.touches / series.shard)
 
 
 def pieces_of(series: Series, shard: int) -> Iterator[Piece]:
     """Yield the pieces of a shard."""
-    end = min((shard + 1) * SHARD, series.touches)
-    for first in range(shard * SHARD, end, PIECE):
+    end = min((shard + 1) * series.shard, series.touches)
+    for first in range(shard * series.shard, end, PIECE):
         yield Piece(series.name, first, min(first + PIECE, end))
 
 

@@ -156,6 +156,11 @@ def validate(
                                  help="Touches of each reader in the picture of error against run "
                                       "time; a hundredth of --touches. 0: no such pictures."),
     ] = None,
+    shard: Annotated[
+        int | None, typer.Option(min=1, show_default=False,
+                                 help="Touches in a file, and lost at most when interrupted; "
+                                      "1000."),
+    ] = None,
     seed: Annotated[
         int | None, typer.Option(min=0, show_default=False, help="Of all that is drawn; 1."),
     ] = None,
@@ -186,7 +191,7 @@ def validate(
         if version:
             told.version(as_json=as_json)
             return 0
-        wishes = Wishes(touches, seed, kinds, levels, overlay, surfaces, study)
+        wishes = Wishes(touches, seed, kinds, levels, overlay, surfaces, study, shard)
         with told.progress_bar() as bar:
             summary = validate_set(
                 folder, wishes, list(specs or ()), database,

@@ -6,7 +6,6 @@ from the touches that are there.
 
 from __future__ import annotations
 
-import platform
 import time
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -18,13 +17,18 @@ import numpy as np
 from recognizer.validation.campaign import (
     KINDS,
     LEVEL_SHARES,
-    TOUCHES,
     Campaign,
     kinds_of,
     levels_of,
     series_of,
+    shards_of,
 )
 from recognizer.validation.errors import FAILED, ValidationError
+from recognizer.validation.extremes import extremes
+from recognizer.validation.left_out import left_out
+from recognizer.validation.precision import contact_study, decoder_study, reader_study
+from recognizer.validation.provenance import circumstances, provenance, rule
+from recognizer.validation.report import page_of
 from recognizer.validation.results import results_of
 from recognizer.validation.run import (
     ASKED,
@@ -35,15 +39,17 @@ from recognizer.validation.run import (
     read_asked,
     touch_all,
     write_json,
+    write_text,
 )
 from recognizer.validation.shards import (
     TIMES,
     columns_of,
     done_shards,
     read_series,
-    shards_of,
     write_table,
 )
+from recognizer.validation.trial import Plan
+from recognizer.validation.work import prepared
 from recognizer.validation.workers import workers_of
 
 TRIALS, RESULTS, TIMES_FILE = "trials.parquet", "results.json", "times.json"
@@ -63,6 +69,7 @@ class Wishes:
     overlay: str = ""
     surfaces: str = ""
     study: int | None = None
+    shard: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +147,7 @@ def validate_set(
         told.stage("report", 0, 0)
         results = _finished(asked, folder)
         seconds = round(time.monotonic() - start, 3)
-        write_json(folder / PROVENANCE, _provenance(begun, seconds, processes, cluster))
+        write_json(folder / PROVENANCE, circumstances(begun, seconds, processes, cluster))
     return _summary(results, seconds)
 
 
@@ -185,6 +192,7 @@ def _campaign(wishes: Wishes, known: Campaign | None) -> Campaign:
         overlay=wishes.overlay or base.overlay,
         files=wishes.surfaces == "files" if wishes.surfaces else base.files,
         study=study if wishes.study is None else wishes.study,
+        shard=base.shard if wishes.shard is None else wishes.shard,
     )
 
 
@@ -194,14 +202,34 @@ def _study(touches: int) -> int:
 
 def _finished(asked: Asked, folder: Path) -> dict[str, Any]:
     """Write everything that follows from the touches; returns the results."""
-    first = series_of(asked.campaign)[0]
-    table = read_series(folder, first)
+    campaign, work = asked.campaign, asked.work_now(folder)
+    series = series_of(campaign)
+    table = read_series(folder, series[0])
+    rows = columns_of(table)
+    spent = columns_of(read_series(folder, series[0], TIMES))
+    reader = prepared(work)
+    results = results_of(rows)
+    times: dict[str, Any] = {name: _spent(spent[name]) for name in ("drawing", "reading")}
+    results["rule"] = rule()
+    results["study"], results["left_out"] = {}, []
+    if campaign.study:
+        studies = {
+            "contact": contact_study(),
+            "decoders": decoder_study(reader.lab.encodings[0], campaign.seed),
+            "readers": reader_study(folder, campaign),
+        }
+        plan = Plan(work.database, campaign.seed, kind="face", files=campaign.files)
+        saved = left_out(reader, plan, studies["readers"])
+        results["study"] = {name: study.counted for name, study in studies.items()}
+        results["left_out"] = saved.counted
+        times |= {name: study.spent for name, study in studies.items()}
+        times["left_out"] = saved.spent
+    results["extremes"] = extremes(reader)
+    results["provenance"] = provenance(asked, work.database)
     write_table(table, folder / TRIALS)
-    results = results_of(columns_of(table))
-    spent = columns_of(read_series(folder, first, TIMES))
-    times = {name: _spent(spent[name]) for name in ("drawing", "reading")}
     write_json(folder / RESULTS, results)
     write_json(folder / TIMES_FILE, times)
+    write_text(folder / REPORT, page_of(results, times, rows))
     return results
 
 
@@ -213,27 +241,17 @@ def _spent(seconds: Any) -> dict[str, float]:
     return {name: round(1e3 * value, 3) for name, value in found.items()}
 
 
-def _provenance(begun: datetime, seconds: float, processes: int, cluster: str) -> dict[str, Any]:
-    return {
-        "utc": begun.isoformat(timespec="seconds"),
-        "seconds": seconds,
-        "workers": cluster or processes,
-        "machine": platform.machine(),
-        "system": platform.platform(),
-        "python": platform.python_version(),
-    }
-
-
 def _summary(results: dict[str, Any], seconds: float) -> Summary:
-    totals = results["totals"]
-    fair = results["enough"]
+    totals, fair = results["totals"], results["enough"]
     return Summary(
-        *(totals[name] for name in ("touches", "right", "wrong", "rejected", "rms_mm", "rms_deg")),
-        seconds,
-        fair["touches"],
-        fair["right"],
-        results["verdict"],
+        touches=totals["touches"],
+        right=totals["right"],
+        wrong=totals["wrong"],
+        rejected=totals["rejected"],
+        rms_mm=totals["rms_mm"],
+        rms_deg=totals["rms_deg"],
+        seconds=seconds,
+        fair=fair["touches"],
+        fair_right=fair["right"],
+        checks=results["verdict"],
     )
-
-
-__all__ = ["TOUCHES", "Summary", "Wishes", "report_anew", "validate_set"]

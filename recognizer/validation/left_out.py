@@ -95,8 +95,10 @@ def _cells(study: Study, reader: Reader) -> None:
     """Cells weighed: those that are registered, not all of the array."""
     for encoding in reader.lab.encodings:
         cells = encoding.array.rows * encoding.array.columns
-        _add(study, f"places weighed: registered cells of {encoding.array.rows} x "
-             f"{encoding.array.columns}", len(encoding.keys), cells, "cells", None, None)  # fmt: skip
+        what = (
+            f"places weighed: registered cells of {encoding.array.rows} x {encoding.array.columns}"
+        )
+        _add(study, what, len(encoding.keys), cells, "cells", None, None)
 
 
 def _add(

@@ -28,7 +28,7 @@ from recognizer.validation.shards import TIMES, columns_of, read_series
 WINDOWS = 200  #: for each decoder
 WRONG_SYMBOLS = 0.05  #: of the windows that decoders read
 LARGEST_SERIAL = 1 << 13  #: places up to which the serial method is shown
-DEPTH = 1  #: rows and columns of a view beyond the window
+DEPTH = 2  #: rows and columns of a view beyond the window
 
 Ints = NDArray[np.int64]
 

@@ -19,13 +19,12 @@ import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
 from generator.database.url import normal_url
 from recognizer.validation.campaign import (
-    TOUCHES,
     Campaign,
     Piece,
     Series,
@@ -63,12 +62,17 @@ class Asked:
     database: str  #: a SQLite file from the folder of the run, or a URL
     set_digest: str
     code_digest: str
+    specs: tuple[str, ...] = ()  #: as they were named
 
     def work(self, folder: Path) -> Work:
         """Return what the workers get."""
         return Work(
             self.campaign, located(self.database, folder), self.set_digest, self.code_digest
         )
+
+    def work_now(self, folder: Path) -> Work:
+        """Return the same for this version, which may be another than that of the touches."""
+        return replace(self.work(folder), code_digest=code_digest())
 
 
 def prepare(
@@ -111,7 +115,9 @@ def prepare(
             raise ValidationError("no set is named", fix="give SPEC.yaml files, or --database URL")
     else:
         named = remembered(database, folder) if database else known.database
-    asked = Asked(campaign, named, set_digest(located(named, folder)), code_digest())
+    digest = set_digest(located(named, folder))
+    names = known.specs if known else tuple(map(str, specs))
+    asked = Asked(campaign, named, digest, code_digest(), names)
     if known is None:
         _remember(asked, folder)
     else:
@@ -202,7 +208,13 @@ def read_asked(folder: Path) -> Asked:
         given = values["campaign"]
         for name in ("kinds", "levels"):
             given[name] = tuple((key, float(share)) for key, share in given[name])
-        return Asked(Campaign(**given), values["database"], values["set"], values["code"])
+        return Asked(
+            campaign=Campaign(**given),
+            database=values["database"],
+            set_digest=values["set"],
+            code_digest=values["code"],
+            specs=tuple(values["specs"]),
+        )
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise ValidationError(
             "no run of validate-set", fix="name the folder that -o named", place=str(folder)
@@ -226,9 +238,13 @@ def remembered(database: str, folder: Path) -> str:
 
 def write_json(path: Path, values: Any) -> None:
     """Write values as JSON, whole or not at all."""
+    write_text(path, json.dumps(values, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file, whole or not at all."""
     undone = path.with_name(path.name + ".writing")
-    text = json.dumps(values, indent=1, ensure_ascii=False, allow_nan=False)
-    undone.write_text(text + "\n", "utf-8")
+    undone.write_text(text, "utf-8")
     os.replace(undone, path)
 
 
@@ -239,6 +255,7 @@ def _remember(asked: Asked, folder: Path) -> None:
         "database": asked.database,
         "set": asked.set_digest,
         "code": asked.code_digest,
+        "specs": list(asked.specs),
     }
     write_json(folder / ASKED, values)
 
@@ -259,6 +276,3 @@ def _check_same(known: Asked, asked: Asked, folder: Path) -> None:
             fix="give the same options, or start anew in another folder with -o",
             place=str(folder),
         )
-
-
-__all__ = ["TOUCHES", "Asked", "Told", "alone", "prepare", "read_asked", "touch_all", "write_json"]

@@ -16,7 +16,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from recognizer.validation.campaign import SHARD, Series, shards_of
+from recognizer.validation.campaign import Series, shards_of
 from recognizer.validation.rows import COLUMNS, Row, Time
 
 SHARDS, TIMES = "shards", "times"
@@ -30,6 +30,7 @@ SCHEMA = pa.schema(
 TIME_SCHEMA = pa.schema(
     [("number", pa.int64()), ("drawing", pa.float64()), ("reading", pa.float64())]
 )
+GROUP = 100_000  #: rows that a file holds together
 _UNDONE = ".writing"
 
 
@@ -55,7 +56,7 @@ def write_table(table: pa.Table, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     undone = path.with_name(path.name + _UNDONE)
     with open(undone, "wb") as file:
-        pq.write_table(table, file, compression="zstd", row_group_size=100 * SHARD)
+        pq.write_table(table, file, compression="zstd", row_group_size=GROUP)
         file.flush()
         os.fsync(file.fileno())
     os.replace(undone, path)

@@ -16,4 +16,5 @@ await build({
   legalComments: "none",
   logLevel: "info",
 });
-for (const name of ["index.html", "icon.svg", "licences.txt"]) copyFileSync(`src/${name}`, out + name);
+for (const name of ["index.html", "icon.svg"]) copyFileSync(`src/${name}`, out + name);
+copyFileSync("node_modules/three/LICENSE", out + "three-licence.txt");

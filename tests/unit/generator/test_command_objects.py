@@ -181,3 +181,16 @@ def test_the_commands_run_on_a_server(capsys, database_on):
         assert said(capsys, "show", "Cube", "--database", url)["files"][0]["state"] == "ok"
         assert run(["retire", "Cube", "--free", "--yes", "--database", url]) == 0
         assert said(capsys, "list", "--database", url)["objects"] == []
+
+
+def test_passwords_are_not_shown(capsys, database_on):
+    with database_on("postgresql") as url:
+        url = url.replace("postgres@", "postgres:secret@", 1)  # the server asks for none
+        assert run(["export", "x.db"]) == 0
+        for command in (["import", "x.db"], ["list"], ["show", "Cube"], ["retire", "Cube"]):
+            assert run([*command, "--database", url]) == 0
+            assert run([*command, "--database", url, "--json"]) == 0
+        assert run(["import", url, "--database", url]) == 4
+        text, messages = capsys.readouterr()
+        assert "postgres:***@" in text
+        assert "secret" not in text + messages

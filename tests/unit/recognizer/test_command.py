@@ -242,13 +242,13 @@ def calibrated_touch(lab):
     folder.mkdir()
 
     def read(forces, number):
-        counts, _ = read_sequence(np.stack([forces] * number), board, fsr, None, rng)
-        counts[:, *DEAD] = 700  # stuck: a reader that believed them would see a bar
-        return counts
+        felt = forces.copy()
+        felt[DEAD] = 0.0
+        return read_sequence(np.stack([felt] * number), board, fsr, None, rng)[0]
 
-    loads = {f: read(np.full((16, 16), f / 256), 40) for f in (0, 40, 100, 200, 400)}
+    loads = {f: read(np.full((16, 16), f / 256), 60) for f in (0, 60, 120, 240, 400)}
     made = calibration_from(
-        loads[0], [even_load(loads[f], f, name=f"{f} N") for f in (40, 100, 200, 400)],
+        loads[0], [even_load(loads[f], f, name=f"{f} N") for f in (60, 120, 240, 400)],
         sensor="bench/0", made="2026-01-01", board=board,
     )  # fmt: skip
     assert made.bad[DEAD].all()

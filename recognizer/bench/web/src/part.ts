@@ -23,6 +23,8 @@ export class Part {
   private symbols: { mesh: InstancedMesh; faces: Uint16Array }[] = [];
   private edges: LineBasicMaterial | null = null;
   private lit = -1;
+  private told: [Answer | null, boolean] = [null, false];
+  private stands = true;
   shape: ObjectShape | null = null;
 
   constructor(sensor: Sensor, private readonly touched: (place: Place) => void) {
@@ -61,6 +63,7 @@ export class Part {
 
   /** Light the recognised face and stand the probe on it; null: nothing is known. */
   tell(answer: Answer | null, contact: boolean): void {
+    this.told = [answer, contact];
     const here = answer !== null && answer.object !== null && answer.object === this.shape?.name;
     const lit = here ? this.shape!.faces.findIndex((face) => face.name === answer.face) : -1;
     if (lit !== this.lit) {
@@ -68,7 +71,7 @@ export class Part {
       this.colour();
     }
     this.ring.visible = false;
-    this.probe.visible = here && answer.T_object_probe !== null;
+    this.probe.visible = this.stands && here && answer.T_object_probe !== null;
     if (this.probe.visible) {
       const stands = matrixOf(answer!.T_object_probe!);
       if (!contact) stands.multiply(new Matrix4().makeTranslation(0, 0, 8));
@@ -76,6 +79,12 @@ export class Part {
       this.probe.matrixWorldNeedsUpdate = true;
     }
     this.stage.draw();
+  }
+
+  /** Show the probe, or leave the part alone. */
+  withProbe(stands: boolean): void {
+    this.stands = stands;
+    this.tell(...this.told);
   }
 
   get litFace(): string { return this.shape?.faces[this.lit]?.name ?? ""; }

@@ -1,0 +1,209 @@
+/** The page: what comes in goes to the panels, what is clicked goes to the server. */
+
+import { get, post } from "./api";
+import { AnswerPanel } from "./answer";
+import { choices, element, isDark, say } from "./dom";
+import { GuideDialog } from "./guide";
+import { Heat } from "./heat";
+import { Live } from "./live";
+import { MapPanel } from "./map";
+import { MosaicPanel } from "./mosaic";
+import { Part, type Place } from "./part";
+import { Replay } from "./replay";
+import { Surface } from "./surface";
+import type { Answer, ArrayMap, BenchInfo, Encoding, Frame, ObjectEntry, ObjectShape, ReaderState, Told } from "./types";
+import { Work } from "./work";
+
+/** What tests and measurements ask for. */
+interface Figures { frames: number; paints: number; latency_ms: number[]; answers: number; click_ms: number[]; lit: string; shown: string; sum: number }
+const figures: Figures = { frames: 0, paints: 0, latency_ms: [], answers: 0, click_ms: [], lit: "", shown: "", sum: 0 };
+Object.assign(window, { bench: figures });
+const KEPT = 5000;
+
+async function begin(): Promise<void> {
+  const info = await get<BenchInfo>("bench");
+  const { sensor } = info;
+  const heat = new Heat(sensor), surface = new Surface(sensor), mosaic = new MosaicPanel(sensor);
+  const answers = new AnswerPanel(info.margin), work = new Work(info), guide = new GuideDialog(), replay = new Replay();
+  const part = new Part(sensor, (place) => void touch(place).catch(() => undefined));
+  const map = new MapPanel((name) => void show(name));
+  let newest: Frame | null = null, painting = false, contact = false, simulated = false;
+  let answer: Answer | null = null, clicked: number | null = null, painted = 0;
+
+  const line = new Live({
+    frame(frame) {
+      figures.frames++;
+      figures.sum = frame.sum;
+      if (element<HTMLInputElement>("freeze").checked) return;
+      newest = frame;
+      if (!painting) {
+        painting = true;
+        requestAnimationFrame(paint);
+      }
+    },
+    mosaic: (image) => mosaic.show(image),
+    told,
+    connected: (there) => { if (!there) work.gone(); },
+  }, "bias-free");
+
+  function paint(): void {
+    painting = false;
+    if (!newest) return;
+    heat.paint(newest);
+    surface.paint(newest, heat.top);
+    figures.paints++;
+    keep(figures.latency_ms, performance.timeOrigin + performance.now() - newest.received_ms);
+    if (performance.now() - painted > 1000) {
+      painted = performance.now();
+      const last = figures.latency_ms.slice(-60).sort((a, b) => a - b);
+      say(element("latency"), `${(last[last.length >> 1] ?? 0).toFixed(0)} ms`);
+    }
+  }
+
+  function told(topic: Told): void {
+    if (topic.topic === "status") {
+      simulated = topic.simulated;
+      work.tell(topic);
+      guide.tell(topic);
+      replay.tell(topic);
+      element("touch").querySelector("button")!.disabled = !simulated;
+    } else if (topic.topic === "answer") take(topic);
+    else if (topic.topic === "mosaic-of") mosaic.told(topic);
+    else if (topic.topic === "reader") void reader(topic);
+    else {
+      contact = topic.contact;
+      answers.contact(contact);
+      if (!contact) heat.answer = null;
+      part.tell(answer, contact);
+    }
+  }
+
+  function take(read: Answer): void {
+    answer = read;
+    figures.answers++;
+    const since = clicked === null ? null : performance.now() - clicked;
+    clicked = null;
+    answers.tell(read, since);
+    heat.answer = read.object ? read : null;
+    map.tell(read);
+    if (since !== null) requestAnimationFrame(() => keep(figures.click_ms, since));
+    if (read.object && read.object !== part.shape?.name && element<HTMLInputElement>("follow").checked) void show(read.object);
+    else lights();
+  }
+
+  function lights(): void {
+    part.tell(answer, contact);
+    if (answer?.face && answer.object === part.shape?.name && element<HTMLInputElement>("follow").checked) part.face(answer.face);
+    mosaic.tell(answer, part.shape);
+    figures.lit = part.litFace;
+    element("part").dataset["lit"] = figures.lit;
+  }
+
+  async function touch(place: Place): Promise<void> {
+    element<HTMLSelectElement>("touch-face").value = place.face;
+    for (const [id, value] of [["touch-x", place.x_mm], ["touch-y", place.y_mm]] as const) element<HTMLInputElement>(id).value = value.toFixed(1);
+    clicked = performance.now();
+    await post("touch", {
+      object: part.shape?.name ?? "", ...place,
+      theta_deg: Number(element<HTMLInputElement>("touch-theta").value), force_n: Number(element<HTMLInputElement>("touch-force").value),
+    });
+  }
+
+  async function show(name: string): Promise<void> {
+    const shape = await get<ObjectShape>(`objects/${encodeURIComponent(name)}`);
+    part.show(shape);
+    figures.shown = name;
+    element<HTMLSelectElement>("object").value = name;
+    choices(element("touch-face"), shape.faces.filter((face) => !face.blank).map((face) => [face.name, face.name]));
+    middle(shape);
+    element("files").replaceChildren(...shape.parts.map((one) => {
+      const item = document.createElement("li"), link = document.createElement("a");
+      link.href = `/api/objects/${encodeURIComponent(name)}/parts/${one.number}`;
+      link.download = "";
+      link.textContent = `${one.name} (${one.format})`;
+      item.append(link);
+      return item;
+    }));
+    lights();
+  }
+
+  /** Put the middle of the chosen face in the form. */
+  function middle(shape: ObjectShape | null): void {
+    const face = shape?.faces.find((one) => one.name === element<HTMLSelectElement>("touch-face").value);
+    if (!face?.centres.length) return;
+    const mean = (k: 0 | 1): string => (face.centres.reduce((sum, c) => sum + c[k], 0) / face.centres.length).toFixed(1);
+    element<HTMLInputElement>("touch-x").value = mean(0);
+    element<HTMLInputElement>("touch-y").value = mean(1);
+  }
+
+  async function reader(state: ReaderState): Promise<void> {
+    const texts = { preparing: "reading the database…", ready: "", off: `${state.cause ?? ""}: ${state.fix ?? ""}` };
+    say(element("reader"), texts[state.state]);
+    if (state.state !== "ready") return;
+    const { encodings } = await get<{ encodings: Encoding[] }>("lab");
+    heat.encodings = encodings;
+    element("encoding-label").hidden = encodings.length < 2;
+    choices(element("encoding"), encodings.map((one, i) => [String(i), `${one.rows} × ${one.columns}, ${one.alphabet}`]));
+    if (encodings.length) await array(0);
+    await objects();
+  }
+
+  async function array(number: number): Promise<void> {
+    map.show(await get<ArrayMap>(`map/${number}`), number);
+  }
+
+  async function objects(): Promise<void> {
+    const { objects: held } = await get<{ objects: ObjectEntry[] }>("objects");
+    choices(element("object"), held.map((one) => [one.name, `${one.name}${one.retired ? " (retired)" : ""}`]));
+    const first = part.shape?.name ?? held[0]?.name;
+    if (first) await show(first);
+  }
+
+  function themes(): void {
+    for (const panel of [part, surface, map, mosaic, replay]) panel.theme();
+  }
+
+  const filter = element<HTMLSelectElement>("filter");
+  choices(filter, info.filters.map((name) => [name, name === "sobel" ? "Sobel" : name]), "bias-free");
+  filter.addEventListener("change", () => { heat.top = 0; line.choose(filter.value); });
+  element("show-symbols").addEventListener("change", (event) => { heat.symbols = (event.target as HTMLInputElement).checked; });
+  element("show-probe").addEventListener("change", (event) => part.withProbe((event.target as HTMLInputElement).checked));
+  element("object").addEventListener("change", (event) => void show((event.target as HTMLSelectElement).value));
+  element("encoding").addEventListener("change", (event) => void array(Number((event.target as HTMLSelectElement).value)));
+  element("touch-face").addEventListener("change", () => middle(part.shape));
+  element("touch").addEventListener("submit", (event) => {
+    event.preventDefault();
+    const number = (id: string): number => Number(element<HTMLInputElement>(id).value);
+    void touch({ face: element<HTMLSelectElement>("touch-face").value, x_mm: number("touch-x"), y_mm: number("touch-y") }).catch(() => undefined);
+  });
+  element("mosaic-clear").addEventListener("click", () => void post("mosaic"));
+  element("save-picture").addEventListener("click", () => picture());
+  element("theme").addEventListener("click", () => {
+    const root = document.documentElement;
+    root.dataset["theme"] = isDark() ? "light" : "dark";
+    localStorage.setItem("theme", root.dataset["theme"]);
+    themes();
+  });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", themes);
+  themes();
+}
+
+function picture(): void {
+  element<HTMLCanvasElement>("heat").toBlob((blob) => {
+    if (!blob) return;
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(blob);
+    link.download = "touch.png";
+    link.click();
+    URL.revokeObjectURL(link.href);
+  });
+}
+
+function keep(list: number[], value: number): void {
+  list.push(value);
+  if (list.length > KEPT) list.splice(0, KEPT / 2);
+}
+
+const chosen = localStorage.getItem("theme");
+if (chosen) document.documentElement.dataset["theme"] = chosen;
+void begin();

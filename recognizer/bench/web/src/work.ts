@@ -1,0 +1,114 @@
+/** Port, sensor, recording, bias, calibration in use; the probe's state and what happened. */
+
+import { get, post, send } from "./api";
+import { choices, element, say, showError } from "./dom";
+import type { BenchInfo, Status } from "./types";
+
+export class Work {
+  private status: Status | null = null;
+  private shown = 0;
+  private probe = ""; // the port that was read last, recordings apart
+
+  constructor(private info: BenchInfo) {
+    const on = (id: string, event: string, act: () => Promise<unknown>): void =>
+      element(id).addEventListener(event, () => void act().catch(() => undefined));
+    const value = (id: string): string => element<HTMLSelectElement>(id).value;
+    on("port", "change", () => post("port", { url: value("port") }));
+    on("port", "focus", () => this.ports());
+    on("sensor", "change", () => post("sensor", { sensor: Number(value("sensor")) }));
+    on("record", "click", () => post("record", { on: !this.status?.recording }));
+    on("bias", "click", () => post("bias", { on: this.status?.bias === "none" }));
+    on("unplug", "click", () => post("unplug", { seconds: 2 }));
+    on("replay", "click", () => post("replay", { name: value("recordings") }));
+    on("leave", "click", () => post("port", { url: this.probe }));
+    on("calibrations", "change", () => post("calibration", { do: "use", name: value("calibrations") }));
+    on("reload", "click", () => post("lab"));
+    on("upload", "change", () => this.upload());
+    choices(element("port"), this.options());
+  }
+
+  tell(status: Status): void {
+    this.status = status;
+    const { feed } = status, live = feed.state === "live";
+    this.state(status);
+    const probes = this.info.ports.map((one) => one.url).filter((url) => !url.startsWith("file:"));
+    if (probes.includes(status.port)) this.probe = status.port;
+    else if (!this.probe) this.probe = probes[0] ?? "";
+    say(element("rate"), live ? `${feed.rate?.toFixed(0)} Hz` : "–");
+    say(element("lost"), feed.lost === undefined ? "–" : String(feed.lost + (feed.late ?? 0)));
+    say(element("damaged"), feed.damaged === undefined ? "–" : String(feed.damaged));
+    const known = status.calibration;
+    say(element("calibration-age"), known ? known.age + (known.bad ? `, ${known.bad} bad` : "") : "none");
+    element("calibration-age").title = known ? `${known.name}, ${known.made} ${known.warning}` : "readings are counts";
+    choices(element("port"), this.options(), this.info.ports.some((one) => one.url === status.port) ? status.port : "");
+    if (feed.sensor !== null && feed.sensor !== undefined) choices(element("sensor"), SENSORS, String(feed.sensor));
+    element<HTMLSelectElement>("sensor").disabled = !live;
+    choices(element("recordings"), status.recordings.length ? status.recordings.map(twice) : [["", "none yet"]]);
+    choices(element("calibrations"), [["", "none: counts"], ...status.calibrations.map(twice)], known?.name ?? "");
+    const record = element<HTMLButtonElement>("record");
+    record.disabled = !live && !status.recording;
+    record.setAttribute("aria-pressed", String(status.recording !== null));
+    say(record, status.recording ? `Stop (${status.recording.frames.toLocaleString("en")})` : "Record");
+    const bias = element<HTMLButtonElement>("bias");
+    bias.disabled = !live;
+    bias.setAttribute("aria-pressed", String(status.bias !== "none"));
+    say(bias, { none: "Take bias", taking: "Taking bias…", taken: "Bias off" }[status.bias]);
+    element("unplug").hidden = !status.simulated;
+    element<HTMLButtonElement>("replay").disabled = !status.recordings.length;
+    this.notices(status);
+  }
+
+  /** What the server says when it cannot be reached. */
+  gone(): void {
+    const state = element("state");
+    state.dataset["state"] = "server-gone";
+    say(state, "open-bench is not running; it is looked for");
+  }
+
+  private state(status: Status): void {
+    const { feed } = status, state = element("state");
+    state.dataset["state"] = feed.state;
+    const device = feed.device ? `${feed.device}${feed.sensor === null || feed.sensor === undefined ? "" : `, sensor ${feed.sensor}`}` : "";
+    const texts = {
+      none: "no probe is connected", waiting: "looking for the probe", live: `probe is there: ${device || status.port}`,
+      gone: `probe is gone: ${feed.cause ?? ""}`, replay: "replaying a recording",
+    };
+    say(state, texts[feed.state]);
+    state.title = feed.fix ?? "";
+  }
+
+  private notices(status: Status): void {
+    const list = element("notices");
+    for (const { number, text } of status.notices) {
+      if (number <= this.shown) continue;
+      this.shown = number;
+      const item = document.createElement("li");
+      item.textContent = `${new Date().toLocaleTimeString("en-GB")}  ${text}`;
+      list.prepend(item);
+      while (list.children.length > 60) list.lastElementChild?.remove();
+    }
+  }
+
+  private options(): [string, string][] {
+    return [...this.info.ports.map((one): [string, string] => [one.url, one.label]), ["", "none"]];
+  }
+
+  private async ports(): Promise<void> {
+    this.info = await get<BenchInfo>("bench");
+    choices(element("port"), this.options());
+  }
+
+  private async upload(): Promise<void> {
+    const input = element<HTMLInputElement>("upload"), file = input.files?.[0];
+    input.value = "";
+    if (!file) return;
+    if (file.size > 64 * 2 ** 20) showError("Recordings of at most 64 MB can be sent in.");
+    else await send(`recordings?name=${encodeURIComponent(file.name)}`, file);
+  }
+}
+
+const SENSORS = Array.from({ length: 8 }, (_, i): [string, string] => [String(i), String(i)]);
+
+function twice(name: string): [string, string] {
+  return [name, name];
+}

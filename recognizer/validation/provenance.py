@@ -1,0 +1,95 @@
+"""Where results come from: versions, seeds, hashes, distributions; no clock, no machine.
+
+The one file with time and machine in it is `provenance.json`, beside the results.
+"""
+
+from __future__ import annotations
+
+import math
+import platform
+import shlex
+from dataclasses import asdict
+from datetime import datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from recognizer.validation.campaign import KINDS, LEVEL_SHARES, Campaign, Shares
+from recognizer.validation.levels import LEVELS, POINTS
+from recognizer.validation.made import members_of
+from recognizer.validation.rows import ENOUGH
+from recognizer.validation.run import Asked
+from recognizer.validation.trial import INSIDE_MM, NEAR_MM, Plan
+
+LIBRARIES = ("numpy", "scipy", "pyarrow", "matplotlib")
+
+
+def provenance(asked: Asked, database: str) -> dict[str, Any]:
+    """Return what a run was, so that it can be done again."""
+    campaign = asked.campaign
+    plan = Plan(database)
+    return {
+        "command": command_of(asked),
+        "versions": {
+            "encoded-objects": version("encoded-objects"),
+            "source, sha256": asked.code_digest,
+            "python": platform.python_version(),
+            **{name: version(name) for name in LIBRARIES},
+        },
+        "campaign": asdict(campaign),
+        "contact": f"tabs, {POINTS} points a tab" if campaign.overlay == "tab" else "layer",
+        "force_n": list(plan.force_n),
+        "tilt_deg": round(math.degrees(plan.tilt_rad), 6),
+        "levels": [asdict(LEVELS[name]) for name, _ in campaign.levels],
+        "set": asked.set_digest,
+        "members": [asdict(member) for member in members_of(database)],
+    }
+
+
+def rule() -> dict[str, float]:
+    """Return the limits by which touches are judged."""
+    return {
+        "enough": ENOUGH,
+        "near_mm": NEAR_MM,
+        "inside_mm": INSIDE_MM,
+        "worn": Plan("").worn,
+    }
+
+
+def command_of(asked: Asked) -> str:
+    """Return the command that does a run again, in any folder."""
+    campaign, plain = asked.campaign, Campaign(asked.campaign.touches)
+    words = ["validate-set", *map(_shown, asked.specs)]
+    words += [] if asked.specs else ["--database", _shown(asked.database)]
+    words += ["--touches", str(campaign.touches), "--seed", str(campaign.seed)]
+    if campaign.kinds != KINDS:
+        words += ["--kinds", _shares(campaign.kinds)]
+    if campaign.levels != LEVEL_SHARES:
+        words += ["--levels", _shares(campaign.levels)]
+    if campaign.overlay != plain.overlay:
+        words += ["--overlay", campaign.overlay]
+    if campaign.files != plain.files:
+        words += ["--surfaces", "database"]
+    words += ["--study", str(campaign.study)]
+    words += ["--shard", str(campaign.shard)] if campaign.shard != plain.shard else []
+    return shlex.join(words)
+
+
+def circumstances(begun: datetime, seconds: float, processes: int, cluster: str) -> dict[str, Any]:
+    """Return when, where and how long: what no two runs share."""
+    return {
+        "utc": begun.isoformat(timespec="seconds"),
+        "seconds": seconds,
+        "workers": cluster or processes,
+        "machine": platform.machine(),
+        "system": platform.platform(),
+    }
+
+
+def _shown(path: str) -> str:
+    """Return a path without the machine's folders."""
+    return Path(path).name if Path(path).is_absolute() or "://" in path else path
+
+
+def _shares(shares: Shares) -> str:
+    return ",".join(f"{name}={share:g}" for name, share in shares)

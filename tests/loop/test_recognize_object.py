@@ -1,0 +1,107 @@
+"""From a spec to an answer by the commands that people use: make, touch, recognise."""
+
+import json
+import signal
+import subprocess
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from generator.command import run as encode_object
+from probe.command import run as probe_sensor
+from recognizer.command import run as recognize_object
+
+CUBE = Path(__file__).parents[2] / "fixtures" / "cube.yaml"
+COMMAND = (sys.executable, "-c", "from recognizer.command import main; main()")
+SHORT_S = 30.0  #: for anything, on a busy machine
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("lab")
+    words = (CUBE, "-o", folder / "out", "--format", "stl", "--database", folder / "lab.db")
+    assert encode_object([str(word) for word in words]) == 0
+    return folder
+
+
+@pytest.fixture
+def asked(capsys, lab, monkeypatch):
+    """Run a command in the lab's folder; its exit code and what it printed."""
+    monkeypatch.chdir(lab)
+
+    def ask(command, *words):
+        capsys.readouterr()
+        code = command([str(word) for word in words])
+        return code, capsys.readouterr().out
+
+    return ask
+
+
+@contextmanager
+def started(lab, *words):
+    """Start `recognize-object` in the lab's folder; it is gone when the block ends."""
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen([*COMMAND, *map(str, words)], cwd=lab, **pipes) as process:
+        try:
+            yield process
+        finally:
+            if process.poll() is None:
+                process.kill()
+
+
+def test_touches_of_a_registered_face_are_recognised(asked):
+    for face, seed, overlay in (("F1", 3, "tab"), ("F4", 4, "pad")):
+        touched, truth_file = f"{face}.h5", f"{face}.json"
+        words = (f"lab.db#Cube/{face}", "--touches", 8, "--frames", 6, "--seed", seed, "--overlay",
+                 overlay, "-o", touched, "--truth", truth_file)  # fmt: skip
+        assert asked(probe_sensor, "simulate", *words)[0] == 0
+        code, out = asked(recognize_object, touched, "--database", "lab.db", "--json")
+        assert code == 0
+        entries = json.loads(out)
+        truth = json.loads(Path(truth_file).read_text())["touches"]
+        assert [entry["seq"] for entry in entries] == [touch["seq"] for touch in truth]
+        errors = []
+        for entry, touch in zip(entries, truth, strict=True):
+            if entry["object"] is None:
+                assert entry["reason"]
+                continue
+            assert (entry["object"], entry["face"]) == ("Cube", face)
+            found, known = np.array(entry["T_object_probe"]), np.array(touch["T_object_probe"])
+            errors.append((np.array(entry["T_face_probe"]) - touch["T_face_probe"])[:2, 3])
+            assert np.linalg.norm((found - known)[:3, 3]) < 2.0
+        assert len(errors) >= 6
+        assert np.sqrt(np.mean(np.square(errors))) < 0.3
+
+
+def test_a_port_is_followed_until_it_is_interrupted(lab):
+    port = "sim:lab.db#Cube/F2?period=0.6&seed=5"
+    with started(lab, "--port", port, "--follow", "--json") as process:
+        lines = [json.loads(process.stdout.readline()) for _ in range(2)]
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=SHORT_S)
+    assert process.returncode == 130
+    assert "recognize-object: interrupted" in err
+    assert lines[0]["seq"] < lines[1]["seq"]
+    assert {line["object"] for line in lines} <= {"Cube", None}
+    assert any(line["face"] == "F2" for line in lines)
+
+
+def test_the_probes_firmware_is_read(asked):
+    port = "sim:lab.db#Cube/F1?x=30&y=30&theta=20&firmware=avr&rate=50&period=1.5"
+    code, out = asked(recognize_object, "--port", port, "--json")
+    (entry,) = json.loads(out)
+    assert code == 0
+    assert (entry["object"], entry["face"]) == ("Cube", "F1")
+    assert (entry["x_mm"], entry["y_mm"]) == pytest.approx((30, 30), abs=0.3)
+
+
+def test_a_recording_is_played_as_a_port(asked):
+    words = ("lab.db#Cube/F3", "--frames", 8, "-o", "played.h5")
+    assert asked(probe_sensor, "simulate", *words)[0] == 0
+    code, out = asked(recognize_object, "--port", "file:played.h5?speed=0", "--follow")
+    assert code == 0
+    assert out.startswith("0: Cube/F3 at (")
+    assert asked(recognize_object, "played.h5") == (code, out)

@@ -1,0 +1,87 @@
+"""Encoding from a script: what the kernel holds becomes an object, and comes back."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
+from OCP.BRepCheck import BRepCheck_Analyzer
+from OCP.BRepGProp import BRepGProp
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeSphere
+from OCP.gp import gp_Pnt
+from OCP.GProp import GProp_GProps
+
+from generator import encode
+from generator.cad.result import _kernel_solid
+from generator.errors import DatabaseError, ShapeError
+from generator.solid import box, volume
+from generator.spec import SpecError
+
+
+def block(x: float = 30.0, y: float = 35.0, z: float = 40.0):
+    return BRepPrimAPI_MakeBox(gp_Pnt(5, 6, 7), x, y, z).Solid()
+
+
+def encoded(folder, solid=None, **options):
+    given = {"name": "Block", "formats": (), "folder": folder / "out"} | options
+    return encode(solid or block(), database=str(folder / "lab.db"), **given)
+
+
+def test_parts_come_back_as_valid_solids_where_the_solid_was(tmp_path):
+    result = encoded(tmp_path, print={"parts": "whole"})
+    (part,) = result.parts
+    solid = _kernel_solid(part)
+    properties = GProp_GProps()
+    BRepGProp.VolumeProperties_s(solid, properties)
+    assert BRepCheck_Analyzer(solid).IsValid()
+    assert properties.Mass() == pytest.approx(volume(part), rel=1e-9)
+    assert properties.Mass() > 30 * 35 * 40
+    centre = properties.CentreOfMass()
+    assert np.abs([centre.X() - 20, centre.Y() - 23.5, centre.Z() - 27]).max() < 0.5
+    low, high = box(part)
+    assert high - low == pytest.approx([32, 37, 42])
+    assert result.symbols == sum(len(face.labels) for face in result.layout.faces) > 50
+
+
+def test_the_same_solid_again_keeps_its_cells_and_another_is_refused(tmp_path):
+    first = encoded(tmp_path)
+    again = encoded(tmp_path, block())
+    assert (first.reused, again.reused) == (False, True)
+    assert again.layout.faces[0].rows.tolist() == first.layout.faces[0].rows.tolist()
+    with pytest.raises(DatabaseError, match="another spec"):
+        encoded(tmp_path, block(31.0))
+    assert not encoded(tmp_path, block(31.0), replace=True).reused
+
+
+def test_settings_are_those_of_a_spec_and_errors_name_them(tmp_path):
+    result = encoded(tmp_path, symbols={"pitch": "8 mm"}, layout="faces", profile="large")
+    assert result.layout.pitch_mm == 8.0
+    assert result.layout.kind == "faces"
+    with pytest.raises(SpecError, match=r"encode\(\):2:10: error: unknown profile 'lagre'"):
+        encoded(tmp_path, profile="lagre")
+    with pytest.raises(SpecError, match="unknown setting 'pich'"):
+        encoded(tmp_path, symbols={"pich": 8})
+    with pytest.raises(SpecError, match="not a plain value"):
+        encoded(tmp_path, symbols={"pitch": object()})
+    with pytest.raises(SpecError, match="one solid is encoded at a time"):
+        encoded(tmp_path, copies=2)
+
+
+def test_what_is_no_single_solid_is_refused_and_leaves_nothing(tmp_path):
+    two = BRepAlgoAPI_Fuse(block(), BRepPrimAPI_MakeBox(gp_Pnt(90, 0, 0), 9, 9, 9).Solid()).Shape()
+    for solid, cause in (
+        (two, "2 solids"),
+        (BRepPrimAPI_MakeSphere(20.0).Solid(), "not planar"),
+        ("block.step", "no solid of build123d or cadquery"),
+    ):
+        with pytest.raises(ShapeError, match=cause):
+            encoded(tmp_path, solid)
+    assert not list(tmp_path.iterdir())
+
+
+def test_nothing_heavy_is_loaded_before_it_is_used():
+    code = "import sys, generator; sys.exit('OCP' in sys.modules or 'numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

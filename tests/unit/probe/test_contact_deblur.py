@@ -1,0 +1,124 @@
+"""The pad's blur taken back as far as the noise lets: case 7 of the stiff and extreme cases."""
+
+import math
+
+import numpy as np
+import pytest
+
+from probe.contact.contract import Touch, WristStiffness
+from probe.contact.deblur import LEAST, arriving, deblurred, thickest_mm
+from probe.contact.layer import layer
+from probe.contact.layer_influence import influence
+from probe.errors import ContactError
+from probe.sensor import Overlay, Sensor
+from probe.surface.indenters import Washer
+
+HELD = WristStiffness(math.inf, math.inf)
+
+
+def pad(height, **more):
+    return Sensor(overlay=Overlay("pad", height, **more))
+
+
+def blurred(sensor, forces):
+    """What arrives of forces that press evenly on squares of tactels."""
+    grid = influence(sensor, 4)
+    pressure = np.zeros((grid.rows, grid.columns))
+    pressure[1:-1, 1:-1] = np.kron(forces, np.ones((4, 4))) / sensor.pitch_mm**2
+    return grid.base_forces_n(pressure)
+
+
+@pytest.mark.parametrize(("height", "passed"), [(1.0, 0.61), (2.0, 0.185), (4.0, 0.0065)])
+def test_what_arrives_of_the_shortest_wave(height, passed):
+    assert arriving(pad(height)) == pytest.approx(passed, rel=5e-3)
+
+
+@pytest.mark.parametrize("height", [4.0, 6.0, 20.0, 1e3])
+def test_pads_of_4_mm_and_more_are_refused(height):
+    with pytest.raises(ContactError, match="passes") as caught:
+        deblurred(np.ones((16, 16)), pad(height), noise_n=0.01)
+    assert "at most 3.75 mm" in caught.value.fix
+
+
+@pytest.mark.parametrize("poisson", [0.0, 0.3, 0.4999, 0.5])
+def test_the_thickest_pad_is_where_the_refusal_begins(poisson):
+    most = thickest_mm(pad(2.0, poisson=poisson))
+    assert arriving(pad(most, poisson=poisson)) == pytest.approx(LEAST, rel=1e-6)
+    read = np.ones((16, 16))
+    assert deblurred(read, pad(0.99 * most, poisson=poisson), noise_n=0.1).arrives > LEAST
+    with pytest.raises(ContactError, match="at most"):
+        deblurred(read, pad(1.01 * most, poisson=poisson), noise_n=0.1)
+
+
+@pytest.mark.parametrize("height", [0.05, 1.0, 2.0, 3.0])
+def test_without_noise_the_forces_come_back(height):
+    true = np.random.default_rng(1).exponential(0.1, (16, 16))
+    true[3:9, 4] = 0
+    found = deblurred(blurred(pad(height), true), pad(height), noise_n=0.0)
+    assert found.forces_n == pytest.approx(true, abs=1e-6)
+    assert found.resolved == 256
+
+
+@pytest.mark.parametrize("height", [1.0, 2.0, 3.0, 3.7])
+def test_noise_is_held_down_and_told(height):
+    """The error is that of the noise and of what was left out; never the plain inverse's."""
+    rng = np.random.default_rng(2)
+    sensor, noise = pad(height), 0.01
+    true = np.kron(rng.exponential(0.3, (4, 4)), np.ones((4, 4)))
+    clean = blurred(sensor, true)
+    found = deblurred(clean + noise * rng.normal(size=(16, 16)), sensor, noise_n=noise)
+    assert (found.forces_n >= 0).all()
+    assert found.noise_n <= 8 * noise
+    error = np.linalg.norm(found.forces_n - true) / np.linalg.norm(true)
+    assert error < np.linalg.norm(clean - true) / np.linalg.norm(true)
+    assert found.resolved < 256 or height < 2
+
+
+def test_directions_are_lost_as_pads_grow():
+    read = np.random.default_rng(3).exponential(0.1, (16, 16))
+    resolved = [deblurred(read, pad(h), noise_n=0.01).resolved for h in (1.0, 2.0, 3.0, 3.7)]
+    assert resolved[0] == 256
+    assert all(np.diff(resolved) < 0)
+    assert resolved[-1] < 128
+
+
+@pytest.mark.parametrize("noise", [0.001, 0.01, 0.05])
+def test_the_washer_of_figure_4_10_is_sharper(noise):
+    """Likeness to the ring's cover of each tactel, at 20 N through 2 mm."""
+    sensor, touch = pad(2.0), Touch(0.3, -0.2, 0.3, 20.0, wrist=HELD)
+    read = layer(Washer(), sensor, touch).forces_n
+    read += noise * np.random.default_rng(0).normal(size=read.shape)
+    step = (np.arange(16) + 0.5) / 16 - 0.5
+    inside = sensor.centres_mm()[:, :, None, None] + sensor.pitch_mm * np.stack(
+        np.meshgrid(step, step), axis=-1
+    )
+    heights = Washer().heights_mm(touch.on_surface(inside).reshape(-1, 2)).reshape(16, 16, -1)
+    cover = (heights == 0).mean(axis=-1)
+
+    def likeness(image):
+        return np.corrcoef(image.ravel(), cover.ravel())[0, 1]
+
+    found = deblurred(read, sensor, noise_n=noise)
+    assert likeness(found.forces_n) > likeness(read) + 0.01
+    assert found.forces_n.sum() == pytest.approx(20.0, rel=0.15)
+
+
+def test_nothing_felt_is_nothing():
+    found = deblurred(np.zeros((16, 16)), pad(2.0), noise_n=0.01)
+    assert not found.forces_n.any()
+    assert found.resolved == 0
+
+
+@pytest.mark.parametrize(
+    ("read", "sensor", "noise", "match"),
+    [
+        (np.ones((16, 16)), Sensor(), 0.01, "kind 'tab'"),
+        (np.ones((16, 15)), pad(2.0), 0.01, "shape"),
+        (np.full((16, 16), np.nan), pad(2.0), 0.01, "finite"),
+        (np.ones((16, 16)), pad(2.0), -1.0, "noise"),
+        (np.ones((16, 16)), pad(2.0), math.inf, "noise"),
+    ],
+)
+def test_what_is_refused(read, sensor, noise, match):
+    with pytest.raises(ContactError, match=match):
+        deblurred(read, sensor, noise_n=noise)
