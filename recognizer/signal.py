@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 CONTACT = 8.0  #: counts over the background by which the strongest tactels must rise
+CONTACT_N = 0.05  #: and newtons
 _FEW = 6  # tactels that must feel something
 
 
@@ -33,7 +34,7 @@ def signal_of(
     *,
     trust: Array | None = None,
     floor: float | None = None,
-    least: float = CONTACT,
+    least: float | None = None,
     newtons: bool = False,
 ) -> Signal:
     """Return the signal of one image.
@@ -47,7 +48,8 @@ def signal_of(
     floor
         Reading without force; by default what the lowest twentieth of the tactels read.
     least
-        How far the strongest tactels must rise above the floor for a contact.
+        How far the strongest tactels must rise above the floor for a contact; by default
+        `CONTACT` counts, or `CONTACT_N` newtons.
     newtons
         Whether the readings are newtons.
     """
@@ -57,8 +59,9 @@ def signal_of(
         return Signal(np.zeros(readings.shape), known, contact=False, newtons=newtons)
     level = float(np.quantile(good, 0.05)) if floor is None else floor
     forces = np.maximum(readings - level, 0.0)
+    rise = (CONTACT_N if newtons else CONTACT) if least is None else least
     strongest = np.sort(forces[known > 0])[-_FEW:]
-    return Signal(forces, known * _alive(forces, known), bool(strongest[0] > least), newtons)
+    return Signal(forces, known * _alive(forces, known), bool(strongest[0] > rise), newtons)
 
 
 def _alive(forces: Array, known: Array) -> Array:

@@ -12,6 +12,7 @@ chord error, pi^2 r / (3 N^2) to first order, which sets the number N of facets.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -92,3 +93,6 @@ def _round(
     facets = tuple(range(1, count + 1))
     side = Developable(kind, facets, radius, half_angle, True, False, error)
     return replace(solid, surfaces=(side,))
+
+
+ROUND_SHAPES: dict[str, Callable[..., Polyhedron]] = {"cylinder": cylinder, "cone": cone}

@@ -44,6 +44,22 @@ class Embossing:
 
 
 @dataclass(frozen=True, slots=True)
+class Wrapped:
+    """Symbols on a round face: not instanced, each bends over the facets under it.
+
+    Their sides and tops are facets of the part like any other; here stands which ones.
+    """
+
+    face: int  #: face of the object
+    facets: tuple[int, ...]  #: of the part that carry them
+    first: int  #: facet of the part with which the symbols' own facets begin
+    symbols: NDArray[np.int64]  #: (m,) symbol that each of the facets from `first` on belongs to
+    labels: NDArray[np.int64]  #: (n,)
+    names: tuple[str, ...]  #: (n,) name of each symbol, "r12c34"
+    feet: tuple[Facet, ...]  #: what the symbols cut out of the facets that carry them
+
+
+@dataclass(frozen=True, slots=True)
 class Part:
     """One printable body."""
 
@@ -52,3 +68,10 @@ class Part:
     facets: tuple[Facet, ...]
     embossings: tuple[Embossing, ...]
     T_object_part: NDArray[np.float64]  #: (4, 4)
+    wrapped: tuple[Wrapped, ...] = ()
+
+    @property
+    def symbols(self) -> int:
+        """Number of symbols; marks such as edge numbers do not count."""
+        flat = sum(len(e.labels) for e in self.embossings if e.face is not None)
+        return flat + sum(len(w.labels) for w in self.wrapped)

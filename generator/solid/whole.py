@@ -17,6 +17,7 @@ from generator.polyhedron.winged import Polyhedron
 from generator.solid.emboss import embossing_of
 from generator.solid.measure import box
 from generator.solid.part import Facet, Part
+from generator.solid.wrap.wrapped import Body, wrapped_onto
 
 
 def whole(polyhedron: Polyhedron, layout: Layout, tiers: tuple[Tiers, ...], name: str) -> Part:
@@ -43,16 +44,23 @@ def whole(polyhedron: Polyhedron, layout: Layout, tiers: tuple[Tiers, ...], name
     SolidError
         If a label has no outline.
     """
+    facets = [Facet(face.name, face.loops) for face in polyhedron.faces]
+    body = Body([polyhedron.vertices], len(polyhedron.vertices), facets)
+    round_faces = {surface.carrier: surface for surface in polyhedron.surfaces}
+    embossings = []
+    for face in layout.faces:
+        if len(face.labels) and face.face in round_faces:
+            wrapped_onto(body, polyhedron, round_faces[face.face], face, tiers)
+        elif len(face.labels):
+            frame = face_frame(polyhedron, face.face)
+            embossings.append(embossing_of(face, tiers, face.face, frame, layout.pitch_mm))
     part = Part(
         name=name,
-        vertices=polyhedron.vertices,
-        facets=tuple(Facet(face.name, face.loops) for face in polyhedron.faces),
-        embossings=tuple(
-            embossing_of(face, tiers, face.face, face_frame(polyhedron, face.face), layout.pitch_mm)
-            for face in layout.faces
-            if len(face.labels)
-        ),
+        vertices=np.concatenate(body.vertices),
+        facets=tuple(body.facets),
+        embossings=tuple(embossings),
         T_object_part=np.eye(4),
+        wrapped=tuple(body.wrapped),
     )
     low, high = box(part)
     return moved(part, -np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]))

@@ -25,9 +25,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
-from probe.contact.layer_influence import Influence, influence
+from probe.contact.layer_influence import influence, nearest_tactel
 from probe.contact.layer_kernel import base_ratio
 from probe.errors import ContactError
 from probe.sensor import Sensor
@@ -66,7 +67,6 @@ def deblurred(forces_n: ArrayLike, sensor: Sensor, *, noise_n: float) -> Deblurr
         When the overlay is no pad, or one that passes too little; for readings or a noise that
         are no numbers.
     """
-    grid = influence(sensor, CELLS)  # refuses what is no pad
     read = np.asarray(forces_n, dtype=np.float64)
     shape = (sensor.rows, sensor.columns)
     if read.shape != shape or not np.isfinite(read).all():
@@ -78,6 +78,7 @@ def deblurred(forces_n: ArrayLike, sensor: Sensor, *, noise_n: float) -> Deblurr
         raise ContactError(
             f"a noise of {noise_n:g} N", fix="give the standard deviation of one reading, >= 0"
         )
+    blur, strengths = blur_of(sensor)
     arrives = arriving(sensor)
     if arrives < LEAST:
         raise ContactError(
@@ -87,7 +88,6 @@ def deblurred(forces_n: ArrayLike, sensor: Sensor, *, noise_n: float) -> Deblurr
             fix=f"take a pad of at most {math.floor(100 * thickest_mm(sensor)) / 100:g} mm, tabs, "
             "or the image as it is",
         )
-    blur, strengths = _blurred(grid)
     level = math.sqrt(float(np.mean(np.square(read))))
     if level == 0:
         return Deblurred(np.zeros(shape), 0.0, 0, arrives)
@@ -126,17 +126,41 @@ def _pressing(blur: Array, read: Array, share: float) -> Array:
 
 
 @lru_cache(maxsize=4)
-def _blurred(grid: Influence) -> tuple[Array, Array]:
-    """Return the blur (n, n) from tactel to tactel, and its singular values (n,)."""
-    n = grid.cells_per_tactel
-    rows, columns = grid.sensor.rows, grid.sensor.columns
-    blur = np.empty((rows * columns, rows * columns))
-    for tactel, (row, column) in enumerate(np.ndindex(rows, columns)):
-        pressure = np.zeros((grid.rows, grid.columns))
-        pressure[1 + row * n : 1 + (row + 1) * n, 1 + column * n : 1 + (column + 1) * n] = (
-            1 / (n * grid.dx_mm) ** 2
+def blur_of(sensor: Sensor) -> tuple[Array, Array]:
+    """Return the blur (n, n) from tactel to tactel, and its singular values (n,).
+
+    Column k is what the tactels feel of 1 N that presses evenly on the square of tactel k.
+
+    Raises
+    ------
+    ContactError
+        When the overlay is no pad.
+    """
+    grid = influence(sensor, CELLS)
+    n, dx, height = grid.cells_per_tactel, grid.dx_mm, sensor.overlay.height_mm
+    down, right = (
+        frequency(cells)
+        for frequency, cells in zip(
+            (scipy.fft.fftfreq, scipy.fft.rfftfreq), grid.domain, strict=True
         )
-        blur[:, tactel] = grid.base_forces_n(pressure).ravel()
+    )
+    s = 2 * math.pi * height / dx * np.hypot(down[:, None], right)
+    # Of a cell pressed evenly and felt as a whole: its own wave, and all shorter ones as one.
+    own = np.square(np.sinc(down)[:, None] * np.sinc(right))
+    beyond = base_ratio(np.array(2 * math.pi * height / dx), sensor.overlay.poisson)
+    passed = base_ratio(s, sensor.overlay.poisson) * own + float(beyond) * (1 - own)
+    orders = [
+        nearest_tactel(whole, cells, n)
+        for whole, cells in zip(grid.domain, (grid.rows, grid.columns), strict=True)
+    ]
+    blur = np.empty((sensor.rows * sensor.columns,) * 2)
+    for tactel, (row, column) in enumerate(np.ndindex(sensor.rows, sensor.columns)):
+        force = np.zeros(grid.domain)
+        force[1 + row * n : 1 + (row + 1) * n, 1 + column * n : 1 + (column + 1) * n] = 1 / n**2
+        felt = scipy.fft.irfft2(scipy.fft.rfft2(force) * passed, s=grid.domain)
+        for axis, (order, starts) in enumerate(orders):
+            felt = np.add.reduceat(felt.take(order, axis=axis), starts, axis=axis)
+        blur[:, tactel] = felt.ravel()
     strengths: Array = np.asarray(np.linalg.svd(blur, compute_uv=False), np.float64)
     blur.setflags(write=False)
     strengths.setflags(write=False)

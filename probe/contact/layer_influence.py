@@ -66,8 +66,8 @@ class Influence:
         """
         stress = self._filtered(pressure, self.base, self.domain[0])
         n = self.cells_per_tactel
-        rows = _nearest_tactel(self.domain[0], self.rows, n)
-        columns = _nearest_tactel(self.domain[1], self.columns, n)
+        rows = nearest_tactel(self.domain[0], self.rows, n)
+        columns = nearest_tactel(self.domain[1], self.columns, n)
         felt = np.add.reduceat(stress[rows[0]], rows[1], axis=0)
         felt = np.maximum(np.add.reduceat(felt[:, columns[0]], columns[1], axis=1), 0.0)
         total = felt.sum()
@@ -132,7 +132,7 @@ def _domain(cells: int, heights: float) -> int:
     return 2 * int(scipy.fft.next_fast_len((least + 1) // 2, real=True))
 
 
-def _nearest_tactel(
+def nearest_tactel(
     domain: int, cells: int, per_tactel: int
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return an order of the domain's cells and where each tactel's run in it starts.

@@ -119,9 +119,21 @@ HEADER = (f"{'':34}{'scans':>5}{'told':>6}{'first':>7}{'95 %':>5}{'wrong':>6}{'a
           f"{'symbols':>8}{'wrong':>6}{'rms mm':>8}{'deg':>7}{'95 %':>7}{'ms':>8}")  # fmt: skip
 
 
-def scanned(scene, kind, level, sigma_tactels, most, rng):
+@dataclass
+class Manner:
+    """How a scan is done."""
+
+    force_n: tuple = (20.0, 120.0)
+    tilt_deg: float = 2.0
+    turn_deg: float | None = None  #: of the sensor; None: any
+
+
+def scanned(scene, kind, level, sigma_tactels, most, rng, manner=None):
     """Return a scan of a face."""
+    manner = manner or Manner()
     theta = float(rng.uniform(-math.pi, math.pi))
+    if manner.turn_deg is not None:
+        theta = math.radians(manner.turn_deg)
     if kind == "corner":
         a, b, c = (scene.region.starts[k] for k in (1, 0, -1))
         edges = [(b + (end - b) * t) for end in (a, c) for t in np.linspace(0.05, 0.6, most // 2)]
@@ -151,9 +163,9 @@ def scanned(scene, kind, level, sigma_tactels, most, rng):
     stood = []
     for k, stand in enumerate(true):
         at = planar_pose(back @ stand)
-        tilt = math.radians(2) * math.sqrt(rng.random())
+        tilt = math.radians(manner.tilt_deg) * math.sqrt(rng.random())
         towards = rng.uniform(-math.pi, math.pi)
-        touch = Touch(*at.tolist(), float(rng.uniform(20, 120)),
+        touch = Touch(*at.tolist(), float(rng.uniform(*manner.force_n)),
                       tilt * math.cos(towards), tilt * math.sin(towards))  # fmt: skip
         try:
             counts, _ = read(surface, SENSOR, touch, LEVELS[level], np.random.default_rng(number))
@@ -265,6 +277,9 @@ def main() -> None:
     parser.add_argument("--ways", nargs="+", default=["joint", "alone", "classical"])
     parser.add_argument("--scans", type=int, default=1, help="of each object, a face at random")
     parser.add_argument("--touches", type=int, default=40, help="at most, of a scan")
+    parser.add_argument("--force", nargs=2, type=float, default=[20.0, 120.0], help="N")
+    parser.add_argument("--tilt", type=float, default=2.0, help="largest, degrees")
+    parser.add_argument("--turn", type=float, default=None, help="degrees; any if not given")
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
     print(HEADER)
@@ -296,7 +311,8 @@ def compare(given, url, lab, reader, faces, profile, kind, level, error):
             sides = sorted(side for name, side in faces if name == thing)
             name = (thing, sides[int(rng.integers(len(sides)))])
             scene = registered_surface(url, *name)
-            felt = scanned(scene, kind, level, sigma, given.touches, rng)
+            manner = Manner(tuple(given.force), given.tilt, given.turn)
+            felt = scanned(scene, kind, level, sigma, given.touches, rng, manner)
             if "joint" in tallies:
                 joint(reader, felt, name, faces, tallies["joint"])
             if "alone" in tallies:

@@ -60,9 +60,14 @@ def test_case_5_no_force_is_no_image_and_a_free_plate_off_its_ground_tips(kind, 
 @pytest.mark.parametrize(("kind", "level"), EVERY_LEVEL)
 @pytest.mark.parametrize("width", [0.01, 0.05, 0.2])
 def test_case_6_thin_strokes_are_felt_or_refused_at_every_level(kind, level, width):
-    """Over nothing, and over a floor that would bear the force if the stroke were lost."""
-    below = (-math.inf, -0.8) if level not in ("footprint", "tabs-7") else (-math.inf,)
-    for floor in below:
+    """Over nothing, and over a floor that would bear the force if the stroke were lost.
+
+    Points on a tip are too far apart to meet every stroke of 0.01 mm, or with 7 of 0.05 mm.
+    """
+    seen = width >= {"footprint": 1.0, "tabs-7": 0.2, "tabs-19": 0.05, "tabs-61": 0.02}.get(
+        level, 0
+    )
+    for floor in (-math.inf, -0.8)[: 1 + seen]:
         for x in (P / 2, 0.31):
             surface, touch = Strip(width, floor_mm=floor), Touch(x, 0, 0.02, 1.0)
             try:
@@ -70,10 +75,7 @@ def test_case_6_thin_strokes_are_felt_or_refused_at_every_level(kind, level, wid
             except ContactError:
                 continue
             assert found.forces_n.sum() == pytest.approx(1.0, rel=1e-5)
-            if width > 0.01 or floor < -1:
-                assert found.forces_n[:, 6:10].sum() > 0.8
-            else:  # so thin that tabs are cut, down to the floor
-                assert found.forces_n[:, 6:10].sum() > 1.2 * 4 / 16
+            assert found.forces_n[:, 6:10].sum() > 0.8
 
 
 def test_case_8_slivers_and_squares_of_a_simulated_face():

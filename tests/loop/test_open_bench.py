@@ -1,0 +1,393 @@
+"""`open-bench` as an operator meets it: a server, the firmware's probe, a real browser."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+
+import httpx
+import numpy as np
+import pytest
+from playwright.sync_api import expect, sync_playwright
+
+from generator.pipeline import encode
+from generator.spec import read_specs
+from probe.recording.read import read_recording
+
+CHROMIUM = "/usr/bin/chromium"
+FLAGS = (
+    "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-quic",
+    "--no-first-run", "--disable-background-networking", "--disable-component-update",
+    "--disable-sync",
+)  # fmt: skip
+PATIENCE_S = 30.0  #: for anything, on a busy machine
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory):
+    """A folder with a registered cube, its database, and a secret beside it."""
+    folder = tmp_path_factory.mktemp("bench")
+    lab = folder / "lab"
+    lab.mkdir()
+    (folder / "secret.txt").write_text("secret")
+    (lab / "cube.yaml").write_text("name: Cube\nshape: {cube: 60 mm}\n")
+    encode(
+        read_specs([lab / "cube.yaml"]), folder=lab / "out", formats=("stl", "glb"),
+        database=str(lab / "lab.db"),
+    )  # fmt: skip
+    return lab
+
+
+@contextmanager
+def served(lab, *options):
+    """Run the server; yields its address, and checks that it ends in order."""
+    words = ("--database", lab / "lab.db", "--folder", lab / "recordings", "--web-port", 0)
+    command = [sys.executable, "-m", "recognizer.bench.command", *map(str, (*words, *options))]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            yield process.stdout.readline().split()[-1]
+        finally:
+            process.terminate()
+            assert process.wait(PATIENCE_S) == 0
+
+
+@pytest.fixture(scope="module")
+def bench(lab):
+    """Address of a bench whose probe runs the firmware."""
+    with served(lab, "--port", "touch:?firmware=avr&hold=1.5") as address:
+        yield address
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
+        yield chromium
+        chromium.close()
+
+
+@contextmanager
+def opened(browser, address, **look):
+    """Open the page; nothing may be asked of anybody else, and nothing go wrong in it."""
+    look = {"viewport": {"width": 1440, "height": 900}} | look
+    page = browser.new_page(**look)
+    asked, wrong = [], []
+    page.on("request", lambda request: asked.append(request.url))
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.goto(address)
+    until(page, "bench.shown !== '' && bench.frames > 0")
+    yield page
+    host = address.split("/")[2]
+    assert {re.split("[/?]", url)[2] for url in asked if not url.startswith("blob:")} == {host}
+    assert wrong == []
+    page.close()
+
+
+@pytest.fixture
+def page(browser, bench):
+    with opened(browser, bench) as page:
+        rest(page)
+        yield page
+
+
+def until(page, wanted):
+    """Wait until an expression holds in the page."""
+    end_s = time.monotonic() + PATIENCE_S
+    while not page.evaluate(wanted):
+        assert time.monotonic() < end_s, wanted
+        time.sleep(0.05)
+
+
+def rest(page):
+    """Wait until nothing is touched any more."""
+    until(page, "bench.sum < 1500")
+
+
+def touched(page, x=0.42, y=0.55):
+    """Click on the part; returns what the page then says."""
+    before = page.evaluate("bench.answers")
+    box = page.get_by_test_id("part").bounding_box()
+    page.mouse.click(box["x"] + x * box["width"], box["y"] + y * box["height"])
+    until(page, f"bench.answers > {before}")
+    return page.get_by_test_id("answer").inner_text()
+
+
+def heat(page):
+    """Return the heat map's pixels, as the page has them."""
+    return page.evaluate("document.getElementById('heat').toDataURL()")
+
+
+def test_live_image_moves_and_the_figures_are_told(page):
+    expect(page.get_by_test_id("state")).to_contain_text("probe is there")
+    expect(page.get_by_test_id("calibration-age")).to_have_text("none")
+    before, frames = heat(page), page.evaluate("bench.frames")
+    until(page, f"bench.frames > {frames + 20}")
+    assert heat(page) != before  # noise alone moves it
+    rate = float(page.get_by_test_id("rate").inner_text().split()[0])
+    assert 20 < rate < 300
+
+
+def test_a_click_touches_there_and_the_face_is_lit(page):
+    said = touched(page)
+    face = page.get_by_test_id("touch-face").input_value()
+    assert said.startswith(f"Cube {face}")
+    assert page.get_by_test_id("part").get_attribute("data-lit") == face
+    asked = [float(page.locator(f"#touch-{axis}").input_value()) for axis in "xy"]
+    read = re.search(r"x (-?[\d.]+), y (-?[\d.]+) mm", page.locator("#pose").inner_text())
+    assert np.allclose(asked, [float(value) for value in read.groups()], atol=0.3)
+    assert "needed" in page.locator("#margin-text").inner_text()
+    expect(page.get_by_test_id("mosaic-text")).to_contain_text(f"Cube {face}")
+    assert "Cube" in page.locator("#map-text").inner_text()
+
+
+def test_keys_turn_the_part_and_touch_it(page):
+    part = page.get_by_test_id("part")
+    part.focus()
+    before, answers = part.screenshot(), page.evaluate("bench.answers")
+    for _ in range(6):
+        page.keyboard.press("ArrowRight")
+    page.keyboard.press("Enter")
+    until(page, f"bench.answers > {answers}")
+    assert part.screenshot() != before
+    face = page.get_by_test_id("touch-face").input_value()
+    assert page.get_by_test_id("answer").inner_text().startswith(f"Cube {face}")
+
+
+def test_a_touch_beyond_the_edge_says_why_it_is_not_answered(page):
+    page.get_by_test_id("touch-face").select_option("F1")
+    answers = page.evaluate("bench.answers")
+    page.locator("#touch-x").fill("-9")
+    page.locator("#touch-y").fill("30")
+    page.get_by_test_id("touch-go").click()
+    until(page, f"bench.answers > {answers}")
+    said = page.get_by_test_id("answer").inner_text()
+    assert said.startswith("Not recognised:")
+    assert page.get_by_test_id("part").get_attribute("data-lit") == ""
+
+
+def test_filters_and_overlays(page):
+    touched(page)
+    seen = {}
+    page.locator("#freeze").uncheck()
+    for name in ("raw", "bias-free", "median", "sobel"):
+        page.get_by_test_id("filter").select_option(name)
+        paints = page.evaluate("bench.paints")
+        until(page, f"bench.paints > {paints + 3}")
+        seen[name] = heat(page)
+    assert len(set(seen.values())) == 4
+    page.get_by_test_id("filter").select_option("bias-free")
+
+
+def test_unplug_and_replug_are_said_plainly(page):
+    page.get_by_test_id("unplug").click()
+    state = page.get_by_test_id("state")
+    expect(state).to_contain_text("probe is gone", timeout=PATIENCE_S * 1e3)
+    expect(state).to_contain_text("probe is there", timeout=PATIENCE_S * 1e3)
+    frames = page.evaluate("bench.frames")
+    until(page, f"bench.frames > {frames + 10}")
+    assert touched(page).startswith("Cube")
+    expect(page.get_by_test_id("notices")).to_contain_text("the probe is back")
+
+
+def test_record_and_replay(page, lab):
+    record = page.get_by_test_id("record")
+    record.click()
+    expect(record).to_have_attribute("aria-pressed", "true")
+    said = touched(page).splitlines()[0]
+    rest(page)
+    record.click()
+    expect(record).to_have_attribute("aria-pressed", "false")
+    name = page.get_by_test_id("recordings").input_value()
+    frames = len(read_recording(lab / "recordings" / name))
+    assert frames > 50
+    answers = page.evaluate("bench.answers")
+    page.get_by_test_id("replay").click()
+    expect(page.get_by_test_id("state")).to_contain_text("replaying")
+    until(page, f"bench.answers > {answers}")
+    assert page.get_by_test_id("answer").inner_text().startswith(said)
+    expect(page.get_by_test_id("play")).to_have_text("Play", timeout=PATIENCE_S * 1e3)
+    before = heat(page)
+    page.get_by_test_id("seek").fill("400")
+    expect(page.get_by_test_id("place")).not_to_have_text(re.compile(r"^0\.0 "))
+    until(page, "bench.sum > 1500")
+    assert heat(page) != before
+    page.get_by_test_id("leave").click()
+    expect(page.get_by_test_id("state")).to_contain_text("probe is there", timeout=PATIENCE_S * 1e3)
+
+
+def test_calibrate_step_by_step(page, lab):
+    page.get_by_test_id("calibrate").click()
+    page.get_by_test_id("guide-loads").fill("40, 150, 500")
+    page.get_by_test_id("guide-seconds").fill("0.5")
+    page.get_by_test_id("guide-start").click()
+    for step in range(4):
+        expect(page.get_by_test_id("guide-ask")).to_contain_text(f"{step + 1} of 4")
+        page.get_by_test_id("guide-load").click()
+        page.wait_for_timeout(300)  # the film creeps
+        page.get_by_test_id("guide-read").click()
+        felt = page.locator("#guide-felt li")
+        expect(felt).to_have_count(step + 1, timeout=PATIENCE_S * 1e3)
+    page.get_by_test_id("guide-finish").click()
+    expect(page.get_by_test_id("guide-result")).to_contain_text("tactels are sound")
+    page.locator("#guide-close").click()
+    expect(page.get_by_test_id("calibration-age")).to_contain_text("fresh")
+    rest(page)
+    assert touched(page).startswith("Cube")
+    expect(page.locator("#scale")).to_contain_text("N")
+    page.get_by_test_id("calibrations").select_option("")
+    expect(page.get_by_test_id("calibration-age")).to_have_text("none")
+    assert list((lab / "recordings").glob("calibration-*.json"))
+
+
+def test_files_and_pictures_can_be_had(page, lab):
+    page.locator("summary").click()
+    with page.expect_download() as download:
+        page.get_by_test_id("files").get_by_role("link").first.click()
+    name = download.value.suggested_filename
+    assert download.value.path().read_bytes() == (lab / "out" / name).read_bytes()
+    with page.expect_download() as download:
+        page.get_by_test_id("save-picture").click()
+    assert download.value.path().read_bytes().startswith(b"\x89PNG")
+    with page.expect_download() as download:
+        page.get_by_test_id("save-frame").click()
+    assert np.loadtxt(download.value.path(), delimiter=",").shape == (16, 16)
+
+
+def test_every_control_has_a_name_and_text_stands_out(page):
+    nameless = page.evaluate(
+        """() => [...document.querySelectorAll('button, a, input, select, canvas, [role]')].filter((one) =>
+        !one.closest('[hidden]') && one.getAttribute('aria-hidden') !== 'true' &&
+        !(one.getAttribute('aria-label') || one.labels?.length || one.textContent.trim()
+          || ['log', 'alert', 'status'].includes(one.role))).map((one) => one.outerHTML)"""
+    )
+    assert nameless == []
+    for theme in ("light", "dark"):
+        page.evaluate(f"document.documentElement.dataset.theme = '{theme}'")
+        for colour in ("--text", "--muted", "--accent", "--good", "--bad", "--lit"):
+            assert contrast(page, colour, "--panel") >= 4.5 - (colour == "--lit")
+
+
+def contrast(page, ink, paper):
+    """Return the ratio of luminances of two of the page's colours."""
+    told = page.evaluate(
+        """(names) => names.map((name) => { const one = document.createElement('i');
+        one.style.color = `var(${name})`; document.body.append(one);
+        const { color } = getComputedStyle(one); one.remove(); return color; })""",
+        [ink, paper],
+    )
+    light = []
+    for text in told:
+        srgb = np.array([float(v) for v in re.findall(r"[\d.]+", text)[:3]]) / 255
+        linear = np.where(srgb <= 0.03928, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+        light.append(float(linear @ (0.2126, 0.7152, 0.0722)))
+    return (max(light) + 0.05) / (min(light) + 0.05)
+
+
+def test_fits_a_narrow_dark_screen(browser, bench):
+    with opened(
+        browser, bench, viewport={"width": 1024, "height": 768}, color_scheme="dark"
+    ) as page:
+        assert page.evaluate("document.documentElement.scrollWidth") <= 1024
+        paper = page.evaluate("getComputedStyle(document.body).backgroundColor")
+        assert all(int(v) < 40 for v in re.findall(r"\d+", paper)[:3])
+
+
+def test_hostile_requests_are_refused(bench, lab):
+    host = bench.split("/")[2]
+    with httpx.Client(base_url=bench) as client:
+
+        def status(method, path, **more):
+            return client.request(method, path, **more).status_code
+
+        for path in (
+            "/static/../../command.py", "/static/%2e%2e/app.py", "/static/..%2f..%2fapp.py",
+            "/api/recordings/..%2f..%2fsecret.txt", "/api/recordings/%2e%2e%2flab.db",
+            "/api/recordings/lab.db", "/api/objects/Cube/parts/-1", "/api/objects/Cube/parts/999",
+            "/api/objects/..%2f..%2fsecret/parts/0", "/etc/passwd", "//etc/passwd",
+        ):  # fmt: skip
+            answer = client.get(path)
+            assert answer.status_code in (400, 404, 422), path
+            assert "secret" not in answer.text.replace("..%2f", "").replace("/secret", "")
+        touch = {"object": "Cube", "face": "F1", "x_mm": 30, "y_mm": 30}
+        for origin in ("http://evil.example", "null", f"http://{host}.evil.example"):
+            assert status("POST", "/api/touch", json=touch, headers={"origin": origin}) == 403
+        assert (
+            status("POST", "/api/touch", json=touch, headers={"sec-fetch-site": "cross-site"})
+            == 403
+        )
+        assert status("GET", "/", headers={"host": "evil.example"}) == 421
+        assert status("POST", "/api/port", json={"url": "file:/etc/passwd"}) == 404
+        assert status("POST", "/api/port", json={"url": f"serial://{lab}/lab.db"}) == 404
+        assert status("POST", "/api/touch", json=touch | {"z": 1}) == 422
+        assert (
+            status(
+                "POST",
+                "/api/touch",
+                content=b"{" * 10,
+                headers={"content-type": "application/json"},
+            )
+            == 422
+        )
+        assert status("POST", "/api/touch", json=touch | {"x_mm": 1e9}) == 400
+        assert status("POST", "/api/touch", content=b" " * 70_000) == 413
+        assert status("POST", "/api/touch", content=(b" " * 1000 for _ in range(70))) == 413
+        assert (
+            status(
+                "POST",
+                "/api/recordings?name=big.h5",
+                headers={"content-length": str(2**31)},
+                content=b"",
+            )
+            == 413
+        )
+        assert status("POST", "/api/recordings?name=..%2Fx.h5", content=b"x") == 404
+        assert status("POST", "/api/recordings?name=x.h5", content=b"no recording") == 400
+        assert not (lab / "recordings" / "x.h5").exists()
+        headers = client.get("/").headers
+        assert "script-src 'self'" in headers["content-security-policy"]
+        assert headers["x-content-type-options"] == "nosniff"
+        assert status("GET", "/api/bench") == 200
+
+
+@pytest.mark.parametrize("origin", [None, "http://evil.example", "null"])
+def test_the_live_line_is_for_the_page_alone(bench, origin):
+    from websockets.exceptions import InvalidStatus
+    from websockets.sync.client import connect
+
+    host = bench.split("/")[2]
+    with pytest.raises(InvalidStatus), connect(f"ws://{host}/live", origin=origin):
+        pass
+
+
+def test_nonsense_on_the_live_line_ends_it(bench):
+    from websockets.exceptions import ConnectionClosed
+    from websockets.sync.client import connect
+
+    host = bench.split("/")[2]
+    for words in ("no json", json.dumps({"filter": "evil"}), "x" * 5000, b"bytes"):
+        with connect(f"ws://{host}/live", origin=f"http://{host}") as line:
+            line.send(words)
+            with pytest.raises(ConnectionClosed):
+                for _ in range(1000):
+                    line.recv(timeout=PATIENCE_S)
+
+
+def test_a_token_is_asked_for_where_others_can_come(lab, browser):
+    with served(lab, "--host", "0.0.0.0", "--port", "sim:") as address:
+        address = address.replace("0.0.0.0", "127.0.0.1")
+        bare, token = address.split("?token=")
+        assert len(token) >= 20
+        assert httpx.get(bare).status_code == 401
+        assert httpx.get(bare + "api/bench").status_code == 401
+        assert httpx.get(bare, params={"token": "wrong"}).status_code == 401
+        assert httpx.get(bare + "api/bench", params={"token": token}).status_code == 401
+        bearer = {"authorization": f"Bearer {token}"}
+        assert httpx.get(bare + "api/bench", headers=bearer).status_code == 200
+        with opened(browser, address) as page:
+            assert page.url == bare  # the token does not stay in the address
+            cookie = page.context.cookies()[0]
+            assert (cookie["httpOnly"], cookie["sameSite"]) == (True, "Strict")

@@ -1,0 +1,133 @@
+"""Results of rows that are written by hand, shards on the disk, and the table of extremes."""
+
+import json
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from recognizer.validation.campaign import Campaign, series_of
+from recognizer.validation.complete import Summary
+from recognizer.validation.extremes import pressed
+from recognizer.validation.results import results_of
+from recognizer.validation.rows import Time
+from recognizer.validation.shards import (
+    SCHEMA,
+    columns_of,
+    done_shards,
+    read_series,
+    shard_file,
+    write_shard,
+)
+from recognizer.validation.told import check_text
+
+NAN = float("nan")
+
+
+def row(number, verdict="right", **changed):
+    right = verdict == "right"
+    plain = {
+        "number": number,
+        "kind": "face",
+        "surface": "face",
+        "level": "mismatch",
+        "object": "Cube",
+        "face": "F1",
+        "x_mm": 1.0,
+        "y_mm": 2.0,
+        "theta_deg": 30.0,
+        "force_n": 50.0,
+        "tilt_deg": 1.0,
+        "edge_mm": 12.0,
+        "symbols": 12,
+        "enough": True,
+        "verdict": verdict,
+        "reason": "ambiguous" if verdict == "rejected" else "",
+        "answer": {"right": "Cube/F1", "wrong": "Box/F2", "rejected": ""}[verdict],
+        "error_mm": 0.05 if right else NAN,
+        "error_deg": -0.2 if right else NAN,
+        "chi2": 2.0 if right else NAN,
+        "margin": 30.0,
+        "noise": 0.1,
+    }
+    return plain | changed
+
+
+def columns(rows, tmp_path):
+    series = series_of(Campaign(len(rows)))[0]
+    write_shard(tmp_path, series.name, 0, rows, [Time(r["number"], 0.1, 0.2) for r in rows])
+    return columns_of(read_series(tmp_path, series))
+
+
+def test_counts_confusion_and_worst(tmp_path):
+    rows = [row(i) for i in range(6)]
+    rows += [
+        row(6, "wrong"),
+        row(7, "rejected"),
+        row(8, "right", object="Box", face="F2", answer="Box/F2", error_mm=0.4, level="low"),
+        row(9, "rejected", kind="foreign", surface="dots", object="", face="", enough=False,
+            symbols=0, edge_mm=NAN),
+    ]  # fmt: skip
+    found = results_of(columns(rows, tmp_path))
+    totals = found["totals"]
+    assert [totals[n] for n in ("touches", "right", "wrong", "rejected")] == [10, 7, 1, 2]
+    assert totals["rms_mm"] == pytest.approx(np.sqrt((6 * 0.05**2 + 0.4**2) / 7), rel=1e-5)
+    assert found["enough"]["touches"] == 9
+    assert found["objects"]["names"] == ["Box", "Cube"]
+    assert found["objects"]["matrix"] == [[1, 0, 0], [1, 6, 1]]
+    assert found["objects"]["confused"] == [
+        {"touched": "Cube/F1", "answered": "Box/F2", "count": 1}
+    ]
+    assert [line["number"] for line in found["worst"][:3]] == [6, 7, 8]
+    assert found["reasons"] == {"ambiguous": 2}
+    wrong, answered, place, turn = found["verdict"]
+    assert not wrong["holds"]
+    assert not answered["holds"]
+    assert place["value"] == pytest.approx(0.05)
+    assert place["holds"]
+    assert turn["holds"]
+    assert all(check_text(check) for check in found["verdict"])
+    json.dumps(found, allow_nan=False)
+
+
+def test_a_wrong_answer_on_a_foreign_surface_is_named(tmp_path):
+    strange = row(1, "wrong", kind="foreign", surface="dots", object="", face="", enough=False)
+    found = results_of(columns([row(0), strange], tmp_path))
+    assert found["objects"]["confused"] == [{"touched": "dots", "answered": "Box/F2", "count": 1}]
+    assert found["totals"]["wrong"] == 1
+
+
+def test_touches_of_nothing_but_foreign_surfaces(tmp_path):
+    rows = [
+        row(i, "rejected", kind="blank", surface="blank", object="", face="", enough=False,
+            symbols=0, margin=NAN)
+        for i in range(3)
+    ]  # fmt: skip
+    found = results_of(columns(rows, tmp_path))
+    assert found["enough"]["answered"]["share"] is None
+    json.dumps(found, allow_nan=False)
+
+
+def test_a_shard_is_there_when_it_is_whole(tmp_path):
+    series = series_of(Campaign(5, shard=3))[0]
+    write_shard(tmp_path, series.name, 1, [row(4), row(3)], [Time(4, 1, 1), Time(3, 1, 1)])
+    assert done_shards(tmp_path, series) == {1}
+    table = pq.read_table(shard_file(tmp_path, series.name, 1))
+    assert table.schema.equals(SCHEMA)
+    assert table.column("number").to_pylist() == [3, 4]
+    assert not [path for path in tmp_path.rglob("*") if path.suffix == ".writing"]
+
+
+def test_fail_under():
+    summary = Summary(100, 98, 0, 2, 0.1, 0.1, 1.0, 50, 49, [])
+    assert summary.exit_code(None) == 0
+    assert summary.exit_code(98.0) == 0
+    assert summary.exit_code(98.5) == 1
+    assert Summary(100, 97, 1, 2, 0.1, 0.1, 1.0, 50, 50, []).exit_code(10.0) == 1
+
+
+def test_stiff_and_extreme_scenes_are_finite_or_refused():
+    lines = list(pressed())
+    assert {line["outcome"] for line in lines} == {"finite", "refused"}
+    failed = [line["case"] for line in lines if not line["passes"]]
+    assert set(failed) <= {"place that is no number"}

@@ -1,0 +1,110 @@
+"""Intervals, calibration, shares of options, and how touches are drawn and split."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import binomtest, chi2
+
+from recognizer.validation.campaign import (
+    KINDS,
+    Campaign,
+    kinds_of,
+    levels_of,
+    pieces_of,
+    plan_of,
+    series_of,
+    shards_of,
+)
+from recognizer.validation.compare import BETTER, SAME, WORSE, _share, _size
+from recognizer.validation.errors import ValidationError
+from recognizer.validation.statistics import calibration, chi2_quantile, rounded, share_of, wilson
+
+
+@pytest.mark.parametrize(("hits", "of"), [(0, 10), (1, 10), (9, 10), (10, 10), (995, 1000), (3, 7)])
+def test_wilson_is_that_of_scipy(hits, of):
+    expected = binomtest(hits, of).proportion_ci(0.95, method="wilson")
+    assert wilson(hits, of) == pytest.approx((expected.low, expected.high), abs=1e-12)
+
+
+def test_nothing_counted_says_nothing():
+    assert wilson(0, 0) == (0.0, 1.0)
+    assert share_of(0, 0)["share"] is None
+
+
+@pytest.mark.parametrize("p", [0.01, 0.5, 0.95, 0.999])
+def test_chi2_quantile(p):
+    assert chi2_quantile(p) == pytest.approx(chi2.ppf(p, 3), rel=1e-9)
+
+
+def test_an_honest_covariance_is_calibrated_and_a_proud_one_is_not():
+    errors = (np.random.default_rng(1).standard_normal((4000, 3)) ** 2).sum(axis=1)
+    for line in calibration(errors):
+        assert line["low"] - 0.01 < line["expected"] < line["high"] + 0.01
+    assert calibration(4 * errors)[2]["share"] < 0.7
+
+
+def test_rounded_keeps_what_it_must():
+    assert rounded(1234567.0) == 1234570.0
+    assert rounded(-0.0) == 0.0
+    assert math.copysign(1, rounded(-0.0)) == 1
+    assert math.isnan(rounded(math.nan))
+
+
+def test_shares_are_read_from_options():
+    assert kinds_of("face=3, edge") == (("face", 0.75), ("edge", 0.25))
+    assert levels_of("mismatch") == (("mismatch", 1.0),)
+    assert kinds_of("face=1,edge=0") == (("face", 1.0),)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("faces", "'faces' is not known"),
+        ("face,face", "stands twice"),
+        ("face=-1", "'-1'"),
+        ("face=much", "'much'"),
+        ("face=nan", "'nan'"),
+        ("face=0", "nothing is left"),
+        ("", "nothing is left"),
+    ],
+)
+def test_shares_that_are_none_are_refused(text, said):
+    with pytest.raises(ValidationError, match=said):
+        kinds_of(text)
+
+
+def test_kinds_come_in_their_shares_and_from_the_number_alone():
+    campaign = Campaign(2000, seed=3)
+    (series,) = series_of(campaign)
+    drawn = [plan_of(campaign, series, "lab.db", number) for number in range(2000)]
+    counts = {kind: sum(k == kind for k, _ in drawn) for kind, _ in KINDS}
+    for kind, share in KINDS:
+        assert counts[kind] / 2000 == pytest.approx(share, abs=0.04)
+    strange = {plan.kind for kind, plan in drawn if kind == "foreign"}
+    assert len(strange) >= 5
+    assert "blank" not in strange
+    assert plan_of(campaign, series, "lab.db", 77) == drawn[77]
+    other = Campaign(80, seed=3)
+    assert plan_of(other, series_of(other)[0], "lab.db", 77) == drawn[77]
+
+
+@pytest.mark.parametrize("touches", [1, 24, 25, 999, 1000, 1001, 2530])
+def test_pieces_cover_every_touch_once(touches):
+    for series in series_of(Campaign(touches, study=30, shard=70)):
+        numbers = [
+            n
+            for shard in range(shards_of(series))
+            for piece in pieces_of(series, shard)
+            for n in range(piece.first, piece.last)
+        ]
+        assert numbers == list(range(series.touches))
+
+
+def test_comparison_calls_chance_chance():
+    assert _share("", share_of(990, 1000), share_of(993, 1000))["word"] == SAME
+    assert _share("", share_of(900, 1000), share_of(990, 1000))["word"] == BETTER
+    assert _share("", share_of(0, 1000), share_of(30, 1000), least=True)["word"] == WORSE
+    assert _size("", 0.050, 0.051, (100, 100))["word"] == SAME
+    assert _size("", 0.050, 0.100, (100, 100))["word"] == WORSE
+    assert _size("", None, 0.1, (0, 10))["word"] == SAME
