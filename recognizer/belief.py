@@ -34,14 +34,15 @@ class Thresholds:
     """When an answer is given."""
 
     margin: float = 10.0  #: nats over the best other place
-    surprise: float = 4.0  #: nats over symbols of no registered place
+    surprise: float = 3.0  #: nats over symbols of no registered place
     explained: float = 0.66  #: share of the image's variance
     explained_by_many: float = 0.55  #: the same where `many` cells agree
     many: int = 10
     cells: int = 4  #: that hold a symbol and are seen
     contradicted: int = 1  #: cells that speak `CLEARLY` for another symbol; `PLAINLY`: none
     rim_mm: float = 2.0  #: how far the sensor's centre may lie beyond the face
-    places: int = 4  #: of every lattice that are verified
+    places: int = 8  #: that are verified at most, two at least
+    near: float = 14.0  #: nats below the best within which places are
     verify_steps: int = 4
 
 
@@ -88,8 +89,8 @@ def support(
         surprise=score - unplaced(encoding, fit),
         explained=explained_share(image, template, fit.pose, fit.gain, labels),
         cells=int((seen & (held < order) & ~worn).sum()),
-        clear=int((against > CLEARLY).sum()),
-        plain=int((against > PLAINLY).sum()),
+        clear=int((seen & (against > CLEARLY)).sum()),
+        plain=int((seen & (against > PLAINLY)).sum()),
     )
 
 

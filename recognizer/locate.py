@@ -21,9 +21,11 @@ Ints = NDArray[np.int64]
 Array = NDArray[np.float64]
 
 CAP = 8.0  #: nats that one cell can cost at most
+CORNER = 8.0  #: tactels on a cell below which it can cost less than that
 WORN = 4.0  #: nats that a symbol costs that is registered but not felt at all
 ANCHORS = 3  #: cells tried as the one that is surely registered, where no window is seen whole
 WINDOWS = 4  #: whole windows that are looked up, the surest ones
+SURE = 6.0  #: nats by which each of their cells shows its symbol rather than any other
 FIRST, FOLLOWED = 6, 512  #: after so many cells only so many candidates go on
 
 
@@ -49,7 +51,7 @@ def places(encoding: Encoding, fits: tuple[Fit, ...], keep: int) -> list[Place]:
 def place_scores(encoding: Encoding, fit: Fit, place: Place) -> float:
     """Return the log-likelihood of the image if the fit lies at this place, nats."""
     labels = shown_at(encoding, place, fit.cells)
-    scores = _worn(fit.scores)[np.arange(len(labels)), labels]
+    scores = _worn(fit)[np.arange(len(labels)), labels]
     return float(scores.sum()) + fit.value
 
 
@@ -62,14 +64,18 @@ def shown_at(encoding: Encoding, place: Place, cells: Ints) -> Ints:
     return np.where(held_by == place.face, label, array.order).astype(np.int64)
 
 
-def _worn(scores: Array) -> Array:
-    """Return scores (m, q + 1) in which a registered symbol may be worn away, or read wrong."""
-    symbols = np.maximum(scores[:, :-1], scores[:, -1:] - WORN)
-    return np.asarray(np.maximum(np.concatenate([symbols, scores[:, -1:]], axis=1), -CAP))
+def _worn(fit: Fit) -> Array:
+    """Return scores (m, q + 1) in which a registered symbol may be worn away, or read wrong.
+
+    Of a cell of which the sensor sees only a corner, less is believed.
+    """
+    symbols = np.maximum(fit.scores[:, :-1], fit.scores[:, -1:] - WORN)
+    least = CAP * np.minimum(1.0, fit.seen / CORNER)[:, None]
+    return np.asarray(np.maximum(np.concatenate([symbols, fit.scores[:, -1:]], axis=1), -least))
 
 
 def _places_of(encoding: Encoding, fit: Fit, number: int, keep: int) -> list[Place]:
-    scores = _worn(fit.scores)
+    scores = _worn(fit)
     found = _by_windows(encoding, fit)
     if found is None:
         found = _by_anchors(encoding, fit, scores)
@@ -97,10 +103,12 @@ def _by_windows(encoding: Encoding, fit: Fit) -> _Candidates | None:
         for i, j in named:
             inside = [named.get((i + c, j - r)) for r in range(down) for c in range(right)]
             cells = [n for n in inside if n is not None]
-            if len(cells) == len(inside) and (least := float(sure[cells].min())) > 0:
+            if len(cells) == len(inside) and (least := float(sure[cells].min())) > SURE:
                 seen.append((least, k, cells))
-    if len(seen) < WINDOWS:
+    if not seen:
         return None
+    largest = max(len(cells) for _, _, cells in seen)
+    seen = [window for window in seen if len(window[2]) == largest]
     found: list[Ints] = []
     shifts: list[Ints] = []
     for _, k, cells in sorted(seen, reverse=True)[:WINDOWS]:

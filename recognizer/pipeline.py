@@ -44,7 +44,7 @@ from recognizer.symbols.template import Template, template_of
 Array = NDArray[np.float64]
 
 #: For touches that the first try does not answer.
-THOROUGH = Settings(candidates=24, finalists=6)
+THOROUGH = Settings(candidates=24, finalists=6, crossed=3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,9 +123,12 @@ def _verified(
     reader: Reader, image: Image, encoding: Encoding, template: Template, found: tuple[Fit, ...]
 ) -> list[Reading]:
     """Return the likeliest places with pose and gain fitted to what the database holds there."""
-    candidates = places(encoding, found, reader.thresholds.places)[: reader.thresholds.places]
+    limits = reader.thresholds
+    candidates = places(encoding, found, limits.places)[: limits.places]
     if not candidates:
         return []
+    near = [place.score > candidates[0].score - limits.near for place in candidates]
+    candidates = candidates[: max(2, sum(near))]
     starts = [found[place.fit] for place in candidates]
     lattices = started(
         np.array([fit.pose for fit in starts]),
@@ -142,7 +145,7 @@ def _verified(
         image,
         template,
         lattices,
-        steps=reader.thresholds.verify_steps,
+        steps=limits.verify_steps,
         shown=shown,
     )
     again = scored(image, template, fitted, reader.settings)

@@ -1,9 +1,9 @@
-"""Index of all small windows that a database holds: six labels -> where they stand.
+"""Index of all small windows that a database holds: six or four labels -> where they stand.
 
-Encoding -> Windows, once per database. A touch that sees six neighbouring symbols whole asks
-for them; what it pays does not grow with the number of registered faces, but with how often
-the same six labels occur (array order to the sixth divides them). Works for every kind of
-array, since only registered cells are listed.
+Encoding -> Windows, once per database. A touch that sees six neighbouring symbols surely asks
+for them, or for four; what it pays does not grow with the number of registered faces, but
+with how often the same labels occur (array order to the sixth divides them). Works for every
+kind of array, since only registered cells are listed.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Ints = NDArray[np.int64]
 
-SHAPES = ((2, 3), (3, 2))  #: rows and columns of a window
+SHAPES = ((2, 3), (3, 2), (2, 2))  #: rows and columns of a window
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,7 +37,7 @@ class Windows:
 
 
 def windows_of(encoding: Encoding) -> tuple[Windows, ...]:
-    """Return the index of an encoding, for both shapes."""
+    """Return the index of an encoding, for all shapes."""
     array, order = encoding.array, encoding.array.order
     rows, columns = np.divmod(encoding.keys, np.uint64(array.columns))
     rows, columns = rows.astype(np.int64), columns.astype(np.int64)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.export.colours import BODY_RGB, RGB, SYMBOL_RGB
-from generator.export.faces import named_facets, symbol_triangles
+from generator.export.faces import named_facets, object_faces, symbol_triangles
 from generator.solid.part import Part
 from generator.solid.triangulate import Mesh
 
@@ -95,9 +95,10 @@ def _faces(
             [(name, _)] = named_facets(part, alone=False)
             groups = [(name, np.arange(len(mesh.triangles)))]
         else:
+            faces = object_faces(part)[mesh.facets]
             groups = [
-                (facet.name, np.flatnonzero(mesh.facets == number))
-                for number, facet in enumerate(part.facets)
+                (name, np.flatnonzero(faces == number))
+                for name, number in named_facets(part, alone=True)
             ]
         for name, chosen in groups:
             used, numbers = np.unique(mesh.triangles[chosen], return_inverse=True)

@@ -18,7 +18,12 @@ from numpy.typing import NDArray
 from PIL import Image, ImageFont
 
 from generator.export.colours import BODY_RGB, SYMBOL_RGB
-from generator.export.faces import centre_and_normal, named_facets, symbol_triangles
+from generator.export.faces import (
+    centre_and_normal,
+    named_facets,
+    object_faces,
+    symbol_triangles,
+)
 from generator.export.labels import Wanted, label_places
 from generator.export.lettering import FONT_SIZES, MARGIN, Font, Label, lettered, plain
 from generator.export.raster import Visible, visible
@@ -128,11 +133,11 @@ def _scene(parts: Sequence[Part], meshes: Sequence[Mesh], apart: float) -> _Scen
         faces = named_facets(part, alone=len(parts) == 1)
         shapes = [centre_and_normal(body, part.facets[number]) for _, number in faces]
         shift = distance * shapes[0][1]
-        facets = part.facets
+        numbers = np.arange(len(part.facets))
         if len(parts) > 1 and not apart:
-            towards = [centre_and_normal(body, facet)[1] @ shapes[0][1] for facet in facets]
-            facets = tuple(f for f, cosine in zip(facets, towards, strict=True) if cosine > _BACK)
-        numbers = [number for number, facet in enumerate(part.facets) if facet in facets]
+            towards = [centre_and_normal(body, facet)[1] @ shapes[0][1] for facet in part.facets]
+            numbers = np.flatnonzero(np.array(towards) > _BACK)
+        belongs = object_faces(part) if len(parts) == 1 else np.arange(len(part.facets))
         shown = np.isin(mesh.facets, numbers)
         vertices.append(mesh.vertices @ T[:3, :3].T + (T[:3, 3] + shift))
         triangles.append(mesh.triangles[shown] + first)
@@ -140,8 +145,8 @@ def _scene(parts: Sequence[Part], meshes: Sequence[Mesh], apart: float) -> _Scen
         symbols.append(symbol_triangles(part, mesh)[shown])
         owner = np.full(len(part.facets), -1)
         owner[[number for _, number in faces]] = np.arange(len(faces)) + len(names)
-        owners.append(owner[mesh.facets[shown]])
-        edges.append(body[_edges(facets)] + shift)
+        owners.append(owner[belongs[mesh.facets[shown]]])
+        edges.append(body[_edges([(part.facets[k], int(belongs[k])) for k in numbers])] + shift)
         names += [name for name, _ in faces]
         centres += [centre + shift for centre, _ in shapes]
         normals += [normal for _, normal in shapes]
@@ -157,15 +162,18 @@ def _scene(parts: Sequence[Part], meshes: Sequence[Mesh], apart: float) -> _Scen
     )
 
 
-def _edges(facets: Sequence[Facet]) -> NDArray[np.int64]:
-    """Return (E, 2) vertices of the edges of some facets."""
-    pairs = {
-        (min(a, b), max(a, b))
-        for facet in facets
-        for loop in facet.loops
-        for a, b in zip(loop, (*loop[1:], loop[0]), strict=True)
-    }
-    return np.array(sorted(pairs), np.int64)
+def _edges(facets: Sequence[tuple[Facet, int]]) -> NDArray[np.int64]:
+    """Return (E, 2) vertices of the edges of facets, without those inside of one face."""
+    faces: dict[tuple[int, int], set[int]] = {}
+    alone: set[tuple[int, int]] = set()
+    for facet, face in facets:
+        for loop in facet.loops:
+            for a, b in zip(loop, (*loop[1:], loop[0]), strict=True):
+                pair = (min(a, b), max(a, b))
+                alone ^= {pair}
+                faces.setdefault(pair, set()).add(face)
+    kept = [pair for pair, both in faces.items() if len(both) > 1 or pair in alone]
+    return np.array(sorted(kept), np.int64)
 
 
 def _best_eye(normals: Points) -> Points:
@@ -271,7 +279,7 @@ def _draw_edges(view: Colours, edges: Points, seen: Visible, slack: float) -> No
 
 
 def _subtitle(size_mm: Sequence[float], parts: Sequence[Part]) -> str:
-    symbols = sum(len(e.labels) for part in parts for e in part.embossings if e.face is not None)
+    symbols = sum(part.symbols for part in parts)
     extent = " x ".join(f"{value:.4g}" for value in size_mm)
     made = f"{len(parts)} panels" if len(parts) > 1 else "one part"
     return f"{extent} mm, {symbols} symbols, {made}"

@@ -61,6 +61,7 @@ def step_chunks(part: Part) -> Iterator[bytes]:
     for embossing in part.embossings:
         yield from _embossed(part, embossing, entities, style, body, shell, coloured)
     shell.append(body.faces())
+    coloured.append(_wrapped_colour(part, shell[-1], entities, style))
     yield entities.taken()
     number = entities.reserve(1)
     yield f"#{number}=CLOSED_SHELL('',(\n".encode("ascii")
@@ -230,6 +231,19 @@ def _embossed(
             body.bounds[embossing.facet] += [f"#{number}" for number in footprints]
 
 
+def _wrapped_colour(
+    part: Part, faces: NDArray[np.int64], entities: Entities, style: str
+) -> NDArray[np.int64]:
+    """Give the facets of wrapped symbols their colour; return the styled items."""
+    numbers = []
+    for wrapped in part.wrapped:
+        own = faces[wrapped.first : wrapped.first + len(wrapped.symbols)]
+        for face in own.tolist():
+            numbers.append(entities.next)
+            entities.add(f"STYLED_ITEM('',({style}),#{face})")
+    return np.array(numbers, np.int64)
+
+
 def _product(entities: Entities, name: str, solid: str, units: str, origin: str) -> None:
     """Write the product that the solid is the shape of."""
     add = entities.add
@@ -251,7 +265,7 @@ def _product(entities: Entities, name: str, solid: str, units: str, origin: str)
 
 def _entities_at_most(part: Part) -> int:
     corners = sum(len(loop) for facet in part.facets for loop in facet.loops)
-    count = 1000 + 20 * corners + 2 * len(part.vertices) + 10 * len(part.facets)
+    count = 1000 + 20 * corners + 2 * len(part.vertices) + 11 * len(part.facets)
     for embossing in part.embossings:
         numbers = np.bincount(embossing.labels, minlength=len(embossing.tiers)).tolist()
         for tiers, symbols in zip(embossing.tiers, numbers, strict=True):

@@ -9,7 +9,8 @@ out). Either way a face ends with one rigid transform to the array. Thesis 6.3.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,6 +29,9 @@ from generator.polyhedron.frame import face_polygon
 from generator.polyhedron.winged import Polyhedron
 
 Clearances = Sequence[Sequence[NDArray[np.float64]]]  #: [face][loop] -> (edges,) mm
+Outlines = Mapping[int, Sequence[NDArray[np.float64]]]  #: face -> loops (k, 2) mm, face frame
+
+NONE: Outlines = MappingProxyType({})
 
 KINDS = ("auto", "faces", "net")
 
@@ -43,6 +47,7 @@ def lay_out(
     *,
     blank_faces: Collection[int] = (),
     allow_blank_faces: bool = False,
+    developed: Outlines = NONE,
 ) -> Layout:
     """Choose the cells of every face, none of them used before.
 
@@ -67,6 +72,9 @@ def lay_out(
         Faces that shall carry no symbols.
     allow_blank_faces
         Leave a face without an identifiable place blank and warn, instead of refusing.
+    developed
+        Faces that stand for a round one, with the outline of all of it, unrolled; it counts in
+        place of their own. Such an object has no net: every face has a lattice of its own.
 
     Returns
     -------
@@ -78,7 +86,15 @@ def lay_out(
     LayoutError
         A face shows no place, the array is full, or a length is impossible.
     """
-    _check(polyhedron, pitch_mm, footprint_half_mm, clearances_mm, kind)
+    outlines = [
+        developed.get(face) or face_polygon(polyhedron, face)
+        for face in range(len(polyhedron.faces))
+    ]
+    _check(polyhedron, outlines, pitch_mm, footprint_half_mm, clearances_mm, kind)
+    if developed and kind == "net":
+        raise LayoutError(
+            "an object with round faces has no net", fix="set layout to faces, or leave it out"
+        )
     unknown = sorted(set(blank_faces) - set(range(len(polyhedron.faces))))
     if unknown:
         raise LayoutError(
@@ -86,8 +102,8 @@ def lay_out(
             fix=f"give face numbers from 0 to {len(polyhedron.faces) - 1}",
         )
     regions = tuple(
-        region_of(face_polygon(polyhedron, face), clearances)
-        for face, clearances in enumerate(clearances_mm)
+        region_of(outline, clearances)
+        for outline, clearances in zip(outlines, clearances_mm, strict=True)
     )
     request = Request(footprint_half_mm, pitch_mm, array.window, rank_test(array))
     task = Task(polyhedron, array, request, regions, frozenset(blank_faces))
@@ -95,7 +111,7 @@ def lay_out(
     plans = []
     if kind != "net":
         plans.append(faces_plan(task))
-    if kind != "faces":
+    if kind != "faces" and not developed:
         plans.append(net_plan(task, unfold(polyhedron)))
     plans.sort(key=lambda plan: plan.worth, reverse=True)  # stable: faces first among equals
 
@@ -208,7 +224,12 @@ def _full(plan: Plan, occupancy: Occupancy) -> LayoutError:
 
 
 def _check(
-    polyhedron: Polyhedron, pitch_mm: float, half_mm: float, clearances: Clearances, kind: str
+    polyhedron: Polyhedron,
+    outlines: Sequence[Sequence[NDArray[np.float64]]],
+    pitch_mm: float,
+    half_mm: float,
+    clearances: Clearances,
+    kind: str,
 ) -> None:
     if kind not in KINDS:
         raise LayoutError(f"unknown layout '{kind}'", fix=f"choose one of {', '.join(KINDS)}")
@@ -222,8 +243,8 @@ def _check(
             f"clearances are given for {len(clearances)} of {len(polyhedron.faces)} faces",
             fix="give one array per loop of every face",
         )
-    for face, given in zip(polyhedron.faces, clearances, strict=True):
-        if [len(loop) for loop in given] != [len(loop) for loop in face.loops]:
+    for face, outline, given in zip(polyhedron.faces, outlines, clearances, strict=True):
+        if [len(loop) for loop in given] != [len(loop) for loop in outline]:
             raise LayoutError(
                 "clearances do not match the edges",
                 fix="give one array per loop with one entry per edge",

@@ -21,7 +21,8 @@ from generator.export.step import step_chunks
 from generator.export.stl import stl_chunks
 from generator.export.threemf import print_files
 from generator.layout.placement import Layout
-from generator.pipeline.plan import Plan, blaming
+from generator.pipeline.blame import blaming
+from generator.pipeline.plan import Plan
 from generator.pipeline.progress import Progress
 from generator.polyhedron import face_polygon
 from generator.solid import Part, panels, prove_closed, triangles, volume, whole
@@ -130,9 +131,12 @@ def _registered(part: Part, kind: str, written: Written) -> RegisteredPart:
 def _array_picture(plan: Plan, layout: Layout) -> str:
     faces = [
         FaceOnArray(
-            plan.polyhedron.faces[face.face].name, face, face_polygon(plan.polyhedron, face.face)
+            plan.polyhedron.faces[face.face].name,
+            face,
+            tuple(plan.developed.get(face.face) or face_polygon(plan.polyhedron, face.face)),
         )
         for face in layout.faces
+        if len(face.labels) or face.face not in plan.blank_faces
     ]
     array = plan.array
     title = f"{plan.spec.name} on the array {array.rows} x {array.columns}"

@@ -47,15 +47,15 @@ def made_of(
     reused: bool,
     skipped: bool = False,
 ) -> Made:
-    """Return what is told of an object."""
+    """Return what is told of an object; a round face counts as one."""
     return Made(
         name=plan.spec.name,
-        faces=len(plan.polyhedron.faces),
+        faces=len({face.name.partition(".")[0] for face in plan.polyhedron.faces}),
         symbols=sum(len(face.labels) for face in layout.faces),
         places=sum(face.places for face in layout.faces),
         parts=parts,
         files=files,
-        warnings=(*plan.polyhedron.notes, *layout.warnings, *warnings),
+        warnings=(*plan.polyhedron.notes, *plan.notes, *layout.warnings, *warnings),
         reused=reused,
         skipped=skipped,
     )

@@ -17,7 +17,8 @@ from generator.database.read import find_object, read_layout
 from generator.database.register import require_same_spec
 from generator.layout.layout import lay_out
 from generator.layout.placement import Layout
-from generator.pipeline.plan import Plan, blaming
+from generator.pipeline.blame import blaming
+from generator.pipeline.plan import Plan
 
 Cells = tuple[NDArray[np.int64], NDArray[np.int64]]  #: rows (n,) and columns (n,)
 
@@ -93,7 +94,9 @@ def laid_out(plan: Plan, others: Cells) -> Layout:
             plan.clearances_mm,
             others,
             plan.spec.layout,
+            blank_faces=plan.blank_faces,
             allow_blank_faces=allow_blank_faces,
+            developed=plan.developed,
         )
 
     layout = attempt(allow_blank_faces=True)

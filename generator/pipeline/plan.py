@@ -5,9 +5,7 @@ Every error is given the line of the setting that causes it. Lengths in mm.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,15 +14,18 @@ from generator.alphabet.known import Alphabet, alphabet_named
 from generator.alphabet.outline import Tiers, footprint_half_mm, outlines
 from generator.alphabet.printable import check_printable
 from generator.array import SymbolArray, array_from
-from generator.errors import ArrayError, GeneratorError
-from generator.layout.layout import Clearances
+from generator.errors import ArrayError
+from generator.layout.layout import Clearances, Outlines
+from generator.pipeline.blame import blaming
+from generator.pipeline.round import RoundFaces, made_whole, round_faces
 from generator.polyhedron import Polyhedron, dihedral
+from generator.polyhedron.round import ROUND_SHAPES
 from generator.polyhedron.shapes import SHAPES
 from generator.printers import Printer, printer_named
 from generator.solid.frame import edge_numbers
 from generator.solid.mitre import symbol_clearance_mm
 from generator.solid.panels import top_insets_mm
-from generator.spec import Located, ObjectSpec, ShapeSpec, blamed
+from generator.spec import Located, ObjectSpec, ShapeSpec
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +40,11 @@ class Plan:
     footprint_half_mm: float  #: half side of the square that holds every symbol's foot
     clearances_mm: Clearances  #: [face][loop][edge], from the edge to the nearest foot
     printer: Printer
+    developed: Outlines = field(
+        default_factory=dict
+    )  #: round faces by the facet that carries them, unrolled
+    blank_faces: frozenset[int] = frozenset()  #: that carry no symbols of their own
+    notes: tuple[str, ...] = ()  #: what was decided for the person who asked
 
     @property
     def spec(self) -> ObjectSpec:
@@ -48,7 +54,11 @@ class Plan:
     @property
     def meaning(self) -> dict[str, Any]:
         """What is registered as the spec: equal values mean the same object."""
-        return self.spec.meaning
+        meaning = self.spec.meaning
+        if self.polyhedron.surfaces:
+            surfaces = [surface.definition() for surface in self.polyhedron.surfaces]
+            meaning["surfaces"] = surfaces
+        return meaning
 
 
 def planned(located: Located, solid: Polyhedron | None = None) -> Plan:
@@ -72,6 +82,8 @@ def planned(located: Located, solid: Polyhedron | None = None) -> Plan:
         printer = printer_named(spec.printer)
     with blaming(located, "shape"):
         polyhedron = _polyhedron(spec.shape) if solid is None else solid
+    located = made_whole(located, polyhedron)
+    spec = located.spec
     with blaming(located, "encoding, profile"):
         array = array_from(spec.encoding)
     with blaming(located, "symbols.alphabet, encoding.alphabet, profile"):
@@ -81,17 +93,21 @@ def planned(located: Located, solid: Polyhedron | None = None) -> Plan:
         check_printable(alphabet, spec.style, printer)
         shapes = outlines(alphabet, spec.style)
         half = footprint_half_mm(alphabet, spec.style)
-    clearances = _clearances(polyhedron, spec, printer)
-    return Plan(located, polyhedron, array, alphabet, shapes, half, clearances, printer)
-
-
-@contextmanager
-def blaming(located: Located, path: str) -> Iterator[None]:
-    """Give errors of a stage the place of the setting at `path`."""
-    try:
-        yield
-    except GeneratorError as error:
-        raise blamed(located, error, path) from error
+    faces = round_faces(polyhedron, shapes, spec, printer)
+    clearances = _clearances(polyhedron, spec, printer, faces)
+    return Plan(
+        located,
+        polyhedron,
+        array,
+        alphabet,
+        shapes,
+        half,
+        clearances,
+        printer,
+        {number: (face.outline,) for number, face in faces.developments.items()},
+        faces.blank,
+        faces.notes,
+    )
 
 
 def _polyhedron(shape: ShapeSpec) -> Polyhedron:
@@ -99,7 +115,8 @@ def _polyhedron(shape: ShapeSpec) -> Polyhedron:
         from generator.polyhedron.read import read_shape  # readers load only for files
 
         return read_shape(shape.file)
-    return SHAPES[shape.kind](**shape.parameters)
+    known = {**SHAPES, **ROUND_SHAPES}
+    return known[shape.kind](**shape.parameters)
 
 
 def _check_order(alphabet: Alphabet, array: SymbolArray) -> None:
@@ -111,7 +128,9 @@ def _check_order(alphabet: Alphabet, array: SymbolArray) -> None:
         )
 
 
-def _clearances(polyhedron: Polyhedron, spec: ObjectSpec, printer: Printer) -> Clearances:
+def _clearances(
+    polyhedron: Polyhedron, spec: ObjectSpec, printer: Printer, faces: RoundFaces
+) -> Clearances:
     """Return what printer, mitre and the neighbouring face's symbols need along each edge."""
     apart = {
         edge: symbol_clearance_mm(dihedral(polyhedron, number), spec.style.height_mm)
@@ -119,10 +138,10 @@ def _clearances(polyhedron: Polyhedron, spec: ObjectSpec, printer: Printer) -> C
     }
     clearances = []
     for number, face in enumerate(polyhedron.faces):
-        needs = [
-            np.array([apart[edge] for edge in zip(loop, loop[1:] + loop[:1], strict=True)])
-            for loop in face.loops
-        ]
+        loops = [list(zip(loop, loop[1:] + loop[:1], strict=True)) for loop in face.loops]
+        if number in faces.developments:
+            loops = [faces.developments[number].outline_edges()]
+        needs = [np.array([apart[edge] for edge in loop]) for loop in loops]
         if spec.parts == "panels":
             insets = top_insets_mm(polyhedron, number, spec.wall_mm, printer)
             needs = [np.maximum(need, inset) for need, inset in zip(needs, insets, strict=True)]

@@ -117,8 +117,7 @@ def _measured(number: int, plan: Plan, layout: Layout) -> list[_Measured]:
     for part in parts_of(plan, layout)[0]:
         low, high = box(part)
         x, y, z = (high - low).tolist()
-        symbols = sum(len(e.labels) for e in part.embossings if e.face is not None)
-        found.append(_Measured(number, part.name, (x, y, z), symbols))
+        found.append(_Measured(number, part.name, (x, y, z), part.symbols))
     return found
 
 

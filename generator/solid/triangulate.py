@@ -18,7 +18,7 @@ from generator.errors import SolidError
 from generator.solid.emboss import to_part, turn
 from generator.solid.frame import area_vector, in_frame, plane_frame
 from generator.solid.lattice import Squares, squares_of
-from generator.solid.part import Embossing, Part
+from generator.solid.part import Embossing, Facet, Part
 from generator.solid.polygon import triangulated
 from generator.solid.template import Template, closed_template, template_of
 
@@ -53,7 +53,10 @@ def triangles(part: Part) -> Mesh:
 def body_mesh(part: Part) -> Mesh:
     """Return the mesh of the body alone: no symbols; marks such as edge numbers stay."""
     marks = tuple(embossing for embossing in part.embossings if embossing.face is None)
-    return triangles(replace(part, embossings=marks))
+    facets = list(part.facets)
+    for wrapped in reversed(part.wrapped):
+        facets[wrapped.first : wrapped.first + len(wrapped.symbols)] = wrapped.feet
+    return triangles(replace(part, facets=tuple(facets), embossings=marks, wrapped=()))
 
 
 def symbol_meshes(part: Part) -> tuple[Mesh, ...]:
@@ -67,6 +70,12 @@ def symbol_meshes(part: Part) -> tuple[Mesh, ...]:
             builder = _Builder(part, body=False)
             builder.symbols(number, None, closed=True)
             meshes.append(builder.mesh())
+    for wrapped in part.wrapped:
+        own = part.facets[wrapped.first : wrapped.first + len(wrapped.symbols)]
+        feet = tuple(
+            Facet(foot.name, tuple(loop[::-1] for loop in foot.loops)) for foot in wrapped.feet
+        )
+        meshes.append(triangles(replace(part, facets=own + feet, embossings=(), wrapped=())))
     return tuple(meshes)
 
 
@@ -92,7 +101,11 @@ class _Builder:
 
     def facet(self, facet: int) -> None:
         """Triangulate a facet and all that stands on it."""
-        loops = [np.array(loop, dtype=np.int64) for loop in self.part.facets[facet].loops]
+        plain = self.part.facets[facet].loops
+        if len(plain) == 1 and len(plain[0]) == 3 and facet not in self.on:
+            self.found.append((np.array(plain, dtype=np.int64), facet, -1, None))
+            return
+        loops = [np.array(loop, dtype=np.int64) for loop in plain]
         numbers = self.on.get(facet, [])
         corners = [self.part.vertices[loop] for loop in loops]
         if numbers:

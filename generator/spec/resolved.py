@@ -24,6 +24,8 @@ class ShapeSpec:
     box                                           size: [x, y, z]
     triangular_prism                              side, height
     prism, pyramid                                sides, height, side or radius
+    cylinder                                      diameter, height
+    cone                                          diameter, height, top_diameter (0 if left out)
     polyhedron                                    vertices: [[x, y, z], ...],
                                                   faces: [[loop, hole, ...], ...]
     file                                          sha256 (of the content of `file`)
@@ -31,7 +33,7 @@ class ShapeSpec:
     ============================================  ===============================================
 
     All but `file` and `solid` are what the functions of `generator.polyhedron.shapes.SHAPES`
-    take.
+    and `generator.polyhedron.round.ROUND_SHAPES` take.
     """
 
     kind: str

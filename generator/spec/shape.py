@@ -87,6 +87,26 @@ class Pyramid(Block):
     """Height of the apex above the base, mm unless a unit is written."""
 
 
+class Cylinder(Block):
+    """A cylinder; symbols are wrapped onto its side."""
+
+    diameter: Length
+    """Diameter, mm unless a unit is written."""
+    height: Length
+    """Distance between base and top, mm unless a unit is written."""
+
+
+class Cone(Block):
+    """A cone, or its lower part; symbols are wrapped onto its side."""
+
+    diameter: Length
+    """Diameter of the base, mm unless a unit is written."""
+    top_diameter: Length | None = None
+    """Diameter of the top, mm unless a unit is written; a pointed cone if left out."""
+    height: Length
+    """Distance between base and top, mm unless a unit is written."""
+
+
 class VerticesAndFaces(Block):
     """Any polyhedron with planar faces."""
 
@@ -113,6 +133,8 @@ class Shape(Block):
     """Edge of a regular dodecahedron."""
     prism: Prism | None = None
     pyramid: Pyramid | None = None
+    cylinder: Cylinder | None = None
+    cone: Cone | None = None
     polyhedron: VerticesAndFaces | None = None
     file: PathText | None = None
     """A model with planar faces: a .step, .stl or .obj file, relative to the spec."""
@@ -129,13 +151,15 @@ EXAMPLES = {
     "dodecahedron": "{dodecahedron: 40 mm}",
     "prism": "{prism: {sides: 6, side: 40 mm, height: 80 mm}}",
     "pyramid": "{pyramid: {sides: 4, side: 80 mm, height: 70 mm}}",
+    "cylinder": "{cylinder: {diameter: 60 mm, height: 80 mm}}",
+    "cone": "{cone: {diameter: 80 mm, top_diameter: 40 mm, height: 80 mm}}",
     "polyhedron": "{polyhedron: {vertices: [[0, 0, 0], ...], faces: [[0, 2, 1], ...]}}",
     "file": "{file: part.step}",
 }
 """How each shape is written, for messages and for `encode-object init`."""
 OTHER_NAMES = {
     "parallelepiped": "box", "cuboid": "box", "block": "box", "brick": "box", "rectangle": "box",
-    "wedge": "triangular_prism", "hexagonal_prism": "prism", "cylinder": "prism", "cone": "pyramid",
+    "wedge": "triangular_prism", "hexagonal_prism": "prism", "frustum": "cone", "tube": "cylinder",
     "mesh": "file", "stl": "file", "step": "file", "obj": "file", "model": "file", "path": "file",
 }  # fmt: skip
 """Names people try, and what they are called here."""

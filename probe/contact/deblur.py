@@ -78,7 +78,7 @@ def deblurred(forces_n: ArrayLike, sensor: Sensor, *, noise_n: float) -> Deblurr
         raise ContactError(
             f"a noise of {noise_n:g} N", fix="give the standard deviation of one reading, >= 0"
         )
-    blur, strengths = blur_of(sensor)
+    influence(sensor, CELLS)  # refuses what is no pad
     arrives = arriving(sensor)
     if arrives < LEAST:
         raise ContactError(
@@ -88,6 +88,7 @@ def deblurred(forces_n: ArrayLike, sensor: Sensor, *, noise_n: float) -> Deblurr
             fix=f"take a pad of at most {math.floor(100 * thickest_mm(sensor)) / 100:g} mm, tabs, "
             "or the image as it is",
         )
+    blur, strengths = blur_of(sensor)
     level = math.sqrt(float(np.mean(np.square(read))))
     if level == 0:
         return Deblurred(np.zeros(shape), 0.0, 0, arrives)

@@ -152,7 +152,7 @@ def _solved(system: Array, wanted: Array) -> Array:
     size = [row[i] for i, row in enumerate(rows)]
     largest = max(*size, 1e-300)
     scale = [1 / math.sqrt(own if own > 1e-30 * largest else largest) for own in size]
-    scaled = [[v * a * b for v, b in zip(row, scale, strict=True)]
+    scaled = [[v * b * a for v, b in zip(row, scale, strict=True)]
               for row, a in zip(rows, scale, strict=True)]  # fmt: skip
     right = [w * a for w, a in zip(wanted.tolist(), scale, strict=True)]
     quick = _eliminated([row[:] for row in scaled], right[:])

@@ -1,6 +1,6 @@
 """What a simulated probe feels, beat by beat: it rests, comes down, holds, and lifts.
 
-Touch on a face -> forces -> counts at the board's rate. On the way down and up, two beats each,
+Touch on a face -> forces -> counts at the board's rate. On the way down and up, a beat each,
 the forces are taken in proportion; the film remembers (hysteresis, creep), and the board is
 noisy, as in `probe.simulate`. Thesis 4.2.
 """
@@ -25,7 +25,7 @@ from recognizer.bench.errors import BenchError
 
 Array = NDArray[np.float64]
 
-STEPS = (0.25, 0.6)  #: shares of the force on the way down, a beat each
+STEPS = (0.5,)  #: shares of the force on the way down, a beat each
 APART_S = 0.08  #: between two touches
 LARGEST_N = 400.0
 

@@ -41,7 +41,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except typer.Exit as leaving:
         code = leaving.exit_code
     except (GeneratorError, ProbeError, RecognizerError) as error:
-        sys.stderr.write(f"open-bench: error: {error.cause}\n")
+        place = f"{error.place}: " if error.place else ""
+        sys.stderr.write(f"open-bench: {place}error: {error.cause}\n")
         if error.fix:
             sys.stderr.write(f"  fix: {error.fix}\n")
         code = error.exit_code

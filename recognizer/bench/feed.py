@@ -28,6 +28,7 @@ SILENT_S = 0.6  #: without a frame a probe is gone
 AT_ONCE = 512  #: frames taken at a time
 POINTS = 800  #: of the time line's picture
 LONGEST = 2_000_000  #: frames of a recording that is played
+FAINT = 2048.0  #: counts of all tactels; a recording of noise alone shall look like one
 JUMP_S = 0.5  #: longer pauses in a recording are shortened to it
 
 
@@ -264,7 +265,7 @@ class ReplayFeed:
         place = np.minimum(self._at_s / max(self.seconds, 1e-9) * bins, bins - 1).astype(int)
         top = np.zeros(bins)
         np.maximum.at(top, place, self.strength)
-        return [round(float(v), 3) for v in top / max(float(top.max()), 1e-9)]
+        return [round(float(v), 3) for v in top / max(float(top.max()), FAINT)]
 
     def close(self) -> None:
         """Pause."""

@@ -36,7 +36,10 @@ def holdings_routes(session: Session, parts: Path | None) -> APIRouter:
     @routes.get("/objects/{name}")
     def one(name: str) -> dict[str, Any]:
         with reading(engine()) as connection:
-            return object_told(connection, name)
+            told = object_told(connection, name)
+        if session.simulation is not None:
+            session.simulation.prepare(name)
+        return told
 
     @routes.get("/objects/{name}/parts/{number}")
     def part(name: str, number: int) -> FileResponse:

@@ -61,7 +61,7 @@ class Reading:
         self._answers = 0
         self._mosaics: OrderedDict[tuple[str, str], Mosaic] = OrderedDict()
         self._grown = 0  #: touch that went into a mosaic last
-        self._contact = False
+        self._contact: bool | None = None  #: not known yet
         self._thread = threading.Thread(target=self._run, name="reading", daemon=True)
         self._thread.start()
 

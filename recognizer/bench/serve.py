@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import secrets
 import signal
 import socket
@@ -27,6 +28,8 @@ from recognizer.bench.session import Session
 SOFTWARE = ("touch:", "Simulated probe: click on the part")
 FIRMWARE = ("touch:?firmware=avr", "Simulated probe, through the firmware")
 PATTERN = ("sim:", "Moving pattern")
+
+_TOKEN = re.compile(r"[A-Za-z0-9_-]{12,200}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,10 +56,15 @@ def serve(asked: Asked) -> int:
     """
     if asked.overlay not in ("tab", "pad"):
         raise BenchError(f"an overlay {asked.overlay!r}", fix="give tab or pad")
+    if asked.token and not _TOKEN.fullmatch(asked.token):
+        raise BenchError(
+            "this token can be guessed, or cannot stand in an address",
+            fix="give 12 or more of letters, digits, - and _, or none: one is made",
+        )
     database = _database(asked.database)
     token = asked.token or ("" if is_loopback(asked.host) else secrets.token_urlsafe(18))
     line = _listening(asked.host, asked.web_port)
-    signal.signal(signal.SIGTERM, _end)
+    before = signal.signal(signal.SIGTERM, _end)
     bulletin = Bulletin()
     sensor = Sensor(overlay=Overlay(kind="pad" if asked.overlay == "pad" else "tab"))
     session = Session(database, asked.folder, sensor, bulletin)
@@ -77,6 +85,7 @@ def serve(asked: Asked) -> int:
     except KeyboardInterrupt:  # how it is ended
         sys.stderr.write("open-bench: ended\n")
     finally:
+        signal.signal(signal.SIGTERM, before)
         session.close()
         line.close()
     return 0
@@ -122,6 +131,7 @@ def _listening(host: str, port: int) -> socket.socket:
     line.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         line.bind((host, port))
+        line.listen(128)  # who knows the address may come, and waits
     except OSError as error:
         line.close()
         raise ProbeError(

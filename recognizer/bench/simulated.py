@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 import threading
 from collections import OrderedDict
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from urllib.parse import parse_qsl
 
 from probe.contact.contract import Touch
@@ -21,7 +21,7 @@ from probe.errors import ProbeError
 from probe.port.emulated import emulated_probe
 from probe.port.simulated import FULL_COUNTS, FULL_MV
 from probe.sensor import Sensor
-from probe.simulate.registered import registered_surface
+from probe.simulate.registered import registered_object, registered_surface
 from probe.simulate.scene import Scene
 from recognizer.bench.beats import Beats, Manner
 from recognizer.bench.errors import BenchError
@@ -53,7 +53,7 @@ class TouchProbe:
     """
 
     def __init__(self, url: str, database: str, sensor: Sensor) -> None:
-        firmware, manner = _manner(url)
+        firmware, manner = manner_of(url)
         self.database = database
         self.firmware = firmware
         self._beats = Beats(sensor, manner)
@@ -72,6 +72,7 @@ class TouchProbe:
                 self._line = SoftwareLine(self._beats.frames(), "bench")
                 self.url = self._line.url
                 stack.callback(self._line.close)
+            stack.callback(self._closed.set)
             self._stack = stack.pop_all()
 
     def touch(
@@ -90,6 +91,19 @@ class TouchProbe:
         touch = Touch(x_mm, y_mm, math.radians(theta_deg), force_n)
         with self._turn:
             self._beats.touch(self._scene(object_name, face), touch)
+
+    def prepare(self, object_name: str) -> None:
+        """Read an object's faces meanwhile, so that its first touch does not wait for it."""
+
+        def read() -> None:
+            with suppress(ProbeError):  # a touch of it says why
+                held = registered_object(self.database, object_name)
+                for face in held.faces:
+                    if face.placement is not None and not self._closed.is_set():
+                        with self._turn:
+                            self._scene(object_name, face.name)
+
+        threading.Thread(target=read, name="faces", daemon=True).start()
 
     def load(self, newtons: float) -> None:
         """Put an even load on; see `Beats.load`."""
@@ -137,7 +151,7 @@ class TouchProbe:
                 return
 
 
-def _manner(url: str) -> tuple[bool, Manner]:
+def manner_of(url: str) -> tuple[bool, Manner]:
     """Read the options of a URL: whether by firmware, and how the probe moves."""
     _, _, query = url.removeprefix(SCHEME).partition("?")
     given = dict(parse_qsl(query, keep_blank_values=True))

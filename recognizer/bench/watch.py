@@ -1,7 +1,8 @@
 """When a touch is worth reading: as soon as it is steady, and again when it has changed.
 
-Forces of frame after frame -> whether to read this one. A touch that never comes to rest is
-read all the same after a while.
+Forces of frame after frame -> whether to read this one. The page wants an answer at once, so
+one steady frame is enough (`recognizer.touches` averages many), and a touch that was not
+answered is read again. One that never comes to rest is read all the same after a while.
 """
 
 from __future__ import annotations
@@ -13,10 +14,10 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-STEADY = 0.05  #: share of the forces that may change from frame to frame
-CHANGED = 0.15  #: share by which a read touch differs from a new one, whatever their strength
+STEADY = 0.15  #: share of the forces that may change from frame to frame; noise alone changes 0.1
+CHANGED = 0.35  #: share by which a read touch differs from a new one, whatever their strength
 RESTLESS_S = 0.3  #: after so long a touch is read although it moves
-AGAIN_S = 0.7  #: after so long a touch that was not answered is read again
+AGAIN_S = 0.4  #: after so long a touch that was not answered is read again
 
 
 @dataclass(slots=True)

@@ -42,11 +42,12 @@ def composite(
         worst = int(np.argmin(against))
         contradicting = against[worst] < -limits.contradicts and (agreement.chosen >= 0).sum() > 2
         if contradicting:
-            loss = float(views.losses[agreement.chosen[worst]])
+            others = np.arange(len(agreement.chosen)) != worst
             agreement = replace(
                 agreement,
-                chosen=np.where(np.arange(len(agreement.chosen)) == worst, -1, agreement.chosen),
-                score=agreement.score - limits.left_out - max(loss, -limits.left_out),
+                chosen=np.where(others, agreement.chosen, -1),
+                score=agreement.score - limits.left_out - agreement.scores[worst],
+                scores=np.where(others, agreement.scores, -limits.left_out),
             )
     most = scores.max(axis=1)
     last = len(agreement.chosen) - 1

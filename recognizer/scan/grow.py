@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from recognizer.belief import WHOLE
 from recognizer.mosaic.touch import PlacedTouch
-from recognizer.pipeline import Reader
-from recognizer.recognition import NO_CONTACT, NOT_ENCODED, TOO_FEW, Recognition, refused
+from recognizer.pipeline import Reader, recognise
+from recognizer.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, TOO_FEW, Recognition, refused
 from recognizer.scan.answer import Located, answered, located, posed
 from recognizer.scan.composite import Composite, composite, expected_fit
 from recognizer.scan.lattice import PlaneLattice, agreed, alike, expected_at, seeded
 from recognizer.scan.settings import ScanSettings
-from recognizer.scan.views import Stands, Views, fits_of, stands_of, views_of
-from recognizer.symbols.fit import Fit
+from recognizer.scan.views import (
+    Stands,
+    View,
+    Views,
+    fits_of,
+    stands_of,
+    tells_place,
+    views_of,
+    widest_mm,
+)
 from recognizer.symbols.pressing import pressing_of
 from recognizer.symbols.refine import Image, image_of
 
@@ -31,9 +41,10 @@ class Scan:
     settings: ScanSettings
     touches: tuple[PlacedTouch, ...]  #: those with contact
     stands: Stands | None
-    fits: tuple[tuple[tuple[Fit, ...], ...], ...]  #: of each encoding, of each touch
+    views: tuple[tuple[tuple[View, ...], ...], ...]  #: of each encoding, of each touch
     lattices: tuple[tuple[PlaneLattice, ...], ...]  #: of each encoding, best first
     astray: int  #: touches in a row that agree with nothing that the others say
+    told: tuple[str | None, str | None] | None  #: object and face by a touch that agreed
     leading: Located | None  #: the likeliest place, whether it is the answer or not
     recognition: Recognition  #: of the probe's pose at the last touch
 
@@ -42,7 +53,7 @@ def begun(reader: Reader, settings: ScanSettings | None = None) -> Scan:
     """Return a scan without touches."""
     none = tuple(() for _ in reader.prepared)
     limits = settings or ScanSettings()
-    return Scan(reader, limits, (), None, none, none, 0, None, refused(0, TOO_FEW))
+    return Scan(reader, limits, (), None, none, none, 0, None, None, refused(0, TOO_FEW))
 
 
 def read_scan(
@@ -92,17 +103,19 @@ def extended(scan: Scan, touch: PlacedTouch) -> Scan:
     finest = min(encoding.style.pitch_mm for encoding in reader.lab.encodings)
     stands = stands_of(reader, touches, scan.stands, limits.loose * finest)
     trusts = [float(each.signal.trust.sum()) for each in touches]
-    fits, lattices, found, images = [], [], [], []
+    shown, lattices, found, images = [], [], [], []
     for k, (encoding, template, bank) in enumerate(reader.prepared):
         image = _image(reader, touch, encoding.style.height_mm)
         near = _near(scan.lattices[k][: limits.guided], stands)
-        enough = limits.clean if scan.recognition and scan.astray == 0 else 0.0
-        new = fits_of(image, template, bank, reader.settings, near, enough)
-        each = (*scan.fits[k], tuple(f for f in new if f.noise <= limits.noise))
+        known = bool(scan.recognition) and scan.astray == 0
+        new = fits_of(
+            image, template, bank, reader, near, limits.clean, known=known, hard=scan.told is None
+        )
+        each = (*scan.views[k], tuple(v for v in new if v.fit.noise <= limits.noise))
         sums = _composites(
             views_of(each, trusts), stands, scan.lattices[k], encoding.style.pitch_mm, limits
         )
-        fits.append(each)
+        shown.append(each)
         lattices.append(tuple(item.agreement.lattice for item in sums))
         found += located(encoding, sums, limits)
         images.append(image)
@@ -112,17 +125,20 @@ def extended(scan: Scan, touch: PlacedTouch) -> Scan:
     if answer:
         found[0], agrees = _posed(reader, images, found[0], stands, limits)
         answer = answered(reader, found, limits, touch.seq)
+    elif scan.told is None and _tells_alone(reader, shown):
+        alone = recognise(reader, touch.signal, touch.seq)
+        answer, agrees = (alone, True) if alone else (answer, agrees)
     astray = 0 if agrees else scan.astray + 1
-    if answer and astray > limits.patience:
-        answer = refused(touch.seq, NOT_ENCODED, margin=answer.margin)
+    answer, told = _believed(scan, answer, astray)
     return Scan(
         reader=reader,
         settings=limits,
         touches=touches,
         stands=stands,
-        fits=tuple(fits),
+        views=tuple(shown),
         lattices=tuple(lattices),
         astray=astray,
+        told=told,
         leading=found[0] if found else None,
         recognition=answer,
     )
@@ -135,9 +151,43 @@ def _posed(
     if best.composite.agreement.chosen[-1] >= 0:
         k = next(n for n, each in enumerate(reader.prepared) if each[0] is best.encoding)
         finer = posed(reader, images[k], reader.prepared[k][1], best, limits)
-        if finer.explained >= reader.thresholds.explained:
+        many = len(best.fit.cells) >= reader.thresholds.many
+        least = reader.thresholds.explained_by_many if many else reader.thresholds.explained
+        if finer.explained >= least and tells_place(finer.fit.covariance):
             return finer, True
     return replace(best, fit=expected_fit(best.composite, stands)), False
+
+
+def _believed(
+    scan: Scan, answer: Recognition, astray: int
+) -> tuple[Recognition, tuple[str | None, str | None] | None]:
+    """Return an answer as far as it may be believed, and what the scan has told by now.
+
+    A touch that does not agree is answered from the others, but only while it is one of few.
+    Two answers about one face exclude each other: neither is believed. A place that only a
+    vague arm tells is none.
+    """
+    if not answer:
+        return answer, scan.told
+    named = answer.object, answer.face
+    if scan.told is not None and named != scan.told:
+        return refused(answer.seq, AMBIGUOUS, margin=answer.margin), None
+    if astray > 0 and (scan.told is None or astray > scan.settings.patience):
+        return refused(answer.seq, NOT_ENCODED, margin=answer.margin), scan.told
+    if answer.covariance is not None and widest_mm(answer.covariance) > scan.settings.loose_mm:
+        return refused(answer.seq, TOO_FEW, margin=answer.margin), scan.told or named
+    return answer, named
+
+
+def _tells_alone(reader: Reader, views: list[tuple[tuple[View, ...], ...]]) -> bool:
+    """Whether the last touch shows cells enough for an answer, if they were all clear."""
+    least = reader.thresholds.surprise + reader.thresholds.margin
+    for (encoding, _, _), each in zip(reader.prepared, views, strict=True):
+        options = math.log(encoding.array.order + 1)
+        cells = max((int((view.fit.seen >= WHOLE).sum()) for view in each[-1]), default=0)
+        if cells * options > math.log(len(encoding.keys)) + least:
+            return True
+    return False
 
 
 def _image(reader: Reader, touch: PlacedTouch, height_mm: float) -> Image:

@@ -23,6 +23,7 @@ Ints = NDArray[np.int64]
 ROUNDS = 2  #: of choosing views and moving the lattice
 _NEIGHBOURS = np.array([[i, j] for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j], np.float64)
 _SETTLED = 0.05  # mm, by which a lattice moves at no touch
+_TIE = 1e-6  # of two views that both say nothing for a lattice the likelier one is taken
 _LEAST = 1e-12  # of a variance, mm^2 or rad^2
 
 
@@ -42,7 +43,8 @@ class Agreement:
     chosen: Ints  #: (n,) the view of each touch, -1 where none agrees
     shifts: Ints  #: (n, 2) whole pitches from the lattice's origin to that of the view
     expected: Array  #: (n, 3) T_lattice_touch
-    score: float  #: nats, 0 if the best view of each touch agrees fully
+    scores: Array  #: (n,) nats that each touch adds
+    score: float  #: their sum
 
 
 def seeded(views: Views, stands: Stands, view: int) -> PlaneLattice:
@@ -95,7 +97,10 @@ def _agreed(
     precision: Array = np.asarray(np.linalg.inv(spread), np.float64)
     chi2 = np.einsum("mi,mij,mj->m", away, precision, away)
     likely = (chi2 < 2 * limits.left_out) & _sure(away, precision, pitch_mm, limits.shift_margin)
-    score = views.losses - chi2 / 2
+    likely &= views.losses > -limits.plainly
+    score = np.maximum(views.losses, -limits.left_out) - chi2 / 2
+    score += np.where(views.led, 0.0, limits.agreement)
+    score += views.losses * _TIE
     chosen, best = np.full(number, -1), np.full(number, -limits.left_out)
     best[np.setdiff1d(np.arange(number), views.touch)] = 0.0  # nothing is felt there
     rising = np.argsort(score, kind="stable")
@@ -104,7 +109,7 @@ def _agreed(
     best[chosen >= 0] = np.maximum(score[chosen[chosen >= 0]], -limits.left_out)
     taken = np.zeros((number, 2), np.int64)
     taken[chosen >= 0] = shifts[chosen[chosen >= 0]]
-    return Agreement(lattice, chosen, taken, expected, float(best.sum()))
+    return Agreement(lattice, chosen, taken, expected, best, float(best.sum()))
 
 
 def _away(views: Views, expected: Array, pitch_mm: float) -> tuple[Array, Ints]:

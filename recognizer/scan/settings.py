@@ -10,10 +10,12 @@ class ScanSettings:
     """Limits of a scan; nats are log-likelihoods."""
 
     left_out: float = 10.0  #: nats that a touch costs which agrees with no lattice
+    plainly: float = 250.0  #: nats by which another lattice must not explain an image better
+    agreement: float = 7.0  #: nats that it says if a view lies on a lattice to which nothing led it
     shift_margin: float = 6.0  #: nats between the likeliest integer shift of a touch and the next
-    look: float = 6.0  #: nats that one touch can say about one cell
+    look: float = 10.0  #: nats that one touch can say about one cell
     alike: float = 0.25  #: correlation of what touches say about one cell: at most 1/alike looks
-    contradicts: float = 14.0  #: nats that a touch may contradict all others before it is left out
+    contradicts: float = 20.0  #: nats that a touch may contradict all others before it is left out
     noise: float = 0.4  #: standard deviation of psi beyond which a touch shows no symbols
     clean: float = 0.15  #: noise of a touch whose symbols are where the answer says: not searched
     wrong: float = 0.05  #: share of the cells that may clearly speak for another symbol
@@ -29,5 +31,6 @@ class ScanSettings:
     guided: int = 2  #: of them that a touch is fitted with if its own fits do not agree
     telling: int = 16  #: cells by which places are listed
     places: int = 6  #: of every lattice that are compared by all cells
+    loose_mm: float = 0.6  #: largest standard deviation of a place that is given as an answer
     patience: int = 3  #: touches in a row that may agree with nothing while others are believed
     verify_steps: int = 3  #: of the last touch's pose, with the symbols that the database holds

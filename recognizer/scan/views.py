@@ -40,10 +40,19 @@ class Stands:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """One lattice that a touch may show."""
+
+    fit: Fit
+    led: bool  #: found only because other touches led there: that it agrees says little
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Views:
     """All lattices that touches may show, one after the other: m views of n touches."""
 
     fits: tuple[Fit, ...]
+    led: NDArray[np.bool_]  #: (m,)
     touch: Ints  #: (m,)
     poses: Array  #: (m, 3) T_lattice_touch
     covariances: Array  #: (m, 3, 3)
@@ -60,7 +69,7 @@ def stands_of(
     """
     last = touches[-1]
     mosaic = None if before is None else before.mosaic
-    sure = last.believed is not None and _widest(last.believed.covariance) <= loose_mm
+    sure = last.believed is not None and widest_mm(last.believed.covariance) <= loose_mm
     if mosaic is None and sure and last.believed is not None:
         pose, covariance = last.believed.pose[None], last.believed.covariance[None]
         if before is None:
@@ -76,7 +85,8 @@ def stands_of(
     return Stands(mosaic.poses, mosaic.covariances, mosaic)
 
 
-def _widest(covariance: Array) -> float:
+def widest_mm(covariance: Array) -> float:
+    """Return the largest standard deviation of a place, mm."""
     return math.sqrt(float(np.linalg.eigvalsh(covariance[:2, :2])[-1]))
 
 
@@ -84,10 +94,13 @@ def fits_of(
     image: Image,
     template: Template,
     bank: Bank,
-    settings: Settings,
+    reader: Reader,
     near: Array,
-    enough: float = 0.0,
-) -> tuple[Fit, ...]:
+    clean: float,
+    *,
+    known: bool,
+    hard: bool,
+) -> tuple[View, ...]:
     """Return the likeliest lattices of an image, and those that lie near given ones.
 
     The latter leave more unexplained, and so say less of each cell, if the image shows what
@@ -97,20 +110,28 @@ def fits_of(
     ----------
     near
         (k, 3) T_lattice_touch that other touches lead to expect.
-    enough
-        Noise of a fit near the first of these with which nothing else is looked for.
+    clean
+        Noise of a fit with which nothing else is looked for.
+    known
+        Whether the first of `near` is where the answer of a moment ago says.
+    hard
+        Whether more may be spent on an image that the usual search does not explain.
     """
-    if enough > 0 and len(near):
+    settings = reader.settings
+    if known and len(near):
         expected = _near(image, template, settings, near[:1], None)
-        if expected and expected[0].noise <= enough:
-            return expected
+        if expected and expected[0].noise <= clean:
+            return (View(expected[0], led=True),)
     found = fits(image, template, bank, settings)
+    if hard and found and found[0].noise > clean:
+        found = fits(image, template, bank, reader.thorough)
+    views = tuple(View(fit, led=False) for fit in found)
     rest = [pose for pose in near if not any(_same(pose, f, template.pitch_mm) for f in found)]
     for fit in _near(image, template, settings, np.array(rest).reshape(-1, 3), found):
         pose = np.array([fit.x_mm, fit.y_mm, fit.theta_rad])
-        if not any(_same(pose, other, template.pitch_mm) for other in found):
-            found = (*found, fit)
-    return found
+        if not any(_same(pose, view.fit, template.pitch_mm) for view in views):
+            views = (*views, View(fit, led=True))
+    return views
 
 
 def _near(
@@ -129,15 +150,15 @@ def _near(
     return scored(image, template, lattices, settings)
 
 
-def views_of(found: Sequence[tuple[Fit, ...]], trusts: Sequence[float]) -> Views:
-    """Return the views of touches from the fits of each, and from how many tactels they have.
+def views_of(found: Sequence[tuple[View, ...]], trusts: Sequence[float]) -> Views:
+    """Return the views of touches, from how many tactels they have.
 
     A fit's value does not say how likely its noise is; here that is put in, so that fits and
     encodings, each with a noise of its own, can be compared. Fits that do not say where they
     lie are left out.
     """
-    kept = [tuple(fit for fit in each if _told(fit.covariance)) for each in found]
-    every = tuple(fit for each in kept for fit in each)
+    kept = [tuple(view for view in each if tells_place(view.fit.covariance)) for each in found]
+    every = tuple(view.fit for each in kept for view in each)
     touch = np.repeat(np.arange(len(kept)), [len(each) for each in kept])
     values = np.array([fit.value for fit in every])
     values -= np.array(trusts)[touch] * np.log([fit.noise for fit in every])
@@ -145,6 +166,7 @@ def views_of(found: Sequence[tuple[Fit, ...]], trusts: Sequence[float]) -> Views
     np.maximum.at(best, touch, values)
     return Views(
         fits=every,
+        led=np.array([view.led for each in kept for view in each], np.bool_),
         touch=touch,
         poses=np.array([[f.x_mm, f.y_mm, f.theta_rad] for f in every]).reshape(-1, 3),
         covariances=np.array([f.covariance for f in every]).reshape(-1, 3, 3),
@@ -153,8 +175,8 @@ def views_of(found: Sequence[tuple[Fit, ...]], trusts: Sequence[float]) -> Views
     )
 
 
-def _told(covariance: Array) -> bool:
-    """Whether a covariance is one: finite, and no direction known too well to be true."""
+def tells_place(covariance: Array) -> bool:
+    """Whether a covariance says where a touch stands: in all directions, and none too well."""
     if not np.isfinite(covariance).all():
         return False
     lowest = np.linalg.eigvalsh(covariance)[0]

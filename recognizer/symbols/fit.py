@@ -34,6 +34,9 @@ from recognizer.symbols.template import Floats, Template, psi
 
 Array = NDArray[np.float64]
 
+SAME_SHIFT = 0.08  #: pitches by which two lattices that are one may differ
+SAME_TURN = 0.02  #: half turns
+
 
 @dataclass(frozen=True, slots=True)
 class Settings:
@@ -43,6 +46,7 @@ class Settings:
     steps: int = 4  #: Gauss-Newton steps of all of them
     finalists: int = 2  #: lattices that are refined to the end
     final_steps: int = 6
+    crossed: int = 0  #: gains that are tried on all lattices, and these turned by quarters
     least_noise: float = 0.05  #: below it a fit is not believed
 
 
@@ -77,11 +81,54 @@ def fits(image: Image, template: Template, bank: Bank, settings: Settings) -> tu
     each = [len(start) for start in starts]
     lattices = started(np.concatenate(starts), np.repeat(gains, each, axis=0))
     lattices = refined(image, template, lattices, steps=settings.steps)
-    best = np.argsort(-lattices.value, kind="stable")[: settings.finalists]
+    if settings.crossed:
+        lattices = _crossed(image, template, lattices, settings.crossed)
+    best = _distinct(lattices, template.pitch_mm)[: settings.finalists]
     lattices = started(lattices.pose[best], lattices.gain[best])
     lattices = refined(image, template, lattices, steps=settings.final_steps)
     found = scored(image, template, lattices, settings)
-    return tuple(sorted(found, key=lambda fit: -fit.value))
+    return tuple(found[b] for b in _distinct(lattices, template.pitch_mm))
+
+
+def _distinct(found: Lattices, pitch: float) -> list[int]:
+    """Return the numbers of lattices, best first, each once."""
+    kept: list[int] = []
+    for b in np.argsort(-found.value, kind="stable").tolist():
+        away = found.pose[kept, :3] - found.pose[b, :3]
+        shift = np.abs((away[:, :2] / pitch + 0.5) % 1.0 - 0.5).max(axis=1)
+        turn = np.abs((away[:, 2] / math.pi + 1.0) % 2.0 - 1.0)
+        if not ((shift < SAME_SHIFT) & (turn < SAME_TURN)).any():
+            kept.append(b)
+    return kept
+
+
+def _crossed(image: Image, template: Template, found: Lattices, gains: int) -> Lattices:
+    """Return lattices, and the same turned by quarters, each under the best of several gains.
+
+    A square lattice turned by a quarter is one again, so all four see the image alike but for
+    the symbols; and a lattice may be stuck under a gain from which another one got away.
+    """
+    best = np.argsort(-found.value, kind="stable")
+    tried = []
+    pose = found.pose[best[: 2 * gains]]
+    for _ in range(4):
+        tried.append(pose)
+        pose = pose.copy()
+        pose[:, 0], pose[:, 1] = -pose[:, 1], pose[:, 0].copy()
+        pose[:, 2] += math.pi / 2
+    poses = np.concatenate([*tried, found.pose])
+    each = [
+        refined(image, template, started(poses, np.tile(gain, (len(poses), 1))), steps=1)
+        for gain in found.gain[best[:gains]]
+    ]
+    kept = np.argmax([lattices.value for lattices in each], axis=0)
+    rows = np.arange(len(poses))
+    return Lattices(
+        pose=np.stack([lattices.pose for lattices in each])[kept, rows],
+        gain=np.stack([lattices.gain for lattices in each])[kept, rows],
+        value=np.stack([lattices.value for lattices in each])[kept, rows],
+        normal=np.stack([lattices.normal for lattices in each])[kept, rows],
+    )
 
 
 def _searched(image: Image, template: Template, bank: Bank, gain: Array, keep: int) -> Array:

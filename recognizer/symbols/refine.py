@@ -68,7 +68,7 @@ class Lattices:
     pose: Array  #: (b, 7) x, y (mm), theta (rad); width, cross-talk, exponent - 1, scale - 1
     gain: Array  #: (b, 4) logarithm of the scale; depth at the centre, slopes per half width
     value: Array  #: (b,) log-likelihood of the image, nats, up to a constant of the image
-    normal: Array  #: (b, 11, 11) inverse covariance of `pose` and `gain`
+    normal: Array  #: (b, 11, 11) inverse covariance of `pose` and `gain`, if noise were `NOISE`
 
 
 def image_of(
@@ -231,7 +231,8 @@ def _seen(
     sure = np.where(np.abs(away) < _FAR, felt.trust, 0.0) / width**2
     weighted = (jacobian * sure[..., None]).swapaxes(1, 2)
     normal = weighted @ jacobian + np.diag(_precision(image))
-    right = (weighted @ (image.forces - force)[..., None])[..., 0]
+    left = image.forces - force
+    right = (weighted @ left[..., None])[..., 0]
     return _Seen(value, normal, right - _known(image, at) * _precision(image))
 
 
@@ -245,7 +246,7 @@ def _moved(at: Lattices, seen: _Seen, damping: Array) -> Lattices:
     pose, gain = at.pose + step[:, :_POSE], at.gain + step[:, _POSE:]
     pose[:, 3:] = np.clip(pose[:, 3:], -LIMITS, LIMITS)
     gain[:, 1] = np.clip(gain[:, 1], 0.3 * at.gain[:, 1], 0.9)
-    return Lattices(pose, bounded_gain(gain), at.value, at.normal)
+    return replace(at, pose=pose, gain=bounded_gain(gain))
 
 
 def _either(better: NDArray[np.bool_], a: Any, b: Any) -> Any:
@@ -317,7 +318,8 @@ def explained_share(
 def started(pose: Array, gain: Array) -> Lattices:
     """Return candidates of which nothing is known but pose (b, 3 or 7) and gain (b, 4)."""
     pose = np.pad(pose, ((0, 0), (0, _POSE - pose.shape[1])))
-    return Lattices(pose, gain, np.zeros(len(pose)), np.zeros((len(pose), 11, 11)))
+    none = np.zeros((len(pose), 11, 11))
+    return Lattices(pose, gain, np.zeros(len(pose)), none)
 
 
 def chosen(cells: NDArray[np.int64], tables: Floats, scores: Array, felt: Felt) -> Array:

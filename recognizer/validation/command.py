@@ -186,11 +186,12 @@ def validate(
 
     def action() -> int:
         from recognizer.validation import told
-        from recognizer.validation.complete import Wishes, validate_set
 
         if version:
             told.version(as_json=as_json)
             return 0
+        from recognizer.validation.complete import Wishes, validate_set
+
         wishes = Wishes(touches, seed, kinds, levels, overlay, surfaces, study, shard)
         with told.progress_bar() as bar:
             summary = validate_set(

@@ -78,7 +78,7 @@ SCENES: tuple[Scene, ...] = (
     Scene("wrist free to turn", _CROSS, replace(_HERE, wrist=_FREE)),
     Scene("wrist 1e9 N mm/rad", _CROSS, replace(_HERE, wrist=WristStiffness(1e9, 1e9))),
     Scene("tilt 20 degrees on a plate", Plate(), replace(_HERE, tilt_x_rad=math.radians(20))),
-    Scene("plane that rises 1 mm a mm", TiltedPlane(1.0, 0.0)),
+    Scene("plane that rises 1 mm a mm", TiltedPlane(1.0, 0.0), expected=EITHER),
     Scene("stroke of 0.02 mm", Strip(0.02), replace(_HERE, force_n=1.0)),
     Scene("cliff through the centre", Strip(200.0), replace(_HERE, x_mm=100.0)),
     Scene("rough, 0.5 mm", Rough(1, 0.5, 4.0)),

@@ -118,7 +118,5 @@ def _told(stdout: str, stderr: str) -> tuple[str, str, str]:
     except (ValueError, KeyError, IndexError):
         lines = (stderr or stdout).strip().splitlines()
         return (lines[-1] if lines else "it failed"), "", ""
-    where = ":".join(
-        str(first[key]) for key in ("file", "line", "column") if first.get(key) is not None
-    )
+    where = str(first.get("place") or "")
     return str(first.get("cause", "it failed")), str(first.get("fix") or ""), where

@@ -208,7 +208,7 @@ def work_precision(study: dict[str, Any], times: dict[str, Any]) -> str:
         _scattered(
             axes[1],
             [
-                (ms, 100 * (1 - line["right"] / line["windows"]), line["decoder"])
+                (1e3 * ms, 100 * (1 - line["right"] / line["windows"]), line["decoder"])
                 for line, ms in zip(study["decoders"], times["decoders"], strict=True)
             ],
         )
@@ -225,11 +225,12 @@ def work_precision(study: dict[str, Any], times: dict[str, Any]) -> str:
         _scattered(axes[3], [(ms, _number(line["rms_mm"]), line["reader"]) for line, ms in readers])
         axes[3].set_ylabel("place, rms, mm")
         axes[3].set_title("readers")
-        for axis in axes:
-            axis.set_xlabel("CPU time of one, ms")
+        for axis, unit in zip(axes, ("ms", "µs", "ms", "ms"), strict=True):
+            axis.set_xlabel(f"CPU time of one, {unit}")
             axis.margins(x=0.25, y=0.15)
         for axis in axes[1:]:
-            axis.set_ylim(bottom=0)
+            top = max(axis.get_ylim()[1], 1e-3)
+            axis.set_ylim(-0.08 * top, 1.1 * top)
     return picture.svg
 
 

@@ -79,7 +79,7 @@ def repeated(folder: Path, number: int, plot: Path | None) -> dict[str, Any]:
     answer = recognise(reader, signal_of(found.counts.astype(np.float64)), number)
     trial = judged(plan, number, found, answer, 0.0)
     row = row_of(trial, kind, seen_of(reader.lab, reader.sensor, trial))
-    row = {name: None if value != value else value for name, value in row.items()}
+    row = {name: _shown(value) for name, value in row.items()}
     if plot is not None:
         with figure_on(plot, 2, 2, (10.5, 10.0)) as axes:
             _draw_surface(axes[0], found, reader)
@@ -87,6 +87,11 @@ def repeated(folder: Path, number: int, plot: Path | None) -> dict[str, Any]:
             _draw_fit(axes[2], found, reader)
             _draw_answer(axes[3], found, reader, answer, row)
     return row
+
+
+def _shown(value: Any) -> Any:
+    """Return a value, None for what is no number or has no bound."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _draw_surface(axis: Axes, found: Drawn, reader: Reader) -> None:

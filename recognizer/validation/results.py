@@ -70,7 +70,7 @@ def results_of(rows: Columns) -> dict[str, Any]:
         "levels": [
             {"level": level, **line_of(rows, (levels == level) & fair)}
             for level in LEVELS
-            if (levels == level).any()
+            if ((levels == level) & fair).any()
         ],
         "objects": _confusion(rows, _isin(kinds, list(ON_FACES))),
         "reasons": dict(sorted(Counter(rows["reason"][verdicts == REJECTED].tolist()).items())),

@@ -107,16 +107,16 @@ def prepare(
             fix="go on with it by --resume, or name another folder with -o",
             place=str(folder),
         )
-    named = remembered(database or str(folder / LAB), folder)
-    if known is None or specs:
+    if known is not None:  # its set is there: it was made before anything was remembered
+        named = remembered(database, folder) if database else known.database
+    else:
+        named = remembered(database or str(folder / LAB), folder)
         if specs:
             make_parts(specs, folder / PARTS, located(named, folder))
         elif not database:
             raise ValidationError("no set is named", fix="give SPEC.yaml files, or --database URL")
-    else:
-        named = remembered(database, folder) if database else known.database
     digest = set_digest(located(named, folder))
-    names = known.specs if known else tuple(map(str, specs))
+    names = tuple(map(str, specs)) if specs or known is None else known.specs
     asked = Asked(campaign, named, digest, code_digest(), names)
     if known is None:
         _remember(asked, folder)
@@ -266,6 +266,8 @@ def _check_same(known: Asked, asked: Asked, folder: Path) -> None:
     differ = [
         f"{name} {before[name]}, now {now[name]}" for name in now if before[name] != now[name]
     ]
+    if known.specs != asked.specs:
+        differ.append(f"specs {', '.join(known.specs)}, now {', '.join(asked.specs)}")
     if known.set_digest != asked.set_digest:
         differ.append("another set")
     if known.code_digest != asked.code_digest:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -110,21 +112,13 @@ def progress_bar() -> Iterator[Told]:
         yield _Silent()
         return
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeRemainingColumn,
-    )
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
     columns = (
         TextColumn("{task.description}"),
         BarColumn(bar_width=20),
         MofNCompleteColumn(),
         TextColumn("{task.fields[text]}"),
-        TextColumn("left"),
-        TimeRemainingColumn(),
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         yield _Shown(bar, bar.add_task("making the set", total=None, text=""))
@@ -141,20 +135,26 @@ class _Silent:
 class _Shown:
     def __init__(self, bar: Progress, task: TaskID) -> None:
         self._bar, self._task = bar, task
+        self._total = self._done = self._new = 0
+        self._start = time.monotonic()
         self._counts = {"right": 0, "wrong": 0, "rejected": 0}
 
     def stage(self, text: str, touches: int, done: int) -> None:
         """Begin a bar; what was done before counts for the bar, not for the rate."""
+        self._total, self._done, self._new = touches, done, 0
+        self._start = time.monotonic()
         self._counts = dict.fromkeys(self._counts, 0)
         self._bar.reset(self._task, total=touches, completed=done, description=text, text="")
 
     def touched(self, rows: tuple[Row, ...]) -> None:
-        """Move the bar."""
+        """Move the bar, and say rate and time left."""
         for row in rows:
             self._counts[row["verdict"]] += 1
-        speed = self._bar.tasks[0].speed
-        rate = f"{speed:.1f} touches/s, " if speed else ""
-        text = rate + ", ".join(f"{n:,} {name}" for name, n in self._counts.items())
+        self._new += len(rows)
+        rate = self._new / max(time.monotonic() - self._start, 1e-3)
+        left = timedelta(seconds=round((self._total - self._done - self._new) / rate))
+        counts = ", ".join(f"{number:,} {name}" for name, number in self._counts.items())
+        text = f"{rate:.1f} touches/s, {left} left; {counts}"
         self._bar.update(self._task, advance=len(rows), text=text)
 
 

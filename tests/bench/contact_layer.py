@@ -41,7 +41,15 @@ from probe.surface.indenters import Cross, HalfPlane, Rough, Sphere, Strip, Tilt
 
 PAD = Sensor(overlay=Overlay("pad"))
 CELLS = (2, 4, 8)
-REFUSALS = ("tips", "press the pad", "strokes", "settle", "no equilibrium", "nothing under")
+REFUSALS = (
+    "tips",
+    "press the pad",
+    "into a pad",
+    "strokes",
+    "settle",
+    "no equilibrium",
+    "nothing under",
+)
 
 
 def cpu(action, repeat):

@@ -164,8 +164,8 @@ def drawn(known, path):
                 panel.loglog([p["ms"] for p in part], [p["error"] for p in part], style, ms=4,
                              lw=1, color=f"C{number}", label=None if alone else case)  # fmt: skip
                 for p in part if alone else ():
-                    panel.annotate("elements", (p["ms"], p["error"]), fontsize=8, ha="right",
-                                   xytext=(-5, -3), textcoords="offset points")  # fmt: skip
+                    panel.annotate("elements", (p["ms"], p["error"]), fontsize=8, ha="center",
+                                   xytext=(0, 6), textcoords="offset points")  # fmt: skip
         worst = known["levels"][kind]
         panel.loglog([p["ms"] for p in worst], [p["error"] for p in worst], "k--", lw=1.5,
                      marker="D", ms=5, label="worst error, median time")  # fmt: skip

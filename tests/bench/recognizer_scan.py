@@ -4,15 +4,17 @@
     python tests/bench/recognizer_scan.py --profiles one-touch --kinds corner worn --levels mismatch
 
 Objects of `fixtures/specs` (80 mm cube, prism, tetrahedron, box; of the product profile the
-cube) are scanned face by face, a touch every 4.25 tactels, in lines there and back from a corner
-of the face (`face`, `worn`: with 20 % of the symbols gone) or along the edges of its first
-corner (`corner`), by an arm whose joints have noise and backlash (`arm`) or with places that
-err by so many tactels; 20-120 N, up to 2 degrees of tilt. A scan is felt by one sensor, drawn
-from a level of `recognizer.validation`, with the same noise in every touch.
+cube) are scanned face by face, a touch every 4.25 tactels: in lines there and back from one end
+of the face (`face`; `worn`: with 20 % of its symbols gone), or round its first corner, 5 mm
+from the edges (`corner`); or another surface of `recognizer.validation.surfaces` is scanned, and
+any answer is wrong. Places are those of an arm whose joints have noise and backlash (`arm`), or
+they err by so many tactels; 20-120 N, up to 2 degrees of tilt. A scan is felt by one sensor,
+drawn from a level of `recognizer.validation`, with the same noise in every touch. Ways:
+`joint`; `alone`, each touch by itself; `classical`, the thesis's.
 
     first     touches until the answer: median and 95 %
     symbols   that a touch had whole in view: named right (share), wrong (number)
-    pose      rms of all answered touches; nees: squared errors over the covariance, / 3
+    rms, 95 % of all answered touches; share within the 95 % ellipse of the covariance
     ms        process time per touch, median (set OMP_NUM_THREADS=1)
 """
 
@@ -26,8 +28,6 @@ from pathlib import Path
 
 import numpy as np
 
-from generator.pipeline import encode
-from generator.spec import read_specs
 from probe.arm.links import Arm
 from probe.contact.contract import Touch
 from probe.errors import ContactError
@@ -45,7 +45,7 @@ from recognizer.pipeline import reader_for, recognise
 from recognizer.scan.grow import begun, extended
 from recognizer.signal import signal_of
 from recognizer.validation.levels import BIAS, LEVELS, read
-from recognizer.validation.surfaces import worn
+from recognizer.validation.surfaces import FOREIGN, worn
 
 SPECS = Path(__file__).parents[2] / "fixtures" / "specs"
 SHAPES = {"thesis": ("cube", "prism", "tetrahedron", "box"), "product": ("cube",),
@@ -53,6 +53,7 @@ SHAPES = {"thesis": ("cube", "prism", "tetrahedron", "box"), "product": ("cube",
 SENSOR = Sensor()
 NAMED = 3.0  # nats
 NEAR_MM = 2.0
+INSET_MM = 5.0  # of a scan along edges
 
 
 @dataclass
@@ -128,7 +129,7 @@ class Manner:
     turn_deg: float | None = None  #: of the sensor; None: any
 
 
-def scanned(scene, kind, level, sigma_tactels, most, rng, manner=None):
+def scanned(scene, encoding, kind, level, sigma_tactels, most, rng, manner=None):
     """Return a scan of a face."""
     manner = manner or Manner()
     theta = float(rng.uniform(-math.pi, math.pi))
@@ -136,8 +137,10 @@ def scanned(scene, kind, level, sigma_tactels, most, rng, manner=None):
         theta = math.radians(manner.turn_deg)
     if kind == "corner":
         a, b, c = (scene.region.starts[k] for k in (1, 0, -1))
-        edges = [(b + (end - b) * t) for end in (a, c) for t in np.linspace(0.05, 0.6, most // 2)]
-        places = np.array(edges)
+        along = [(end - b) / np.linalg.norm(end - b) for end in (a, c)]
+        steps = INSET_MM + 4.25 * SENSOR.pitch_mm * np.arange(most // 2)
+        first, second = (b + INSET_MM * sum(along) + steps[:, None] * way for way in along)
+        places = np.concatenate([first[::-1], second[1:]])
     else:
         plan = raster([scene.region.starts], SENSOR, theta_rad=theta, least_cover=0.5)
         lines = [plan.places_mm[plan.lines == n] for n in np.unique(plan.lines)]
@@ -157,7 +160,11 @@ def scanned(scene, kind, level, sigma_tactels, most, rng, manner=None):
         believed, true = np.array(wanted), np.array(wanted)
         true[:, :2, 3] += rng.normal(0, sigma, (len(true), 2))
         spread = [np.array([sigma, sigma, 0.003])] * len(true)
-    surface = worn(scene.surface, 0.2, rng) if kind == "worn" else scene.surface
+    surface = scene.surface
+    if kind == "worn":
+        surface = worn(surface, 0.2, rng)
+    elif kind in FOREIGN:
+        surface = FOREIGN[kind](encoding, rng)
     back, number = np.linalg.inv(T_base_face), int(rng.integers(1 << 30))
     felt = Felt([], [], np.zeros((0, 3)))
     stood = []
@@ -221,7 +228,8 @@ def joint(reader, felt, name, faces, tally):
             first = k + 1
     tally.scans += 1
     tally.first.append(first)
-    tally.symbols += named(scan, *faces[name], felt)
+    if name in faces:
+        tally.symbols += named(scan, *faces[name], felt)
 
 
 def alone(reader, felt, name, tally):
@@ -271,7 +279,7 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--profiles", nargs="+", default=["thesis", "product", "one-touch"])
-    parser.add_argument("--kinds", nargs="+", default=["face"])
+    parser.add_argument("--kinds", nargs="+", default=["face"], help="and those of FOREIGN")
     parser.add_argument("--levels", nargs="+", default=["typical", "mismatch"])
     parser.add_argument("--errors", nargs="+", default=["arm"], help="arm, or tactels")
     parser.add_argument("--ways", nargs="+", default=["joint", "alone", "classical"])
@@ -281,13 +289,15 @@ def main() -> None:
     parser.add_argument("--tilt", type=float, default=2.0, help="largest, degrees")
     parser.add_argument("--turn", type=float, default=None, help="degrees; any if not given")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--databases", type=Path, help="folder of them, made if they are not there")
     given = parser.parse_args()
     print(HEADER)
     with tempfile.TemporaryDirectory() as folder:
         for profile in given.profiles:
-            url = f"sqlite:///{folder}/{profile}.db"
-            specs = read_specs([SPECS / f"{profile}-{shape}.yaml" for shape in SHAPES[profile]])
-            encode(specs, folder=Path(folder) / profile, database=url, formats=())
+            file = (given.databases or Path(folder)) / f"{profile}.db"
+            url = f"sqlite:///{file}"
+            if not file.exists():
+                made(profile, url, Path(folder))
             lab = open_lab(url)
             reader = reader_for(lab, SENSOR)
             faces = {}
@@ -301,6 +311,15 @@ def main() -> None:
                         compare(given, url, lab, reader, faces, profile, kind, level, error)
 
 
+def made(profile, url, folder):
+    """Register the objects of a profile."""
+    from generator.pipeline import encode
+    from generator.spec import read_specs
+
+    specs = read_specs([SPECS / f"{profile}-{shape}.yaml" for shape in SHAPES[profile]])
+    encode(specs, folder=folder / profile, database=url, formats=())
+
+
 def compare(given, url, lab, reader, faces, profile, kind, level, error):
     """Print a line for each way."""
     tallies = {way: Tally() for way in given.ways}
@@ -312,14 +331,17 @@ def compare(given, url, lab, reader, faces, profile, kind, level, error):
             name = (thing, sides[int(rng.integers(len(sides)))])
             scene = registered_surface(url, *name)
             manner = Manner(tuple(given.force), given.tilt, given.turn)
-            felt = scanned(scene, kind, level, sigma, given.touches, rng, manner)
+            felt = scanned(scene, faces[name][0], kind, level, sigma, given.touches, rng, manner)
+            if kind in FOREIGN:
+                name = ("", "")  # any answer is wrong
             if "joint" in tallies:
                 joint(reader, felt, name, faces, tallies["joint"])
             if "alone" in tallies:
                 alone(reader, felt, name, tallies["alone"])
             if "classical" in tallies:
                 found = classical(lab, felt, name, sigma, tallies["classical"])
-                tallies["classical"].symbols += counted(found, *faces[name], felt)
+                if name in faces:
+                    tallies["classical"].symbols += counted(found, *faces[name], felt)
     for way, tally in tallies.items():
         label = f"{profile} {kind} {level} {error} {way}"
         print(f"{label:34}{tally.line()}", flush=True)

@@ -64,10 +64,8 @@ def test_case_6_thin_strokes_are_felt_or_refused_at_every_level(kind, level, wid
 
     Points on a tip are too far apart to meet every stroke of 0.01 mm, or with 7 of 0.05 mm.
     """
-    seen = width >= {"footprint": 1.0, "tabs-7": 0.2, "tabs-19": 0.05, "tabs-61": 0.02}.get(
-        level, 0
-    )
-    for floor in (-math.inf, -0.8)[: 1 + seen]:
+    lost = {"footprint": 1.0, "tabs-7": 0.1, "tabs-19": 0.02, "tabs-61": 0.02, "layer-2": 0.02}
+    for floor in (-math.inf, -0.8)[: 1 + (width > lost.get(level, 0.0))]:
         for x in (P / 2, 0.31):
             surface, touch = Strip(width, floor_mm=floor), Touch(x, 0, 0.02, 1.0)
             try:

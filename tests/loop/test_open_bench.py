@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import re
-import subprocess
-import sys
 import time
 from contextlib import contextmanager
 
@@ -14,8 +11,6 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect, sync_playwright
 
-from generator.pipeline import encode
-from generator.spec import read_specs
 from probe.recording.read import read_recording
 
 CHROMIUM = "/usr/bin/chromium"
@@ -24,41 +19,13 @@ FLAGS = (
     "--no-first-run", "--disable-background-networking", "--disable-component-update",
     "--disable-sync",
 )  # fmt: skip
-PATIENCE_S = 30.0  #: for anything, on a busy machine
+PATIENCE_S = 90.0  #: for anything, on a busy machine
 
 
 @pytest.fixture(scope="module")
-def lab(tmp_path_factory):
-    """A folder with a registered cube, its database, and a secret beside it."""
-    folder = tmp_path_factory.mktemp("bench")
-    lab = folder / "lab"
-    lab.mkdir()
-    (folder / "secret.txt").write_text("secret")
-    (lab / "cube.yaml").write_text("name: Cube\nshape: {cube: 60 mm}\n")
-    encode(
-        read_specs([lab / "cube.yaml"]), folder=lab / "out", formats=("stl", "glb"),
-        database=str(lab / "lab.db"),
-    )  # fmt: skip
-    return lab
-
-
-@contextmanager
-def served(lab, *options):
-    """Run the server; yields its address, and checks that it ends in order."""
-    words = ("--database", lab / "lab.db", "--folder", lab / "recordings", "--web-port", 0)
-    command = [sys.executable, "-m", "recognizer.bench.command", *map(str, (*words, *options))]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        try:
-            yield process.stdout.readline().split()[-1]
-        finally:
-            process.terminate()
-            assert process.wait(PATIENCE_S) == 0
-
-
-@pytest.fixture(scope="module")
-def bench(lab):
+def bench(served):
     """Address of a bench whose probe runs the firmware."""
-    with served(lab, "--port", "touch:?firmware=avr&hold=1.5") as address:
+    with served("--port", "touch:?firmware=avr&hold=1.5") as address:
         yield address
 
 
@@ -104,7 +71,7 @@ def until(page, wanted):
 
 def rest(page):
     """Wait until nothing is touched any more."""
-    until(page, "bench.sum < 1500")
+    until(page, "bench.contact === false")
 
 
 def touched(page, x=0.42, y=0.55):
@@ -213,7 +180,7 @@ def test_record_and_replay(page, lab):
     before = heat(page)
     page.get_by_test_id("seek").fill("400")
     expect(page.get_by_test_id("place")).not_to_have_text(re.compile(r"^0\.0 "))
-    until(page, "bench.sum > 1500")
+    until(page, "bench.contact === true")
     assert heat(page) != before
     page.get_by_test_id("leave").click()
     expect(page.get_by_test_id("state")).to_contain_text("probe is there", timeout=PATIENCE_S * 1e3)
@@ -221,7 +188,7 @@ def test_record_and_replay(page, lab):
 
 def test_calibrate_step_by_step(page, lab):
     page.get_by_test_id("calibrate").click()
-    page.get_by_test_id("guide-loads").fill("40, 150, 500")
+    page.get_by_test_id("guide-loads").fill("80, 200, 600")
     page.get_by_test_id("guide-seconds").fill("0.5")
     page.get_by_test_id("guide-start").click()
     for step in range(4):
@@ -259,10 +226,11 @@ def test_files_and_pictures_can_be_had(page, lab):
 
 def test_every_control_has_a_name_and_text_stands_out(page):
     nameless = page.evaluate(
-        """() => [...document.querySelectorAll('button, a, input, select, canvas, [role]')].filter((one) =>
-        !one.closest('[hidden]') && one.getAttribute('aria-hidden') !== 'true' &&
-        !(one.getAttribute('aria-label') || one.labels?.length || one.textContent.trim()
-          || ['log', 'alert', 'status'].includes(one.role))).map((one) => one.outerHTML)"""
+        """() => [...document.querySelectorAll('button, a, input, select, canvas, [role]')]
+        .filter((one) => !one.closest('[hidden]') && one.getAttribute('aria-hidden') !== 'true'
+          && !(one.getAttribute('aria-label') || one.labels?.length || one.textContent.trim()
+          || ['log', 'alert', 'status'].includes(one.role)))
+        .map((one) => one.outerHTML)"""
     )
     assert nameless == []
     for theme in ("light", "dark"):
@@ -296,88 +264,8 @@ def test_fits_a_narrow_dark_screen(browser, bench):
         assert all(int(v) < 40 for v in re.findall(r"\d+", paper)[:3])
 
 
-def test_hostile_requests_are_refused(bench, lab):
-    host = bench.split("/")[2]
-    with httpx.Client(base_url=bench) as client:
-
-        def status(method, path, **more):
-            return client.request(method, path, **more).status_code
-
-        for path in (
-            "/static/../../command.py", "/static/%2e%2e/app.py", "/static/..%2f..%2fapp.py",
-            "/api/recordings/..%2f..%2fsecret.txt", "/api/recordings/%2e%2e%2flab.db",
-            "/api/recordings/lab.db", "/api/objects/Cube/parts/-1", "/api/objects/Cube/parts/999",
-            "/api/objects/..%2f..%2fsecret/parts/0", "/etc/passwd", "//etc/passwd",
-        ):  # fmt: skip
-            answer = client.get(path)
-            assert answer.status_code in (400, 404, 422), path
-            assert "secret" not in answer.text.replace("..%2f", "").replace("/secret", "")
-        touch = {"object": "Cube", "face": "F1", "x_mm": 30, "y_mm": 30}
-        for origin in ("http://evil.example", "null", f"http://{host}.evil.example"):
-            assert status("POST", "/api/touch", json=touch, headers={"origin": origin}) == 403
-        assert (
-            status("POST", "/api/touch", json=touch, headers={"sec-fetch-site": "cross-site"})
-            == 403
-        )
-        assert status("GET", "/", headers={"host": "evil.example"}) == 421
-        assert status("POST", "/api/port", json={"url": "file:/etc/passwd"}) == 404
-        assert status("POST", "/api/port", json={"url": f"serial://{lab}/lab.db"}) == 404
-        assert status("POST", "/api/touch", json=touch | {"z": 1}) == 422
-        assert (
-            status(
-                "POST",
-                "/api/touch",
-                content=b"{" * 10,
-                headers={"content-type": "application/json"},
-            )
-            == 422
-        )
-        assert status("POST", "/api/touch", json=touch | {"x_mm": 1e9}) == 400
-        assert status("POST", "/api/touch", content=b" " * 70_000) == 413
-        assert status("POST", "/api/touch", content=(b" " * 1000 for _ in range(70))) == 413
-        assert (
-            status(
-                "POST",
-                "/api/recordings?name=big.h5",
-                headers={"content-length": str(2**31)},
-                content=b"",
-            )
-            == 413
-        )
-        assert status("POST", "/api/recordings?name=..%2Fx.h5", content=b"x") == 404
-        assert status("POST", "/api/recordings?name=x.h5", content=b"no recording") == 400
-        assert not (lab / "recordings" / "x.h5").exists()
-        headers = client.get("/").headers
-        assert "script-src 'self'" in headers["content-security-policy"]
-        assert headers["x-content-type-options"] == "nosniff"
-        assert status("GET", "/api/bench") == 200
-
-
-@pytest.mark.parametrize("origin", [None, "http://evil.example", "null"])
-def test_the_live_line_is_for_the_page_alone(bench, origin):
-    from websockets.exceptions import InvalidStatus
-    from websockets.sync.client import connect
-
-    host = bench.split("/")[2]
-    with pytest.raises(InvalidStatus), connect(f"ws://{host}/live", origin=origin):
-        pass
-
-
-def test_nonsense_on_the_live_line_ends_it(bench):
-    from websockets.exceptions import ConnectionClosed
-    from websockets.sync.client import connect
-
-    host = bench.split("/")[2]
-    for words in ("no json", json.dumps({"filter": "evil"}), "x" * 5000, b"bytes"):
-        with connect(f"ws://{host}/live", origin=f"http://{host}") as line:
-            line.send(words)
-            with pytest.raises(ConnectionClosed):
-                for _ in range(1000):
-                    line.recv(timeout=PATIENCE_S)
-
-
-def test_a_token_is_asked_for_where_others_can_come(lab, browser):
-    with served(lab, "--host", "0.0.0.0", "--port", "sim:") as address:
+def test_a_token_is_asked_for_where_others_can_come(served, browser):
+    with served("--host", "0.0.0.0", "--port", "sim:") as address:
         address = address.replace("0.0.0.0", "127.0.0.1")
         bare, token = address.split("?token=")
         assert len(token) >= 20

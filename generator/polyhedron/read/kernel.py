@@ -3,7 +3,8 @@
     python -m generator.polyhedron.read.kernel model.step answer.json
 
 A damaged file can crash the kernel; here it takes only this process with it. The answer
-holds `points` and `faces` (loops of point numbers), or the `cause` and `fix` of a refusal.
+holds `points` and `faces` (loops of point numbers), and for round faces what `curved` adds, or
+the `cause` and `fix` of a refusal.
 """
 
 from __future__ import annotations
@@ -11,7 +12,6 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -89,7 +89,11 @@ def _faces(solid: Any) -> dict[str, Any]:
     from OCP.TopTools import TopTools_IndexedMapOfShape
 
     faces = [TopoDS.Face_s(face) for face in _explored(solid, TopAbs_FACE)]
-    _refuse_curved(faces)
+    kinds = [_kind(face) for face in faces]
+    if set(kinds) != {"plane"}:
+        from generator.polyhedron.read.curved import curved_faces
+
+        return curved_faces(solid, faces, kinds)
     numbers = TopTools_IndexedMapOfShape()
     TopExp.MapShapes_s(solid, TopAbs_VERTEX, numbers)
     points = np.zeros((numbers.Extent(), 3))
@@ -99,22 +103,16 @@ def _faces(solid: Any) -> dict[str, Any]:
     return {"points": points.tolist(), "faces": [_loops(face, numbers) for face in faces]}
 
 
-def _refuse_curved(faces: list[Any]) -> None:
+def _kind(face: Any) -> str:
+    """Return what surface a face has: plane, cylinder, cone, sphere, torus, bsplinesurface, ..."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.GeomLib import GeomLib_IsPlanarSurface
 
-    curved: Counter[str] = Counter()
-    for face in faces:
-        if not GeomLib_IsPlanarSurface(BRep_Tool.Surface_s(face), PLANAR_MM).IsPlanar():
-            kind = BRepAdaptor_Surface(face).GetType().name
-            curved[kind.removeprefix("GeomAbs_").lower()] += 1
-    if curved:
-        kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(curved.items()))
-        raise ShapeError(
-            f"{curved.total()} of {len(faces)} faces are not planar ({kinds})",
-            fix="leave out holes, fillets and other round parts, or replace them by planar faces",
-        )
+    if GeomLib_IsPlanarSurface(BRep_Tool.Surface_s(face), PLANAR_MM).IsPlanar():
+        return "plane"
+    kind: str = BRepAdaptor_Surface(face).GetType().name
+    return kind.removeprefix("GeomAbs_").lower()
 
 
 def _loops(face: Any, numbers: Any) -> list[list[int]]:

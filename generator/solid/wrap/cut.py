@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from generator.errors import SolidError
 from generator.solid.wrap.strip import Points, Strip
@@ -75,6 +74,8 @@ class _Knife:
             first -= 1
         while last < strip.facets and strip.beside(last, foot).max() > -NUDGE_MM:
             last += 1
+        if strip.beside(first, foot).min() <= 0.0 or strip.beside(last, foot).max() >= 0.0:
+            raise SolidError("a symbol reaches over the side of its face", place=place)
         self.first, self.lines = first, range(first + 1, last)
         self.points = [[self._numbered(ring, z) for ring in tier]
                        for tier, z in zip(rings, z_mm, strict=True)]  # fmt: skip
@@ -105,7 +106,9 @@ class _Knife:
         facet = np.full(len(ring), self.first)
         for line in self.lines:
             beside = self.strip.beside(line, ring)
-            off = np.where(beside < 0.0, np.minimum(beside, -NUDGE_MM), np.maximum(beside, NUDGE_MM))
+            off = np.where(
+                beside < 0.0, np.minimum(beside, -NUDGE_MM), np.maximum(beside, NUDGE_MM)
+            )
             ring += (off - beside)[:, None] * self.strip.right[line]
             facet = np.where(off > 0.0, line, facet)
         first = len(self.made.flat)

@@ -48,8 +48,12 @@ class Strip:
         offset = point - d.low
         side = (offset * self.right).sum(axis=1)
         up = d.high - d.low
-        ahead = (offset * up).sum(axis=1) > 0.0  # beyond the tip of a cone sides are exchanged
-        held = (side[:-1] >= 0.0) & (side[1:] < 0.0) & ahead[:-1]
+        length = np.hypot(up[:, 0], up[:, 1])
+        height = (offset * up).sum(axis=1) / length
+        # Beyond the tip of a cone there is a mirror image of every facet; ends are not square.
+        slack = np.abs(np.diff(d.low, axis=0)).max() + np.abs(np.diff(d.high, axis=0)).max()
+        near = (height > -slack) & (height < length + slack)
+        held = (side[:-1] >= 0.0) & (side[1:] < 0.0) & near[:-1]
         return int(np.argmax(held)) if held.any() else -1
 
     def lifted(self, facet: int, points: Points, z_mm: Points) -> Points:

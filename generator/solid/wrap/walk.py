@@ -36,9 +36,7 @@ def loops_of(edges: Sequence[tuple[int, int]], place: str) -> list[Loop]:
     return loops
 
 
-def with_holes(
-    loops: Sequence[Loop], points: NDArray[np.float64]
-) -> list[tuple[Loop, ...]]:
+def with_holes(loops: Sequence[Loop], points: NDArray[np.float64]) -> list[tuple[Loop, ...]]:
     """Return each counter-clockwise loop with the clockwise ones that lie in it.
 
     Parameters

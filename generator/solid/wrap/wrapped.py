@@ -8,6 +8,7 @@ the sides as triangles. Points that pieces share have one number, so the part st
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,8 +124,10 @@ def _cut_strip(
         flat |= rim
         low, high = rim
         inner = crossed.get(line, [])
-        heights = strip.along(line, np.array([flat[k] for k in inner])) if inner else []
-        chains.append([low, *(k for _, k in sorted(zip(heights, inner, strict=True))), high])
+        if inner:
+            heights = strip.along(line, np.array([flat[k] for k in inner])).tolist()
+            inner = [k for _, k in sorted(zip(heights, inner, strict=True))]
+        chains.append([low, *inner, high])
     for number, facet in enumerate(surface.facets):
         if number not in edges and not {number, number + 1} & set(crossed):
             continue
@@ -140,9 +143,7 @@ def _cut_strip(
         pieces = _named_pieces(own, flat, plain.name)
         if pointed:
             pieces = [tuple(_without(loop, top[1]) for loop in loops) for loops in pieces]
-        shown = [
-            tuple(tuple(real.get(k, k) for k in loop) for loop in loops) for loops in pieces
-        ]
+        shown = [tuple(tuple(real.get(k, k) for k in loop) for loop in loops) for loops in pieces]
         body.facets[facet] = Facet(plain.name, shown[0])
         body.facets += [Facet(plain.name, loops) for loops in shown[1:]]
 
@@ -182,7 +183,7 @@ def _add_symbols(
         before = len(body.facets)
         full = f"{name}/{names[symbol]}"
         for _, piece in cut.sides:
-            for triangle in _fan(piece, cut):
+            for triangle in _fan(piece):
                 body.facets.append(Facet(f"{full}/side", (_shifted(triangle, first),)))
         for _, loops in cut.tops:
             body.facets.append(Facet(f"{full}/top", tuple(_shifted(k, first) for k in loops)))
@@ -204,11 +205,11 @@ def _add_symbols(
     )
 
 
-def _fan(piece: Loop, cut: Cut) -> list[Loop]:
+def _fan(piece: Loop) -> list[Loop]:
     """Return the triangles of a convex piece, from its lowest numbered corner."""
     k = piece.index(min(piece))
     turned = piece[k:] + piece[:k]
-    return [(turned[0], b, c) for b, c in zip(turned[1:], turned[2:], strict=False)]
+    return [(turned[0], b, c) for b, c in pairwise(turned[1:])]
 
 
 def _shifted(loop: Loop, first: int) -> Loop:

@@ -1,6 +1,8 @@
 """Results of rows that are written by hand, shards on the disk, and the table of extremes."""
 
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -131,3 +133,17 @@ def test_stiff_and_extreme_scenes_are_finite_or_refused():
     assert {line["outcome"] for line in lines} == {"finite", "refused"}
     failed = [line["case"] for line in lines if not line["passes"]]
     assert set(failed) <= {"place that is no number"}
+
+
+def test_help_loads_nothing_heavy():
+    code = (
+        "import sys\n"
+        "from recognizer.validation.command import run\n"
+        "for arguments in (['--help'], ['repeat', '--help'], ['--version']):\n"
+        "    assert run(arguments) == 0\n"
+        "heavy = {'numpy', 'scipy', 'sqlalchemy', 'pyarrow', 'matplotlib', 'jinja2', 'distributed'}"
+        " & set(sys.modules)\n"
+        "sys.exit(str(heavy) if heavy else 0)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

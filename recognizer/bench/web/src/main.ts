@@ -15,8 +15,8 @@ import type { Answer, ArrayMap, BenchInfo, Encoding, Frame, ObjectEntry, ObjectS
 import { Work } from "./work";
 
 /** What tests and measurements ask for. */
-interface Figures { frames: number; paints: number; latency_ms: number[]; answers: number; click_ms: number[]; lit: string; shown: string; sum: number }
-const figures: Figures = { frames: 0, paints: 0, latency_ms: [], answers: 0, click_ms: [], lit: "", shown: "", sum: 0 };
+interface Figures { frames: number; paints: number; latency_ms: number[]; answers: number; click_ms: number[]; lit: string; shown: string; contact: boolean | null }
+const figures: Figures = { frames: 0, paints: 0, latency_ms: [], answers: 0, click_ms: [], lit: "", shown: "", contact: null };
 Object.assign(window, { bench: figures });
 const KEPT = 5000;
 
@@ -33,7 +33,6 @@ async function begin(): Promise<void> {
   const line = new Live({
     frame(frame) {
       figures.frames++;
-      figures.sum = frame.sum;
       if (element<HTMLInputElement>("freeze").checked) return;
       newest = frame;
       if (!painting) {
@@ -71,7 +70,7 @@ async function begin(): Promise<void> {
     else if (topic.topic === "mosaic-of") mosaic.told(topic);
     else if (topic.topic === "reader") void reader(topic);
     else {
-      contact = topic.contact;
+      contact = figures.contact = topic.contact;
       answers.contact(contact);
       if (!contact) heat.answer = null;
       part.tell(answer, contact);

@@ -7,6 +7,7 @@ import type { BenchInfo, Status } from "./types";
 export class Work {
   private status: Status | null = null;
   private shown = 0;
+  private newest: string | undefined; // recording
   private probe = ""; // the port that was read last, recordings apart
 
   constructor(private info: BenchInfo) {
@@ -44,6 +45,10 @@ export class Work {
     if (feed.sensor !== null && feed.sensor !== undefined) choices(element("sensor"), SENSORS, String(feed.sensor));
     element<HTMLSelectElement>("sensor").disabled = !live;
     choices(element("recordings"), status.recordings.length ? status.recordings.map(twice) : [["", "none yet"]]);
+    if (status.recordings[0] !== this.newest) {
+      this.newest = status.recordings[0];
+      element<HTMLSelectElement>("recordings").value = this.newest ?? "";
+    }
     choices(element("calibrations"), [["", "none: counts"], ...status.calibrations.map(twice)], known?.name ?? "");
     const record = element<HTMLButtonElement>("record");
     record.disabled = !live && !status.recording;

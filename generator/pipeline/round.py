@@ -1,0 +1,73 @@
+"""Round faces of an object: how they are printed, unrolled, and which stay blank.
+
+A round face is no flat panel, so an object that has one is printed whole. Each round face is
+laid out on its development, under the number of its first facet; the other facets carry nothing.
+Cylinder and cone stand on their base when they are printed, so it stays blank.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from generator.alphabet.outline import Tiers
+from generator.errors import SolidError
+from generator.pipeline.blame import blaming
+from generator.polyhedron import Polyhedron
+from generator.polyhedron.development import Development, development
+from generator.printers import Printer
+from generator.solid.wrap import bend_problem
+from generator.spec import Located, ObjectSpec
+
+STANDING = ("cylinder", "cone")  #: shapes that are printed standing on F1
+
+
+@dataclass(frozen=True, slots=True)
+class RoundFaces:
+    """The round faces that carry symbols, and the faces that carry none."""
+
+    developments: Mapping[int, Development]  #: by the facet that carries them
+    blank: frozenset[int]
+    notes: tuple[str, ...]
+
+
+def made_whole(located: Located, polyhedron: Polyhedron) -> Located:
+    """Return the spec of an object with round faces as one that is printed whole.
+
+    Raises
+    ------
+    SpecError
+        Panels are asked for in the spec.
+    """
+    if not (polyhedron.surfaces or polyhedron.blank) or located.spec.parts == "whole":
+        return located
+    asked = located.tree.value.get("print")
+    if isinstance(asked, dict) and asked.get("parts") == "panels":
+        with blaming(located, "print.parts"):
+            raise SolidError(
+                "a round face cannot be printed as a flat panel", fix="set parts to whole"
+            )
+    return replace(located, spec=replace(located.spec, parts="whole"))
+
+
+def round_faces(
+    polyhedron: Polyhedron, tiers: tuple[Tiers, ...], spec: ObjectSpec, printer: Printer
+) -> RoundFaces:
+    """Unroll the round faces; one whose bend the printer cannot follow stays blank."""
+    developments: dict[int, Development] = {}
+    blank = set(polyhedron.blank)
+    notes: list[str] = []
+    for surface in polyhedron.surfaces:
+        name = polyhedron.faces[surface.carrier].name
+        unrolled = development(polyhedron, surface)
+        problem = bend_problem(unrolled, tiers, spec.style, printer)
+        if problem:
+            notes.append(f"{surface.kind} {name} stays blank: {problem}")
+            blank |= set(surface.facets)
+        else:
+            developments[surface.carrier] = unrolled
+            blank |= set(surface.facets[1:])
+    if polyhedron.kind in STANDING:
+        blank.add(0)
+        notes.append(f"{polyhedron.faces[0].name} stays blank: the part is printed standing on it")
+    return RoundFaces(developments, frozenset(blank), tuple(notes))

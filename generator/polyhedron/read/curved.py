@@ -1,0 +1,357 @@
+"""The CAD kernel's part of reading solids with round faces: facets on common points.
+
+The kernel divides every edge once, into steps of one angle for all circles, so faces meet in
+the same points. A planar face becomes a polygon. A cylinder or cone face between two circles
+and two straight lines (or all around) becomes a run of facets that unroll; everything else is
+taken as the kernel's triangles, which no symbol stands on. Lengths in mm, angles in rad.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from itertools import groupby, pairwise
+from typing import Any
+
+import numpy as np
+
+from generator.errors import ShapeError
+
+CHORD_ERROR_MM = 0.02  #: of the largest cylinder or cone
+STEPS = (24, 240)  #: fewest and most to a full circle
+MOST_FACETS = 4000
+INTERIOR_RAD = 0.35  #: between triangles of faces that carry no symbols
+SAME = 1e-6  #: share of the radius, and rad, within which lines and circles are what they seem
+
+
+@dataclass(slots=True)
+class _Found:
+    """The solid's facets so far."""
+
+    points: list[Any] = field(default_factory=list)  #: (3,) mm
+    faces: list[list[list[int]]] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)
+    surfaces: list[dict[str, Any]] = field(default_factory=list)
+    blank: list[int] = field(default_factory=list)  #: faces that cannot be unrolled
+    kinds: dict[str, str] = field(default_factory=dict)  #: names of those -> what they are
+
+    def add(self, name: str, loops: list[list[list[int]]]) -> list[int]:
+        """Append facets of one face of the solid; return their numbers."""
+        first = len(self.faces)
+        self.faces += loops
+        self.names += [name if k == 0 else f"{name}.{k + 1}" for k in range(len(loops))]
+        return list(range(first, len(self.faces)))
+
+
+def curved_faces(solid: Any, faces: list[Any], kinds: list[str]) -> dict[str, Any]:
+    """Return points and facets of a solid with round faces, and which of them unroll.
+
+    Parameters
+    ----------
+    solid, faces
+        Of the kernel.
+    kinds
+        What each face is: plane, cylinder, cone, sphere, ...
+
+    Raises
+    ------
+    ShapeError
+        There are too many facets, or the kernel cannot divide a face.
+    """
+    from OCP.BRepMesh import BRepMesh_IncrementalMesh
+    from OCP.IMeshTools import IMeshTools_Parameters
+
+    # Linear limits that never count: the angle alone divides circles, so those of a cone match.
+    limits = IMeshTools_Parameters()
+    limits.Deflection = limits.DeflectionInterior = 1e6
+    limits.Angle = 2.0 * _step(faces, kinds)  # which the kernel halves on edges
+    limits.AngleInterior = INTERIOR_RAD
+    limits.MinSize = 1e-6
+    BRepMesh_IncrementalMesh(solid, limits)
+    divided: set[int] = set()  # straight edges whose inner points triangles need
+    while (found := _gathered(faces, kinds, divided)) is None:
+        pass  # a face fell back to triangles, so its neighbours must take its points
+    return {
+        "points": [list(map(float, point)) for point in found.points],
+        "faces": found.faces,
+        "names": found.names,
+        "surfaces": found.surfaces,
+        "blank": found.blank,
+        "kinds": found.kinds,
+    }
+
+
+def _gathered(faces: list[Any], kinds: list[str], divided: set[int]) -> _Found | None:
+    """Return all facets; None after `divided` has grown, so that it must be done again."""
+    found = _Found()
+    nodes = _Nodes(found, divided)
+    before = len(divided)
+    for number, (face, kind) in enumerate(zip(faces, kinds, strict=True), 1):
+        name = f"F{number}"
+        wires = nodes.wires(face)
+        if kind == "plane":
+            found.add(name, [[_ids(wire) for wire in wires]])
+            continue
+        run = _run(face, kind, wires, found.points) if kind in ("cylinder", "cone") else None
+        if run is not None:
+            loops, definition = run
+            facets = found.add(name, [[loop] for loop in loops])
+            found.surfaces.append(definition | {"facets": facets})
+        else:
+            divided |= nodes.dropped
+            found.blank += found.add(name, [[t] for t in nodes.triangles(face)])
+            found.kinds[name] = kind
+        if len(found.faces) > MOST_FACETS:
+            raise ShapeError(
+                f"its round faces need more than {MOST_FACETS} facets",
+                fix="leave out small fillets and other round parts that carry no symbols",
+            )
+    return found if len(divided) == before else None
+
+
+def _step(faces: list[Any], kinds: list[str]) -> float:
+    """Return the angle between two points of a circle."""
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+
+    radii = [1.0]
+    for face, kind in zip(faces, kinds, strict=True):
+        surface = BRepAdaptor_Surface(face)
+        if kind == "cylinder":
+            radii.append(surface.Cylinder().Radius())
+        elif kind == "cone":
+            ends = (surface.FirstVParameter(), surface.LastVParameter())
+            sine = math.sin(surface.Cone().SemiAngle())
+            radii += [abs(surface.Cone().RefRadius() + v * sine) for v in ends]
+    steps = math.pi / math.acos(max(0.0, 1.0 - CHORD_ERROR_MM / max(radii)))
+    wanted = min(max(4 * math.ceil(steps / 4), STEPS[0]), STEPS[1])
+    return 2.0 * math.pi / wanted * (1.0 + 1e-9)  # so that a rounding adds no step
+
+
+def _ids(wire: list[tuple[Any, list[int]]]) -> list[int]:
+    """Return the points around a wire, each once."""
+    return [number for _, numbers in wire for number in numbers[:-1]]
+
+
+class _Nodes:
+    """Points of the kernel's division by number, those of an edge shared by its faces."""
+
+    def __init__(self, found: _Found, divided: set[int]) -> None:
+        from OCP.TopTools import TopTools_IndexedMapOfShape
+
+        self.found = found
+        self.divided = divided
+        self.dropped: set[int] = set()  #: straight edges of the face at work, less inner points
+        self.edges = TopTools_IndexedMapOfShape()
+        self.vertices = TopTools_IndexedMapOfShape()
+        self.on_edge: dict[int, list[int]] = {}
+        self.at_vertex: dict[int, int] = {}
+        self.of_face: dict[int, int] = {}  #: node of the face at work -> point
+
+    def wires(self, face: Any) -> list[list[tuple[Any, list[int]]]]:
+        """Return the wires, outer first: edges in order with their points, material to the left."""
+        from OCP.BRep import BRep_Tool
+        from OCP.BRepTools import BRepTools, BRepTools_WireExplorer
+        from OCP.TopAbs import TopAbs_WIRE
+        from OCP.TopExp import TopExp_Explorer
+        from OCP.TopLoc import TopLoc_Location
+        from OCP.TopoDS import TopoDS
+
+        self.location = TopLoc_Location()
+        self.mesh = BRep_Tool.Triangulation_s(face, self.location)
+        if self.mesh is None:
+            raise ShapeError("the CAD kernel cannot divide a face", fix="export the model again")
+        self.of_face, self.dropped = {}, set()
+        outer = BRepTools.OuterWire_s(face)
+        explorer, wires = TopExp_Explorer(face, TopAbs_WIRE), []
+        while explorer.More():
+            wires.append(TopoDS.Wire_s(explorer.Current()))
+            explorer.Next()
+        wires.sort(key=lambda wire: not wire.IsSame(outer))
+        found = []
+        for wire in wires:
+            walk, edges = BRepTools_WireExplorer(wire, face), []
+            while walk.More():
+                edge = walk.Current()
+                numbers = self._along(edge)
+                if not BRep_Tool.Degenerated_s(edge):
+                    edges.append((edge, numbers))
+                walk.Next()
+            found.append(edges)
+        return found
+
+    def triangles(self, face: Any) -> list[list[int]]:
+        """Return the triangles of the face at work, counter-clockwise from outside."""
+        from OCP.TopAbs import TopAbs_REVERSED
+
+        flipped = face.Orientation() == TopAbs_REVERSED
+        found = []
+        for k in range(1, self.mesh.NbTriangles() + 1):
+            a, b, c = (self._point(node) for node in self.mesh.Triangle(k).Get())
+            if len({a, b, c}) == 3:
+                found.append([a, c, b] if flipped else [a, b, c])
+        return found
+
+    def _along(self, edge: Any) -> list[int]:
+        """Return the points of an edge in its direction."""
+        from OCP.BRep import BRep_Tool
+        from OCP.TopAbs import TopAbs_REVERSED
+        from OCP.TopExp import TopExp
+
+        polygon = BRep_Tool.PolygonOnTriangulation_s(edge, self.mesh, self.location)
+        if polygon is None:
+            raise ShapeError("the CAD kernel cannot divide an edge", fix="export the model again")
+        nodes = [polygon.Node(k) for k in range(1, polygon.NbNodes() + 1)]
+        key = self.edges.Add(edge)
+        if len(nodes) > 2 and key not in self.divided and _straight(edge):
+            nodes = [nodes[0], nodes[-1]]
+            self.dropped.add(key)
+        numbers = self.on_edge.get(key)
+        if numbers is None:
+            ends = [
+                self._vertex(TopExp.FirstVertex_s(edge)),
+                self._vertex(TopExp.LastVertex_s(edge)),
+            ]
+            if BRep_Tool.Degenerated_s(edge):
+                numbers = [ends[0]] * len(nodes)
+            else:
+                inner = [self._new(node) for node in nodes[1:-1]]
+                numbers = [ends[0], *inner, ends[1]]
+            self.on_edge[key] = numbers
+        self.of_face |= dict(zip(nodes, numbers, strict=True))
+        return numbers[::-1] if edge.Orientation() == TopAbs_REVERSED else numbers
+
+    def _vertex(self, vertex: Any) -> int:
+        from OCP.BRep import BRep_Tool
+
+        key = self.vertices.Add(vertex)
+        if key not in self.at_vertex:
+            point = BRep_Tool.Pnt_s(vertex)
+            self.found.points.append((point.X(), point.Y(), point.Z()))
+            self.at_vertex[key] = len(self.found.points) - 1
+        return self.at_vertex[key]
+
+    def _new(self, node: int) -> int:
+        point = self.mesh.Node(node).Transformed(self.location.Transformation())
+        self.found.points.append((point.X(), point.Y(), point.Z()))
+        return len(self.found.points) - 1
+
+    def _point(self, node: int) -> int:
+        if node not in self.of_face:
+            self.of_face[node] = self._new(node)
+        return self.of_face[node]
+
+
+def _run(
+    face: Any, kind: str, wires: list[list[tuple[Any, list[int]]]], points: list[Any]
+) -> tuple[list[list[int]], dict[str, Any]] | None:
+    """Return the facets of a cylinder or cone between two circles; None for any other outline."""
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+
+    if len(wires) != 1:
+        return None
+    surface = BRepAdaptor_Surface(face)
+    shape = surface.Cylinder() if kind == "cylinder" else surface.Cone()
+    axis = shape.Axis()
+    origin = np.array([axis.Location().X(), axis.Location().Y(), axis.Location().Z()])
+    ahead = np.array([axis.Direction().X(), axis.Direction().Y(), axis.Direction().Z()])
+    where = np.array(points)
+    sides = [_Side.of(numbers, where[numbers] - origin, ahead) for _, numbers in wires[0]]
+    chains = _two_chains(sides)
+    if chains is None:
+        return None
+    low, high = chains
+    angles = [_angles(where[chain] - origin, ahead) for chain in (low, high) if len(chain) > 1]
+    if len(angles) == 2 and (
+        len(low) != len(high) or np.abs(angles[0] - angles[1]).max() > math.radians(0.01)
+    ):
+        return None
+    pairs = list(zip(low, high if len(high) > 1 else high * len(low), strict=True))
+    loops = [[a, b, d, c] if c != d else [a, b, c] for (a, c), (b, d) in pairwise(pairs)]
+    chosen = where[[*low, *high]] - origin
+    reach = np.linalg.norm(chosen - (chosen @ ahead)[:, None] * ahead, axis=1).max()
+    turn = float(np.abs(np.diff(angles[0])).max())
+    corners = where[loops[0]] - origin
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    middle = corners[:2].mean(axis=0)
+    return loops, {
+        "kind": kind,
+        "radius_mm": float(reach),
+        "half_angle_rad": abs(float(shape.SemiAngle())) if kind == "cone" else 0.0,
+        "closed": low[0] == low[-1],
+        "concave": bool(normal @ (middle - (middle @ ahead) * ahead) < 0.0),
+        "chord_error_mm": float(reach * (1.0 - math.cos(turn / 2.0))),
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class _Side:
+    """One edge of a round face."""
+
+    kind: str  #: circle, line, other
+    numbers: list[int]  #: its points, in order around the face
+
+    @classmethod
+    def of(cls, numbers: list[int], place: Any, ahead: Any) -> _Side:
+        """Return what an edge is; `place` (k, 3) from a point of the axis along `ahead`."""
+        height = place @ ahead
+        radial = place - height[:, None] * ahead
+        radius = np.linalg.norm(radial, axis=1)
+        slack = SAME * max(1.0, float(np.abs(place).max()))
+        if len(numbers) > 2 and np.ptp(height) <= slack and np.ptp(radius) <= slack:
+            return cls("circle", numbers)
+        if len(numbers) == 2 and _upright(radial, radius):
+            return cls("line", numbers)
+        return cls("other", numbers)
+
+
+def _straight(edge: Any) -> bool:
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepAdaptor import BRepAdaptor_Curve
+    from OCP.GeomAbs import GeomAbs_Line
+
+    if BRep_Tool.Degenerated_s(edge):
+        return False
+    return bool(BRepAdaptor_Curve(edge).GetType() == GeomAbs_Line)
+
+
+def _upright(radial: Any, radius: Any) -> bool:
+    """Whether both ends of a straight edge lie on one side of the axis; the tip counts."""
+    if radius.min() <= SAME * radius.max():
+        return True
+    cosine = float(radial[0] @ radial[1]) / float(radius[0] * radius[1])
+    return cosine > 1.0 - 1e-9
+
+
+def _two_chains(sides: list[_Side]) -> tuple[list[int], list[int]] | None:
+    """Return the points below and above, both to the right; None for another outline.
+
+    The outline is circles, a line, circles, a line; or, of a cone up to its tip, circles and two
+    lines.
+    """
+    starts = [
+        k for k, side in enumerate(sides) if side.kind == "circle" and sides[k - 1].kind == "line"
+    ]
+    if not starts:
+        return None
+    sides = sides[starts[0] :] + sides[: starts[0]]
+    runs = [(kind, list(same)) for kind, same in groupby(sides, key=lambda side: side.kind)]
+    shape = [kind if kind == "circle" else f"{len(same)} {kind}" for kind, same in runs]
+    below = _joined([side.numbers for side in runs[0][1]])
+    if shape == ["circle", "1 line", "circle", "1 line"]:
+        return below, _joined([side.numbers for side in runs[2][1]])[::-1]
+    if shape == ["circle", "2 line"]:
+        return below, [runs[1][1][0].numbers[-1]]
+    return None
+
+
+def _joined(chains: list[list[int]]) -> list[int]:
+    """Return chains that follow each other as one."""
+    return [*(number for chain in chains for number in chain[:-1]), chains[-1][-1]]
+
+
+def _angles(place: Any, ahead: Any) -> Any:
+    """Return the angles of points about the axis, without jumps."""
+    radial = place - (place @ ahead)[:, None] * ahead
+    x = radial[0] / np.linalg.norm(radial[0])
+    y = np.cross(ahead, x)
+    return np.unwrap(np.arctan2(radial @ y, radial @ x))

@@ -1,0 +1,47 @@
+"""A registered cube and a running `open-bench`, for the tests of its page and of its guard."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from contextlib import contextmanager
+
+import pytest
+
+ENDED_S = 30.0
+
+
+@pytest.fixture(scope="session")
+def lab(tmp_path_factory):
+    """A folder with a registered cube, its files and its database, and a secret beside it."""
+    from generator.pipeline import encode
+    from generator.spec import read_specs
+
+    folder = tmp_path_factory.mktemp("bench")
+    lab = folder / "lab"
+    lab.mkdir()
+    (folder / "secret.txt").write_text("kept to itself")
+    (lab / "cube.yaml").write_text("name: Cube\nshape: {cube: 60 mm}\n")
+    encode(
+        read_specs([lab / "cube.yaml"]), folder=lab / "out", formats=("stl", "glb"),
+        database=str(lab / "lab.db"),
+    )  # fmt: skip
+    return lab
+
+
+@pytest.fixture(scope="session")
+def served(lab):
+    """Return a context manager: options -> address of a server, that has to end in order."""
+
+    @contextmanager
+    def running(*options):
+        words = ("--database", lab / "lab.db", "--folder", lab / "recordings", "--web-port", 0)
+        command = [sys.executable, "-m", "recognizer.bench.command", *map(str, (*words, *options))]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            try:
+                yield process.stdout.readline().split()[-1]
+            finally:
+                process.terminate()
+                assert process.wait(ENDED_S) == 0
+
+    return running

@@ -1,0 +1,92 @@
+"""Who must not get at `open-bench`: other pages, other names, paths that lead out, floods."""
+
+from __future__ import annotations
+
+import json
+import socket
+import time
+from contextlib import suppress
+
+import httpx
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+PATIENCE_S = 30.0
+
+
+@pytest.fixture(scope="module")
+def bench(served):
+    with served("--port", "touch:") as address:
+        yield address
+
+
+def test_hostile_requests_are_refused(bench, lab):
+    host = bench.split("/")[2]
+    with httpx.Client(base_url=bench) as client:
+
+        def status(method, path, **more):
+            return client.request(method, path, **more).status_code
+
+        for path in (
+            "/static/../../command.py", "/static/%2e%2e/app.py", "/static/..%2f..%2fapp.py",
+            "/api/recordings/..%2f..%2fsecret.txt", "/api/recordings/%2e%2e%2flab.db",
+            "/api/recordings/lab.db", "/api/objects/Cube/parts/-1", "/api/objects/Cube/parts/999",
+            "/api/objects/..%2f..%2fsecret/parts/0", "/etc/passwd", "//etc/passwd",
+        ):  # fmt: skip
+            answer = client.get(path)
+            assert answer.status_code in (400, 404, 422), path
+            assert "kept to itself" not in answer.text
+        touch = {"object": "Cube", "face": "F1", "x_mm": 30, "y_mm": 30}
+        for origin in ("http://evil.example", "null", f"http://{host}.evil.example"):
+            assert status("POST", "/api/touch", json=touch, headers={"origin": origin}) == 403
+        assert (
+            status("POST", "/api/touch", json=touch, headers={"sec-fetch-site": "cross-site"})
+            == 403
+        )
+        assert status("GET", "/", headers={"host": "evil.example"}) == 421
+        assert status("POST", "/api/port", json={"url": "file:/etc/passwd"}) == 404
+        assert status("POST", "/api/port", json={"url": f"serial://{lab}/lab.db"}) == 404
+        assert status("POST", "/api/touch", json=touch | {"z": 1}) == 422
+        assert (
+            status(
+                "POST",
+                "/api/touch",
+                content=b"{" * 10,
+                headers={"content-type": "application/json"},
+            )
+            == 422
+        )
+        assert status("POST", "/api/touch", json=touch | {"x_mm": 1e9}) == 400
+        assert status("POST", "/api/touch", content=b" " * 70_000) == 413
+        assert status("POST", "/api/touch", content=(b" " * 1000 for _ in range(70))) == 413
+        assert status("POST", "/api/recordings?name=..%2Fx.h5", content=b"x") == 404
+        assert status("POST", "/api/recordings?name=x.h5", content=b"no recording") == 400
+        assert not (lab / "recordings" / "x.h5").exists()
+        headers = client.get("/").headers
+        assert "script-src 'self'" in headers["content-security-policy"]
+        assert headers["x-content-type-options"] == "nosniff"
+        assert status("GET", "/api/bench") == 200
+    head = f"POST /api/recordings?name=b.h5 HTTP/1.1\r\nhost: {host}\r\ncontent-length: {2**40}"
+    with socket.create_connection(host.split(":"), timeout=PATIENCE_S) as line:
+        line.sendall(f"{head}\r\n\r\n".encode())  # refused before a byte of it is sent
+        assert line.recv(12) == b"HTTP/1.1 413"
+
+
+@pytest.mark.parametrize("origin", [None, "http://evil.example", "null"])
+def test_the_live_line_is_for_the_page_alone(bench, origin):
+    host = bench.split("/")[2]
+    with pytest.raises(InvalidStatus), connect(f"ws://{host}/live", origin=origin):
+        pass
+
+
+def test_nonsense_on_the_live_line_ends_it(bench):
+    host = bench.split("/")[2]
+    for words in ("no json", json.dumps({"filter": "evil"}), "x" * 5000, b"bytes"):
+        with connect(f"ws://{host}/live", origin=f"http://{host}") as line:
+            line.send(words)
+            end_s = time.monotonic() + PATIENCE_S
+            with suppress(ConnectionClosed):
+                while time.monotonic() < end_s:
+                    line.recv(timeout=PATIENCE_S)
+            assert time.monotonic() < end_s

@@ -1,0 +1,255 @@
+"""`validate-set` from spec to report: the same bytes whoever does the work, and after any end."""
+
+import json
+import math
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pyarrow.parquet as pq
+import pytest
+
+from recognizer.lab import open_lab
+from recognizer.pipeline import reader_for
+from recognizer.validation.command import run
+from recognizer.validation.errors import SetError
+from recognizer.validation.trial import Plan, drawn, sensor_of
+from recognizer.validation.written import written_surface
+
+TOUCHES, SHARD = 18, 6
+COMMAND = [sys.executable, "-m", "recognizer.validation.command"]
+SAME = ("trials.parquet", "results.json")
+
+
+@pytest.fixture(scope="module")
+def spec(tmp_path_factory):
+    path = tmp_path_factory.mktemp("specs") / "cube.yaml"
+    path.write_text("name: Cube\nshape: {cube: 45 mm}\n")
+    return path
+
+
+def asked(spec: Path, folder: Path, *more: str) -> list[str]:
+    return [str(spec), "--touches", str(TOUCHES), "--shard", str(SHARD), "--study", "0",
+            "-o", str(folder), *more]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def reference(spec, tmp_path_factory):
+    """A run by one process, and what it printed."""
+    folder = tmp_path_factory.mktemp("reference")
+    done = subprocess.run(
+        [*COMMAND, *asked(spec, folder, "--json")], capture_output=True, text=True, check=True
+    )
+    return folder, json.loads(done.stdout)
+
+
+def assert_same(folder: Path, reference: Path):
+    for name in SAME:
+        assert (folder / name).read_bytes() == (reference / name).read_bytes(), name
+
+
+def begun(*arguments: str) -> subprocess.Popen:
+    """Start a run in a session of its own, so that all of its processes can be found."""
+    return subprocess.Popen(
+        [*COMMAND, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
+    )  # fmt: skip
+
+
+def wait_for(holds, seconds=60.0):
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "it takes too long"
+        time.sleep(0.02)
+
+
+def left_of(session: int) -> list[int]:
+    found = []
+    for process in psutil.process_iter(["pid", "status"]):
+        try:
+            ours = os.getsid(process.pid) == session
+        except ProcessLookupError:
+            continue
+        if ours and process.info["status"] != psutil.STATUS_ZOMBIE:
+            found.append(process.pid)
+    return found
+
+
+def test_what_it_prints_and_leaves(reference):
+    folder, printed = reference
+    rows = pq.read_table(folder / "trials.parquet").to_pydict()
+    assert rows["number"] == list(range(TOUCHES))
+    for verdict in ("right", "wrong", "rejected"):
+        assert printed[verdict] == rows["verdict"].count(verdict)
+    assert printed["touches"] == TOUCHES
+    assert printed["right"] > 0
+    assert printed["rms_mm"] < 0.5
+    assert printed["rms_deg"] < 2
+    assert printed["seconds"] > 0
+    told = (folder / "results.json").read_text() + (folder / "report.html").read_text()
+    assert str(folder) not in told
+    assert str(Path.home()) not in told
+    assert not re.search(r"20\d\d-\d\d-\d\d[T ]", told)
+    assert "utc" in json.loads((folder / "provenance.json").read_text())
+    page = (folder / "report.html").read_text()
+    assert not re.search(r"""(src|href)\s*=\s*["'](?!#|data:)""", page)
+    assert not re.search(r"url\((?!#)|@import", page)
+
+
+def test_two_processes_interrupted_killed_and_resumed(spec, reference, tmp_path):
+    folder = tmp_path / "run"
+    work = asked(spec, folder)
+    for number, shards in ((signal.SIGINT, 1), (signal.SIGKILL, 2)):
+        more = ["--resume", "-j", "1"] if shards > 1 else ["-j", "2"]
+        process = begun(*work, *more)
+        wait_for(lambda n=shards: len(list(folder.glob("shards/touches/*.parquet"))) >= n)
+        process.send_signal(number)
+        _, err = process.communicate(timeout=30)
+        if number == signal.SIGINT and process.returncode == 130:
+            assert "interrupted; go on with --resume" in err
+            assert "Traceback" not in err
+        wait_for(lambda p=process.pid: not left_of(p), 20)
+    again = subprocess.run([*COMMAND, *work, "-j", "2", "--resume"], capture_output=True, text=True)
+    assert again.returncode == 0, again.stderr
+    assert_same(folder, reference[0])
+    assert not list(folder.rglob("*.writing"))
+
+
+def test_a_cluster_of_two_workers_one_of_them_killed(spec, reference, tmp_path):
+    environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    address = tmp_path / "scheduler.json"
+    started = []
+
+    def start(what, *options):
+        module = f"distributed.cli.dask_{what}"
+        process = subprocess.Popen(
+            [sys.executable, "-m", module, *options, "--no-dashboard"],
+            env=environment,
+            cwd=tmp_path,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        started.append(process)
+
+    try:
+        start("scheduler", "--port", "0", "--host", "127.0.0.1", "--scheduler-file", str(address))
+        wait_for(address.exists)
+        url = json.loads(address.read_text())["address"]
+        for _ in range(2):
+            start("worker", url, "--nthreads", "1", "--no-nanny")
+        folder = tmp_path / "run"
+        process = begun(*asked(spec, folder, "--cluster", url))
+        wait_for(lambda: list(folder.glob("shards/touches/*.parquet")))
+        started[1].kill()
+        _, err = process.communicate(timeout=120)
+        assert process.returncode == 0, err
+    finally:
+        for one in started:
+            one.kill()
+            one.wait()
+    assert_same(folder, reference[0])
+
+
+def test_repeat_report_and_compare(reference, tmp_path, capsys):
+    folder = reference[0]
+    rows = pq.read_table(folder / "trials.parquet").to_pylist()
+    right = next(row for row in rows if row["verdict"] == "right")
+    strange = next(row for row in rows if row["kind"] in ("foreign", "blank"))
+    for row in (right, strange):
+        picture = tmp_path / f"{row['number']}.png"
+        assert (
+            run(["repeat", str(folder), str(row["number"]), "--plot", str(picture), "--json"]) == 0
+        )
+        again = json.loads(capsys.readouterr().out)
+        assert again == {
+            name: None if isinstance(value, float) and not math.isfinite(value) else value
+            for name, value in row.items()
+        }
+        assert picture.stat().st_size > 10_000
+    page, results = (folder / "report.html").read_bytes(), (folder / "results.json").read_bytes()
+    assert run(["report", str(folder)]) == 0
+    assert (folder / "results.json").read_bytes() == results
+    assert (folder / "report.html").read_bytes() == page
+    capsys.readouterr()
+    html = tmp_path / "pair.html"
+    assert run(["compare", str(folder), str(folder), "-o", str(html), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["differ"] == []
+    assert {line["word"] for line in found["lines"]} <= {"same within chance", ""}
+    assert html.stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["--touches", "5"], 2, "no set is named"),
+        (["--touches", "0"], 2, "touches"),
+        (["--kinds", "facet"], 2, "'facet' is not known"),
+        (["--levels", "low=-1"], 2, "'-1'"),
+        (["--overlay", "felt"], 2, "'felt' is not known"),
+        (["--database", "nowhere.db"], 4, "nowhere.db"),
+        (["missing.yaml"], 2, "missing.yaml"),
+        (["repeat", "nowhere", "1"], 2, "no run of validate-set"),
+        (["report", "nowhere"], 2, "no run of validate-set"),
+        (["compare", "nowhere", "nowhere"], 2, "results.json"),
+    ],
+)
+def test_bad_input_is_refused(arguments, code, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run(arguments) == code
+    told = capsys.readouterr()
+    assert said in told.err
+    assert "Traceback" not in told.err
+    assert not (tmp_path / "validation" / "asked.json").exists()
+    assert run([*arguments, "--json"]) == code
+    assert json.loads(capsys.readouterr().out)["error"]["exit_code"] == code
+
+
+def test_a_folder_is_not_taken_twice_nor_resumed_otherwise(spec, reference, capsys):
+    folder = reference[0]
+    assert run(asked(spec, folder)) == 2
+    assert "holds a run already" in capsys.readouterr().err
+    assert run([*asked(spec, folder), "--resume", "--seed", "9"]) == 2
+    assert "seed 1, now 9" in capsys.readouterr().err
+
+
+def test_written_files_are_what_is_registered(reference):
+    database = str(reference[0] / "lab.db")
+    reader = reader_for(open_lab(database), sensor_of("tab"))
+    for number in range(4):
+        said, written = (
+            drawn(Plan(database, level="low", files=files), number, reader)
+            for files in (False, True)
+        )
+        assert said.touch == written.touch
+        points = said.touch.on_surface(reader.sensor.centres_mm()).reshape(-1, 2)
+        points = points[said.scene.region.distance_mm(points) > 0.5]
+        points = points[said.scene.region.contains(points)]
+        a, b = (each.surface.heights_mm(points) for each in (said, written))
+        np.testing.assert_allclose(a, b, atol=2e-5)
+        near = said.scene.region.distance_mm(points).min() > 1
+        assert not near or np.array_equal(said.counts, written.counts)
+
+
+def test_a_changed_file_is_found_out(reference, tmp_path):
+    import shutil
+
+    lab = tmp_path / "lab"
+    shutil.copytree(reference[0], lab)
+    database = str(lab / "lab.db")
+    file = next(iter(sorted((lab / "parts").rglob("*-F1.stl"))))
+    written_surface(database, "Cube", "F1")
+    content = bytearray(file.read_bytes())
+    content[200] ^= 1
+    file.write_bytes(content)
+    with pytest.raises(SetError, match="not the one that the database registers"):
+        written_surface(database, "Cube", "F1")
+    file.unlink()
+    with pytest.raises(SetError, match="cannot read the part"):
+        written_surface(database, "Cube", "F1")

@@ -1,0 +1,131 @@
+"""Who is let in: hosts, origins, tokens, sizes."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from recognizer.bench.guard import COOKIE, Guard, Rules, is_loopback, rules_for
+
+LOCAL = rules_for("127.0.0.1", "")
+OPEN = rules_for("0.0.0.0", "a-long-token")
+
+
+async def echo(scope, receive, send):
+    """Say how many bytes came."""
+    came, more = 0, scope["type"] == "http"
+    while more:
+        message = await receive()
+        if message["type"] == "http.disconnect":
+            break
+        came += len(message.get("body", b""))
+        more = message.get("more_body", False)
+    await send({"type": "http.response.start", "status": 200, "headers": []})
+    await send({"type": "http.response.body", "body": str(came).encode()})
+
+
+def asked(rules, method="GET", path="/api/x", *, body=(b"",), query="", kind="http", **headers):
+    """Return the messages that a guarded application answers with."""
+    headers = {"host": "127.0.0.1:8080"} | headers
+    scope = {
+        "type": kind, "method": method, "path": path, "query_string": query.encode(),
+        "headers": [(k.replace("_", "-").encode(), v.encode()) for k, v in headers.items()],
+    }  # fmt: skip
+    waiting = [
+        {"type": "http.request", "body": part, "more_body": i + 1 < len(body)}
+        for i, part in enumerate(body)
+    ]
+    sent = []
+
+    async def receive():
+        return waiting.pop(0)
+
+    async def send(message):
+        sent.append(message)
+
+    asyncio.run(Guard(echo, rules)(scope, receive, send))
+    return sent
+
+
+def status(*args, **named):
+    return asked(*args, **named)[0]["status"]
+
+
+def test_loopback_addresses():
+    assert all(map(is_loopback, ("127.0.0.1", "127.9.9.9", "::1", "localhost")))
+    assert not any(map(is_loopback, ("0.0.0.0", "192.168.1.2", "::", "bench.example")))
+
+
+@pytest.mark.parametrize(
+    ("host", "let_in"),
+    [
+        ("127.0.0.1:8080", True), ("localhost:9", True), ("[::1]:8080", True), ("LOCALHOST", True),
+        ("evil.example", False), ("127.0.0.1.evil.example", False), ("", False),
+        ("evil.example@127.0.0.1", False), ("127.0.0.1/evil", False), ("127.0.0.1\\@evil", False),
+    ],
+)  # fmt: skip
+def test_a_local_server_answers_to_local_names_alone(host, let_in):
+    assert status(LOCAL, host=host) == (200 if let_in else 421)
+
+
+@pytest.mark.parametrize(
+    ("origin", "let_in"),
+    [
+        ("http://127.0.0.1:8080", True), ("http://127.0.0.1:8081", False), ("null", False),
+        ("http://evil.example", False), ("http://127.0.0.1:8080.evil.example", False),
+        ("http://localhost:8080", False),
+    ],
+)  # fmt: skip
+def test_other_pages_change_nothing(origin, let_in):
+    assert status(LOCAL, "POST", origin=origin) == (200 if let_in else 403)
+    assert (asked(LOCAL, kind="websocket", origin=origin)[0]["type"] != "websocket.close") == let_in
+
+
+def test_the_live_line_needs_an_origin_and_cross_site_requests_are_refused():
+    assert asked(LOCAL, kind="websocket")[0] == {
+        "type": "websocket.close", "code": 1008, "reason": "a request from another page",
+    }  # fmt: skip
+    assert status(LOCAL, "POST", sec_fetch_site="cross-site") == 403
+    assert status(LOCAL, "POST", sec_fetch_site="same-origin") == 200
+    assert status(LOCAL, "POST") == 200  # no browser
+
+
+def test_a_token_is_known_by_header_by_cookie_and_by_the_printed_address():
+    assert status(OPEN) == 401
+    assert status(OPEN, authorization="Bearer a-long-token") == 200
+    assert status(OPEN, authorization="Bearer a-long-toke") == 401
+    assert status(OPEN, authorization="Basic a-long-token") == 401
+    assert status(OPEN, cookie=f"a=b; {COOKIE}=a-long-token") == 200
+    assert status(OPEN, cookie=f"{COOKIE}=other") == 401
+    assert status(OPEN, query="token=a-long-token") == 401  # only on the page itself
+    start, _ = asked(OPEN, path="/", query="token=a-long-token")
+    headers = dict(start["headers"])
+    assert (start["status"], headers[b"location"]) == (303, b"/")
+    assert b"HttpOnly" in headers[b"set-cookie"]
+    assert b"SameSite=Strict" in headers[b"set-cookie"]
+    assert status(OPEN, path="/", query="token=") == 401
+    assert status(OPEN, host="bench.example", authorization="Bearer a-long-token") == 200
+
+
+@pytest.mark.parametrize("length", ["101", "99999999999999999999999", "-1", "ten", "1_0", "²"])
+def test_a_declared_length_beyond_the_limit_is_refused_before_it_comes(length):
+    rules = Rules(frozenset({"127.0.0.1"}), body=100)
+    sent = asked(rules, "POST", content_length=length)
+    assert [sent[0]["status"], len(sent)] == [413, 2]
+
+
+def test_a_body_that_grows_beyond_the_limit_ends_there():
+    rules = Rules(frozenset({"127.0.0.1"}), body=100, upload=300)
+    assert asked(rules, "POST", body=(b"x" * 60, b"x" * 40))[1]["body"] == b"100"
+    sent = asked(rules, "POST", body=(b"x" * 60, b"x" * 41, b"x" * 1000))
+    assert [sent[0]["status"], len(sent)] == [413, 2]  # and nothing after it
+    assert asked(rules, "POST", "/api/recordings", body=(b"x" * 300,))[1]["body"] == b"300"
+
+
+def test_every_answer_forbids_what_the_page_does_not_need():
+    for sent in (asked(LOCAL), asked(LOCAL, host="evil.example")):
+        headers = dict(sent[0]["headers"])
+        assert b"default-src 'none'" in headers[b"content-security-policy"]
+        assert b"unsafe" not in headers[b"content-security-policy"]
+        assert headers[b"x-content-type-options"] == b"nosniff"

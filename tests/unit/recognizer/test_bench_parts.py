@@ -1,0 +1,304 @@
+"""The bench without a server: files, watch, images, messages, board, time line, calibration."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import struct
+import time
+
+import numpy as np
+import pytest
+from recognizer.bench.replay import ReplayFeed
+
+from generator.database.registered import RegisteredPart
+from probe.circuit import Electronics, fsr_of, read_counts
+from probe.errors import CalibrationError, RecordingError
+from probe.frame import frame_from
+from probe.recording.read import read_recording
+from probe.recording.record import Recorder
+from probe.sensor import Sensor
+from recognizer.bench.bulletin import Bulletin, Reader
+from recognizer.bench.errors import BenchError, BusyError, UnknownError
+from recognizer.bench.files import checked_name, kept, listed, named, part_to_send
+from recognizer.bench.guided import Guide, forces_given
+from recognizer.bench.images import FILTERS, filtered
+from recognizer.bench.message import FramePicture, mosaic_picture
+from recognizer.bench.simulated import manner_of
+from recognizer.bench.watch import AGAIN_S, RESTLESS_S, Watch
+from recognizer.mosaic.image import GlobalImage
+
+
+def recorded(path, counts, step_ns=10_000_000):
+    with Recorder(path, sensor="bench/0") as recorder:
+        for i, value in enumerate(counts):
+            image = np.full((16, 16), 3)
+            image[4:9, 4:9] += value
+            recorder.append(frame_from(image, t_ns=i * step_ns, seq=i))
+    return path
+
+
+# -- files
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["", ".h5", "../x.h5", "a/../x.h5", "/etc/x.h5", "a\\b.h5", "a\0.h5", "x.txt", "a..h5",
+     "x" * 200 + ".h5", "x.h5\n", "~.h5"],
+)  # fmt: skip
+def test_names_that_could_mean_another_place_are_refused(name):
+    with pytest.raises(UnknownError):
+        checked_name(name, ".h5")
+
+
+def test_files_of_the_folder_and_no_others(tmp_path):
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    (tmp_path / "secret.h5").write_text("secret")
+    (folder / "link.h5").symlink_to(tmp_path / "secret.h5")
+    (folder / "touch-001.h5").write_text("")
+    assert named(folder, "touch-001.h5", ".h5") == folder / "touch-001.h5"
+    for name in ("link.h5", "none.h5"):
+        with pytest.raises(UnknownError):
+            named(folder, name, ".h5")
+    (folder / "live.part.h5").write_text("")
+    assert set(listed(folder, ".h5")) == {"touch-001.h5", "link.h5"}
+    assert listed(tmp_path / "nowhere", ".h5") == []
+
+
+def test_a_recording_that_is_sent_in_is_kept_only_if_it_is_one(tmp_path):
+    content = recorded(tmp_path / "mine.h5", [0, 9]).read_bytes()
+    folder = tmp_path / "kept"
+    assert kept(folder, "a.h5", content) == 2
+    with pytest.raises(BenchError, match="already"):
+        kept(folder, "a.h5", content)
+    for bad in (b"", b"no recording", content[:-900]):
+        with pytest.raises(RecordingError):
+            kept(folder, "b.h5", bad)
+    assert [path.name for path in folder.iterdir()] == ["a.h5"]
+
+
+def test_parts_are_sent_from_their_folder_alone(tmp_path):
+    lab = tmp_path / "lab"
+    lab.mkdir()
+    (tmp_path / "secret.stl").write_text("secret")
+    (lab / "ok.stl").write_text("solid")
+    (lab / "link.stl").symlink_to(tmp_path / "secret.stl")
+
+    def part(file):
+        return RegisteredPart("p", "stl", file, "", np.eye(4))
+
+    database, folder = str(lab / "lab.db"), lab.resolve()
+    assert part_to_send(database, folder, part("ok.stl")) == lab / "ok.stl"
+    for file in ("../secret.stl", "link.stl", "/etc/passwd", "none.stl", "."):
+        with pytest.raises(UnknownError):
+            part_to_send(database, folder, part(file))
+    with pytest.raises(UnknownError):
+        part_to_send(database, None, part("ok.stl"))
+
+
+# -- when a touch is read
+
+
+def test_a_touch_is_read_once_it_is_steady_and_again_when_it_has_changed():
+    rng = np.random.default_rng(0)
+    touch, other = rng.random((16, 16)), rng.random((16, 16))
+    watch = Watch()
+    assert not watch.due(0 * touch, contact=False, now_s=0.0)
+    assert not watch.due(0.3 * touch, contact=True, now_s=0.01)
+    assert not watch.due(touch, contact=True, now_s=0.02)
+    assert watch.due(touch, contact=True, now_s=0.03)
+    watch.read(touch, answered=True, now_s=0.03)
+    assert not watch.due(touch, contact=True, now_s=0.04)
+    assert not watch.due(0.6 * touch, contact=True, now_s=0.05)  # it is lifted
+    assert not watch.due(0.6 * touch, contact=True, now_s=0.06)
+    assert not watch.due(other, contact=True, now_s=0.07)
+    assert watch.due(other, contact=True, now_s=0.08)  # it has been moved
+    assert watch.touches == 1
+
+
+def test_restless_and_unanswered_touches_are_read_all_the_same():
+    rng = np.random.default_rng(0)
+    watch, now_s = Watch(), 0.0
+    while not watch.due(rng.random((16, 16)), contact=True, now_s=now_s):
+        now_s += 0.01
+    assert now_s == pytest.approx(RESTLESS_S, abs=0.02)
+    touch = rng.random((16, 16))
+    watch.read(touch, answered=False, now_s=now_s)
+    watch.due(touch, contact=True, now_s=now_s)
+    assert not watch.due(touch, contact=True, now_s=now_s + 0.9 * AGAIN_S)
+    assert watch.due(touch, contact=True, now_s=now_s + 1.1 * AGAIN_S)
+
+
+# -- what the pages get
+
+
+def test_filters_build_on_each_other():
+    image = np.full((16, 16), 7.0)
+    image[4:10, 4:10] = 107.0
+    image[2, 12] = 300.0
+    made = {wish: filtered(image, Sensor(), wish) for wish in FILTERS}
+    assert made["raw"][0, 0] == 7
+    assert made["bias-free"][0, 0] == 0
+    assert made["bias-free"][6, 6] == 100
+    assert made["median"][2, 12] == 0  # the spike
+    assert made["median"][6, 6] == 100
+    assert made["sobel"][6, 6] == 0
+    assert made["sobel"][6, 3] > 0
+    assert filtered(image, Sensor(), "bias-free", image).max() == 0
+
+
+def test_a_frame_is_packed_as_its_module_says():
+    image = np.arange(256.0).reshape(16, 16)
+    picture = FramePicture(image, Sensor(), None, True, 2**32 + 5, 1.5, 1e12)
+    data = picture.as_bytes("raw")
+    assert len(data) == 32 + 1024
+    kind, newtons, wish, _, seq, t_s, received, largest, _ = struct.unpack("<cBBBIddff", data[:32])
+    assert (kind, newtons, FILTERS[wish], seq, t_s, received, largest) == (
+        b"F", 1, "raw", 5, 1.5, 1e12, 255,
+    )  # fmt: skip
+    assert np.array_equal(np.frombuffer(data, "<f4", offset=32).reshape(16, 16), image)
+    assert picture.as_bytes("raw") is data  # made once for all pages
+
+
+def test_a_mosaic_is_packed_thinned_and_tells_what_was_not_felt():
+    values = np.linspace(0, 10, 700 * 30).reshape(700, 30)
+    count = np.ones(values.shape, np.int64)
+    count[0, 0] = 0
+    image = GlobalImage(values, values, values, count, 0.4, (1.0, 2.0))
+    data = mosaic_picture(image, 3).as_bytes("raw")
+    _, _, _, _, rows, columns, touches, step, x, y, top = struct.unpack("<cBBBIIIffff", data[:32])
+    assert (rows, columns, touches) == (350, 15, 3)
+    assert (step, x, y) == pytest.approx((0.8, 1.0, 2.0))
+    cells = np.frombuffer(data, np.uint8, offset=32).reshape(rows, columns)
+    assert cells[0, 0] == 0
+    assert cells[0, 1] == 1
+    assert np.allclose((cells[1:] - 1.0) * top / 254, values[2::2, ::2], atol=top / 254)
+    empty = GlobalImage(*[np.zeros((0, 0))] * 3, np.zeros((0, 0), np.int64), 0.4, (0.0, 0.0))
+    assert len(mosaic_picture(empty, 0).as_bytes("raw")) == 32
+
+
+def test_a_page_gets_the_newest_of_every_topic_and_nothing_twice():
+    async def told():
+        board = Bulletin()
+        board.attach(asyncio.get_running_loop())
+        page = Reader()
+        board.readers.add(page)
+        for i in range(3):
+            board.publish("status", {"i": i})
+        board.publish("answer", {"face": "F1"})
+        await asyncio.wait_for(page.news.wait(), 5)
+        first = [json.loads(text) for text in board.news(page)]
+        again = board.news(page)
+        board.publish("status", {"i": 3})
+        return first, again, [json.loads(text) for text in board.news(page)]
+
+    first, again, later = asyncio.run(told())
+    assert first == [{"topic": "status", "i": 2}, {"topic": "answer", "face": "F1"}]
+    assert again == []
+    assert later == [{"topic": "status", "i": 3}]
+
+
+# -- replay
+
+
+def taken(feed, seconds):
+    frames, end_s = [], time.monotonic() + seconds
+    while time.monotonic() < end_s and feed.told()["playing"]:
+        frames += feed.take(0.05)
+    frames += feed.take(0.0)
+    return [frame.seq for frame in frames]
+
+
+def test_a_recording_plays_in_order_goes_where_it_is_told_and_pauses_at_its_end(tmp_path):
+    values = [0] * 20 + [200] * 20 + [0] * 20
+    feed = ReplayFeed("file:x", read_recording(recorded(tmp_path / "x.h5", values)))
+    assert feed.seconds == pytest.approx(0.59)
+    assert taken(feed, 5.0) == list(range(60))
+    assert feed.told()["at"] == pytest.approx(feed.seconds, abs=1e-3)
+    assert not feed.told()["playing"]
+    feed.play(playing=None, speed=None, at_s=0.305)
+    assert [frame.seq for frame in feed.take(0.0)] == [30]  # shown although it pauses
+    assert feed.take(0.0) == []
+    feed.play(playing=True, speed=20.0, at_s=0.205)
+    assert taken(feed, 5.0) == list(range(20, 60))
+    feed.play(playing=True, speed=20.0, at_s=None)  # from its beginning again
+    assert taken(feed, 5.0) == list(range(60))
+    strength = np.array(feed.overview())
+    assert strength[22:38].min() == 1.0
+    assert strength[:18].max() == strength[42:].max() == 0.0
+    with pytest.raises(BenchError, match="speed"):
+        feed.play(playing=None, speed=1e9, at_s=None)
+
+
+def test_an_empty_recording_and_one_whose_clock_jumps(tmp_path):
+    feed = ReplayFeed("file:x", read_recording(recorded(tmp_path / "empty.h5", [])))
+    assert (feed.take(0.0), feed.overview(), feed.told()["playing"]) == ([], [], False)
+    path = tmp_path / "jump.h5"
+    with Recorder(path) as recorder:
+        for i, t_ns in enumerate((0, 10**7, 10**13, 10**13 + 10**7, 5, 10**7)):
+            recorder.append(frame_from(np.zeros((16, 16)), t_ns=t_ns, seq=i))
+    feed = ReplayFeed("file:x", read_recording(path))
+    assert 0 < feed.seconds < 2
+
+
+# -- calibration
+
+
+def fed(guide, newtons, rng, state):
+    """Read one step of a guide from a simulated board."""
+    guide.read()
+    board, fsr, forces = Electronics(), fsr_of(16, 16), np.full((16, 16), newtons / 256)
+    while guide.told()["reading"]:
+        counts, state[0] = read_counts(forces, board, fsr, state[0], rng)
+        state[1] += 1
+        guide.take(frame_from(counts, t_ns=state[1] * 10_000_000, seq=state[1]))
+
+
+def test_a_guide_leads_to_a_calibration():
+    guide = Guide("bench/0", forces_given([80, 200, 600]), 0.3, Electronics(), "2026-01-01")
+    rng, state = np.random.default_rng(0), [None, 0]
+    with pytest.raises(BusyError):
+        guide.calibration()
+    for newtons in (0, 80, 200, 600):
+        assert guide.told()["newtons"] == newtons
+        fed(guide, newtons, rng, state)
+    assert guide.done
+    assert "felt by 256 of 256" in guide.told()["felt"][-1]
+    assert not guide.calibration().bad.any()
+    guide.again()
+    assert guide.told()["step"] == 3
+    fed(guide, 600, rng, state)
+    with pytest.raises(BusyError):
+        guide.read()
+
+
+def test_loads_that_tell_nothing_are_refused_with_what_is_missing():
+    guide = Guide("bench/0", forces_given([40]), 0.2, Electronics(), "2026-01-01")
+    rng, state = np.random.default_rng(0), [None, 0]
+    for newtons in (0, 40):
+        fed(guide, newtons, rng, state)
+    with pytest.raises(CalibrationError) as refused:
+        guide.calibration()
+    assert refused.value.fix
+    for bad in ([], [0.0], [float("nan")], [1e9], [1.0] * 99):
+        with pytest.raises(BenchError):
+            forces_given(bad)
+
+
+# -- the simulated probe
+
+
+@pytest.mark.parametrize(
+    "url",
+    ["touch:?firmware=z80", "touch:?rate=0", "touch:?rate=nan", "touch:?x=1", "touch:?hold=a"],
+)
+def test_a_simulated_probe_that_cannot_be_had(url):
+    with pytest.raises(BenchError):
+        manner_of(url)
+
+
+def test_a_simulated_probe_as_asked():
+    firmware, manner = manner_of("touch:?firmware=avr&rate=50&hold=1&noise=quiet&seed=3")
+    assert firmware
+    assert (manner.rate, manner.hold_s, manner.noise, manner.seed) == (50, 1, "quiet", 3)
