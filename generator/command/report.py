@@ -94,7 +94,7 @@ def encoded(result: Encoded, *, dry_run: bool, as_json: bool) -> None:
     if dry_run:
         write(f"\n{array} then; nothing was written ({result.seconds:.1f} s)")
         return
-    write(f"\n{array}; registered in {result.database} ({result.seconds:.1f} s)")
+    write(f"\n{array}; registered in {_shown(result.database)} ({result.seconds:.1f} s)")
     if following := _next_step(result.objects):
         write(following)
 
@@ -156,7 +156,7 @@ def _encoded_values(result: Encoded, dry_run: bool) -> dict[str, Any]:
             }
             for made in result.objects
         ],
-        "database": result.database,
+        "database": _shown(result.database),
         "array": {
             "rows": result.rows,
             "columns": result.columns,
@@ -192,3 +192,10 @@ def message(text: str, word: str, colour: str = "yellow") -> None:
     if sys.stderr.isatty() and not os.environ.get("NO_COLOR"):
         text = text.replace(word, typer.style(word, fg=colour, bold=True), 1)
     sys.stderr.write(text + "\n")
+
+
+def _shown(url: str) -> str:
+    """Return a database's URL as it may be printed."""
+    from generator.database.url import without_password
+
+    return without_password(url)

@@ -136,11 +136,19 @@ def _occupancy(
     rows: int, columns: int, taken_rows: NDArray[np.int64], taken_columns: NDArray[np.int64]
 ) -> Occupancy:
     r, c = _on_torus(taken_rows, rows), _on_torus(taken_columns, columns)
+    if _rising(r, c):  # as a database gives them
+        return Occupancy(rows, columns, r, c)
     order = np.lexsort((c, r))
     r, c = r[order], c[order]
     new = np.ones(len(r), dtype=bool)
     new[1:] = (np.diff(r) != 0) | (np.diff(c) != 0)
     return Occupancy(rows, columns, r[new], c[new])
+
+
+def _rising(r: NDArray[np.int64], c: NDArray[np.int64]) -> bool:
+    """Return whether cells come row by row, each once."""
+    down, right = np.diff(r), np.diff(c)
+    return bool(((down > 0) | ((down == 0) & (right > 0))).all())
 
 
 def _on_torus(values: NDArray[np.int64], size: int) -> NDArray[np.int64]:

@@ -3,10 +3,12 @@
 ::
 
     command     open-bench: options, and what an error means for the exit code
-    app         the routes: page, live line, work, objects, files
+    serve       from the options to a server that runs
+    app         the routes: page, live line;  work   what is done;  holdings   what is registered
     guard       who may ask: host, origin, token, sizes, and what the page may load
     session     one probe and all that is done with it; shared by every page
-    feed        frames: of a probe that may go and come back, or of a recording with a time line
+    feed        frames of a probe that may go and come back;  replay   those of a recording
+    meaning     what counts mean now: calibration, bias
     simulated   a probe over registered parts that comes down where it is told
     beats       what that probe feels, beat by beat;  line   its serial line
     images      a frame through the filters

@@ -18,16 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.calibration import (
-    Calibration,
-    calibrated,
-    calibration_hash,
-    drift_of,
-    read_calibration,
-    write_calibration,
-)
+from probe.calibration import calibration_hash, read_calibration, write_calibration
 from probe.circuit import Electronics
-from probe.command.live_state import BIAS_FRAMES, next_free
+from probe.command.live_state import next_free
 from probe.errors import ProbeError
 from probe.frame import Frame
 from probe.port.url import address_of
@@ -36,11 +29,13 @@ from probe.recording.record import Recorder
 from probe.sensor import Sensor
 from recognizer.bench.bulletin import Bulletin
 from recognizer.bench.errors import BenchError, BusyError
-from recognizer.bench.feed import Feed, NoFeed, ProbeFeed, ReplayFeed
+from recognizer.bench.feed import Feed, NoFeed, ProbeFeed
 from recognizer.bench.files import listed, named
 from recognizer.bench.guided import Guide, condition_told, forces_given
+from recognizer.bench.meaning import Meaning, safe_values
 from recognizer.bench.message import FramePicture
 from recognizer.bench.reading import Offered, Reading
+from recognizer.bench.replay import ReplayFeed
 from recognizer.bench.simulated import SCHEME, TouchProbe
 
 Array = NDArray[np.float64]
@@ -74,10 +69,7 @@ class Session:
         self._feed: Feed = NoFeed()
         self._url = ""
         self._newest: Frame | None = None
-        self._calibration: Calibration | None = None
-        self._calibration_name = self._warning = ""
-        self._bias: Array | None = None
-        self._resting: list[NDArray[np.uint16]] | None = None
+        self._meaning = Meaning()
         self._recorder: Recorder | None = None
         self._guide: Guide | None = None
         self._notices: deque[tuple[int, str]] = deque(maxlen=NOTICES)
@@ -142,7 +134,7 @@ class Session:
             if not isinstance(self._feed, ProbeFeed):
                 raise BusyError("no probe is connected", fix="choose a port first")
             self._feed.select(sensor)
-            self._bias = self._resting = None
+            self._meaning = Meaning()
             self._report()
 
     def simulated(self) -> TouchProbe:
@@ -163,8 +155,7 @@ class Session:
     def bias(self, *, on: bool) -> None:
         """Take the bias of the unloaded sensor, or do without it."""
         with self._turn:
-            self._bias, self._resting = None, [] if on else None
-            self._note("taking the bias: keep the sensor unloaded" if on else "bias off")
+            self._note(self._meaning.switch_bias(on=on))
             self._report()
 
     def record(self, *, on: bool) -> None:
@@ -182,7 +173,7 @@ class Session:
                 if not isinstance(self._feed, ProbeFeed):
                     raise BusyError("no probe is connected", fix="choose a port first")
                 self.folder.mkdir(parents=True, exist_ok=True)
-                known = self._calibration
+                known = self._meaning.calibration
                 path = next_free(self.folder, "touch", ".h5")
                 self._recorder = Recorder(
                     path, sensor=self._sensor_name(), attributes={"url": self._url},
@@ -227,7 +218,7 @@ class Session:
             path = next_free(self.folder, "calibration", ".json")
             write_calibration(found, path)
             self._guide = None
-            self._use(found, path.name)
+            self._note(self._meaning.use(found, path.name))
             return {"name": path.name, **condition_told(found)}
 
     def cancel_calibration(self) -> None:
@@ -245,12 +236,11 @@ class Session:
             When it is none, or another sensor's.
         """
         with self._turn:
-            if not name:
-                self._calibration, self._calibration_name, self._warning = None, "", ""
-                self._note("readings are counts")
-            else:
+            found = None
+            if name:
                 path = named(self.folder, name, ".json")
-                self._use(read_calibration(path, sensor=self._sensor_name() or None), name)
+                found = read_calibration(path, sensor=self._sensor_name() or None)
+            self._note(self._meaning.use(found, name))
             self._report()
 
     def newest(self) -> tuple[Frame, Array, str]:
@@ -264,7 +254,7 @@ class Session:
         with self._turn:
             if self._newest is None:
                 raise BusyError("no frame came yet", fix="connect a probe first")
-            values, newtons = self._values(self._newest)
+            values, newtons, _ = safe_values(self._meaning, self._newest)
             return self._newest, values, "N" if newtons else "counts"
 
     def told(self) -> dict[str, Any]:
@@ -275,18 +265,10 @@ class Session:
                 "port": self._url,
                 "feed": self._feed.told(),
                 "simulated": self.simulation is not None,
-                "calibration": None if self._calibration is None else {
-                    "name": self._calibration_name,
-                    "made": self._calibration.made,
-                    "age": _age(self._calibration.made),
-                    "bad": int(self._calibration.bad.sum()),
-                    "warning": self._warning,
-                },
-                "bias": "taking" if self._resting is not None
-                else "none" if self._bias is None else "taken",
                 "recording": None if recorder is None
                 else {"name": recorder.path.name, "frames": recorder.frames},
                 "guide": None if guide is None else guide.told(),
+                **self._meaning.told(),
                 "recordings": listed(self.folder, ".h5"),
                 "calibrations": listed(self.folder, ".json"),
                 "notices": [{"number": n, "text": text} for n, text in self._notices],
@@ -316,29 +298,22 @@ class Session:
                 self._record(frame)
             if self._guide is not None:
                 self._guide.take(frame)
-            if self._resting is not None:
-                self._rest(frame)
+            for notice in self._meaning.take(frame):
+                self._note(notice)
         if not frames:
             return
         frame, received_ms = frames[-1], time.time() * 1e3
-        values, newtons = self._values(frame)
+        values, newtons, wrong = safe_values(self._meaning, frame)
+        if wrong:
+            self._note(wrong)
         self._newest = frame
-        bias = None if newtons else self._bias
+        bias = None if newtons else self._meaning.bias
         self._bulletin.publish(
             "frame",
             FramePicture(values, self.sensor, bias, newtons, frame.seq, frame.t_ns * 1e-9,
                          received_ms),
         )  # fmt: skip
-        self.reading.offer(Offered(frame, self._calibration, received_ms))
-
-    def _values(self, frame: Frame) -> tuple[Array, bool]:
-        if self._calibration is not None:
-            try:
-                return calibrated(frame, self._calibration).values, True
-            except ProbeError as error:
-                self._note(f"calibration off: {error.cause}")
-                self._calibration = None
-        return frame.counts.astype(np.float64), False
+        self.reading.offer(Offered(frame, self._meaning.calibration, received_ms))
 
     def _record(self, frame: Frame) -> None:
         assert self._recorder is not None
@@ -347,22 +322,6 @@ class Session:
         except ProbeError as error:
             self._note(str(error))
             self._recorder = None
-
-    def _rest(self, frame: Frame) -> None:
-        assert self._resting is not None
-        self._resting.append(frame.counts)
-        if len(self._resting) < BIAS_FRAMES:
-            return
-        frames, self._resting = np.stack(self._resting), None
-        self._bias = frames.mean(axis=0)
-        self._note(f"the bias is the mean of {BIAS_FRAMES} frames")
-        if self._calibration is not None:
-            self._warning = drift_of(self._calibration, frames).warning
-            self._note(self._warning or "the calibration still holds")
-
-    def _use(self, calibration: Calibration, name: str) -> None:
-        self._calibration, self._calibration_name, self._warning = calibration, name, ""
-        self._note(f"readings are newtons by {name}")
 
     def _leave(self) -> None:
         """Let go of what is connected."""
@@ -373,8 +332,8 @@ class Session:
             self.simulation.close()
             self.simulation = None
         self._url = ""
-        self._newest = self._bias = self._resting = self._guide = None
-        self._calibration, self._calibration_name, self._warning = None, "", ""
+        self._newest = self._guide = None
+        self._meaning = Meaning()
 
     def _end_recording(self) -> None:
         if self._recorder is not None:
@@ -396,15 +355,3 @@ class Session:
 
     def _report(self) -> None:
         self._bulletin.publish("status", self.told())
-
-
-def _age(made: str) -> str:
-    """Return how old a calibration is, in words."""
-    try:
-        then = datetime.datetime.fromisoformat(made)
-    except ValueError:
-        return made or "not dated"
-    days = (datetime.datetime.now(then.tzinfo) - then).total_seconds() / 86400
-    if days >= 2:
-        return f"{days:.0f} days"
-    return f"{24 * days:.0f} h" if days >= 0.1 else "fresh"
