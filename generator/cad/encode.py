@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import json
 from collections.abc import Sequence
@@ -11,6 +12,7 @@ from typing import Any
 
 from generator.cad.read import polyhedron_from
 from generator.layout.placement import Layout
+from generator.pipeline.choose import chosen
 from generator.pipeline.encode import encode_planned
 from generator.pipeline.files import parts_of
 from generator.pipeline.plan import Plan, planned
@@ -62,7 +64,7 @@ def encode(
     database
         `lab.db`, `sqlite:///lab.db` or `postgresql://host/name`.
     profile
-        As in a spec: one-touch, thesis, product, large, fine.
+        As in a spec: one-touch, thesis, product, large, fine, auto.
     folder
         For the files; `out/NAME` if left out.
     formats
@@ -89,7 +91,9 @@ def encode(
     url = database_option(database)
     given = {"name": name, "profile": profile, **settings}
     located = spec_of(given, ShapeSpec("solid", {"sha256": _digest(polyhedron)}))
-    plan = planned(located, polyhedron)
+    choice = chosen([located], url, polyhedron)
+    plan = planned(choice.specs[0], polyhedron)
+    plan = dataclasses.replace(plan, notes=(*plan.notes, *choice.notes))
     product = encode_planned(
         plan,
         folder=Path(folder) if folder is not None else None,

@@ -2,8 +2,11 @@
 
 ::
 
+    choose.py   the array, for profile auto
     plan.py     what the stages need of one spec
     place.py    cells for it: those it has, or free ones
+    round.py    cylinder and cone faces: unrolled, printed whole
+    faces.py    what each face shows
     files.py    layout -> parts -> staged files
     make.py     one object, one transaction
     sets.py     several objects, in parallel; what was made before is skipped

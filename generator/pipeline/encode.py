@@ -9,6 +9,7 @@ finds the cells in the database and makes the same bytes again.
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,6 +20,8 @@ from generator.database.cells import find_array, occupied
 from generator.database.open import database_exists, open_database
 from generator.database.transaction import reading
 from generator.layout.placement import Layout
+from generator.pipeline.choose import chosen
+from generator.pipeline.faces import face_reports
 from generator.pipeline.files import parts_of
 from generator.pipeline.made import Encoded, Made, made_of
 from generator.pipeline.make import Order, Product, made_under_lock
@@ -78,9 +81,12 @@ def encode(
     began = time.perf_counter()
     url = database or specs[0].spec.database
     plans: list[Plan] = []
-    for number, located in enumerate(specs):
+    choice = chosen(specs, url)
+    for number, located in enumerate(choice.specs):
         progress(f"planning {located.spec.name}", 0.1 * number / len(specs))
-        plans.append(planned(located))
+        plan = planned(located)
+        notes = choice.notes if number == 0 else ()
+        plans.append(dataclasses.replace(plan, notes=(*plan.notes, *notes)))
     rest = within(progress, 0.1, 1.0)
     files: tuple[Path, ...] = ()
     if dry_run:
@@ -146,7 +152,8 @@ def _rehearse(
         place = placed(connection, plan, replace, new)
         step(f"building {plan.spec.name}", 0.5)
         parts, warnings = parts_of(plan, place.layout)
-        made.append(made_of(plan, place.layout, len(parts), warnings, (), reused=place.reused))
+        one = made_of(plan, place.layout, len(parts), warnings, (), reused=place.reused)
+        made.append(dataclasses.replace(one, face_reports=face_reports(plan, place.layout)))
         if not place.reused:
             new.append(place.layout)
         used = place.taken + made[-1].symbols

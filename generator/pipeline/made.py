@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from generator.layout.placement import Layout
+from generator.pipeline.faces import FaceReport
 from generator.pipeline.plan import Plan
 
 
@@ -22,6 +23,9 @@ class Made:
     warnings: tuple[str, ...]
     reused: bool  #: registered before, so the same cells again
     skipped: bool = False  #: registered before, and all its files stand unchanged
+    face_reports: tuple[
+        FaceReport, ...
+    ] = ()  #: of a dry run: face by face, and how small it may be
 
 
 @dataclass(frozen=True, slots=True)

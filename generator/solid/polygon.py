@@ -15,7 +15,11 @@ Ring = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 
-def triangulated(rings: Sequence[Ring], numbers: Index, name: str) -> Index:
+#: Triangles thinner than this share of their longest side are taken for flat.
+FLAT = 1e-9
+
+
+def triangulated(rings: Sequence[Ring], numbers: Index, name: str, flat: float = FLAT) -> Index:
     """Return the (m, 3) triangles of an area bounded by rings.
 
     Parameters
@@ -27,6 +31,8 @@ def triangulated(rings: Sequence[Ring], numbers: Index, name: str) -> Index:
         (sum of k,) what to call the points, ring after ring.
     name
         Of the facet, for the error.
+    flat
+        Share of its longest side by which a triangle is flat, and avoided if it can be.
 
     Raises
     ------
@@ -41,7 +47,7 @@ def triangulated(rings: Sequence[Ring], numbers: Index, name: str) -> Index:
     else:
         # The fast path for convex rings makes triangles of three points on a line.
         found = np.asarray(ear_clipped(list(rings), allow_convex=False), dtype=np.int64)
-        found = without_slivers(points, found)
+        found = without_slivers(points, found, flat)
     u, v = points[found[:, 1]] - points[found[:, 0]], points[found[:, 2]] - points[found[:, 0]]
     areas = (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
     size = float(np.ptp(points, axis=0).max()) ** 2
@@ -56,7 +62,7 @@ def triangulated(rings: Sequence[Ring], numbers: Index, name: str) -> Index:
     return named
 
 
-def without_slivers(points: Ring, triangles: Index) -> Index:
+def without_slivers(points: Ring, triangles: Index, share: float = FLAT) -> Index:
     """Return a triangulation in which triangles of three points on a line are flipped away.
 
     Such a triangle has its longest side in common with another one; exchanging that side
@@ -68,8 +74,10 @@ def without_slivers(points: Ring, triangles: Index) -> Index:
         (n, 2).
     triangles
         (m, 3), counter-clockwise, flat ones included.
+    share
+        Of its longest side: a thinner triangle is flat.
     """
-    flat = _flat(points, triangles)
+    flat = _flat(points, triangles, share)
     if not flat.any():
         return triangles
     faces = [tuple(face) for face in triangles.tolist()]
@@ -82,7 +90,7 @@ def without_slivers(points: Ring, triangles: Index) -> Index:
             break
         number = waiting.pop()
         face = faces[number]
-        if not _flat(points, np.array([face]))[0]:
+        if not _flat(points, np.array([face]), share)[0]:
             continue
         sides = [(face[k], face[(k + 1) % 3]) for k in range(3)]
         a, c = max(sides, key=lambda side: float(np.hypot(*(points[side[1]] - points[side[0]]))))
@@ -99,13 +107,13 @@ def without_slivers(points: Ring, triangles: Index) -> Index:
     return np.array(faces, dtype=np.int64)
 
 
-def _flat(points: Ring, triangles: Index) -> NDArray[np.bool_]:
-    """Whether triangles are thinner than 1e-9 of their longest side."""
+def _flat(points: Ring, triangles: Index, share: float) -> NDArray[np.bool_]:
+    """Whether triangles are thinner than a share of their longest side."""
     corners = points[triangles]
     u = np.roll(corners, -1, axis=1) - corners
     longest = (u**2).sum(axis=2).max(axis=1)
     twice = u[:, 0, 0] * u[:, 1, 1] - u[:, 0, 1] * u[:, 1, 0]
-    thin: NDArray[np.bool_] = np.abs(twice) <= 1e-9 * longest
+    thin: NDArray[np.bool_] = np.abs(twice) <= share * longest
     return thin
 
 

@@ -19,10 +19,13 @@ from generator.solid.emboss import to_part, turn
 from generator.solid.frame import area_vector, in_frame, plane_frame
 from generator.solid.lattice import Squares, squares_of
 from generator.solid.part import Embossing, Facet, Part
-from generator.solid.polygon import triangulated
+from generator.solid.polygon import FLAT, triangulated
 from generator.solid.template import Template, closed_template, template_of
 
 Index = NDArray[np.int64]
+
+#: As `polygon.FLAT`, for pieces of symbols on round faces.
+BENT_FLAT = 1e-5
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +129,11 @@ class _Builder:
                 for hole in squares.outline:
                     rings.append(squares.points[hole])
                     loops.append(squares.first + hole)
-        found = triangulated(rings, np.concatenate(loops), self.part.facets[facet].name)
+        name = self.part.facets[facet].name
+        # On a round face what was a straight line bends a little: rounding could turn triangles
+        # along it that are not quite flat.
+        share = BENT_FLAT if "/" in name else FLAT
+        found = triangulated(rings, np.concatenate(loops), name, share)
         self.found.append((found, facet, -1, None))
 
     def symbols(

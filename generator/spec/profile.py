@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from generator.array.profiles import PROFILES
 
 DEFAULT_PROFILE = "one-touch"
+AUTO = "auto"  # the smallest array that the objects fit, chosen when they are made
 EXPLICIT = "explicit"  # stands for the profile's name where an encoding is written out
 HEIGHT_MM = 1.0  # a multiple of common layer heights
 DRAFTS_RAD = (0.174532925199, 0.130899693900, 0.087266462600, 0.043633231300)

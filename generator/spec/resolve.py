@@ -23,6 +23,7 @@ from generator.spec.encoding import Encoding
 from generator.spec.located import mark_of
 from generator.spec.problem import Problem, SpecError
 from generator.spec.profile import (
+    AUTO,
     DATABASE,
     DEFAULT_PROFILE,
     DRAFTS_RAD,
@@ -75,7 +76,7 @@ def resolved(
         shape = resolved_shape(settings.shape, tree, refuse)
     encoding, order = _array(settings, refuse)
     if settings.encoding is None or order is None:
-        defaults = defaults_of_profile(settings.profile or DEFAULT_PROFILE)
+        defaults = defaults_of_profile(_profile(settings))
     else:
         defaults = defaults_of_order(order)
     printer = settings.print.printer or defaults.printer
@@ -174,10 +175,16 @@ def _refuse_order(alphabet: Alphabet, order: int, refuse: Refuse) -> None:
     refuse("symbols.alphabet, encoding, profile", cause, fix)
 
 
+def _profile(settings: NamedSettings) -> str:
+    """Return the profile that defaults come from; `auto` begins with the default one."""
+    named = settings.profile or DEFAULT_PROFILE
+    return DEFAULT_PROFILE if named == AUTO else named
+
+
 def _array(settings: NamedSettings, refuse: Refuse) -> tuple[dict[str, Any], int | None]:
     """Return the complete definition of the array, and its number of symbols."""
     if settings.encoding is None:
-        return _profile_definition(settings.profile or DEFAULT_PROFILE)
+        return _profile_definition(_profile(settings))
     if settings.profile is not None:
         refuse(
             "encoding",

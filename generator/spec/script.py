@@ -7,6 +7,7 @@ the same words and get the same messages; the place is `encode():line:column`.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +59,34 @@ def spec_of(settings: Mapping[str, Any], shape: ShapeSpec) -> Located:
             [Problem("one solid is encoded at a time", fix, tree.key_mark(("copies",)))]
         )
     return Located(resolved(read, tree, shape)[0], tree)
+
+
+def with_profile(
+    located: Located, name: str, defaults: str, encoding: Mapping[str, Any]
+) -> Located:
+    """Return a spec on another array.
+
+    Parameters
+    ----------
+    located
+        The spec.
+    name
+        Of the profile, as the database will name it.
+    defaults
+        Profile whose symbols and printer hold where the spec names none.
+    encoding
+        Complete definition of the array.
+
+    Raises
+    ------
+    SpecError
+        The spec's own settings do not go with those of the profile.
+    """
+    value = {key: inner for key, inner in located.tree.value.items() if key != "shape"}
+    read = NamedSettings.model_validate({**value, "profile": defaults})
+    specs = resolved(read, located.tree, located.spec.shape)
+    same = next(spec for spec in specs if spec.name == located.spec.name)
+    return replace(located, spec=replace(same, profile=name, encoding=encoding))
 
 
 def _plain(value: Any) -> Any:

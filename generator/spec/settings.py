@@ -18,7 +18,7 @@ from generator.spec.shape import EXAMPLES, Shape
 SPEC_VERSION = 1
 COPIES_MAX = 1000
 
-ProfileName = Literal["one-touch", "thesis", "product", "large", "fine"]
+ProfileName = Literal["one-touch", "thesis", "product", "large", "fine", "auto"]
 AlphabetName = Literal["thesis-2", "dense-4", "letters-4", "dense-8"]
 Format = Literal["step", "stl", "3mf", "glb"]
 
@@ -121,7 +121,8 @@ class Defaults(Block):
     version: Version = 1
     """Version of this file format."""
     profile: ProfileName | None = None
-    """The array, its alphabet and its pitch by name; one-touch if left out."""
+    """The array, its alphabet and its pitch by name; one-touch if left out. auto takes the
+    smallest array that holds the objects."""
     encoding: Encoding | None = None
     """The array, named explicitly, in place of a profile."""
     layout: Literal["auto", "net", "faces"] = "auto"

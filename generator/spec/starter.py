@@ -20,7 +20,7 @@ version: 1
 name: {name}
 {shape}
 
-# profile: one-touch     # one-touch | thesis | product | large | fine
+# profile: one-touch     # one-touch | thesis | product | large | fine | auto
 # layout: auto           # auto | net (one lattice through the unfolded object) | faces
 # copies: 1              # each copy has cells of its own, so that two are told apart
 

@@ -57,6 +57,12 @@ class Located:
         i, j = math.floor(self.fit.x_mm / pitch), math.floor(self.fit.y_mm / pitch)
         return (self.place.row - j) % array.rows, (self.place.column + i) % array.columns
 
+    @property
+    def face(self) -> tuple[str, str]:
+        """Names of object and face."""
+        held = self.encoding.face(self.place.face)
+        return held.object, held.face
+
     def same(self, other: Located) -> bool:
         """Whether two say the same place, up to a cell's rounding."""
         if self.encoding is not other.encoding or self.place.face != other.place.face:
@@ -125,8 +131,7 @@ def answered(
     margin = math.inf if other is None else best.score - other.score
     runner_up = None
     if other is not None:
-        face = other.encoding.face(other.place.face)
-        runner_up = RunnerUp(face.object, face.face, other.index)
+        runner_up = RunnerUp(*other.face, other.index)
     reason = _doubt(reader, best, margin, limits)
     face = best.encoding.face(best.place.face)
     pose = face_pose(best.encoding, face, best.place, best.fit)

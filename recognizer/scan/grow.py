@@ -127,7 +127,8 @@ def extended(scan: Scan, touch: PlacedTouch) -> Scan:
         answer = answered(reader, found, limits, touch.seq)
     elif scan.told is None and _tells_alone(reader, shown):
         alone = recognise(reader, touch.signal, touch.seq)
-        answer, agrees = (alone, True) if alone else (answer, agrees)
+        if alone and found and found[0].face == (alone.object, alone.face):
+            answer, agrees = alone, True
     astray = 0 if agrees else scan.astray + 1
     answer, told = _believed(scan, answer, astray)
     return Scan(

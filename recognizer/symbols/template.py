@@ -5,8 +5,8 @@ offset from the centre of a symbol, 0 over the bare face, 1 over a wide plateau.
 the symbol's axes (x along the array's columns, y against its rows), mm.
 
 A tab feels the share of its tip that the plateau covers, and a little more than that share
-because a partly covered tip bulges into the open side; the pad passes on only what is
-coarser than its thickness (numerics of `probe.contact`). Responses are kept as
+because a partly covered tip bulges into the open side; what a pad feels is pressed once by
+the layer model (`pad`). Responses are kept as
 psi(y) = log(1 + 3 y) / log 4, in which gain errors and noise have about one size. Three
 things are fitted with the rest, to first order: how much wider than asked the strokes are
 printed, how far tactels hear their neighbours, and an exponent, for a force law that is not
@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from generator.alphabet import Alphabet, SymbolStyle
 from probe.sensor import Sensor
 
+Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
 STEP_MM = 0.05  #: grid of the tables
@@ -34,6 +35,7 @@ _PENETRATION_MM = 0.4  #: of the plateau into the overlay, for the part of a wal
 _PSI = 3.0
 WIDER_MM = 0.1  #: unit of the width
 CROSS_TALK = 0.12  #: of a reading that its neighbours get; twice that at the far end
+PEAK = 98.0  #: percentile of a pad's responses that counts as 1
 LOW, HIGH = 0.7, 1.1  #: exponents between which the slope is taken
 
 
@@ -72,30 +74,57 @@ class Template:
 @lru_cache(maxsize=16)
 def template_of(alphabet: Alphabet, style: SymbolStyle, sensor: Sensor) -> Template:
     """Return the template of an alphabet, as embossed and as felt by a sensor."""
-    reach = alphabet.reach * style.pitch_mm
-    extent = reach + style.stroke_mm / 2 + style.draft_mm + _blur_mm(sensor)
-    steps = math.ceil(extent / STEP_MM) + 1
-    axis = (np.arange(2 * steps + 1) - steps) * STEP_MM
-    x, y = np.meshgrid(axis, axis)
+    pad = sensor.overlay.kind == "pad"
+    felt = _pad_felt if pad else _tab_felt
+    half = style.pitch_mm / 2 if pad else _reach_mm(alphabet, style, sensor)
+    steps = math.ceil(half / STEP_MM) + (0 if pad else 1)
+    axis = np.asarray((np.arange(2 * steps + 1) - steps) * STEP_MM, np.float64)
+    usual, wide = (
+        felt(alphabet, replace(style, stroke_mm=style.stroke_mm + by), sensor, axis)
+        for by in (0.0, WIDER_MM)
+    )
     values = np.zeros((len(axis), len(axis), alphabet.order, 6), np.float32)
-    ink = []
-    for label, glyph in enumerate(alphabet.glyphs):
-        away = _distance(np.array(glyph.strokes, dtype=np.float64) * reach, x, y)
-        thin, usual, wide = (
-            _felt(_presence(away, replace(style, stroke_mm=style.stroke_mm + by)), sensor)
-            for by in (-WIDER_MM, 0.0, WIDER_MM)
-        )
-        middle = _heard(usual, CROSS_TALK, sensor)
-        ink.append(usual.sum() * STEP_MM**2 / style.pitch_mm**2)
+    for label in range(alphabet.order):
+        middle = _heard(usual[label], CROSS_TALK, sensor)
         values[..., label, 0] = psi(middle)
         values[..., label, 1] = np.gradient(values[..., label, 0], STEP_MM, axis=1)
         values[..., label, 2] = np.gradient(values[..., label, 0], STEP_MM, axis=0)
-        wider = psi(_heard(wide, CROSS_TALK, sensor)) - psi(_heard(thin, CROSS_TALK, sensor))
-        values[..., label, 3] = wider / 2
-        values[..., label, 4] = psi(_heard(usual, 2 * CROSS_TALK, sensor)) - psi(usual)
+        values[..., label, 3] = psi(_heard(wide[label], CROSS_TALK, sensor)) - psi(middle)
+        values[..., label, 4] = psi(_heard(usual[label], 2 * CROSS_TALK, sensor)) - psi(
+            usual[label]
+        )
         values[..., label, 5] = (psi(middle**HIGH) - psi(middle**LOW)) / (HIGH - LOW)
+    ink = float(usual.sum() * STEP_MM**2 / style.pitch_mm**2) / alphabet.order
     values.setflags(write=False)
-    return Template(style.pitch_mm, alphabet.order, steps * STEP_MM, values, float(np.mean(ink)))
+    return Template(style.pitch_mm, alphabet.order, steps * STEP_MM, values, ink)
+
+
+def _tab_felt(alphabet: Alphabet, style: SymbolStyle, sensor: Sensor, axis: Array) -> Array:
+    """Return the responses (order, n, n) of tabs."""
+    x, y = np.meshgrid(axis, axis)
+    reach = alphabet.reach * style.pitch_mm
+    return np.stack(
+        [
+            _felt(_presence(_distance(np.array(g.strokes, float) * reach, x, y), style), sensor)
+            for g in alphabet.glyphs
+        ]
+    )
+
+
+def _pad_felt(alphabet: Alphabet, style: SymbolStyle, sensor: Sensor, axis: Array) -> Array:
+    """Return the responses (order, n, n) of a pad, 1 where they are highest."""
+    from scipy.ndimage import uniform_filter
+
+    from recognizer.symbols.pad import pad_responses
+
+    wide = sensor.pitch_mm / 2
+    beyond = np.arange(axis[0] - wide, axis[-1] + wide + STEP_MM / 2, STEP_MM)
+    base = pad_responses(alphabet, style, sensor, beyond)
+    size = round(sensor.pitch_mm / STEP_MM)
+    tactels = np.array([uniform_filter(one, size, mode="nearest") for one in base])
+    cut = (tactels.shape[1] - len(axis)) // 2
+    tactels = tactels[:, cut : cut + len(axis), cut : cut + len(axis)]
+    return np.asarray(tactels / np.percentile(tactels, PEAK))
 
 
 def _heard(felt: NDArray[np.float64], share: float, sensor: Sensor) -> NDArray[np.float64]:
@@ -127,22 +156,18 @@ def _presence(distance: NDArray[np.float64], style: SymbolStyle) -> NDArray[np.f
     return np.clip(1 - (distance - top) / max(wall, STEP_MM), 0, 1)
 
 
-def _blur_mm(sensor: Sensor) -> float:
-    if sensor.overlay.kind == "tab":
-        return sensor.overlay.tab_diameter_mm / 2 + sensor.pitch_mm
-    return 1.5 * sensor.pitch_mm + 1.5 * sensor.overlay.height_mm
+def _reach_mm(alphabet: Alphabet, style: SymbolStyle, sensor: Sensor) -> float:
+    """Return how far from its centre a symbol is felt."""
+    strokes = alphabet.reach * style.pitch_mm + style.stroke_mm / 2 + style.draft_mm
+    return strokes + sensor.overlay.tab_diameter_mm / 2 + sensor.pitch_mm
 
 
 def _felt(presence: NDArray[np.float64], sensor: Sensor) -> NDArray[np.float64]:
     from scipy.signal import fftconvolve
 
-    if sensor.overlay.kind == "tab":
-        cover = fftconvolve(presence, _disc(sensor.overlay.tab_diameter_mm / 2), mode="same")
-        cover = np.clip(cover, 0, 1)
-        return np.asarray(cover * (1 + _BULGE * (1 - cover)))
-    cell = _box(sensor.pitch_mm)
-    spread = fftconvolve(presence, _pad_kernel(sensor.overlay.height_mm), mode="same")
-    return np.asarray(np.clip(fftconvolve(spread, cell, mode="same"), 0, None))
+    cover = fftconvolve(presence, _disc(sensor.overlay.tab_diameter_mm / 2), mode="same")
+    cover = np.clip(cover, 0, 1)
+    return np.asarray(cover * (1 + _BULGE * (1 - cover)))
 
 
 def _disc(radius: float) -> NDArray[np.float64]:
@@ -159,22 +184,3 @@ def _ring(radius: float) -> NDArray[np.float64]:
     x, y = np.meshgrid(axis, axis)
     ring = np.clip(1 - np.abs(np.hypot(x, y) - radius) / STEP_MM, 0, 1)
     return np.asarray(ring / ring.sum())
-
-
-def _box(width: float) -> NDArray[np.float64]:
-    steps = math.ceil(width / 2 / STEP_MM)
-    axis = np.clip(
-        (width / 2 - np.abs(np.arange(-steps, steps + 1) * STEP_MM)) / STEP_MM + 0.5, 0, 1
-    )
-    box = np.outer(axis, axis)
-    return np.asarray(box / box.sum())
-
-
-def _pad_kernel(thickness: float) -> NDArray[np.float64]:
-    """Return how a point load spreads on its way to the base of a bonded incompressible layer."""
-    spread = 0.55 * thickness
-    steps = math.ceil(3 * spread / STEP_MM)
-    axis = np.arange(-steps, steps + 1) * STEP_MM
-    x, y = np.meshgrid(axis, axis)
-    kernel = np.exp(-(x * x + y * y) / (2 * spread * spread))
-    return np.asarray(kernel / kernel.sum())

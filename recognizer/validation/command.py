@@ -154,7 +154,7 @@ def validate(
     study: Annotated[
         int | None, typer.Option(min=0, show_default=False,
                                  help="Touches of each reader in the picture of error against run "
-                                      "time; a hundredth of --touches. 0: no such pictures."),
+                                      "time; a twentieth of --touches, 200 at most. 0: none."),
     ] = None,
     shard: Annotated[
         int | None, typer.Option(min=1, show_default=False,

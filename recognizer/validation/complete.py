@@ -55,7 +55,7 @@ from recognizer.validation.workers import workers_of
 TRIALS, RESULTS, TIMES_FILE = "trials.parquet", "results.json", "times.json"
 REPORT, PROVENANCE = "report.html", "provenance.json"
 DEFAULT_TOUCHES = 1000
-STUDY_SHARE, STUDY = 0.01, (10, 200)  #: touches of a reader of the study: share, least and most
+STUDY_SHARE, STUDY = 0.05, (10, 200)  #: touches of a reader of the study: share, least and most
 
 
 @dataclass(frozen=True, slots=True)

@@ -166,7 +166,8 @@ def test_dry_run_tells_what_will_be_made_and_writes_nothing(tmp_path):
         (o.name, o.symbols, o.places, o.parts) for o in done.objects
     ]
     assert dry.used_cells == done.used_cells
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"A", "B"}
+    of_set = {"spec-packing.csv", "spec-overview.pdf"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"A", "B", *of_set}
 
 
 def test_verified_files_are_kept_and_known(tmp_path):

@@ -19,7 +19,7 @@ FLAGS = (
     "--no-first-run", "--disable-background-networking", "--disable-component-update",
     "--disable-sync",
 )  # fmt: skip
-PATIENCE_S = 90.0  #: for anything, on a busy machine
+PATIENCE_S = 30.0  #: for anything, on a busy machine
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +106,7 @@ def test_a_click_touches_there_and_the_face_is_lit(page):
     asked = [float(page.locator(f"#touch-{axis}").input_value()) for axis in "xy"]
     read = re.search(r"x (-?[\d.]+), y (-?[\d.]+) mm", page.locator("#pose").inner_text())
     assert np.allclose(asked, [float(value) for value in read.groups()], atol=0.3)
-    assert "needed" in page.locator("#margin-text").inner_text()
+    assert re.search("needed|no other", page.locator("#margin-text").inner_text())
     expect(page.get_by_test_id("mosaic-text")).to_contain_text(f"Cube {face}")
     assert "Cube" in page.locator("#map-text").inner_text()
 
@@ -177,11 +177,16 @@ def test_record_and_replay(page, lab):
     until(page, f"bench.answers > {answers}")
     assert page.get_by_test_id("answer").inner_text().startswith(said)
     expect(page.get_by_test_id("play")).to_have_text("Play", timeout=PATIENCE_S * 1e3)
-    before = heat(page)
-    page.get_by_test_id("seek").fill("400")
-    expect(page.get_by_test_id("place")).not_to_have_text(re.compile(r"^0\.0 "))
-    until(page, "bench.contact === true")
-    assert heat(page) != before
+    until(page, "bench.contact === false")
+    strength = httpx.get(f"{page.url}api/timeline").json()["strength"]
+    held = np.flatnonzero(np.array(strength) > 0.8)
+    place = 1000 * (held[len(held) // 2] + 0.5) / len(strength)
+    page.get_by_test_id("seek").fill(f"{place:.0f}")
+    until(page, "bench.contact === true")  # shown although it pauses
+    expect(page.get_by_test_id("play")).to_have_text("Play")
+    told = float(page.get_by_test_id("place").inner_text().split()[0])
+    whole = float(page.get_by_test_id("place").inner_text().split()[2])
+    assert told == pytest.approx(place / 1000 * whole, abs=0.2)
     page.get_by_test_id("leave").click()
     expect(page.get_by_test_id("state")).to_contain_text("probe is there", timeout=PATIENCE_S * 1e3)
 

@@ -49,7 +49,10 @@ def bend_problem(
     gap = share * min(gap_inside_mm(shape) for shape in tiers)
     least = INSIDE_SHARE * printer.gap_min_mm
     if gap < least * (1 - 1e-9):
-        return f"its bend narrows gaps to {gap:.2g} mm, {printer.name} needs {least:g} mm"
+        return (
+            f"its bend narrows gaps in a symbol to {gap:.3g} mm, {printer.name} needs {least:g} "
+            "mm; a larger pitch helps"
+        )
     return ""
 
 

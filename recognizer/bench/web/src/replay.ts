@@ -15,11 +15,7 @@ export class Replay {
   constructor() {
     element("play").addEventListener("click", () => void post("replay", { playing: !this.status?.feed.playing }));
     element("speed").addEventListener("change", (event) => void post("replay", { speed: Number((event.target as HTMLSelectElement).value) }));
-    this.seek.addEventListener("input", () => {
-      this.held = true;
-      this.go();
-    });
-    this.seek.addEventListener("change", () => { this.held = false; });
+    this.seek.addEventListener("input", () => this.go());
     new ResizeObserver(() => this.paint()).observe(this.canvas);
   }
 
@@ -49,11 +45,13 @@ export class Replay {
 
   private asked = 0;
 
-  /** Go where the slider is, at most ten times a second. */
+  /** Go where the slider is, at most ten times a second; meanwhile it stays there. */
   private go(): void {
+    const at_s = (Number(this.seek.value) / 1000) * (this.status?.feed.seconds ?? 0);
+    this.held = true;
     clearTimeout(this.asked);
     this.asked = setTimeout(() => {
-      void post("replay", { at_s: (Number(this.seek.value) / 1000) * (this.status?.feed.seconds ?? 0) });
+      void post("replay", { at_s }).finally(() => { this.held = false; });
     }, 100);
   }
 

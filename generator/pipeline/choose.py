@@ -1,0 +1,171 @@
+"""`profile: auto`: the array that the objects need.
+
+Of arrays with the same symbols the smallest is taken in which the objects fit beside what the
+database holds: `one-touch`, `large`, and its next sizes. Objects that are registered keep the array
+they are on. Faces that stay blank and would show a place with the finer symbols of `fine` make it
+the choice where the spec names a printer for them, and a note where it does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from sqlalchemy import Connection
+
+from generator.array import array_from
+from generator.array.profiles import PROFILES, Profile, enlarged
+from generator.database.cells import find_array, occupied
+from generator.database.open import database_exists, open_database
+from generator.database.read import find_object
+from generator.database.transaction import reading
+from generator.errors import ArrayError, GeneratorError, LayoutError
+from generator.layout.placement import Layout
+from generator.pipeline.place import NO_CELLS, laid_out
+from generator.pipeline.plan import Plan, planned
+from generator.polyhedron import Polyhedron
+from generator.spec import Located
+from generator.spec.profile import AUTO
+from generator.spec.script import with_profile
+
+FULL = 0.8  #: share of an array that faces of all shapes fill without a search
+LARGER = 4  #: sizes tried beyond `large`
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """The specs with their array, and what the person should know about it."""
+
+    specs: tuple[Located, ...]
+    notes: tuple[str, ...] = ()
+
+
+def chosen(specs: Sequence[Located], url: str, solid: Polyhedron | None = None) -> Choice:
+    """Return the specs with a profile in place of `auto`.
+
+    Parameters
+    ----------
+    specs
+        Of one run; where one of them names its profile, all others follow it.
+    url
+        Of the database, which need not be there yet.
+    solid
+        Shape of the one object, where it does not come from its spec.
+
+    Raises
+    ------
+    GeneratorError
+        No array is large enough, or an object cannot be made at all.
+    """
+    if not any(one.spec.profile == AUTO for one in specs):
+        return Choice(tuple(specs))
+    named = {one.spec.profile for one in specs} - {AUTO}
+    if named:
+        name = named.pop()
+        return Choice(tuple(_with(one, PROFILES[name]) for one in specs))
+    if not database_exists(url):
+        return _chosen(specs, None, solid)
+    with reading(open_database(url, writable=False)) as connection:
+        return _chosen(specs, connection, solid)
+
+
+def _chosen(
+    specs: Sequence[Located], connection: Connection | None, solid: Polyhedron | None
+) -> Choice:
+    if connection is not None:
+        for one in specs:
+            known = find_object(connection, one.spec.name)
+            for candidate in _candidates() if known else ():
+                if known and known.profile == candidate.name:
+                    return Choice(tuple(_with(each, candidate) for each in specs))
+    found: tuple[tuple[Located, ...], int] | None = None
+    for candidate in _candidates():
+        tried = tuple(_with(one, candidate) for one in specs)
+        needed, blank = _needs(tried, solid)
+        if needed is not None and _fits(tried, needed, connection):
+            found = (tried, blank)
+            break
+    if found is None:
+        raise LayoutError(
+            "the objects fit no array that is made here", fix="make them in several databases"
+        )
+    tried, blank = found
+    if not blank:
+        return Choice(tried)
+    return _finer(tried, blank, connection, solid)
+
+
+def _finer(
+    specs: tuple[Located, ...],
+    blank: int,
+    connection: Connection | None,
+    solid: Polyhedron | None,
+) -> Choice:
+    """Take the finer symbols where they show faces that stay blank otherwise."""
+    try:
+        finer = tuple(_with(one, PROFILES["fine"]) for one in specs)
+        needed, left = _needs(finer, solid)
+    except GeneratorError:  # the printer that the spec names cannot make them
+        return Choice(specs)
+    if needed is None or left >= blank or not _fits(finer, needed, connection):
+        return Choice(specs)
+    if all(_names_printer(one) for one in specs):
+        return Choice(finer)
+    faces = f"{blank - left} of the {blank} blank faces"
+    return Choice(specs, (f"profile fine, for resin printers, would show places on {faces}",))
+
+
+def _candidates() -> Iterator[Profile]:
+    """Yield the arrays from the smallest on."""
+    yield PROFILES["one-touch"]
+    larger = PROFILES["large"]
+    yield larger
+    for _ in range(LARGER):
+        try:
+            larger = enlarged(larger)
+        except ArrayError:
+            return
+        rows, columns = larger.encoding["rows"], larger.encoding["columns"]
+        yield replace(larger, name=f"large-{rows}x{columns}")
+
+
+def _with(located: Located, profile: Profile) -> Located:
+    defaults = "large" if profile.name.startswith("large") else profile.name
+    return with_profile(located, profile.name, defaults, profile.array().definition())
+
+
+def _needs(specs: Sequence[Located], solid: Polyhedron | None) -> tuple[int | None, int]:
+    """Return how many cells the objects need, None if one does not fit, and their blank faces."""
+    known: dict[str, tuple[int, int]] = {}
+    needed = blank = 0
+    for one in specs:
+        key = repr(one.spec.meaning)
+        if key not in known:
+            plan = planned(one, solid)
+            try:
+                layout = laid_out(plan, NO_CELLS)
+            except LayoutError as error:
+                if "is full" not in error.cause:
+                    raise
+                return None, 0
+            known[key] = _counts(plan, layout)
+        needed, blank = needed + known[key][0], blank + known[key][1]
+    return needed, blank
+
+
+def _counts(plan: Plan, layout: Layout) -> tuple[int, int]:
+    cells = sum(len(face.labels) for face in layout.faces)
+    return cells, len(set(layout.blank_faces) - plan.blank_faces)
+
+
+def _fits(specs: Sequence[Located], needed: int, connection: Connection | None) -> bool:
+    array = array_from(specs[0].spec.encoding)
+    taken = 0
+    if connection is not None:
+        taken = len(occupied(connection, find_array(connection, array))[0])
+    return needed + taken <= FULL * array.rows * array.columns
+
+
+def _names_printer(located: Located) -> bool:
+    written = located.tree.value.get("print")
+    return isinstance(written, dict) and written.get("printer") is not None

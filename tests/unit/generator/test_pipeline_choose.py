@@ -1,0 +1,85 @@
+"""`profile: auto`, and what is told of each face."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from generator.pipeline import encode
+from generator.spec import SpecError, read_specs
+
+
+def dry(folder: Path, text: str, **options):
+    file = folder / "spec.yaml"
+    file.write_text(text)
+    url = f"sqlite:///{folder / 'lab.db'}"
+    return encode(read_specs([file]), database=url, folder=folder / "out",
+                  **({"dry_run": True} | options))  # fmt: skip
+
+
+def test_auto_takes_the_smallest_array_that_holds_the_objects(tmp_path):
+    few = dry(tmp_path, "name: A\nprofile: auto\nshape: {cube: 60 mm}\n")
+    assert (few.rows, few.columns) == (63, 65)
+    many = dry(tmp_path, "name: A\nprofile: auto\nshape: {cube: 60 mm}\ncopies: 10\n")
+    assert (many.rows, many.columns) == (255, 257)
+
+
+def test_auto_goes_on_where_the_database_is_full(tmp_path):
+    text = "name: {}\nprofile: auto\nshape: {{cube: 140 mm}}\n"
+    first = dry(tmp_path, text.format("A"), dry_run=False, formats=())
+    assert (first.rows, first.columns) == (63, 65)
+    second = dry(tmp_path, text.format("B"))
+    assert (second.rows, second.columns) == (255, 257)
+    again = dry(tmp_path, text.format("A"))
+    assert again.objects[0].reused
+    assert (again.rows, again.columns) == (63, 65)
+
+
+def test_auto_takes_finer_symbols_for_a_printer_that_makes_them(tmp_path):
+    text = "name: A\nprofile: auto\nshape: {box: [60, 60, 13]}\n"
+    (made,) = dry(tmp_path, text).objects
+    assert any("profile fine, for resin printers, would show places on 4 of the 4 blank" in w
+               for w in made.warnings)  # fmt: skip
+    finer = dry(tmp_path, text + "print: {printer: resin}\n")
+    assert (finer.rows, finer.columns) == (255, 257)
+    assert all(face.places for face in finer.objects[0].face_reports)
+
+
+def test_auto_follows_a_profile_that_the_set_names(tmp_path):
+    text = "objects:\n- {name: A, shape: {cube: 60}, profile: large}\n"
+    with pytest.raises(SpecError, match="on another array"):
+        dry(tmp_path, text + "- {name: B, shape: {cube: 60}, profile: auto}\n")
+    text = text.replace("large", "one-touch") + "- {name: B, shape: {cube: 60}, profile: auto}\n"
+    assert dry(tmp_path, text).rows == 63
+
+
+def test_each_face_is_told_with_the_least_size_that_shows_a_place(tmp_path):
+    (made,) = dry(tmp_path, "name: A\nshape: {cube: 60 mm}\n").objects
+    assert [face.name for face in made.face_reports] == [f"F{k}" for k in range(1, 7)]
+    least = made.face_reports[0].smallest_mm[0]
+    assert 18 < least < 24
+    box = "name: A\nshape: {{box: [60, {0:.2f}, {0:.2f}]}}\nlayout: faces\n"
+    (enough,) = dry(tmp_path, box.format(least + 0.5)).objects
+    assert enough.face_reports[2].places > 0
+    (short,) = dry(tmp_path, box.format(least - 1.5)).objects
+    square = [face for face in short.face_reports if max(face.size_mm) < 59]
+    assert square
+    assert not any(face.places for face in square)
+
+
+def test_a_round_face_is_told_as_one(tmp_path):
+    text = "name: A\nshape: {cylinder: {diameter: 40 mm, height: 30 mm}}\n"
+    (made,) = dry(tmp_path, text).objects
+    assert made.faces == 3
+    side, top = made.face_reports
+    assert (side.name, side.kind, top.kind) == ("F2", "cylinder", "plane")
+    assert side.size_mm == pytest.approx((125.66, 30.0), abs=0.01)
+    assert side.smallest_mm[1] < 30
+    assert "F1 stays blank" in made.warnings[0]
+
+
+def test_panels_of_a_round_object_are_refused_where_they_are_asked_for(tmp_path):
+    text = "name: A\nshape: {cylinder: {diameter: 40 mm, height: 30 mm}}\nprint: {parts: panels}\n"
+    with pytest.raises(SpecError, match=r":3:16: error: a round face cannot be printed as a flat"):
+        dry(tmp_path, text)
