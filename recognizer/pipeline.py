@@ -97,26 +97,34 @@ class Reading:
 
 def recognise(reader: Reader, signal: Signal, seq: int = 0) -> Recognition:
     """Return what one touch says."""
+    return explained(reader, signal, seq)[0]
+
+
+def explained(reader: Reader, signal: Signal, seq: int = 0) -> tuple[Recognition, Reading | None]:
+    """Return what one touch says, and the reading that was judged; None where there is none."""
     if not signal.contact:
-        return refused(seq, NO_CONTACT)
-    answer = _answer(reader, _readings(reader, signal, reader.settings), seq)
+        return refused(seq, NO_CONTACT), None
+    found = readings(reader, signal, reader.settings)
+    answer = _answer(reader, found, seq)
     if not answer:  # spend more only where it is needed
-        again = _answer(reader, _readings(reader, signal, reader.thorough), seq)
-        answer = again if again else answer
-    return answer
+        again = readings(reader, signal, reader.thorough)
+        second = _answer(reader, again, seq)
+        if second:
+            answer, found = second, again
+    return answer, found[0] if found else None
 
 
-def _readings(reader: Reader, signal: Signal, settings: Settings) -> list[Reading]:
+def readings(reader: Reader, signal: Signal, settings: Settings) -> list[Reading]:
     """Return the verified places over all encodings, best first."""
-    readings: list[Reading] = []
+    found: list[Reading] = []
     for encoding, template, bank in reader.prepared:
         pressing = pressing_of(reader.sensor, encoding.style.height_mm)
         image = image_of(
             reader.sensor, signal.forces, signal.trust, pressing, newtons=signal.newtons
         )
-        found = fits(image, template, bank, settings)
-        readings += _verified(reader, image, encoding, template, found)
-    return sorted(readings, key=lambda reading: -reading.score)
+        seen = fits(image, template, bank, settings)
+        found += _verified(reader, image, encoding, template, seen)
+    return sorted(found, key=lambda reading: -reading.score)
 
 
 def _verified(
@@ -149,33 +157,33 @@ def _verified(
         shown=shown,
     )
     again = scored(image, template, fitted, reader.settings)
-    readings = []
+    verified = []
     for place in candidates:
         # a place is as likely as under the best of the fits that began where its own did: what
         # one of them missed of gain and sharpness is no word against the symbols
         fair = [again[b] for b, other in enumerate(candidates) if other.fit == place.fit]
         scores = [place_scores(encoding, fit, place) for fit in fair]
         best = int(np.argmax(scores))
-        readings.append(Reading(image, template, encoding, place, fair[best], scores[best]))
-    return readings
+        verified.append(Reading(image, template, encoding, place, fair[best], scores[best]))
+    return verified
 
 
-def _answer(reader: Reader, readings: list[Reading], seq: int) -> Recognition:
-    if not readings:
+def _answer(reader: Reader, found: list[Reading], seq: int) -> Recognition:
+    if not found:
         return refused(seq, TOO_FEW)
-    best = readings[0]
+    best = found[0]
     index = _index(best)
-    other = next((r for r in readings[1:] if not _same(best, r)), None)
+    other = next((r for r in found[1:] if not _same(best, r)), None)
     margin = math.inf if other is None else best.score - other.score
     runner_up = None
     if other is not None:
         face = other.encoding.face(other.place.face)
         runner_up = RunnerUp(face.object, face.face, _index(other))
     limits = reader.thresholds
-    found = best.support()
-    if not found.holds(limits):
+    speaks = best.support()
+    if not speaks.holds(limits):
         return refused(seq, NOT_ENCODED, margin=margin, runner_up=runner_up)
-    if found.cells < limits.cells:
+    if speaks.cells < limits.cells:
         return refused(seq, TOO_FEW, margin=margin, runner_up=runner_up)
     if margin < limits.margin:
         return refused(seq, AMBIGUOUS, margin=margin, runner_up=runner_up)

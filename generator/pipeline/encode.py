@@ -135,13 +135,18 @@ def _rehearsed(
 ) -> tuple[list[Made], int]:
     """Return what `encode` would make: each object beside the ones before it."""
     if not database_exists(url):
-        return _rehearse(None, plans, replace, progress)
+        return _rehearse(None, plans, replace, progress, reports=True)
     with reading(open_database(url, writable=False)) as connection:
-        return _rehearse(connection, plans, replace, progress)
+        return _rehearse(connection, plans, replace, progress, reports=True)
 
 
 def _rehearse(
-    connection: Connection | None, plans: Sequence[Plan], replace: bool, progress: Progress
+    connection: Connection | None,
+    plans: Sequence[Plan],
+    replace: bool,
+    progress: Progress,
+    *,
+    reports: bool = False,
 ) -> tuple[list[Made], int]:
     made: list[Made] = []
     new: list[Layout] = []
@@ -153,7 +158,9 @@ def _rehearse(
         step(f"building {plan.spec.name}", 0.5)
         parts, warnings = parts_of(plan, place.layout)
         one = made_of(plan, place.layout, len(parts), warnings, (), reused=place.reused)
-        made.append(dataclasses.replace(one, face_reports=face_reports(plan, place.layout)))
+        if reports:
+            one = dataclasses.replace(one, face_reports=face_reports(plan, place.layout))
+        made.append(one)
         if not place.reused:
             new.append(place.layout)
         used = place.taken + made[-1].symbols

@@ -15,7 +15,6 @@ from sqlalchemy import Connection
 from generator.database.cells import find_array, occupied
 from generator.database.read import find_object, read_layout
 from generator.database.register import require_same_spec
-from generator.errors import LayoutError
 from generator.layout.layout import lay_out
 from generator.layout.placement import Layout
 from generator.pipeline.blame import blaming
@@ -102,9 +101,5 @@ def laid_out(plan: Plan, others: Cells) -> Layout:
 
     layout = attempt(allow_blank_faces=True)
     if len(layout.blank_faces) == len(plan.polyhedron.faces):
-        layout = attempt(allow_blank_faces=False)  # says what to change
-    if len(layout.blank_faces) == len(plan.polyhedron.faces):
-        why = "; ".join((*plan.polyhedron.notes, *plan.notes))
-        fix = "give it a planar face, or a cylinder or cone face between two circles"
-        raise LayoutError(f"no face of the object carries symbols: {why}", fix=fix)
+        return attempt(allow_blank_faces=False)  # says what to change
     return layout

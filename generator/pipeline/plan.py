@@ -93,7 +93,8 @@ def planned(located: Located, solid: Polyhedron | None = None) -> Plan:
         check_printable(alphabet, spec.style, printer)
         shapes = outlines(alphabet, spec.style)
         half = footprint_half_mm(alphabet, spec.style)
-    faces = round_faces(polyhedron, shapes, spec, printer)
+    with blaming(located, "shape"):
+        faces = round_faces(polyhedron, shapes, spec, printer)
     clearances = _clearances(polyhedron, spec, printer, faces)
     return Plan(
         located,

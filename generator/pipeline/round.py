@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from generator.alphabet.outline import Tiers
-from generator.errors import SolidError
+from generator.errors import LayoutError, SolidError
 from generator.pipeline.blame import blaming
 from generator.polyhedron import Polyhedron
 from generator.polyhedron.development import Development, development
@@ -53,7 +53,13 @@ def made_whole(located: Located, polyhedron: Polyhedron) -> Located:
 def round_faces(
     polyhedron: Polyhedron, tiers: tuple[Tiers, ...], spec: ObjectSpec, printer: Printer
 ) -> RoundFaces:
-    """Unroll the round faces; one whose bend the printer cannot follow stays blank."""
+    """Unroll the round faces; one whose bend the printer cannot follow stays blank.
+
+    Raises
+    ------
+    LayoutError
+        No face is left for symbols.
+    """
     developments: dict[int, Development] = {}
     blank = set(polyhedron.blank)
     notes: list[str] = []
@@ -70,4 +76,8 @@ def round_faces(
     if polyhedron.kind in STANDING:
         blank.add(0)
         notes.append(f"{polyhedron.faces[0].name} stays blank: the part is printed standing on it")
+    if len(blank - set(developments)) == len(polyhedron.faces):
+        why = "; ".join((*polyhedron.notes, *notes))
+        fix = "give it a planar face, or a cylinder or cone face between two circles"
+        raise LayoutError(f"no face of the object carries symbols: {why}", fix=fix)
     return RoundFaces(developments, frozenset(blank), tuple(notes))

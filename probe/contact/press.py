@@ -71,6 +71,13 @@ def press(
         equilibrium.
     """
     level = level_for(sensor, accuracy)
+    place = (touch.x_mm, touch.y_mm, touch.theta_rad, touch.tilt_x_rad, touch.tilt_y_rad)
+    if not (all(map(math.isfinite, place)) and 0 <= touch.force_n < math.inf):
+        raise ContactError(
+            f"a touch at x {touch.x_mm:g} mm, y {touch.y_mm:g} mm, turned by {touch.theta_rad:g} "
+            f"rad, tilted by {touch.tilt_x_rad:g}, {touch.tilt_y_rad:g} rad, {touch.force_n:g} N",
+            fix="give finite numbers, and a force of 0 or more",
+        )
     return _MODELS[level](surface, sensor, touch)
 
 

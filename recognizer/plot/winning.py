@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from recognizer.lab import EncodedFace, Encoding
 from recognizer.locate import Place
-from recognizer.pipeline import Reader, Reading, _answer, _readings
+from recognizer.pipeline import Reader, explained
 from recognizer.signal import Signal
 
 Array = NDArray[np.float64]
@@ -53,7 +53,7 @@ class Winning:
 
 def winning(reader: Reader, signal: Signal) -> Winning | None:
     """Return the best reading of a touch; None where no symbol is seen."""
-    best = _best(reader, signal)
+    _, best = explained(reader, signal)
     if best is None:
         return None
     encoding, place, fit = best.encoding, best.place, best.fit
@@ -73,14 +73,3 @@ def winning(reader: Reader, signal: Signal) -> Winning | None:
         registered=registered,
         felt=fit.scores[np.arange(len(registered)), registered] > -CLEARLY,
     )
-
-
-def _best(reader: Reader, signal: Signal) -> Reading | None:
-    """Return the reading that `recognise` judges."""
-    if not signal.contact:
-        return None
-    readings = _readings(reader, signal, reader.settings)
-    if not _answer(reader, readings, 0):
-        again = _readings(reader, signal, reader.thorough)
-        readings = again if _answer(reader, again, 0) else readings
-    return readings[0] if readings else None

@@ -102,7 +102,6 @@ def extended(scan: Scan, touch: PlacedTouch) -> Scan:
     touches = (*scan.touches, replace(touch, decoded=None))
     finest = min(encoding.style.pitch_mm for encoding in reader.lab.encodings)
     stands = stands_of(reader, touches, scan.stands, limits.loose * finest)
-    trusts = [float(each.signal.trust.sum()) for each in touches]
     shown, lattices, found, images = [], [], [], []
     for k, (encoding, template, bank) in enumerate(reader.prepared):
         image = _image(reader, touch, encoding.style.height_mm)
@@ -113,7 +112,7 @@ def extended(scan: Scan, touch: PlacedTouch) -> Scan:
         )
         each = (*scan.views[k], tuple(v for v in new if v.fit.noise <= limits.noise))
         sums = _composites(
-            views_of(each, trusts), stands, scan.lattices[k], encoding.style.pitch_mm, limits
+            views_of(each), stands, scan.lattices[k], encoding.style.pitch_mm, limits
         )
         shown.append(each)
         lattices.append(tuple(item.agreement.lattice for item in sums))

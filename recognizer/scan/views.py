@@ -150,18 +150,12 @@ def _near(
     return scored(image, template, lattices, settings)
 
 
-def views_of(found: Sequence[tuple[View, ...]], trusts: Sequence[float]) -> Views:
-    """Return the views of touches, from how many tactels they have.
-
-    A fit's value does not say how likely its noise is; here that is put in, so that fits and
-    encodings, each with a noise of its own, can be compared. Fits that do not say where they
-    lie are left out.
-    """
+def views_of(found: Sequence[tuple[View, ...]]) -> Views:
+    """Return the views of touches. Fits that do not say where they lie are left out."""
     kept = [tuple(view for view in each if tells_place(view.fit.covariance)) for each in found]
     every = tuple(view.fit for each in kept for view in each)
     touch = np.repeat(np.arange(len(kept)), [len(each) for each in kept])
     values = np.array([fit.value for fit in every])
-    values -= np.array(trusts)[touch] * np.log([fit.noise for fit in every])
     best = np.full(len(kept), -np.inf)
     np.maximum.at(best, touch, values)
     return Views(

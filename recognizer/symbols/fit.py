@@ -36,6 +36,7 @@ Array = NDArray[np.float64]
 
 SAME_SHIFT = 0.08  #: pitches by which two lattices that are one may differ
 SAME_TURN = 0.02  #: half turns
+UNSEEN = 1e-8  #: least eigenvalue of a normal matrix of unit diagonal
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,11 +190,18 @@ def scored(
                 scores=scores - most[:, None],
                 seen=np.bincount(dense, felt.press[b] * felt.trust, len(names)).astype(np.float64),
                 noise=noise,
-                value=float(most.sum() + level[b]),
-                covariance=scale[b] * np.linalg.pinv(lattices.normal[b])[:3, :3],
+                value=float(most.sum() + level[b] - felt.trust.sum() * math.log(noise)),
+                covariance=scale[b] * _inverse(lattices.normal[b])[:3, :3],
             )
         )
     return tuple(found)
+
+
+def _inverse(normal: Array) -> Array:
+    """Return the inverse of a normal matrix; wide, not narrow, in what the image does not show."""
+    unit = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-12))
+    sizes, axes = np.linalg.eigh(normal * np.outer(unit, unit))
+    return np.asarray((axes / np.maximum(sizes, UNSEEN)) @ axes.T * np.outer(unit, unit))
 
 
 def _away(felt: Felt, tables: Floats, cells: NDArray[np.int64]) -> Array:

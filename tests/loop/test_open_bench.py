@@ -70,7 +70,9 @@ def until(page, wanted):
 
 
 def rest(page):
-    """Wait until nothing is touched any more."""
+    """Wait until nothing is touched any more, and the film has forgotten it."""
+    until(page, "bench.contact === false")
+    page.wait_for_timeout(500)
     until(page, "bench.contact === false")
 
 

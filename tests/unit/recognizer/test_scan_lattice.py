@@ -62,7 +62,7 @@ def a_scan(number=6, sigma_mm=0.3, seed=1):
 
 
 def views_from(fits):
-    return views_of([tuple(View(f, led=False) for f in each) for each in fits], [256.0] * len(fits))
+    return views_of([tuple(View(f, led=False) for f in each) for each in fits])
 
 
 def test_touches_on_one_lattice_agree_and_their_cells_meet():
