@@ -8,13 +8,14 @@ the choice where the spec names a printer for them, and a note where it does not
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from sqlalchemy import Connection
 
 from generator.array import array_from
-from generator.array.profiles import PROFILES, Profile, enlarged
+from generator.array.profiles import DEFAULT_PROFILE, PROFILES, Profile, enlarged
 from generator.database.cells import find_array, occupied
 from generator.database.open import database_exists, open_database
 from generator.database.read import find_object
@@ -59,10 +60,11 @@ def chosen(specs: Sequence[Located], url: str, solid: Polyhedron | None = None) 
     """
     if not any(one.spec.profile == AUTO for one in specs):
         return Choice(tuple(specs))
-    named = {one.spec.profile for one in specs} - {AUTO}
-    if named:
-        name = named.pop()
-        return Choice(tuple(_with(one, PROFILES[name]) for one in specs))
+    named = [one.spec for one in specs if one.spec.profile != AUTO]
+    if named:  # on the same array, or the specs would have been refused
+        profile, encoding = named[0].profile, named[0].encoding
+        defaults = profile if profile in PROFILES else DEFAULT_PROFILE
+        return Choice(tuple(_followed(one, profile, defaults, encoding) for one in specs))
     if not database_exists(url):
         return _chosen(specs, None, solid)
     with reading(open_database(url, writable=False)) as connection:
@@ -132,6 +134,15 @@ def _candidates() -> Iterator[Profile]:
 def _with(located: Located, profile: Profile) -> Located:
     defaults = "large" if profile.name.startswith("large") else profile.name
     return with_profile(located, profile.name, defaults, profile.array().definition())
+
+
+def _followed(
+    located: Located, profile: str, defaults: str, encoding: Mapping[str, Any]
+) -> Located:
+    """Return a spec with the array of another one, if its own is to be chosen."""
+    if located.spec.profile != AUTO:
+        return located
+    return with_profile(located, profile, defaults, encoding)
 
 
 def _needs(specs: Sequence[Located], solid: Polyhedron | None) -> tuple[int | None, int]:

@@ -83,10 +83,10 @@ def with_profile(
         The spec's own settings do not go with those of the profile.
     """
     value = {key: inner for key, inner in located.tree.value.items() if key != "shape"}
-    read = NamedSettings.model_validate({**value, "profile": defaults})
-    specs = resolved(read, located.tree, located.spec.shape)
-    same = next(spec for spec in specs if spec.name == located.spec.name)
-    return replace(located, spec=replace(same, profile=name, encoding=encoding))
+    read = NamedSettings.model_validate({**value, "profile": defaults, "copies": 1})
+    (spec,) = resolved(read, located.tree, located.spec.shape)
+    own = replace(spec, name=located.spec.name, profile=name, encoding=encoding)  # of a copy
+    return replace(located, spec=own)
 
 
 def _plain(value: Any) -> Any:

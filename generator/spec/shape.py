@@ -137,7 +137,8 @@ class Shape(Block):
     cone: Cone | None = None
     polyhedron: VerticesAndFaces | None = None
     file: PathText | None = None
-    """A model with planar faces: a .step, .stl or .obj file, relative to the spec."""
+    """A model, relative to the spec: a .stl or .obj file with planar faces, or a .step file, whose
+    cylinder and cone faces are unrolled; other round faces stay blank."""
 
 
 KINDS = tuple(Shape.model_fields)

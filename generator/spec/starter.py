@@ -54,7 +54,7 @@ def starter(shape: str) -> str:
     folder = name.lower().replace(" ", "-")
     line = _POLYHEDRON if shape == "polyhedron" else f"shape: {EXAMPLES[shape]}"
     if shape == "file":
-        line += "    # .step, .stl or .obj with planar faces, relative to this file"
+        line += "    # .step, .stl or .obj, relative to this file"
     return _TEMPLATE.format(name=name, file=f"{folder}.yaml", shape=line, folder=folder)
 
 

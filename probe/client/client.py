@@ -121,7 +121,7 @@ class Client:
             with self._ready:
                 self._ready.wait_for(lambda: self._frames or self._ended, timeout_s)
                 if not self._frames:
-                    if self._failure is not None:
+                    if self._ended and self._failure is not None:
                         raise self._failure
                     return
                 frame = self._frames.popleft()
@@ -288,7 +288,7 @@ class Client:
         self._port.close()
 
     def _greeting(self) -> bytes:
-        return Command.IDENT + self._sensor + self._bits + Command.START
+        return self._sensor + self._bits + Command.IDENT + Command.START
 
     def _tell(self, notice: str) -> None:
         with self._ready:

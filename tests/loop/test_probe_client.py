@@ -198,7 +198,7 @@ def test_a_silent_device_is_told_and_gets_its_commands(line):
         with pytest.raises(PortError, match=r"silent for 1.2 s"):
             until(client, lambda f: True)
         # Greeted at once and after each half second of silence; stopped at the end.
-        assert os.read(master, 100) == b"i3s" * 3 + b"x"
+        assert os.read(master, 100) == b"3is" * 3 + b"x"
 
 
 def test_the_avr_stands_behind_a_url():

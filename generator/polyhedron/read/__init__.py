@@ -1,4 +1,4 @@
-"""Polyhedra from files: STL, OBJ and STEP with planar faces.
+"""Polyhedra from files: STL and OBJ with planar faces, STEP with round ones, too.
 
 A mesh file holds triangles or polygons in mm; coplanar ones that hang together become one
 face with its holes. A STEP file's own unit is honoured. One body per file.
@@ -24,7 +24,7 @@ READERS = (*MESHES, ".step", ".stp")
 
 
 def read_shape(path: str | Path) -> Polyhedron:
-    """Read one solid with planar faces from a file.
+    """Read one solid from a file.
 
     Parameters
     ----------
@@ -35,13 +35,14 @@ def read_shape(path: str | Path) -> Polyhedron:
     -------
     Polyhedron
         Of kind `file`; its faces F1, F2, ... are in the order in which the file first shows
-        them, coordinates as in the file, mm.
+        them, coordinates as in the file, mm. Cylinder and cone faces of STEP are runs of facets,
+        its `surfaces`; other round faces are facets that stay `blank`.
 
     Raises
     ------
     ShapeError
         With file, place, cause and way out: no such file, too large, truncated, not closed,
-        several bodies, curved surfaces.
+        several bodies, a mesh with curved surfaces.
     """
     file = Path(path)
     suffix = file.suffix.lower()

@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 from generator.pipeline import encode
+from generator.pipeline.choose import chosen
+from generator.pipeline.plan import planned
 from generator.spec import SpecError, read_specs
 
 
@@ -18,32 +20,45 @@ def dry(folder: Path, text: str, **options):
                   **({"dry_run": True} | options))  # fmt: skip
 
 
+def choice(folder: Path, text: str):
+    file = folder / "spec.yaml"
+    file.write_text(text)
+    return chosen(read_specs([file]), f"sqlite:///{folder / 'lab.db'}")
+
+
+def profiles(found) -> set[str]:
+    return {one.spec.profile for one in found.specs}
+
+
 def test_auto_takes_the_smallest_array_that_holds_the_objects(tmp_path):
-    few = dry(tmp_path, "name: A\nprofile: auto\nshape: {cube: 60 mm}\n")
-    assert (few.rows, few.columns) == (63, 65)
-    many = dry(tmp_path, "name: A\nprofile: auto\nshape: {cube: 60 mm}\ncopies: 10\n")
-    assert (many.rows, many.columns) == (255, 257)
+    text = "name: A\nprofile: auto\nshape: {cube: 60 mm}\ncopies: "
+    assert profiles(choice(tmp_path, text + "2")) == {"one-touch"}
+    assert profiles(choice(tmp_path, text + "9")) == {"large"}
+    larger = choice(tmp_path, text + "200")
+    assert profiles(larger) == {"large-511x513"}
+    assert planned(larger.specs[0]).array.rows == 511
+    assert larger.specs[199].spec.name == "A-200"
 
 
 def test_auto_goes_on_where_the_database_is_full(tmp_path):
-    text = "name: {}\nprofile: auto\nshape: {{cube: 140 mm}}\n"
+    text = "name: {}\nprofile: auto\nshape: {{cube: 140 mm}}\nprint: {{parts: whole}}\n"
     first = dry(tmp_path, text.format("A"), dry_run=False, formats=())
     assert (first.rows, first.columns) == (63, 65)
-    second = dry(tmp_path, text.format("B"))
-    assert (second.rows, second.columns) == (255, 257)
+    assert profiles(choice(tmp_path, text.format("B"))) == {"large"}
     again = dry(tmp_path, text.format("A"))
     assert again.objects[0].reused
     assert (again.rows, again.columns) == (63, 65)
 
 
 def test_auto_takes_finer_symbols_for_a_printer_that_makes_them(tmp_path):
-    text = "name: A\nprofile: auto\nshape: {box: [60, 60, 13]}\n"
-    (made,) = dry(tmp_path, text).objects
-    assert any("profile fine, for resin printers, would show places on 4 of the 4 blank" in w
-               for w in made.warnings)  # fmt: skip
-    finer = dry(tmp_path, text + "print: {printer: resin}\n")
-    assert (finer.rows, finer.columns) == (255, 257)
-    assert all(face.places for face in finer.objects[0].face_reports)
+    text = "name: A\nprofile: auto\nshape: {prism: {sides: 8, side: 14, height: 20}}\n"
+    found = choice(tmp_path, text)
+    assert profiles(found) == {"one-touch"}
+    (note,) = found.notes
+    assert note.startswith("profile fine, for resin printers, would show places on 8 of the 8")
+    assert profiles(choice(tmp_path, text + "print: {printer: resin}\n")) == {"fine"}
+    coarse = choice(tmp_path, text + "print: {printer: fdm-0.4}\n")
+    assert (profiles(coarse), coarse.notes) == ({"one-touch"}, ())
 
 
 def test_auto_follows_a_profile_that_the_set_names(tmp_path):

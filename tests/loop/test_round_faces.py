@@ -1,0 +1,152 @@
+"""Cylinder and cone from spec to file: registered, sliced, and read off the printed surface.
+
+Needs the Debian package `prusa-slicer`; without it one of these tests fails.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from generator.alphabet.known import alphabet_from
+from generator.alphabet.outline import outlines
+from generator.alphabet.rings import distance, inside
+from generator.array import array_from
+from generator.database.open import open_database
+from generator.database.read import read_object
+from generator.database.transaction import reading
+from generator.pipeline import encode
+from generator.polyhedron.developable import developable_from
+from generator.polyhedron.development import development
+from generator.spec import read_specs
+
+SHAPES = {
+    "cylinder": "{cylinder: {diameter: 36 mm, height: 30 mm}}",
+    "cone": "{cone: {diameter: 46 mm, top_diameter: 26 mm, height: 30 mm}}",
+}
+
+
+@pytest.fixture(scope="module", params=SHAPES)
+def made(request, tmp_path_factory):
+    """A round object: its folder, what was made, and what the database knows."""
+    folder: Path = tmp_path_factory.mktemp(request.param)
+    spec = folder / "spec.yaml"
+    spec.write_text(f"name: Round\nshape: {SHAPES[request.param]}\n")
+    url = f"sqlite:///{folder / 'lab.db'}"
+    result = encode(read_specs([spec]), folder=folder / "out", database=url,
+                    formats=("stl", "3mf", "glb"), verify=True)  # fmt: skip
+    with reading(open_database(url, writable=False)) as connection:
+        return folder / "out", result.objects[0], read_object(connection, "Round")
+
+
+def stl(path: Path) -> np.ndarray:
+    kind = np.dtype([("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
+    return np.frombuffer(path.read_bytes()[84:], kind)["v"].astype(float)
+
+
+def outermost(triangles: np.ndarray, start: np.ndarray, along: np.ndarray) -> float:
+    """Return how far along a ray the last triangle is (Moeller and Trumbore, 1997)."""
+    a = triangles[:, 0]
+    u, v = triangles[:, 1] - a, triangles[:, 2] - a
+    p = np.cross(along, v)
+    det = (u * p).sum(axis=1)
+    det = np.where(np.abs(det) > 1e-12, det, np.inf)
+    s = start - a
+    b = (s * p).sum(axis=1) / det
+    q = np.cross(s, u)
+    c = (q @ along) / det
+    t = (v * q).sum(axis=1) / det
+    hit = (b >= 0) & (c >= 0) & (b + c <= 1) & (t > 0) & (t < 10) & np.isfinite(det)
+    return float(t[hit].max())
+
+
+def test_the_surface_bears_the_registered_symbols_where_the_database_says(made):
+    folder, told, known = made
+    (surface,) = [developable_from(one) for one in known.spec["surfaces"]]
+    d = development(known.polyhedron, surface)
+    face = known.layout.faces[surface.carrier]
+    array = array_from(known.array.definition)
+    assert (array.symbols(face.rows, face.columns) == face.labels).all()
+    tiers = outlines(alphabet_from(known.alphabet), known.style)
+    (part,) = known.parts
+    triangles = stl(folder / Path(part.file).name) @ part.T_object_part[:3, :3].T
+    triangles = triangles + part.T_object_part[:3, 3]
+    rotation, h = -face.placement.rotation_rad, known.style.height_mm
+    R = np.array([[np.cos(rotation), -np.sin(rotation)], [np.sin(rotation), np.cos(rotation)]])
+    rng = np.random.default_rng(1)
+    right = np.column_stack([d.high[:, 1] - d.low[:, 1], d.low[:, 0] - d.high[:, 0]])
+    asked = raised = 0
+    for label, centre in zip(face.labels.tolist(), face.centres_mm, strict=True):
+        for q in rng.uniform(-0.35, 0.35, (4, 2)) * known.style.pitch_mm:
+            top, foot = tiers[label].rings[-1], tiers[label].rings[0]
+            on, off = inside(q[None], top)[0], not inside(q[None], foot)[0]
+            near = min(distance(q[None], top)[0], distance(q[None], foot)[0])
+            if near < 0.1 or on == off:
+                continue  # on a side of the symbol
+            at = centre + R @ q
+            beside = ((at - d.low) * right).sum(axis=1)
+            facet = int(np.flatnonzero((beside[:-1] >= 0) & (beside[1:] < 0))[0])
+            T = d.T_object_flat[facet]
+            start = T[:3, :2] @ at + T[:3, 3] - 0.5 * T[:3, 2]
+            height = outermost(triangles, start, T[:3, 2]) - 0.5
+            assert height == pytest.approx(h if on else 0.0, abs=1e-3)
+            asked, raised = asked + 1, raised + int(on)
+    assert asked > 60
+    assert 0.2 < raised / asked < 0.8
+    assert told.symbols == sum(len(one.labels) for one in known.layout.faces)
+
+
+def test_a_round_face_is_one_node_and_one_face(made):
+    folder, told, known = made
+    assert told.faces == 3
+    names = re.findall(rb'"name":"(F[^"]*)"', (folder / "Round.glb").read_bytes()[:20000])
+    assert sorted(set(names)) == [b"F1", b"F2", b"F3"]
+    carriers = {face.face for face in known.layout.faces if len(face.labels)}
+    assert known.spec["surfaces"][0]["facets"][0] in carriers
+    assert {known.polyhedron.faces[number].name for number in carriers} <= {"F2", "F3"}
+
+
+def test_the_slicer_repairs_nothing_and_prints_symbols_on_every_layer(made, tmp_path):
+    folder, _, known = made
+    slicer = shutil.which("prusa-slicer")
+    if slicer is None:
+        pytest.fail("prusa-slicer is missing: apt-get install prusa-slicer (Debian package)")
+
+    def run(*command: str) -> str:
+        done = subprocess.run([slicer, *command], capture_output=True, text=True, timeout=300,
+                              check=True)  # fmt: skip
+        return done.stdout
+
+    found = run("--info", str(folder / "Round.stl"))
+    assert "manifold = yes" in found
+    assert "number_of_parts =  1" in found
+    assert not re.search("open_edges|facets_reversed|degenerate_facets", found)
+    two = run("--info", str(folder / "Round.3mf"))
+    assert two.count("manifold = yes") == 2
+    gcode = tmp_path / "round.gcode"
+    run("--export-gcode", "--layer-height", "0.2", "--first-layer-height", "0.2", "--skirts", "0",
+        "--perimeters", "1", "--fill-density", "0", "-o", str(gcode),
+        str(folder / "Round.stl"))  # fmt: skip
+    layers: dict[float, list[tuple[float, float]]] = {}
+    z = 0.0
+    for line in gcode.read_text().splitlines():
+        if match := re.match(r"G1 Z([\d.]+)", line):
+            z = float(match[1])
+        elif match := re.match(r"G1 X([-\d.]+) Y([-\d.]+) E", line):
+            layers.setdefault(z, []).append((float(match[1]), float(match[2])))
+    height = float(np.ptp(known.polyhedron.vertices[:, 2]))
+    assert max(layers) == pytest.approx(height + known.style.height_mm)
+    middle = np.array([(min(x) + max(x)) / 2 for x in zip(*layers[0.2], strict=True)])
+    rim = np.hypot(*(np.array(layers[0.2]) - middle).T).max()
+    assert rim == pytest.approx(known.spec["surfaces"][0]["radius_mm"], abs=0.4)
+    # Between base and top every third layer at least has symbols outside of the round side.
+    base = known.spec["surfaces"][0]["radius_mm"]
+    lean = np.tan(known.spec["surfaces"][0]["half_angle_rad"])
+    out = [np.hypot(*(np.array(points) - middle).T).max() - (base - level * lean)
+           for level, points in layers.items() if 3.0 < level < height - 3.0]  # fmt: skip
+    assert np.mean(np.array(out) > 0.4) > 0.33
