@@ -35,9 +35,9 @@ class Thresholds:
 
     margin: float = 10.0  #: nats over the best other place
     surprise: float = 3.0  #: nats over symbols of no registered place
-    explained: float = 0.66  #: share of the image's variance
-    explained_by_many: float = 0.55  #: the same where `many` cells agree
-    many: int = 10
+    explained: float = 0.72  #: share of the image's variance
+    explained_by_many: float = 0.58  #: the same where `many` cells agree
+    many: int = 11
     cells: int = 4  #: that hold a symbol and are seen
     contradicted: int = 1  #: cells that speak `CLEARLY` for another symbol; `PLAINLY`: none
     rim_mm: float = 2.0  #: how far the sensor's centre may lie beyond the face

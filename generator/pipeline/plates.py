@@ -19,7 +19,7 @@ from generator.export.packing import Packed, packing_csv
 from generator.export.threemf import PrintFile, print_file
 from generator.layout.placement import Layout
 from generator.pipeline.files import parts_of
-from generator.pipeline.parallel import Task, done_by
+from generator.pipeline.parallel import FEW, Task, done_by
 from generator.pipeline.plan import Plan
 from generator.pipeline.progress import Progress, within
 from generator.printers import printer_named
@@ -91,7 +91,7 @@ def written_set(
                     Task(f"plate {number}", _plate_files, _plate_task(objects, name, plate))
                     for number, plate in enumerate(plates, 1)
                 ],
-                jobs,
+                jobs if len(plates) >= FEW else 1,
                 within(progress, 0.3, 0.9),
             )
             for number, content in enumerate(contents, 1):

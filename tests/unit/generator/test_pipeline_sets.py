@@ -182,4 +182,6 @@ def test_errors_come_back_from_other_processes(tmp_path):
     assert str(error[0](*error[1])) == str(caught.value)
     tasks = [Task(str(k), int, (text,)) for k, text in enumerate(["1", "x", "3", "y"])]
     with pytest.raises(ValueError, match="'x'"):
-        done_by(tasks, 2, silent)
+        done_by(tasks, 1, silent)
+    with pytest.raises(ValueError, match="'x'"):
+        done_by(tasks[:2], 2, silent)
