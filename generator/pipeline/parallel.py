@@ -7,13 +7,12 @@ that a forked copy would wait for. They end with the process that started them.
 
 from __future__ import annotations
 
-import contextlib
 import multiprocessing
 import multiprocessing.connection
 import os
 import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import ProcessPoolExecutor, as_completed, wait
 from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -24,7 +23,7 @@ from generator.pipeline.progress import Progress
 
 Result = TypeVar("Result")
 
-FEW = 4  #: fewer tasks are done in this process
+FEW = 16  #: fewer tasks are done in this process, where nobody asked for others
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,43 +58,62 @@ class Engines:
             cls._open.popitem()[1].dispose()
 
 
-def done_by(tasks: Sequence[Task[Result]], jobs: int | None, progress: Progress) -> list[Result]:
-    """Return the results of the tasks in their order.
+class Workers:
+    """Processes for the tasks of one run, started when there is enough to do; a context.
 
     Parameters
     ----------
-    tasks
-        Independent of each other.
     jobs
-        Processes; None for one on each processor that we may use.
-
-    Raises
-    ------
-    Exception
-        That of the first task, in their order, that failed; tasks not begun by then are left.
+        How many; None for one on each processor that we may use, if tasks are many.
     """
-    workers = min(jobs or len(os.sched_getaffinity(0)), len(tasks))
-    if workers <= 1 or (jobs is None and len(tasks) < FEW):
-        results = []
-        with contextlib.closing(Engines):
+
+    def __init__(self, jobs: int | None) -> None:
+        self._few = 2 if jobs else FEW
+        self._jobs = jobs or len(os.sched_getaffinity(0))
+        self._pool: ProcessPoolExecutor | None = None
+
+    def __enter__(self) -> Workers:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        Engines.close()
+        if self._pool is not None:
+            self._pool.shutdown(wait=True, cancel_futures=True)
+
+    def done(self, tasks: Sequence[Task[Result]], progress: Progress) -> list[Result]:
+        """Return the results of independent tasks in their order.
+
+        Raises
+        ------
+        Exception
+            That of the first task, in their order, that failed; tasks not begun by then are
+            left.
+        """
+        if self._jobs == 1 or len(tasks) < self._few:
+            results = []
             for number, task in enumerate(tasks):
                 progress(task.what, number / len(tasks))
                 results.append(task.done())
-        return results
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_end_with_parent)
-    futures: list[Future[Result]] = []
-    try:
-        futures = [pool.submit(task.done) for task in tasks]
+            return results
+        futures = [self._started().submit(task.done) for task in tasks]
         what = {future: task.what for future, task in zip(futures, tasks, strict=True)}
         for number, future in enumerate(as_completed(futures), 1):
             if future.exception() is not None:
                 break
             progress(what[future], number / len(tasks))
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-    failed = [f for f in futures if not f.cancelled() and f.exception() is not None]
-    return [future.result() for future in failed[:1] or futures]
+        for future in futures:
+            future.cancel()
+        wait(futures)
+        failed = [f for f in futures if not f.cancelled() and f.exception() is not None]
+        return [future.result() for future in failed[:1] or futures]
+
+    def _started(self) -> ProcessPoolExecutor:
+        if self._pool is None:
+            context = multiprocessing.get_context("spawn")
+            self._pool = ProcessPoolExecutor(
+                self._jobs, mp_context=context, initializer=_end_with_parent
+            )
+        return self._pool
 
 
 def _end_with_parent() -> None:

@@ -19,7 +19,7 @@ from generator.export.packing import Packed, packing_csv
 from generator.export.threemf import PrintFile, print_file
 from generator.layout.placement import Layout
 from generator.pipeline.files import parts_of
-from generator.pipeline.parallel import FEW, Task, done_by
+from generator.pipeline.parallel import Task, Workers
 from generator.pipeline.plan import Plan
 from generator.pipeline.progress import Progress, within
 from generator.printers import printer_named
@@ -55,7 +55,7 @@ class _SetPlate:
 
 
 def written_set(
-    objects: Sequence[SetObject], folder: Path, jobs: int | None, progress: Progress
+    objects: Sequence[SetObject], folder: Path, workers: Workers, progress: Progress
 ) -> tuple[Path, ...]:
     """Write the files of a set; return their paths.
 
@@ -65,12 +65,11 @@ def written_set(
         A file cannot be written.
     """
     name = _name(objects)
-    tasks = [
-        Task(f"measuring {one.plan.spec.name}", _measured, (number, one.plan, one.layout))
-        for number, one in enumerate(objects)
-    ]
-    measured = done_by(tasks, 1, within(progress, 0.0, 0.3))
-    plates = _plates(objects, [part for parts in measured for part in parts])
+    measured: list[_Measured] = []
+    for number, one in enumerate(objects):
+        progress(f"measuring {one.plan.spec.name}", 0.3 * number / len(objects))
+        measured += _measured(number, one.plan, one.layout)
+    plates = _plates(objects, measured)
     packed = [_packed(objects, plate, number) for number, plate in enumerate(plates, 1)]
     rows = sorted((row for some in packed for row in some), key=lambda row: row.order)
     listed = packing_csv(rows)
@@ -86,12 +85,11 @@ def written_set(
         return tuple(folder / each for each in names)
     with Staging(folder) as staging:
         if with_models:
-            contents = done_by(
+            contents = workers.done(
                 [
                     Task(f"plate {number}", _plate_files, _plate_task(objects, name, plate))
                     for number, plate in enumerate(plates, 1)
                 ],
-                jobs if len(plates) >= FEW else 1,
                 within(progress, 0.3, 0.9),
             )
             for number, content in enumerate(contents, 1):

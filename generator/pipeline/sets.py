@@ -21,7 +21,7 @@ from generator.database.transaction import reading
 from generator.layout.placement import Layout
 from generator.pipeline.made import Made, made_of
 from generator.pipeline.make import Order, Product, made_at
-from generator.pipeline.parallel import Engines, Task, done_by
+from generator.pipeline.parallel import Engines, Task, Workers
 from generator.pipeline.place import Placed, placed
 from generator.pipeline.plates import SetObject, written_set
 from generator.pipeline.progress import Progress, within
@@ -74,7 +74,21 @@ def made_as_set(
                 new.append(place.layout)
             numbers.append(number)
             tasks.append(Task(f"making {name}", _make, (url, order, place)))
-    found = done_by(tasks, jobs, within(progress, 0.1, 0.8))
+    with Workers(jobs) as workers:
+        found = workers.done(tasks, within(progress, 0.1, 0.8))
+        return _together(orders, products, numbers, found, folder, workers, progress)
+
+
+def _together(
+    orders: Sequence[Order],
+    products: list[Product | None],
+    numbers: Sequence[int],
+    found: Sequence[Product],
+    folder: Path,
+    workers: Workers,
+    progress: Progress,
+) -> tuple[list[Made], tuple[Path, ...]]:
+    """Write what belongs to the set as a whole; return its objects in order and its files."""
     for number, product in zip(numbers, found, strict=True):
         products[number] = product
     done = [product for product in products if product is not None]
@@ -82,7 +96,7 @@ def made_as_set(
         SetObject(order.plan, product.placed.layout, order.formats)
         for order, product in zip(orders, done, strict=True)
     ]
-    files = written_set(objects, folder, jobs, within(progress, 0.8, 1.0))
+    files = written_set(objects, folder, workers, within(progress, 0.8, 1.0))
     return [product.made for product in done], files
 
 

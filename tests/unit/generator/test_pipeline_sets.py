@@ -17,7 +17,7 @@ from generator.database.transaction import reading
 from generator.errors import DatabaseError
 from generator.pipeline import encode
 from generator.pipeline.make import Order, made_at, made_under_lock
-from generator.pipeline.parallel import Task, done_by
+from generator.pipeline.parallel import Task, Workers
 from generator.pipeline.place import placed
 from generator.pipeline.plan import planned
 from generator.pipeline.progress import silent
@@ -181,7 +181,6 @@ def test_errors_come_back_from_other_processes(tmp_path):
     error = SpecError(caught.value.problems).__reduce__()
     assert str(error[0](*error[1])) == str(caught.value)
     tasks = [Task(str(k), int, (text,)) for k, text in enumerate(["1", "x", "3", "y"])]
-    with pytest.raises(ValueError, match="'x'"):
-        done_by(tasks, 1, silent)
-    with pytest.raises(ValueError, match="'x'"):
-        done_by(tasks[:2], 2, silent)
+    for jobs in (1, 2):
+        with Workers(jobs) as workers, pytest.raises(ValueError, match="'x'"):
+            workers.done(tasks, silent)

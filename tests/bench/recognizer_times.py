@@ -1,0 +1,127 @@
+"""Time of a touch by stage, and error against run time of the reader's settings.
+
+    python tests/bench/recognizer_times.py --database lab.db [--touches 40] [--png docs/recognizer-precision.png]
+
+Process time on one core, medians; touches are those of `recognizer.validation`, by number.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import time
+from dataclasses import replace
+
+for library in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(library, "1")
+
+import numpy as np  # noqa: E402
+
+from recognizer.lab import open_lab  # noqa: E402
+from recognizer.locate import places  # noqa: E402
+from recognizer.pipeline import explained, reader_for, readings  # noqa: E402
+from recognizer.signal import signal_of  # noqa: E402
+from recognizer.symbols.fit import Settings, fits  # noqa: E402
+from recognizer.symbols.pressing import pressing_of  # noqa: E402
+from recognizer.symbols.refine import felt_under, first_gain, image_of  # noqa: E402
+from recognizer.symbols.search import search  # noqa: E402
+from recognizer.validation.trial import Plan, drawn, judged, sensor_of  # noqa: E402
+
+SETTINGS = {
+    "1 lattice, 2 + 2 steps": Settings(candidates=1, steps=2, finalists=1, final_steps=2),
+    "2 lattices, 3 + 4 steps": Settings(candidates=2, steps=3, finalists=1, final_steps=4),
+    "4 lattices, 4 + 6 steps (default)": Settings(),
+    "8 lattices, 4 + 10 steps": Settings(candidates=8, finalists=4, final_steps=10),
+    "24 lattices, 6 + 14 steps": Settings(24, 6, 6, 14),
+}
+
+
+def clocked(action):
+    start = time.process_time()
+    found = action()
+    return found, 1e3 * (time.process_time() - start)
+
+
+def stages(reader, signals):
+    """Return medians of the stages, ms."""
+    encoding, template, bank = reader.prepared[0]
+    rows = []
+    for signal in signals:
+        pressing = pressing_of(reader.sensor, encoding.style.height_mm)
+        image, made = clocked(
+            lambda signal=signal, pressing=pressing: image_of(
+                reader.sensor, signal.forces, signal.trust, pressing, newtons=False
+            )
+        )
+        gain = first_gain(image, template.ink)
+        felt = felt_under(image, gain[None])
+        seen, weights = (
+            part.reshape(bank.shape).astype(np.float32) for part in (felt.psi, felt.trust)
+        )
+        _, coarse = clocked(lambda s=seen, w=weights: search(bank, s, w, template.order, 4))
+        found, fitted = clocked(lambda i=image: fits(i, template, bank, reader.settings))
+        _, placed = clocked(lambda f=found: places(encoding, f, 8))
+        _, read = clocked(lambda s=signal: readings(reader, s, reader.settings))
+        _, whole = clocked(lambda s=signal: explained(reader, s))
+        rows.append((made, coarse, fitted - coarse, placed, read - fitted - placed, whole))
+    names = ("image", "coarse search", "refinement", "places", "verification", "whole touch")
+    return dict(zip(names, np.median(rows, axis=0), strict=True))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--database", required=True)
+    parser.add_argument("--touches", type=int, default=40)
+    parser.add_argument("--seed", type=int, default=9)
+    parser.add_argument("--png")
+    options = parser.parse_args()
+    reader = reader_for(open_lab(options.database), sensor_of("tab"))
+    points = {}
+    for level in ("typical", "mismatch"):
+        plan = Plan(options.database, options.seed, level)
+        touches = [drawn(plan, number, reader) for number in range(options.touches)]
+        signals = [signal_of(each.counts.astype(float)) for each in touches]
+        print(f"{level}:")
+        for name, ms in stages(reader, signals).items():
+            print(f"  {name:16s} {ms:7.2f} ms")
+        for name, settings in SETTINGS.items():
+            one = replace(reader, settings=settings, thorough=settings)
+            found = []
+            for number, (touch, signal) in enumerate(zip(touches, signals, strict=True)):
+                (answer, _), ms = clocked(lambda s=signal, r=one: explained(r, s))
+                found.append((judged(plan, number, touch, answer, ms / 1e3), ms))
+            right = [t for t, _ in found if t.verdict == "right"]
+            wrong = sum(t.verdict == "wrong" for t, _ in found)
+            rms = float(np.sqrt(np.mean([t.error_mm**2 for t in right])))
+            ms = float(np.median([m for _, m in found]))
+            points.setdefault(level, []).append((ms, rms, len(right) / len(found), name))
+            print(f"  {name:36s} {ms:7.1f} ms  rms {rms:.3f} mm  right {len(right)}, wrong {wrong}")
+    if options.png:
+        draw(points, options.png)
+
+
+def draw(points, path):
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4), constrained_layout=True)
+    for level, each in points.items():
+        ms, rms, share, _ = zip(*each, strict=True)
+        left.plot(ms, rms, "o-", label=level)
+        right.plot(ms, 100 * np.array(share), "o-", label=level)
+    left.set_ylabel("rms error of the position, mm")
+    right.set_ylabel("answered right at the first try, %")
+    for axes in (left, right):
+        axes.set_xlabel("processor time of a touch, ms")
+        axes.set_xscale("log")
+        axes.grid(alpha=0.3)
+        axes.legend(title="level")
+    left.set_ylim(bottom=0)
+    figure.suptitle("Reader: error against run time, 1 ... 24 lattices")
+    figure.savefig(path, dpi=110, metadata={"Software": None})
+
+
+if __name__ == "__main__":
+    main()

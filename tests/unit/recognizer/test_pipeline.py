@@ -1,0 +1,251 @@
+"""One touch: object, face and pose, or the reason why not; the stages of it."""
+
+import math
+import os
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from generator.pipeline import encode
+from generator.spec import read_specs
+from probe.contact.contract import Touch
+from probe.contact.tabs import tabs
+from probe.sensor import Sensor
+from probe.simulate.registered import registered_surface
+from recognizer.belief import Support, Thresholds
+from recognizer.lab import open_lab
+from recognizer.locate import CAP, Place, place_scores, places, shown_at
+from recognizer.pipeline import explained, reader_for, readings, recognise
+from recognizer.pose import inside_mm
+from recognizer.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, OUTSIDE, TOO_FEW
+from recognizer.signal import CONTACT_N, signal_of
+from recognizer.symbols.fit import Fit
+from recognizer.symbols.template import psi, template_of
+from recognizer.validation.levels import LEVELS
+from recognizer.validation.surfaces import FOREIGN
+from recognizer.validation.trial import INSIDE_MM, Plan, drawn, sensor_of, trial
+
+
+@pytest.fixture(scope="module")
+def url(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("lab")
+    for name, shape in (("Cube", "cube: 60 mm"), ("Tetra", "tetrahedron: 80 mm")):
+        (folder / f"{name}.yaml").write_text(f"name: {name}\nshape: {{{shape}}}\n")
+    specs = read_specs([folder / "Cube.yaml", folder / "Tetra.yaml"])
+    database = f"sqlite:///{folder / 'lab.db'}"
+    encode(specs, folder=folder / "out", database=database, formats=())
+    return database
+
+
+@pytest.fixture(scope="module")
+def reader(url):
+    return reader_for(open_lab(url), Sensor())
+
+
+@pytest.fixture(scope="module")
+def pad_reader(url):
+    return reader_for(open_lab(url), sensor_of("pad"))
+
+
+def felt(url, name, face, touch):
+    return tabs(registered_surface(url, name, face).surface, Sensor(), touch).forces_n
+
+
+@pytest.mark.parametrize(("name", "face"), [("Cube", "F1"), ("Cube", "F6"), ("Tetra", "F2")])
+def test_a_clean_touch_is_placed(url, reader, name, face):
+    touch = Touch(32.0, 24.0, 0.7, 80.0)
+    forces = felt(url, name, face, touch)
+    for newtons in (True, False):
+        image = forces if newtons else 100 * forces
+        found = recognise(reader, signal_of(image, floor=0.0, newtons=newtons), 5)
+        assert (found.object, found.face, found.seq) == (name, face, 5)
+        T = found.T_face_probe
+        assert T[:2, 3] == pytest.approx([32.0, 24.0], abs=0.05)
+        assert math.atan2(T[1, 0], T[0, 0]) == pytest.approx(0.7, abs=0.003)
+        assert found.margin > 20
+        scene = registered_surface(url, name, face)
+        assert found.T_object_probe == pytest.approx(scene.T_object_surface @ T)
+
+
+@pytest.mark.parametrize("level", list(LEVELS))
+def test_touches_of_a_level(url, reader, level):
+    found = [trial(Plan(url, 3, level), number, reader) for number in range(12)]
+    assert all(t.verdict != "wrong" for t in found)
+    right = [t for t in found if t.verdict == "right"]
+    assert len(right) >= 11
+    assert math.sqrt(np.mean([t.error_mm**2 for t in right])) < 0.1
+    assert math.sqrt(np.mean([t.error_deg**2 for t in right])) < 0.4
+
+
+def test_touches_through_a_pad(url, pad_reader):
+    found = [trial(Plan(url, 3, "typical"), number, pad_reader) for number in range(8)]
+    assert all(t.verdict != "wrong" for t in found)
+    assert sum(t.verdict == "right" for t in found) >= 6
+
+
+@pytest.mark.parametrize("kind", list(FOREIGN))
+def test_other_surfaces_are_refused(url, reader, kind):
+    found = [trial(Plan(url, 5, "typical", kind), number, reader) for number in range(6)]
+    assert [t.verdict for t in found] == ["rejected"] * 6
+    assert {t.reason for t in found} <= {NOT_ENCODED, TOO_FEW, AMBIGUOUS, NO_CONTACT, OUTSIDE}
+
+
+@pytest.mark.parametrize("kind", ["edge", "corner", "worn"])
+def test_hard_touches_are_never_wrong(url, reader, kind):
+    plan = Plan(url, 7, "typical", kind)
+    found = [trial(plan, number, reader) for number in range(10)]
+    assert all(t.verdict != "wrong" for t in found)
+    if kind == "edge":
+        assert all(t.edge_mm < INSIDE_MM for t in found)
+        assert any(t.verdict == "right" for t in found)
+
+
+def test_a_trial_is_known_by_its_number(url, reader):
+    plan = Plan(url, 11, "hard")
+    again = [drawn(plan, number, reader) for number in (4, 4, 5)]
+    assert again[0].touch == again[1].touch != again[2].touch
+    assert (again[0].counts == again[1].counts).all()
+    first, second = trial(plan, 4, reader), trial(plan, 4, reader)
+    assert replace(first, seconds=0.0) == replace(second, seconds=0.0)
+
+
+def test_nothing_pressed_is_no_contact(reader):
+    found = recognise(reader, signal_of(np.full((16, 16), 9.0)), 2)
+    assert not found
+    assert found.reason == NO_CONTACT
+    assert explained(reader, signal_of(np.full((16, 16), 9.0)))[1] is None
+
+
+def test_dead_rows_are_told_from_the_image(url, reader):
+    image = 100 * felt(url, "Cube", "F2", Touch(30.0, 30.0, -2.0, 90.0))
+    image[6] = 0.0
+    signal = signal_of(image, floor=0.0)
+    assert (signal.trust[6] == 0).all()
+    assert signal.trust.sum() == 15 * 16
+    found = recognise(reader, signal)
+    assert (found.object, found.face) == ("Cube", "F2")
+
+
+def test_contact_is_judged_in_its_own_unit():
+    image = np.zeros((16, 16))
+    image[4:8, 4:8] = 2 * CONTACT_N
+    assert signal_of(image, floor=0.0, newtons=True).contact
+    assert not signal_of(image, floor=0.0).contact
+
+
+def test_the_reading_behind_an_answer(url, reader):
+    signal = signal_of(felt(url, "Cube", "F3", Touch(28.0, 33.0, 2.0, 70.0)), newtons=True)
+    answer, reading = explained(reader, signal)
+    assert reading.encoding.face(reading.place.face).face == answer.face == "F3"
+    speaks = reading.support()
+    assert speaks.holds(reader.thresholds)
+    assert speaks.explained > 0.85
+    assert speaks.cells >= 9
+    assert speaks.clear == speaks.plain == 0
+    scores = [r.score for r in readings(reader, signal, reader.settings)]
+    assert scores == sorted(scores, reverse=True)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"surprise": 2.0}, {"explained": 0.5}, {"clear": 2}, {"plain": 1},
+     {"explained": 0.65, "cells": 8}],
+)  # fmt: skip
+def test_what_is_not_believed(change):
+    good = Support(surprise=12.0, explained=0.8, cells=12, clear=0, plain=0)
+    assert good.holds(Thresholds())
+    assert not replace(good, **change).holds(Thresholds())
+
+
+def test_the_index_of_windows_lists_every_window(reader):
+    encoding = reader.lab.encodings[0]
+    order = encoding.array.order
+    for windows in encoding.windows():
+        down, right = windows.shape
+        assert (np.diff(windows.codes) >= 0).all()
+        for code, cell in list(zip(windows.codes, windows.cells, strict=True))[::97]:
+            row, column = divmod(int(encoding.keys[cell]), encoding.array.columns)
+            rows, columns = np.mgrid[row : row + down, column : column + right]
+            held, labels = encoding.at(rows % encoding.array.rows, columns % encoding.array.columns)
+            assert (held == encoding.owners[cell]).all()
+            digits = labels.ravel().astype(int).tolist()
+            assert int("".join(map(str, digits)), order) == code
+            assert cell in windows.at(int(code))
+
+
+def test_a_large_array_is_looked_up_like_a_small_one(reader):
+    encoding = reader.lab.encodings[0]
+    sparse = replace(encoding, dense=None, known={}, indexed=[])
+    rng = np.random.default_rng(2)
+    rows = rng.integers(encoding.array.rows, size=500)
+    columns = rng.integers(encoding.array.columns, size=500)
+    for one, other in zip(encoding.at(rows, columns), sparse.at(rows, columns), strict=True):
+        assert (one == other).all()
+
+
+def place_of(encoding, at=40):
+    """A lattice that shows the cells about a registered one without doubt."""
+    row, column = divmod(int(encoding.keys[at]), encoding.array.columns)
+    place = Place(0, row, column, int(encoding.owners[at]), 0.0)
+    cells = np.stack(np.meshgrid(np.arange(-2, 3), np.arange(-2, 3)), axis=-1).reshape(-1, 2)
+    shown = shown_at(encoding, place, cells)
+    scores = np.full((len(cells), encoding.array.order + 1), -30.0)
+    scores[np.arange(len(cells)), shown] = 0.0
+    fit = Fit(3.5, 3.5, 0.0, np.zeros(4), np.zeros(4), cells, scores, np.full(len(cells), 20.0),
+              0.1, -5.0, np.eye(3))  # fmt: skip
+    return place, fit
+
+
+def test_a_sure_lattice_is_placed_and_a_wrong_cell_costs_its_cap(reader):
+    encoding = reader.lab.encodings[0]
+    place, fit = place_of(encoding)
+    best = places(encoding, (fit,), 5)[0]
+    assert (best.row, best.column, best.face) == (place.row, place.column, place.face)
+    assert best.score == pytest.approx(-5.0)
+    assert place_scores(encoding, fit, place) == pytest.approx(-5.0)
+    scores = fit.scores.copy()
+    middle = int(np.flatnonzero((fit.cells == 0).all(axis=1))[0])
+    scores[middle] = [*np.roll(scores[middle][:-1], 1).tolist(), -30.0]
+    spoiled = replace(fit, scores=scores)
+    assert place_scores(encoding, spoiled, place) == pytest.approx(-5.0 - CAP)
+    best = places(encoding, (spoiled,), 5)[0]
+    assert (best.row, best.column, best.face) == (place.row, place.column, place.face)
+
+
+def test_a_point_in_a_face(reader):
+    face = next(
+        reader.lab.encodings[0].face(n)
+        for n in range(10)
+        if reader.lab.encodings[0].face(n).object == "Cube"
+    )
+    assert inside_mm(face, 30.0, 30.0) == pytest.approx(30.0)
+    assert inside_mm(face, 30.0, -2.0) == pytest.approx(-2.0)
+    assert inside_mm(face, 63.0, 64.0) == pytest.approx(-5.0)
+
+
+@pytest.mark.parametrize("overlay", ["tab", "pad"])
+def test_a_template_is_the_derivative_of_itself(reader, overlay):
+    encoding = reader.lab.encodings[0]
+    template = template_of(encoding.alphabet, encoding.style, sensor_of(overlay))
+    at = np.array([[-1.2, 0.4], [0.3, -1.7], [1.6, 1.1]])
+    by = 0.1
+    aside = np.array([by, 0.0])
+    there = template.at(at)
+    ahead, behind = template.at(at + aside), template.at(at - aside)
+    assert (ahead - behind)[..., 0] / (2 * by) == pytest.approx(there[..., 1], abs=0.06)
+    assert template.at(np.array([[90.0, 0.0]])) == pytest.approx(0.0)
+    assert 0.1 < template.ink < 0.7
+    assert float(psi(np.array(1.0))) == pytest.approx(1.0)
+
+
+def test_reading_loads_no_cad_and_no_pictures():
+    heavy = ("matplotlib", "build123d", "cadquery", "OCP", "pymeshlab", "dask", "fastapi", "skfem")
+    asked = f"[name for name in {heavy!r} if name in sys.modules]"
+    program = f"import recognizer, recognizer.pipeline, sys; print({asked})"
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, env=os.environ
+    )
+    assert done.stdout.strip() == "[]", done.stderr
