@@ -43,10 +43,10 @@ UNSEEN = 1e-8  #: least eigenvalue of a normal matrix of unit diagonal
 class Settings:
     """How much work the fit spends."""
 
-    candidates: int = 4  #: lattices taken from the coarse search
-    steps: int = 4  #: Gauss-Newton steps of all of them
+    candidates: int = 3  #: lattices taken from the coarse search
+    steps: int = 3  #: Gauss-Newton steps of all of them
     finalists: int = 2  #: lattices that are refined to the end
-    final_steps: int = 6
+    final_steps: int = 4
     crossed: int = 0  #: gains that are tried on all lattices, and these turned by quarters
     least_noise: float = 0.05  #: below it a fit is not believed
 

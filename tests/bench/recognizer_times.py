@@ -1,6 +1,6 @@
 """Time of a touch by stage, and error against run time of the reader's settings.
 
-    python tests/bench/recognizer_times.py --database lab.db [--touches 40] [--png docs/recognizer-precision.png]
+    python tests/bench/recognizer_times.py --database lab.db [--touches 40] [--png PICTURE.png]
 
 Process time on one core, medians; touches are those of `recognizer.validation`, by number.
 """
@@ -30,8 +30,8 @@ from recognizer.validation.trial import Plan, drawn, judged, sensor_of  # noqa: 
 SETTINGS = {
     "1 lattice, 2 + 2 steps": Settings(candidates=1, steps=2, finalists=1, final_steps=2),
     "2 lattices, 3 + 4 steps": Settings(candidates=2, steps=3, finalists=1, final_steps=4),
-    "4 lattices, 4 + 6 steps (default)": Settings(),
-    "8 lattices, 4 + 10 steps": Settings(candidates=8, finalists=4, final_steps=10),
+    "3 lattices, 3 + 4 steps (default)": Settings(),
+    "8 lattices, 4 + 10 steps": Settings(8, 4, 4, 10),
     "24 lattices, 6 + 14 steps": Settings(24, 6, 6, 14),
 }
 
