@@ -106,11 +106,15 @@ def explained(reader: Reader, signal: Signal, seq: int = 0) -> tuple[Recognition
         return refused(seq, NO_CONTACT), None
     found = readings(reader, signal, reader.settings)
     answer = _answer(reader, found, seq)
-    if not answer:  # spend more only where it is needed
-        again = readings(reader, signal, reader.thorough)
-        second = _answer(reader, again, seq)
-        if second:
-            answer, found = second, again
+    if answer and found[0].support().cells >= reader.thresholds.many:
+        return answer, found[0]
+    # Spend more where it is needed: no answer yet, or one that few cells speak for.
+    again = readings(reader, signal, reader.thorough)
+    second = _answer(reader, again, seq)
+    if answer and second and not _same(found[0], again[0]):
+        return refused(seq, AMBIGUOUS, margin=0.0, runner_up=answer.runner_up), again[0]
+    if answer or second:
+        return second, again[0] if again else None
     return answer, found[0] if found else None
 
 

@@ -1,4 +1,3 @@
-# ruff: noqa: T201 - a script talks to whoever runs it
 """Encode a bracket that build123d made, and go on with the embossed solid in build123d."""
 
 from build123d import Align, Box, Cylinder, Pos

@@ -1,4 +1,3 @@
-# ruff: noqa: T201 - a script talks to whoever runs it
 """Encode a wedge that cadquery made as mitred panels, and assemble them in cadquery."""
 
 import cadquery

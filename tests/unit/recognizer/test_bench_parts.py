@@ -9,7 +9,6 @@ import time
 
 import numpy as np
 import pytest
-from recognizer.bench.replay import ReplayFeed
 
 from generator.database.registered import RegisteredPart
 from probe.circuit import Electronics, fsr_of, read_counts
@@ -24,6 +23,7 @@ from recognizer.bench.files import checked_name, kept, listed, named, part_to_se
 from recognizer.bench.guided import Guide, forces_given
 from recognizer.bench.images import FILTERS, filtered
 from recognizer.bench.message import FramePicture, mosaic_picture
+from recognizer.bench.replay import ReplayFeed
 from recognizer.bench.simulated import manner_of
 from recognizer.bench.watch import AGAIN_S, RESTLESS_S, Watch
 from recognizer.mosaic.image import GlobalImage
