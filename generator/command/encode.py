@@ -74,6 +74,10 @@ def encode(
     replace: Annotated[
         bool, typer.Option("--replace", help="Allow a changed spec under a registered name."),
     ] = False,
+    jobs: Annotated[
+        int | None, typer.Option("-j", "--jobs", metavar="N", min=1, show_default=False,
+                                 help="Processes for a set of many objects."),
+    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="One JSON object on stdout, also for errors."),
     ] = False,
@@ -92,7 +96,7 @@ def encode(
         if not specs:
             raise typer.BadParameter("no spec is named")
         _make(specs, folder, formats, database, dry_run=dry_run, verify=verify, replace=replace,
-              as_json=as_json)  # fmt: skip
+              jobs=jobs, as_json=as_json)  # fmt: skip
         return 0
 
     return action
@@ -107,6 +111,7 @@ def _make(
     dry_run: bool,
     verify: bool,
     replace: bool,
+    jobs: int | None,
     as_json: bool,
 ) -> None:
     """Make the objects and report them."""
@@ -131,5 +136,6 @@ def _make(
             verify=verify,
             replace=replace,
             progress=progress,
+            jobs=jobs,
         )
     report.encoded(encoded, dry_run=dry_run, as_json=as_json)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -94,6 +95,9 @@ def encoded(result: Encoded, *, dry_run: bool, as_json: bool) -> None:
     if dry_run:
         write(f"\n{array} then; nothing was written ({result.seconds:.1f} s)")
         return
+    if result.set_files:
+        folder = result.set_files[0].parent
+        write(f"set:\n  {folder}{os.sep}  {', '.join(file.name for file in result.set_files)}")
     write(f"\n{array}; registered in {_shown(result.database)} ({result.seconds:.1f} s)")
     if following := _next_step(result.objects):
         write(following)
@@ -101,12 +105,24 @@ def encoded(result: Encoded, *, dry_run: bool, as_json: bool) -> None:
 
 def _object_text(made: Made, dry_run: bool) -> str:
     """Return a few lines on one object."""
-    verb = (
-        "would be made" if dry_run else "registered before, same cells" if made.reused else "made"
-    )
+    verb = "made"
+    if dry_run:
+        verb = "would be made"
+    elif made.skipped:
+        verb = "registered before, its files are unchanged: nothing to do"
+    elif made.reused:
+        verb = "registered before, same cells"
     counts = f"{_number(made.faces, 'face')}, {_number(made.symbols, 'symbol')}"
     parts, places = _number(made.parts, "part"), _number(made.places, "place")
     lines = [f"{made.name}: {verb}; {counts}, {parts}, {places} told apart by touch"]
+    for face in made.face_reports:
+        size, least = (
+            " x ".join(f"{v:.3g}" for v in each) for each in (face.size_mm, face.smallest_mm)
+        )
+        lines.append(
+            f"  {face.name:6} {size} mm, {_number(face.symbols, 'symbol')}, "
+            f"{_number(face.places, 'place')}; it could be as small as {least} mm"
+        )
     for folder in dict.fromkeys(file.parent for file in made.files):
         lines.append(f"  {folder}{os.sep}  {_file_list(folder, made.files)}")
     return "\n".join(lines)
@@ -152,10 +168,13 @@ def _encoded_values(result: Encoded, dry_run: bool) -> dict[str, Any]:
                 "places": made.places,
                 "parts": made.parts,
                 "reused": made.reused,
+                "skipped": made.skipped,
+                "face_reports": [asdict(face) for face in made.face_reports],
                 "warnings": list(made.warnings),
             }
             for made in result.objects
         ],
+        "set_files": [str(file) for file in result.set_files],
         "database": _shown(result.database),
         "array": {
             "rows": result.rows,
