@@ -26,6 +26,8 @@ WORN = 4.0  #: nats that a symbol costs that is registered but not felt at all
 ANCHORS = 3  #: cells tried as the one that is surely registered, where no window is seen whole
 WINDOWS = 4  #: whole windows that are looked up, the surest ones
 SURE = 6.0  #: nats by which each of their cells shows its symbol rather than any other
+MANY = 1024  #: candidates, from which on those count that two windows agree on
+LARGE = 1 << 18  #: registered cells, from which on a touch must show four symbols surely
 FIRST, FOLLOWED = 6, 512  #: after so many cells only so many candidates go on
 
 
@@ -77,6 +79,8 @@ def _worn(fit: Fit) -> Array:
 def _places_of(encoding: Encoding, fit: Fit, number: int, keep: int) -> list[Place]:
     scores = _worn(fit)
     found = _by_windows(encoding, fit)
+    if found is None and len(encoding.keys) > LARGE:
+        return []
     if found is None:
         found = _by_anchors(encoding, fit, scores)
     rows, columns, owners = found
@@ -146,7 +150,12 @@ def _zeros(encoding: Encoding, at: Ints, cells: Ints) -> _Candidates:
     row = (rows.astype(np.int64) + cells[:, 1]) % array.rows
     column = (columns.astype(np.int64) - cells[:, 0]) % array.columns
     owners = encoding.owners[at]
-    _, once = np.unique(np.stack([row, column, owners.astype(np.int64)]), axis=1, return_index=True)
+    places = row.astype(np.uint64) * np.uint64(array.columns) + column.astype(np.uint64)
+    _, place = np.unique(places, return_inverse=True)
+    both = place.reshape(-1).astype(np.int64) * (len(encoding.faces) + 1) + owners
+    _, once, votes = np.unique(both, return_index=True, return_counts=True)
+    if len(once) > MANY and (votes > 1).any():
+        once = once[votes > 1]  # several windows say the same
     return row[once], column[once], owners[once]
 
 

@@ -1,73 +1,136 @@
-"""Reading a touch in databases of 10 ... 100,000 registered faces: time, memory, right answers.
+"""Reading a touch among 10 ... 100,000 registered faces: time, memory, right answers.
 
-    python tests/bench/recognizer_scale.py [--objects 2 167 1667 16667] [--touches 30]
+    python tests/bench/recognizer_scale.py [--faces 12 1000 10000 100000] [--touches 40]
 
-Databases are filled by `database_scale.py` (cubes in a 4095 x 4097 array), which takes some
-minutes for the largest. Process time, median; memory is the peak of a process of its own.
+Faces of 60 x 60 mm, 64 symbols each, fill a 4095 x 4097 array without gaps. They are put into
+the reader's memory as `open_lab` leaves them; what a database takes to give them is measured by
+`database_scale.py`. Process time, median; memory is the peak of a process of its own.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import multiprocessing
 import os
 import resource
-import sys
-import tempfile
 import time
 from collections import Counter
-from pathlib import Path
 
 for library in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(library, "1")
-sys.path.insert(0, str(Path(__file__).parent))
 
 import numpy as np  # noqa: E402
-from database_scale import fill, spots  # noqa: E402
+from sqlalchemy import create_engine  # noqa: E402
 
-from generator.database.open import open_database  # noqa: E402
+from generator.alphabet import SymbolStyle, alphabet_named  # noqa: E402
+from generator.array import enlarged, profile  # noqa: E402
+from probe.contact.contract import Touch  # noqa: E402
+from probe.sensor import Sensor  # noqa: E402
+from probe.surface.face import Face  # noqa: E402
+from probe.surface.lattice import Lattice, listed  # noqa: E402
+from probe.surface.polygon import polygon  # noqa: E402
+from probe.surface.symbols import Relief, embossed  # noqa: E402
+from probe.surface.template import template  # noqa: E402
+from recognizer.lab import EncodedFace, Encoding, Lab, cell_keys  # noqa: E402
+from recognizer.pipeline import reader_for, recognise  # noqa: E402
+from recognizer.signal import signal_of  # noqa: E402
+from recognizer.validation.levels import TYPICAL, read  # noqa: E402
+
+SIDE = 8  # symbols along an edge
+STYLE = SymbolStyle()
+ALPHABET = alphabet_named("dense-4")
+SQUARE = np.array([[0.0, 0.0], [60.0, 0.0], [60.0, 60.0], [0.0, 60.0]])
+R, C = (index.ravel() for index in np.mgrid[:SIDE, :SIDE])
+CENTRES = np.column_stack([(C + 0.5) * 7.0 + 2.0, 58.0 - (R + 0.5) * 7.0])
 
 
-def read(url: str, touches: int, level: str) -> str:
-    from recognizer.lab import open_lab
-    from recognizer.pipeline import reader_for
-    from recognizer.validation.trial import Plan, sensor_of, trial
+def array_4095():
+    known = profile("large")
+    while known.array().rows < 4095:
+        known = enlarged(known)
+    return known.array()
 
+
+class Faces(dict):
+    """All faces, each made when it is asked for."""
+
+    def __init__(self, array, row, column):
+        self.made_of = array, row, column
+
+    def __contains__(self, number):
+        return True
+
+    def __missing__(self, n):
+        array, row, column = self.made_of
+        rows, columns = row[n] + R, column[n] + C
+        labels = array.symbols(rows, columns)
+        name = f"object {n // 6}", f"F{n % 6 + 1}"
+        return EncodedFace(*name, np.eye(4), (SQUARE,), 0.0, rows, columns, labels, CENTRES)
+
+
+def encoding_of(array, faces: int) -> Encoding:
+    wide = math.ceil(math.sqrt(faces))
+    row, column = (SIDE * part for part in np.divmod(np.arange(faces), wide))
+    rows, columns = (row[:, None] + R).ravel(), (column[:, None] + C).ravel()
+    labels = np.concatenate(
+        [
+            array.symbols(r, c)
+            for r, c in zip(np.array_split(rows, 64), np.array_split(columns, 64), strict=True)
+        ]
+    )
+    keys = cell_keys(array.columns, rows, columns)
+    order = np.argsort(keys)
+    owners = np.repeat(np.arange(faces), SIDE * SIDE)[order]
+    known = Faces(array, row, column)
+    return Encoding(
+        array=array, alphabet=ALPHABET, style=STYLE, keys=keys[order],
+        owners=np.append(owners, -1).astype(np.int32),
+        labels=np.append(labels[order], -1).astype(np.int8), dense=None,
+        faces=np.column_stack([np.arange(faces) // 6, np.arange(faces) % 6]),
+        names={}, engine=create_engine("sqlite://"), known=known,
+    )  # fmt: skip
+
+
+def measured(faces: int, touches: int) -> str:
+    encoding = encoding_of(array_4095(), faces)
+    reader = reader_for(Lab("", (encoding,)), Sensor())
     start = time.process_time()
-    lab = open_lab(url)
-    opened = time.process_time() - start
-    reader = reader_for(lab, sensor_of("tab"))
-    start = time.process_time()
-    lab.encodings[0].windows()
+    encoding.windows()
     indexed = time.process_time() - start
-    found = [trial(Plan(url, 1, level), number, reader) for number in range(touches)]
-    counts = Counter(t.verdict for t in found)
-    ms = 1e3 * float(np.median([t.seconds for t in found]))
+    rng = np.random.default_rng(1)
+    relief = Relief(STYLE.height_mm, STYLE.stroke_mm, STYLE.draft_rad, STYLE.chamfer_mm)
+    glyphs = tuple(glyph.strokes for glyph in ALPHABET.glyphs)
+    drawn = template(embossed(glyphs, ALPHABET.reach * STYLE.pitch_mm, relief), STYLE.pitch_mm)
+    counts, ms = Counter(), []
+    for _ in range(touches):
+        number = int(rng.integers(faces))
+        held = encoding.known[number]
+        lattice = Lattice(drawn, listed(R, C, held.labels), 0.0, -2.0, -58.0)
+        x, y = rng.uniform(12, 48, 2)
+        touch = Touch(x, y, rng.uniform(-math.pi, math.pi), rng.uniform(20, 120))
+        image, _ = read(Face(lattice, polygon([SQUARE])), Sensor(), touch, TYPICAL, rng)
+        start = time.process_time()
+        found = recognise(reader, signal_of(image.astype(float)))
+        ms.append(1e3 * (time.process_time() - start))
+        right = (found.object, found.face) == (held.object, held.face)
+        counts["right" if right else "wrong" if found else "rejected"] += 1
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    faces = sum(len(encoding.faces) for encoding in lab.encodings)
     return (
-        f"{faces:8,d} {opened:9.2f} {indexed:9.2f} {ms:9.1f} {peak:9.0f} "
+        f"{faces:8,d} {indexed:9.2f} {np.median(ms):9.1f} {peak:9.0f} "
         f"{counts['right']:7d} {counts['wrong']:6d} {counts['rejected']:6d}"
     )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--objects", type=int, nargs="+", default=[2, 167, 1667, 16667])
-    parser.add_argument("--touches", type=int, default=30)
-    parser.add_argument("--level", default="typical")
+    parser.add_argument("--faces", type=int, nargs="+", default=[12, 1000, 10000, 100000])
+    parser.add_argument("--touches", type=int, default=40)
     options = parser.parse_args()
-    print("   faces    open s   index s  ms/touch   peak MB   right  wrong reject")
-    with tempfile.TemporaryDirectory() as folder:
-        url = f"sqlite:///{folder}/lab.db"
-        where, have = spots(), 0
-        for want in options.objects:
-            engine = open_database(url, writable=True)
-            fill(engine, have, want, where)
-            engine.dispose()
-            have = want
-            with multiprocessing.get_context("spawn").Pool(1) as alone:
-                print(alone.apply(read, (url, options.touches, options.level)), flush=True)
+    print("   faces   index s  ms/touch   peak MB   right  wrong reject")
+    for faces in options.faces:
+        with multiprocessing.get_context("spawn").Pool(1) as alone:
+            print(alone.apply(measured, (faces, options.touches)), flush=True)
 
 
 if __name__ == "__main__":
