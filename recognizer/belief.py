@@ -35,6 +35,8 @@ class Thresholds:
 
     margin: float = 10.0  #: nats over the best other place
     surprise: float = 3.0  #: nats over symbols of no registered place
+    sure: float = 7.0  #: nats from which on less than `well` may be explained
+    well: float = 0.8
     explained: float = 0.72  #: share of the image's variance
     explained_by_many: float = 0.58  #: the same where `many` cells agree
     many: int = 11
@@ -61,6 +63,7 @@ class Support:
         few = self.cells < limits.many
         return (
             self.surprise >= limits.surprise
+            and (self.surprise >= limits.sure or self.explained >= limits.well)
             and self.explained >= (limits.explained if few else limits.explained_by_many)
             and self.clear <= limits.contradicted
             and self.plain == 0
