@@ -9,12 +9,13 @@ what it should and no more.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.lab import Encoding
+from recognizer.lab import Encoding, cell_keys
 from recognizer.symbols.fit import Fit
 
 Ints = NDArray[np.int64]
@@ -64,6 +65,19 @@ def shown_at(encoding: Encoding, place: Place, cells: Ints) -> Ints:
         (place.row - cells[:, 1]) % array.rows, (place.column + cells[:, 0]) % array.columns
     )
     return np.where(held_by == place.face, label, array.order).astype(np.int64)
+
+
+def under_centre(encoding: Encoding, fit: Fit, place: Place) -> tuple[int, int]:
+    """Return row and column of the array's cell under the sensor's centre."""
+    pitch, array = encoding.style.pitch_mm, encoding.array
+    i, j = math.floor(fit.x_mm / pitch), math.floor(fit.y_mm / pitch)
+    return (place.row - j) % array.rows, (place.column + i) % array.columns
+
+
+def neighbours(encoding: Encoding, a: tuple[int, int], b: tuple[int, int]) -> bool:
+    """Whether two cells are one, up to a cell's rounding."""
+    array = encoding.array
+    return (a[0] - b[0] + 1) % array.rows <= 2 and (a[1] - b[1] + 1) % array.columns <= 2
 
 
 def _worn(fit: Fit) -> Array:
@@ -150,8 +164,7 @@ def _zeros(encoding: Encoding, at: Ints, cells: Ints) -> _Candidates:
     row = (rows.astype(np.int64) + cells[:, 1]) % array.rows
     column = (columns.astype(np.int64) - cells[:, 0]) % array.columns
     owners = encoding.owners[at]
-    places = row.astype(np.uint64) * np.uint64(array.columns) + column.astype(np.uint64)
-    _, place = np.unique(places, return_inverse=True)
+    _, place = np.unique(cell_keys(array.columns, row, column), return_inverse=True)
     both = place.reshape(-1).astype(np.int64) * (len(encoding.faces) + 1) + owners
     _, once, votes = np.unique(both, return_index=True, return_counts=True)
     if len(once) > MANY and (votes > 1).any():

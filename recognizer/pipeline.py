@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from probe.sensor import Sensor
 from recognizer.belief import Support, Thresholds, support
 from recognizer.lab import Encoding, Lab
-from recognizer.locate import Place, place_scores, places, shown_at
+from recognizer.locate import Place, neighbours, place_scores, places, shown_at, under_centre
 from recognizer.pose import face_covariance, face_pose, inside_mm
 from recognizer.recognition import (
     AMBIGUOUS,
@@ -105,12 +105,12 @@ def explained(reader: Reader, signal: Signal, seq: int = 0) -> tuple[Recognition
     if not signal.contact:
         return refused(seq, NO_CONTACT), None
     found = readings(reader, signal, reader.settings)
-    answer = _answer(reader, found, seq)
-    if answer and found[0].support().cells >= reader.thresholds.many:
+    answer, cells = _answer(reader, found, seq)
+    if answer and cells >= reader.thresholds.many:
         return answer, found[0]
     # Spend more where it is needed: no answer yet, or one that few cells speak for.
     again = readings(reader, signal, reader.thorough)
-    second = _answer(reader, again, seq)
+    second, _ = _answer(reader, again, seq)
     if answer and second and not _same(found[0], again[0]):
         return refused(seq, AMBIGUOUS, margin=0.0, runner_up=answer.runner_up), again[0]
     if answer or second:
@@ -172,55 +172,71 @@ def _verified(
     return verified
 
 
-def _answer(reader: Reader, found: list[Reading], seq: int) -> Recognition:
+def _answer(reader: Reader, found: list[Reading], seq: int) -> tuple[Recognition, int]:
+    """Return what readings, best first, say together, and how many cells speak for it."""
     if not found:
-        return refused(seq, TOO_FEW)
+        return refused(seq, TOO_FEW), 0
     best = found[0]
-    index = _index(best)
     other = next((r for r in found[1:] if not _same(best, r)), None)
     margin = math.inf if other is None else best.score - other.score
     runner_up = None
     if other is not None:
         face = other.encoding.face(other.place.face)
         runner_up = RunnerUp(face.object, face.face, _index(other))
-    limits = reader.thresholds
-    speaks = best.support()
+    limits, speaks = reader.thresholds, best.support()
+    reason = ""
     if not speaks.holds(limits):
-        return refused(seq, NOT_ENCODED, margin=margin, runner_up=runner_up)
-    if speaks.cells < limits.cells:
-        return refused(seq, TOO_FEW, margin=margin, runner_up=runner_up)
-    if margin < limits.margin:
-        return refused(seq, AMBIGUOUS, margin=margin, runner_up=runner_up)
-    face = best.encoding.face(best.place.face)
-    pose = face_pose(best.encoding, face, best.place, best.fit)
+        reason = NOT_ENCODED
+    elif speaks.cells < limits.cells:
+        reason = TOO_FEW
+    elif margin < limits.margin:
+        reason = AMBIGUOUS
+    told = placed(
+        best.encoding, best.fit, best.place, limits, seq,
+        reason=reason, margin=margin, runner_up=runner_up,
+    )  # fmt: skip
+    return told, speaks.cells
+
+
+def placed(
+    encoding: Encoding,
+    fit: Fit,
+    place: Place,
+    limits: Thresholds,
+    seq: int,
+    *,
+    reason: str,
+    margin: float,
+    runner_up: RunnerUp | None,
+) -> Recognition:
+    """Return the answer at a place, or the refusal where there is a reason or no face."""
+    if reason:
+        return refused(seq, reason, margin=margin, runner_up=runner_up)
+    face = encoding.face(place.face)
+    pose = face_pose(encoding, face, place, fit)
     if inside_mm(face, float(pose[0, 3]), float(pose[1, 3])) < -limits.rim_mm:
         return refused(seq, OUTSIDE, margin=margin, runner_up=runner_up)
     return Recognition(
         seq=seq,
         object=face.object,
         face=face.face,
-        index=index,
+        index=under_centre(encoding, fit, place),
         T_face_probe=pose,
         T_object_probe=face.T_object_face @ pose,
-        covariance=face_covariance(face, best.fit.covariance),
+        covariance=face_covariance(face, fit.covariance),
         margin=margin,
         runner_up=runner_up,
         reason="",
-        noise=best.fit.noise,
+        noise=fit.noise,
     )
 
 
 def _index(reading: Reading) -> tuple[int, int]:
-    """Return the array cell under the sensor's centre."""
-    pitch, array = reading.encoding.style.pitch_mm, reading.encoding.array
-    i, j = math.floor(reading.fit.x_mm / pitch), math.floor(reading.fit.y_mm / pitch)
-    return (reading.place.row - j) % array.rows, (reading.place.column + i) % array.columns
+    return under_centre(reading.encoding, reading.fit, reading.place)
 
 
 def _same(a: Reading, b: Reading) -> bool:
     """Whether two readings say the same place, up to a cell's rounding."""
     if a.encoding is not b.encoding or a.place.face != b.place.face:
         return False
-    (ra, ca), (rb, cb) = _index(a), _index(b)
-    array = a.encoding.array
-    return (ra - rb + 1) % array.rows <= 2 and (ca - cb + 1) % array.columns <= 2
+    return neighbours(a.encoding, _index(a), _index(b))

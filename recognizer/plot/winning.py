@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.lab import EncodedFace, Encoding
-from recognizer.locate import Place
+from recognizer.locate import Place, shown_at
 from recognizer.pipeline import Reader, explained
 from recognizer.signal import Signal
 
@@ -57,11 +57,7 @@ def winning(reader: Reader, signal: Signal) -> Winning | None:
     if best is None:
         return None
     encoding, place, fit = best.encoding, best.place, best.fit
-    array = encoding.array
-    held_by, label = encoding.at(
-        (place.row - fit.cells[:, 1]) % array.rows, (place.column + fit.cells[:, 0]) % array.columns
-    )
-    registered = np.where(held_by == place.face, label, -1).astype(np.int64)  # -1: last score
+    shown = shown_at(encoding, place, fit.cells)
     return Winning(
         encoding=encoding,
         place=place,
@@ -70,6 +66,6 @@ def winning(reader: Reader, signal: Signal) -> Winning | None:
         y_mm=fit.y_mm,
         theta_rad=fit.theta_rad,
         cells=fit.cells,
-        registered=registered,
-        felt=fit.scores[np.arange(len(registered)), registered] > -CLEARLY,
+        registered=np.where(shown == encoding.array.order, -1, shown),
+        felt=fit.scores[np.arange(len(shown)), shown] > -CLEARLY,
     )

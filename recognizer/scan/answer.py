@@ -17,13 +17,11 @@ from numpy.typing import NDArray
 
 from recognizer.belief import CLEARLY, WHOLE, unplaced
 from recognizer.lab import Encoding
-from recognizer.locate import Place, place_scores, places, shown_at
-from recognizer.pipeline import Reader
-from recognizer.pose import face_covariance, face_pose, inside_mm
+from recognizer.locate import Place, neighbours, place_scores, places, shown_at, under_centre
+from recognizer.pipeline import Reader, placed
 from recognizer.recognition import (
     AMBIGUOUS,
     NOT_ENCODED,
-    OUTSIDE,
     TOO_FEW,
     Recognition,
     RunnerUp,
@@ -53,9 +51,7 @@ class Located:
     @property
     def index(self) -> tuple[int, int]:
         """Row and column of the array's cell under the sensor's centre."""
-        pitch, array = self.encoding.style.pitch_mm, self.encoding.array
-        i, j = math.floor(self.fit.x_mm / pitch), math.floor(self.fit.y_mm / pitch)
-        return (self.place.row - j) % array.rows, (self.place.column + i) % array.columns
+        return under_centre(self.encoding, self.fit, self.place)
 
     @property
     def face(self) -> tuple[str, str]:
@@ -67,9 +63,7 @@ class Located:
         """Whether two say the same place, up to a cell's rounding."""
         if self.encoding is not other.encoding or self.place.face != other.place.face:
             return False
-        (ra, ca), (rb, cb) = self.index, other.index
-        array = self.encoding.array
-        return (ra - rb + 1) % array.rows <= 2 and (ca - cb + 1) % array.columns <= 2
+        return neighbours(self.encoding, self.index, other.index)
 
 
 def located(
@@ -132,25 +126,10 @@ def answered(
     runner_up = None
     if other is not None:
         runner_up = RunnerUp(*other.face, other.index)
-    reason = _doubt(reader, best, margin, limits)
-    face = best.encoding.face(best.place.face)
-    pose = face_pose(best.encoding, face, best.place, best.fit)
-    outside = inside_mm(face, float(pose[0, 3]), float(pose[1, 3])) < -reader.thresholds.rim_mm
-    if reason or outside:
-        return refused(seq, reason or OUTSIDE, margin=margin, runner_up=runner_up)
-    return Recognition(
-        seq=seq,
-        object=face.object,
-        face=face.face,
-        index=best.index,
-        T_face_probe=pose,
-        T_object_probe=face.T_object_face @ pose,
-        covariance=face_covariance(face, best.fit.covariance),
-        margin=margin,
-        runner_up=runner_up,
-        reason="",
-        noise=best.fit.noise,
-    )
+    return placed(
+        best.encoding, best.fit, best.place, reader.thresholds, seq,
+        reason=_doubt(reader, best, margin, limits), margin=margin, runner_up=runner_up,
+    )  # fmt: skip
 
 
 def _doubt(reader: Reader, best: Located, margin: float, limits: ScanSettings) -> str:
