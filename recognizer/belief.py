@@ -24,6 +24,7 @@ from recognizer.symbols.refine import Image, explained_share
 from recognizer.symbols.template import Template
 
 Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 WHOLE = 6.0  #: tactels that look at a cell which counts as seen
 CLEARLY, PLAINLY = 8.0, 16.0  #: nats by which a cell speaks for another symbol
@@ -74,27 +75,45 @@ def support(
     image: Image, template: Template, encoding: Encoding, fit: Fit, place: Place, score: float
 ) -> Support:
     """Return what speaks for a place, under the fit it was verified with."""
-    order = encoding.array.order
-    held = shown_at(encoding, place, fit.cells)
-    here = np.arange(len(held))
-    own = fit.scores[here, held]
-    worn = (held < order) & (fit.scores[:, order] > own)
-    others = fit.scores[:, :order].max(axis=1)
-    against = np.where(worn, 0.0, others - own)
-    seen = fit.seen >= WHOLE
-
-    def labels(cells: Ints) -> Ints:
-        found = shown_at(encoding, place, cells.reshape(-1, 2)).reshape(cells.shape[:-1])
-        found[_within(cells, fit.cells[worn])] = order
-        return np.where(found == order, -1, found)
-
+    cells = weighed(encoding, fit, place)
+    worn = fit.cells[cells.worn]
     return Support(
         surprise=score - unplaced(encoding, fit),
-        explained=explained_share(image, template, fit.pose, fit.gain, labels),
-        cells=int((seen & (held < order) & ~worn).sum()),
-        clear=int((seen & (against > CLEARLY)).sum()),
-        plain=int((seen & (against > PLAINLY)).sum()),
+        explained=explained_share(
+            image, template, fit.pose, fit.gain, lambda at: left_at(encoding, place, worn, at)
+        ),
+        cells=int(cells.told.sum()),
+        clear=int((cells.seen & (cells.against > CLEARLY)).sum()),
+        plain=int((cells.seen & (cells.against > PLAINLY)).sum()),
     )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cells:
+    """What the cells in view (m,) say of a place."""
+
+    worn: Flags  #: hold a symbol that is not felt at all
+    seen: Flags  #: tactels enough look at them
+    told: Flags  #: seen, with a symbol that is not worn
+    against: NDArray[np.float64]  #: nats by which they speak for another symbol
+
+
+def weighed(encoding: Encoding, fit: Fit, place: Place) -> Cells:
+    """Return what the cells of a fit say of a place."""
+    order = encoding.array.order
+    held = shown_at(encoding, place, fit.cells)
+    own = fit.scores[np.arange(len(held)), held]
+    worn = np.asarray((held < order) & (fit.scores[:, order] > own))
+    seen = np.asarray(fit.seen >= WHOLE)
+    against = np.where(worn, 0.0, fit.scores[:, :order].max(axis=1) - own)
+    return Cells(worn, seen, seen & (held < order) & ~worn, against)
+
+
+def left_at(encoding: Encoding, place: Place, worn: Ints, cells: Ints) -> Ints:
+    """Return the labels that cells (..., 2) show at a place, -1 for none, or worn away (k, 2)."""
+    found = shown_at(encoding, place, cells.reshape(-1, 2)).reshape(cells.shape[:-1])
+    gone = (cells[..., None, :] == worn).all(axis=-1).any(axis=-1)
+    return np.where(gone | (found == encoding.array.order), -1, found)
 
 
 def unplaced(encoding: Encoding, fit: Fit) -> float:
@@ -106,11 +125,3 @@ def unplaced(encoding: Encoding, fit: Fit) -> float:
     options = encoding.array.order + 1
     each = np.log(np.exp(fit.scores).sum(axis=1)) - math.log(options)
     return float(each.sum()) + fit.value + math.log(len(encoding.keys))
-
-
-def _within(cells: Ints, some: Ints) -> NDArray[np.bool_]:
-    """Return which cells (..., 2) are among some (k, 2)."""
-    found = np.zeros(cells.shape[:-1], np.bool_)
-    for cell in some:
-        found |= (cells == cell).all(axis=-1)
-    return found

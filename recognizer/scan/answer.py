@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.belief import CLEARLY, WHOLE, unplaced
+from recognizer.belief import CLEARLY, left_at, unplaced, weighed
 from recognizer.lab import Encoding
-from recognizer.locate import Place, neighbours, place_scores, places, shown_at, under_centre
+from recognizer.locate import Place, neighbours, place_scores, places, under_centre
 from recognizer.pipeline import Reader, placed
 from recognizer.recognition import (
     AMBIGUOUS,
@@ -89,13 +89,10 @@ def posed(
 ) -> Located:
     """Return a place whose last touch was fitted again with the symbols that belong there."""
     encoding, place, fit = found.encoding, found.place, found.fit
-    order = encoding.array.order
-    worn = fit.cells[_worn(encoding, fit, place)]
+    worn = fit.cells[weighed(encoding, fit, place).worn]
 
     def shown(cells: Ints) -> Ints:
-        labels = shown_at(encoding, place, cells.reshape(-1, 2)).reshape(cells.shape[:-1])
-        gone = (cells[..., None, :] == worn).all(axis=-1).any(axis=-1)
-        return np.where(gone | (labels == order), -1, labels).astype(np.int64)
+        return left_at(encoding, place, worn, cells)
 
     start = started(fit.pose[None], fit.gain[None])
     lattices = refined(image, template, start, steps=limits.verify_steps, shown=shown)
@@ -135,26 +132,15 @@ def answered(
 def _doubt(reader: Reader, best: Located, margin: float, limits: ScanSettings) -> str:
     """Return why the best place may not be believed; nothing if it may."""
     encoding, fit, place = best.encoding, best.fit, best.place
-    order = encoding.array.order
-    held = shown_at(encoding, place, fit.cells)
-    worn = _worn(encoding, fit, place)
-    own = fit.scores[np.arange(len(held)), held]
-    against = np.where(worn, 0.0, fit.scores[:, :order].max(axis=1) - own)
-    seen = (fit.seen >= WHOLE) & (held < order) & ~worn
+    cells = weighed(encoding, fit, place)
+    told = int(cells.told.sum())
     chance = unplaced(encoding, fit)
     if fit.value - chance < reader.thresholds.surprise:
         return TOO_FEW  # if every cell agreed fully it would be no surprise either
     if best.score - chance < reader.thresholds.surprise:
         return NOT_ENCODED
-    if (against > CLEARLY).sum() > max(reader.thresholds.contradicted, limits.wrong * seen.sum()):
+    if (cells.against > CLEARLY).sum() > max(reader.thresholds.contradicted, limits.wrong * told):
         return NOT_ENCODED
-    if seen.sum() < reader.thresholds.cells:
+    if told < reader.thresholds.cells:
         return TOO_FEW
     return AMBIGUOUS if margin < reader.thresholds.margin else ""
-
-
-def _worn(encoding: Encoding, fit: Fit, place: Place) -> NDArray[np.bool_]:
-    """Return which cells (m,) hold a symbol that is not felt at all."""
-    held, order = shown_at(encoding, place, fit.cells), encoding.array.order
-    own = fit.scores[np.arange(len(held)), held]
-    return np.asarray((held < order) & (fit.scores[:, order] > own))
