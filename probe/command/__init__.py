@@ -2,7 +2,7 @@
 
 ::
 
-    __init__.py    what an error or an interruption means for the exit code
+    __init__.py    what an error means for the exit code; ending: interruptions, misuse
     app            which command: the modules below register themselves there
     options        options that several commands share
     report         results and errors as text and as JSON
@@ -24,15 +24,10 @@ needed: `probe-sensor --help` loads neither numpy, h5py and pyserial nor a plott
 
 from __future__ import annotations
 
-import io
-import os
-import signal
-import sys
 from collections.abc import Callable, Sequence
-from types import FrameType
 from typing import NoReturn
 
-FAILED, BAD_INPUT, DEVICE, INTERRUPTED = 1, 2, 3, 130
+from probe.command.ending import BAD_INPUT, FAILED, leave, misuse, unwritten
 
 Action = Callable[[], int]
 """What a command does once its options are read; returns the exit code."""
@@ -40,20 +35,7 @@ Action = Callable[[], int]
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run `probe-sensor` and leave with its exit code."""
-    signal.signal(signal.SIGTERM, _end)
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # a name the terminal cannot show
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    try:
-        code = run(given)
-        sys.stdout.flush()
-    except KeyboardInterrupt:
-        sys.stderr.write("\nprobe-sensor: interrupted\n")
-        code = INTERRUPTED
-    except BrokenPipeError:  # the reader of our output has gone, as in `| head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = FAILED
-    sys.exit(code)
+    leave("probe-sensor", run, arguments)
 
 
 def run(arguments: list[str]) -> int:
@@ -79,25 +61,12 @@ def run(arguments: list[str]) -> int:
         return error.exit_code
     except usage_error as error:
         fix = f"see {command_of(arguments)} --help"
-        report.error(ProbeError(_misuse(error), fix=fix), as_json=as_json)
+        report.error(ProbeError(misuse(error), fix=fix), as_json=as_json)
         return BAD_INPUT
     except BrokenPipeError:
         raise
     except OSError as error:
-        what = f"cannot write '{error.filename}'" if error.filename else "cannot write"
-        cause = f"{what}: {error.strerror or error}"
-        report.error(ProbeError(cause, fix="check folder, space and rights"), as_json=as_json)
+        report.error(
+            ProbeError(unwritten(error), fix="check folder, space and rights"), as_json=as_json
+        )
         return FAILED
-
-
-def _misuse(error: Exception) -> str:
-    """Return what is wrong with an option, with the option's name."""
-    if getattr(error, "param", None) is None:  # a message of our own, which names it
-        return str(getattr(error, "message", error))
-    told = str(getattr(error, "format_message", error.__str__)())
-    return told.replace("Invalid value for ", "").removesuffix(".")
-
-
-def _end(number: int, _frame: FrameType | None) -> NoReturn:
-    """Leave on a request to end, so that what is open is closed."""
-    sys.exit(128 + number)

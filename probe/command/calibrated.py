@@ -20,7 +20,8 @@ from probe.calibration import (
 from probe.calibration.average import averaged
 from probe.calibration.condition import Thresholds, common_bias, raised
 from probe.circuit import Electronics
-from probe.command import FAILED, report
+from probe.command import report
+from probe.command.ending import FAILED
 from probe.command.exported import refuse_taken
 from probe.command.laws import condition_map, described, places
 from probe.command.listen import Counts, frames_of

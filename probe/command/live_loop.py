@@ -13,7 +13,8 @@ from rich.console import Console
 from rich.live import Live
 
 from probe.calibration import read_calibration
-from probe.command import INTERRUPTED, report
+from probe.command import report
+from probe.command.ending import INTERRUPTED
 from probe.command.keys import Pressed, keys
 from probe.command.live_state import LiveState
 from probe.command.live_view import line_of, rendered

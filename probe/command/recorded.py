@@ -9,7 +9,8 @@ from threading import Event
 from typing import Any
 
 from probe.calibration import Calibration, calibration_hash, read_calibration
-from probe.command import INTERRUPTED, report
+from probe.command import report
+from probe.command.ending import INTERRUPTED
 from probe.command.progress import Told, progress_bar
 from probe.command.stream import Stream, interruption, name_of
 from probe.errors import PortError, ProbeError, RecordingError

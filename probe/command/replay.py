@@ -50,7 +50,7 @@ def _pipe(url: str, *, as_json: bool) -> int:
     """Write every frame when its time has come."""
     import sys
 
-    from probe.command import INTERRUPTED
+    from probe.command.ending import INTERRUPTED
     from probe.command.stream import Stream, interruption
 
     with interruption() as interrupted, Stream(url) as stream:

@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 
 from probe.circuit import QUIET, Electronics, Noise, fsr_of, read_counts
-from probe.command import INTERRUPTED, report
+from probe.command import report
+from probe.command.ending import INTERRUPTED
 from probe.command.exported import refuse_taken, staged
 from probe.command.progress import progress_bar
 from probe.command.recorded import check_output

@@ -16,33 +16,15 @@ imported before it is needed: `recognize-object --help` loads no numpy, database
 
 from __future__ import annotations
 
-import io
-import os
-import signal
-import sys
 from collections.abc import Sequence
-from types import FrameType
 from typing import NoReturn
 
-FAILED, BAD_INPUT, INTERRUPTED = 1, 2, 130
+from probe.command.ending import BAD_INPUT, FAILED, leave, misuse, unwritten
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run `recognize-object` and leave with its exit code."""
-    signal.signal(signal.SIGTERM, _end)
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # a name the terminal cannot show
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    try:
-        code = run(given)
-        sys.stdout.flush()
-    except KeyboardInterrupt:
-        sys.stderr.write("\nrecognize-object: interrupted\n")
-        code = INTERRUPTED
-    except BrokenPipeError:  # the reader of our output has gone, as in `| head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = FAILED
-    sys.exit(code)
+    leave("recognize-object", run, arguments)
 
 
 def run(arguments: list[str]) -> int:
@@ -67,28 +49,13 @@ def run(arguments: list[str]) -> int:
         report.error(error, as_json=as_json)
         return error.exit_code
     except usage_error as error:
-        told = _misuse(error)
+        told = misuse(error)
         fix = "see recognize-object --help"
         report.error(RecognizerError(told, fix=fix), as_json=as_json)
         return BAD_INPUT
     except BrokenPipeError:
         raise
     except OSError as error:
-        what = f"cannot write '{error.filename}'" if error.filename else "cannot write"
-        cause = f"{what}: {error.strerror or error}"
         fix = "check folder, space and rights"
-        report.error(RecognizerError(cause, fix=fix), as_json=as_json)
+        report.error(RecognizerError(unwritten(error), fix=fix), as_json=as_json)
         return FAILED
-
-
-def _misuse(error: Exception) -> str:
-    """Return what is wrong with an option, with the option's name."""
-    if getattr(error, "param", None) is None:  # a message of our own, which names it
-        return str(getattr(error, "message", error))
-    told = str(getattr(error, "format_message", error.__str__)())
-    return told.replace("Invalid value for ", "").removesuffix(".")
-
-
-def _end(number: int, _frame: FrameType | None) -> NoReturn:
-    """Leave on a request to end, so that what is open is closed."""
-    sys.exit(128 + number)

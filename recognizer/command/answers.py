@@ -10,13 +10,14 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
+from probe.command.ending import FAILED, INTERRUPTED
 from probe.command.exported import refuse_taken, staged
 from probe.command.progress import Told, progress_bar
 from probe.command.report import message, warning, write_json
 from probe.command.stream import interruption
 from probe.errors import ProbeError
 from probe.frame import Frame
-from recognizer.command import FAILED, INTERRUPTED, report
+from recognizer.command import report
 from recognizer.command.placed import object_in_base
 from recognizer.command.source import Source, at_port, listened, recorded
 from recognizer.lab import open_lab

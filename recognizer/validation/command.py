@@ -14,18 +14,15 @@ heavy is imported before it is needed.
 
 from __future__ import annotations
 
-import io
 import os
-import signal
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import FrameType
 from typing import Annotated, NoReturn
 
 import typer
 
-BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130
+from probe.command.ending import BAD_INPUT, FAILED, leave
+
 TOOLS = ("compare", "repeat", "report")
 HELP = """Touch a set of objects in simulation, read every touch, and report how far the answers \
 can be trusted.
@@ -67,20 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run `validate-set` and leave with its exit code."""
     for library in ("OMP", "OPENBLAS", "MKL"):  # work is shared by touches, not within one
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
-    signal.signal(signal.SIGTERM, _end)
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    try:
-        code = run(given)
-        sys.stdout.flush()
-    except KeyboardInterrupt:
-        sys.stderr.write("\nvalidate-set: interrupted; go on with --resume\n")
-        code = INTERRUPTED
-    except BrokenPipeError:  # the reader of our output has gone, as in `| head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = FAILED
-    sys.exit(code)
+    leave("validate-set", run, arguments, advice="; go on with --resume")
 
 
 def run(arguments: list[str]) -> int:
@@ -263,11 +247,6 @@ def report(
         return 0
 
     return action
-
-
-def _end(number: int, _frame: FrameType | None) -> NoReturn:
-    """Leave on a request to end, so that what is open is closed."""
-    sys.exit(128 + number)
 
 
 if __name__ == "__main__":
