@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from recognizer.lab import Encoding
 from recognizer.locate import Place, shown_at
 from recognizer.symbols.fit import Fit
-from recognizer.symbols.refine import Image, explained_share
+from recognizer.symbols.gain import Image
+from recognizer.symbols.refine import explained_share
 from recognizer.symbols.template import Template
 
 Ints = NDArray[np.int64]

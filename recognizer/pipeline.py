@@ -36,8 +36,9 @@ from recognizer.recognition import (
 )
 from recognizer.signal import Signal
 from recognizer.symbols.fit import Fit, Settings, fits, scored
+from recognizer.symbols.gain import Image, image_of
 from recognizer.symbols.pressing import pressing_of
-from recognizer.symbols.refine import Image, image_of, refined, started
+from recognizer.symbols.refine import refined, started
 from recognizer.symbols.search import Bank, bank_of
 from recognizer.symbols.template import Template, template_of
 

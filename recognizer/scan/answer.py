@@ -30,7 +30,8 @@ from recognizer.recognition import (
 from recognizer.scan.composite import Composite
 from recognizer.scan.settings import ScanSettings
 from recognizer.symbols.fit import Fit, scored
-from recognizer.symbols.refine import Image, explained_share, refined, started
+from recognizer.symbols.gain import Image
+from recognizer.symbols.refine import explained_share, refined, started
 from recognizer.symbols.template import Template
 
 Array = NDArray[np.float64]

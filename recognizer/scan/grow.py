@@ -27,8 +27,8 @@ from recognizer.scan.views import (
     views_of,
     widest_mm,
 )
+from recognizer.symbols.gain import Image, image_of
 from recognizer.symbols.pressing import pressing_of
-from recognizer.symbols.refine import Image, image_of
 
 Array = NDArray[np.float64]
 

@@ -19,7 +19,8 @@ from recognizer.mosaic.planar import wrapped
 from recognizer.mosaic.touch import PlacedTouch
 from recognizer.pipeline import Reader
 from recognizer.symbols.fit import Fit, Settings, fits, scored
-from recognizer.symbols.refine import Image, first_gain, refined, started
+from recognizer.symbols.gain import Image, first_gain
+from recognizer.symbols.refine import refined, started
 from recognizer.symbols.search import Bank
 from recognizer.symbols.template import Template
 

@@ -15,19 +15,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from recognizer.symbols.covariance import covariances
+from recognizer.symbols.gain import Image, felt_under, first_gain, tilted_gain
 from recognizer.symbols.noise import Felt, log_likelihoods, spread
 from recognizer.symbols.refine import (
     NOISE,
-    Image,
     Lattices,
     cells_and_offsets,
     chosen,
-    felt_under,
-    first_gain,
     refined,
     started,
     tables_at,
-    tilted_gain,
 )
 from recognizer.symbols.search import Bank, search
 from recognizer.symbols.template import Floats, Template, psi
@@ -36,17 +34,16 @@ Array = NDArray[np.float64]
 
 SAME_SHIFT = 0.08  #: pitches by which two lattices that are one may differ
 SAME_TURN = 0.02  #: half turns
-UNSEEN = 1e-8  #: least eigenvalue of a normal matrix of unit diagonal
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
     """How much work the fit spends."""
 
-    candidates: int = 3  #: lattices taken from the coarse search
-    steps: int = 3  #: Gauss-Newton steps of all of them
-    finalists: int = 2  #: lattices that are refined to the end
-    final_steps: int = 4
+    candidates: int = 2  #: lattices taken from the coarse search
+    steps: int = 2  #: Gauss-Newton steps of all of them
+    finalists: int = 1  #: lattices that are refined to the end
+    final_steps: int = 2
     crossed: int = 0  #: gains that are tried on all lattices, and these turned by quarters
     least_noise: float = 0.05  #: below it a fit is not believed
 
@@ -172,7 +169,7 @@ def scored(
         noise = max(settings.least_noise, left)
     each = log_likelihoods(felt, tables, np.full(len(cells), noise))
     level = felt.measure + (felt.trust * np.log(felt.press)).sum(axis=1)
-    scale = (noise / NOISE) ** 2 * _alike(away * felt.trust, image.shape)
+    covariance = covariances(image, lattices, away * felt.trust, noise)
     found = []
     for b in range(len(cells)):
         names, dense = np.unique(cells[b], axis=0, return_inverse=True)
@@ -191,17 +188,10 @@ def scored(
                 seen=np.bincount(dense, felt.press[b] * felt.trust, len(names)).astype(np.float64),
                 noise=noise,
                 value=float(most.sum() + level[b] - felt.trust.sum() * math.log(noise)),
-                covariance=scale[b] * _inverse(lattices.normal[b])[:3, :3],
+                covariance=covariance[b],
             )
         )
     return tuple(found)
-
-
-def _inverse(normal: Array) -> Array:
-    """Return the inverse of a normal matrix; wide, not narrow, in what the image does not show."""
-    unit = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-12))
-    sizes, axes = np.linalg.eigh(normal * np.outer(unit, unit))
-    return np.asarray((axes / np.maximum(sizes, UNSEEN)) @ axes.T * np.outer(unit, unit))
 
 
 def _away(felt: Felt, tables: Floats, cells: NDArray[np.int64]) -> Array:
@@ -209,18 +199,3 @@ def _away(felt: Felt, tables: Floats, cells: NDArray[np.int64]) -> Array:
     scores = log_likelihoods(felt, tables, np.full(len(cells), NOISE))
     values = chosen(cells, tables, scores, felt)
     return (felt.psi - values[..., 0]) * felt.press / spread(values[:, :, None])[..., 0]
-
-
-def _alike(away: Array, shape: tuple[int, int]) -> Array:
-    """Return by how much (b,) neighbours that err alike widen a covariance, 1 or more.
-
-    The sum of the autocorrelation of what is left over the eight neighbours.
-    """
-    left = np.clip(away, -4 * NOISE, 4 * NOISE).reshape(-1, *shape)
-    left = left - left.mean(axis=(1, 2), keepdims=True)
-    own = np.maximum((left * left).sum(axis=(1, 2)), 1e-12)
-    side = (left[:, 1:] * left[:, :-1]).sum(axis=(1, 2))
-    side += (left[:, :, 1:] * left[:, :, :-1]).sum(axis=(1, 2))
-    across = (left[:, 1:, 1:] * left[:, :-1, :-1]).sum(axis=(1, 2))
-    across += (left[:, 1:, :-1] * left[:, :-1, 1:]).sum(axis=(1, 2))
-    return np.asarray(np.maximum(1.0, 1.0 + 2.0 * (side + across) / own))

@@ -32,6 +32,10 @@ class Felt:
     contact: Array  #: (b, n) 1, falling to 0 where the sensor hangs in the air
     trust: Array  #: (n,)
     measure: Array  #: (b,) sum of log |d psi / d force|: makes planes of other gain comparable
+    depth: Array  #: (b, n) of the plate below the tops of the symbols, heights of the overlay
+    plain: Array  #: (b, n) F of `pressing` there
+    lower: Array  #: (b, n) and over the bare face
+    plateau: Array  #: (b, n) force on a plateau, no less than where the sensor hangs in the air
 
 
 def spread(tables: Floats | Array) -> Floats:

@@ -31,7 +31,7 @@ class Bank:
     shape: tuple[int, int]  #: rows and columns of the image
     reach: int  #: kernels are (2 reach + 1) tactels wide
     rim: int  #: how many tactels around the matrix are places
-    kernels: Floats  #: (2 K K, rotations * phases^2 * order): T, then T^2
+    kernels: Floats  #: (2 K K, order * rotations * phases^2): T, then T^2
     lookups: NDArray[np.int32]  #: (rotations, shifts^2, cells) into places, last one = none
     rotations_rad: NDArray[np.float64]  #: (rotations,)
     shifts_mm: NDArray[np.float64]  #: (shifts^2, 2) of the lattice
@@ -62,12 +62,13 @@ def bank_of(
     dx = (k[None, :, None, None] - offset[None, None, None, :]) * d
     dy = (-k[:, None, None, None] + offset[None, None, :, None]) * d
     dx, dy = np.broadcast_arrays(dx, dy)
-    kernels = np.empty((2, len(k) ** 2, rotations, phases * phases, template.order), np.float32)
+    kernels = np.empty((2, len(k) ** 2, template.order, rotations, phases * phases), np.float32)
     for i, turn in enumerate(turns):
         c, s = math.cos(turn), math.sin(turn)
         u = np.stack([c * dx - s * dy, s * dx + c * dy], axis=-1)
         value = template.at(u)[..., 0].reshape(len(k) ** 2, phases * phases, template.order)
-        kernels[0, :, i], kernels[1, :, i] = value, value * value
+        kernels[0, :, :, i] = value.swapaxes(1, 2)
+        kernels[1, :, :, i] = kernels[0, :, :, i] ** 2
     lookups, shifts_mm = _lookups(template, sensor, turns, rim, phases, shifts)
     return Bank(
         (sensor.rows, sensor.columns),
@@ -143,7 +144,7 @@ def lattice_scores(bank: Bank, values: Floats, weights: Floats, order: int) -> F
     height, width = patches.shape[1:3]
     flat = patches.transpose(1, 2, 0, 3, 4).reshape(height * width, -1)
     turns = len(bank.rotations_rad)
-    best = (flat @ bank.kernels).reshape(height, width, turns, -1, order).max(axis=-1)
+    best = (flat @ bank.kernels).reshape(height, width, order, turns, -1).max(axis=2)
     np.maximum(best, 0, out=best)
     phases = round(math.sqrt(best.shape[-1]))
     grid = best.reshape(height, width, turns, phases, phases).transpose(2, 0, 3, 1, 4)

@@ -18,8 +18,8 @@ from recognizer.pipeline import Reader, recognise
 from recognizer.recognition import Recognition
 from recognizer.signal import signal_of
 from recognizer.symbols.fit import Fit, fits
+from recognizer.symbols.gain import image_of
 from recognizer.symbols.pressing import pressing_of
-from recognizer.symbols.refine import image_of
 from recognizer.validation.campaign import plan_of, series_of
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.pictures import figure_on
