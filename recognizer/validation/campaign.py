@@ -43,8 +43,8 @@ LEVEL_SHARES: Shares = (("low", 0.1), ("typical", 0.4), ("hard", 0.2), ("mismatc
 #: Readers of the picture of error against run time: candidates, steps, finalists, final steps.
 READERS: dict[str, tuple[int, int, int, int]] = {
     "least": (1, 1, 1, 1),
-    "few": (2, 2, 1, 3),
-    "fewer steps": (4, 2, 2, 3),
+    "one lattice": (1, 2, 1, 2),
+    "more steps": (3, 3, 2, 4),
     "more candidates": (12, 4, 4, 6),
     "most": (24, 6, 8, 10),
 }

@@ -21,7 +21,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from probe.command.ending import BAD_INPUT, FAILED, leave
+from probe.command.ending import BAD_INPUT, FAILED, leave, misuse, unwritten
 
 TOOLS = ("compare", "repeat", "report")
 HELP = """Touch a set of objects in simulation, read every touch, and report how far the answers \
@@ -89,15 +89,21 @@ def run(arguments: list[str]) -> int:
                    as_json=as_json)  # fmt: skip
         return error.exit_code
     except usage_error as error:
-        cause = str(getattr(error, "format_message", error.__str__)()).removesuffix(".")
-        told.error("UsageError", cause, "see validate-set --help", "", BAD_INPUT, as_json=as_json)
+        told.error(
+            "UsageError", misuse(error), "see validate-set --help", "", BAD_INPUT, as_json=as_json
+        )
         return BAD_INPUT
     except BrokenPipeError:
         raise
     except OSError as error:
-        what = f"cannot write '{error.filename}'" if error.filename else "cannot write"
-        cause = f"{what}: {error.strerror or error}"
-        told.error("OSError", cause, "check folder, space and rights", "", FAILED, as_json=as_json)
+        told.error(
+            "OSError",
+            unwritten(error),
+            "check folder, space and rights",
+            "",
+            FAILED,
+            as_json=as_json,
+        )
         return FAILED
 
 

@@ -28,9 +28,9 @@ from recognizer.symbols.search import search  # noqa: E402
 from recognizer.validation.trial import Plan, drawn, judged, sensor_of  # noqa: E402
 
 SETTINGS = {
-    "1 lattice, 2 + 2 steps": Settings(candidates=1, steps=2, finalists=1, final_steps=2),
-    "2 lattices, 3 + 4 steps": Settings(candidates=2, steps=3, finalists=1, final_steps=4),
-    "3 lattices, 3 + 4 steps (default)": Settings(),
+    "1 lattice, 1 + 1 steps": Settings(1, 1, 1, 1),
+    "2 lattices, 2 + 2 steps (default)": Settings(),
+    "3 lattices, 3 + 4 steps": Settings(3, 3, 2, 4),
     "8 lattices, 4 + 10 steps": Settings(8, 4, 4, 10),
     "24 lattices, 6 + 14 steps": Settings(24, 6, 6, 14),
 }
