@@ -34,7 +34,7 @@ from recognizer.filters import TactileImage, median, unbiased
 from recognizer.grid import Acceptance, Grid, grid
 from recognizer.lab import Encoding, Lab
 from recognizer.locate import Place
-from recognizer.pose import face_covariance, face_pose, inside_mm
+from recognizer.pose import face_covariance, face_pose, inside_mm, pose_on_object
 from recognizer.recognition import (
     AMBIGUOUS,
     NO_CONTACT,
@@ -214,7 +214,7 @@ def _answered(
         face=face.face,
         index=index(place),
         T_face_probe=pose,
-        T_object_probe=face.T_object_face @ pose,
+        T_object_probe=pose_on_object(face, pose),
         covariance=face_covariance(face, lever @ fit.covariance @ lever.T),
         margin=decoded.margin,
         runner_up=runner_up,

@@ -8,6 +8,7 @@ column; faces are read from the database when a touch first meets them.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
@@ -19,15 +20,19 @@ from generator.alphabet import Alphabet, SymbolStyle, alphabet_from
 from generator.array import FoldedArray, ProductArray, array_from
 from generator.database.cells import held_cells
 from generator.database.open import open_database
-from generator.database.read import read_array, read_object, read_styles
+from generator.database.read import read_array, read_object, read_styles, read_surfaces
 from generator.database.registered import RegisteredObject, RegisteredStyle
 from generator.database.transaction import reading
+from generator.polyhedron.developable import Developable
+from generator.polyhedron.tangent import RoundFace
 from recognizer.errors import LabError
 from recognizer.windows import Windows, windows_of
 
 Ints = NDArray[np.int64]
 
 DENSE = 1 << 22  #: arrays of at most so many cells are looked up in a table
+LEAST_MM, MOST_MM = 15.0, 400.0  #: radii of round faces that are told apart from flat ones
+FINER = 1.35  #: from one of them to the next
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,6 +48,7 @@ class EncodedFace:
     columns: Ints  #: (n,)
     labels: Ints  #: (n,)
     centres_mm: NDArray[np.float64]  #: (n, 2) face frame
+    round: RoundFace | None = None  #: of a round face; its frame is that of the unrolled plane
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,6 +65,7 @@ class Encoding:
     faces: Ints  #: (f, 2) object and face number in the database
     names: dict[int, str]  #: of the objects, by their numbers
     engine: Engine
+    radii_mm: tuple[float, ...] = ()  #: of round faces, nearly, rising; none: all faces are flat
     indexed: list[Windows] = field(default_factory=list)  #: filled by `windows`
     known: dict[int, EncodedFace] = field(default_factory=dict)
 
@@ -132,6 +139,7 @@ def _encodings(connection: Connection, engine: Engine) -> Iterable[Encoding]:
     for entry in read_styles(connection):
         styles.setdefault((entry.array_id, entry.alphabet, entry.style), []).append(entry)
     cells: dict[int, Ints] = {}
+    surfaces = read_surfaces(connection)
     for (array_id, alphabet, style), objects in sorted(styles.items(), key=lambda item: item[0][0]):
         if array_id not in cells:
             cells = {array_id: held_cells(connection, array_id)}
@@ -157,7 +165,25 @@ def _encodings(connection: Connection, engine: Engine) -> Iterable[Encoding]:
             faces=faces,
             names={entry.object_id: entry.name for entry in objects},
             engine=engine,
+            radii_mm=radii_of(
+                one for entry in objects for one in surfaces.get(entry.object_id, ())
+            ),
         )
+
+
+def radii_of(surfaces: Iterable[Developable]) -> tuple[float, ...]:
+    """Return radii of which one is near to each at which a plate can touch round faces.
+
+    A cone has all radii from its largest down.
+    """
+    steps: set[int] = set()
+    for surface in surfaces:
+        if surface.concave:
+            continue  # a flat plate feels nothing in a hole
+        largest = surface.radius_mm / math.cos(surface.half_angle_rad)
+        last = round(math.log(min(max(largest, LEAST_MM), MOST_MM) / LEAST_MM) / math.log(FINER))
+        steps |= set(range(last + 1)) if surface.half_angle_rad else {last}
+    return tuple(LEAST_MM * FINER**step for step in sorted(steps))
 
 
 def _encoded_faces(found: RegisteredObject) -> Iterable[tuple[int, EncodedFace]]:
@@ -169,11 +195,12 @@ def _encoded_faces(found: RegisteredObject) -> Iterable[tuple[int, EncodedFace]]
                 object=found.entry.name,
                 face=face.name,
                 T_object_face=face.T_object_face,
-                polygon_mm=face.polygon_mm,
+                polygon_mm=(face.round.outline_mm,) if face.round else face.polygon_mm,
                 rotation_rad=layout.placement.rotation_rad,
                 rows=layout.rows,
                 columns=layout.columns,
                 labels=layout.labels,
                 centres_mm=layout.centres_mm,
+                round=face.round,
             ),
         )

@@ -14,7 +14,7 @@ centre lies on the face.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from probe.sensor import Sensor
 from recognizer.belief import Support, Thresholds, support
 from recognizer.lab import Encoding, Lab
-from recognizer.locate import Place, neighbours, place_scores, places, shown_at, under_centre
-from recognizer.pose import face_covariance, face_pose, inside_mm
+from recognizer.locate import Place, neighbours, place_scores, places, rivals, shown_at, under_centre
+from recognizer.pose import face_covariance, face_pose, inside_mm, pose_on_object
 from recognizer.recognition import (
     AMBIGUOUS,
     NO_CONTACT,
@@ -34,6 +34,7 @@ from recognizer.recognition import (
     RunnerUp,
     refused,
 )
+from recognizer.round import round_places
 from recognizer.signal import Signal
 from recognizer.symbols.fit import Fit, Settings, fits, scored
 from recognizer.symbols.gain import Image, image_of
@@ -114,9 +115,7 @@ def explained(reader: Reader, signal: Signal, seq: int = 0) -> tuple[Recognition
     second, _ = _answer(reader, again, seq)
     if answer and second and not _same(found[0], again[0]):
         return refused(seq, AMBIGUOUS, margin=0.0, runner_up=answer.runner_up), again[0]
-    if answer or second:
-        return second, again[0] if again else None
-    return answer, found[0] if found else None
+    return second, again[0] if again else None
 
 
 def readings(reader: Reader, signal: Signal, settings: Settings) -> list[Reading]:
@@ -129,19 +128,74 @@ def readings(reader: Reader, signal: Signal, settings: Settings) -> list[Reading
         )
         seen = fits(image, template, bank, settings)
         found += _verified(reader, image, encoding, template, seen)
+        if encoding.radii_mm:
+            found += _on_round_faces(reader, image, encoding, template, bank, settings)
     return sorted(found, key=lambda reading: -reading.score)
 
 
 def _verified(
     reader: Reader, image: Image, encoding: Encoding, template: Template, found: tuple[Fit, ...]
 ) -> list[Reading]:
-    """Return the likeliest places with pose and gain fitted to what the database holds there."""
+    """Return the likeliest places, best first, fitted to what the database holds there."""
     limits = reader.thresholds
-    candidates = places(encoding, found, limits.places)[: limits.places]
+    candidates = _flat(encoding, places(encoding, found, limits.places))[: limits.places]
     if not candidates:
         return []
     near = [place.score > candidates[0].score - limits.near for place in candidates]
     candidates = candidates[: max(2, sum(near))]
+    verified = _fitted(reader, image, encoding, template, candidates, found)
+    best = verified[0]
+    others = [
+        place
+        for place in _flat(
+            encoding, rivals(encoding, best.fit, best.place, len(found), limits.places)
+        )
+        if place.score > best.score - limits.near and not _among(verified, place)
+    ]
+    if others:
+        everything = [replace(best.place, fit=len(found)), *others]
+        verified += _fitted(reader, image, encoding, template, everything, (*found, best.fit))
+    return sorted(verified, key=lambda reading: -reading.score)
+
+
+def _flat(encoding: Encoding, found: list[Place]) -> list[Place]:
+    """Return the places on flat faces; those on round ones are read with their bend."""
+    if not encoding.radii_mm:
+        return found
+    return [place for place in found if encoding.face(place.face).round is None]
+
+
+def _on_round_faces(
+    reader: Reader,
+    image: Image,
+    encoding: Encoding,
+    template: Template,
+    bank: Bank,
+    settings: Settings,
+) -> list[Reading]:
+    limits = reader.thresholds
+    return [
+        Reading(read.image, template, encoding, read.place, read.fit, read.score)
+        for read in round_places(
+            image, reader.sensor, encoding, template, bank, settings, reader.settings, limits
+        )
+    ]
+
+
+def _among(verified: list[Reading], place: Place) -> bool:
+    at = (place.face, place.row, place.column)
+    return any((r.place.face, r.place.row, r.place.column) == at for r in verified)
+
+
+def _fitted(
+    reader: Reader,
+    image: Image,
+    encoding: Encoding,
+    template: Template,
+    candidates: list[Place],
+    found: tuple[Fit, ...],
+) -> list[Reading]:
+    """Return places with pose and gain fitted to their symbols, best first."""
     starts = [found[place.fit] for place in candidates]
     lattices = started(
         np.array([fit.pose for fit in starts]),
@@ -158,7 +212,7 @@ def _verified(
         image,
         template,
         lattices,
-        steps=limits.verify_steps,
+        steps=reader.thresholds.verify_steps,
         shown=shown,
     )
     again = scored(image, template, fitted, reader.settings)
@@ -170,7 +224,7 @@ def _verified(
         scores = [place_scores(encoding, fit, place) for fit in fair]
         best = int(np.argmax(scores))
         verified.append(Reading(image, template, encoding, place, fair[best], scores[best]))
-    return verified
+    return sorted(verified, key=lambda reading: -reading.score)
 
 
 def _answer(reader: Reader, found: list[Reading], seq: int) -> tuple[Recognition, int]:
@@ -223,7 +277,7 @@ def placed(
         face=face.face,
         index=under_centre(encoding, fit, place),
         T_face_probe=pose,
-        T_object_probe=face.T_object_face @ pose,
+        T_object_probe=pose_on_object(face, pose),
         covariance=face_covariance(face, fit.covariance),
         margin=margin,
         runner_up=runner_up,

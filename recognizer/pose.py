@@ -35,6 +35,14 @@ def face_pose(encoding: Encoding, face: EncodedFace, place: Place, fit: Fit) -> 
     return pose
 
 
+def pose_on_object(face: EncodedFace, T_face_probe: Array) -> Array:
+    """Return T_object_probe (4, 4), mm: on a round face the sensor stands in the tangent plane."""
+    if face.round is None:
+        return face.T_object_face @ T_face_probe
+    x, y = float(T_face_probe[0, 3]), float(T_face_probe[1, 3])
+    return face.round.tangent(x, y) @ T_face_probe
+
+
 def face_covariance(face: EncodedFace, covariance: Array) -> Array:
     """Turn a covariance (3, 3) of x, y (mm) and theta (rad) from the lattice to the face frame."""
     c, s = math.cos(face.rotation_rad), math.sin(face.rotation_rad)

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
 
 from generator.command import report
+from generator.database.read import surfaces_of
 from generator.database.url import without_password
 
 if TYPE_CHECKING:
     from generator.database.carry import Carried
     from generator.database.part_state import PartState
-    from generator.database.registered import ObjectEntry, RegisteredFace, RegisteredObject
-    from generator.layout.placement import FaceLayout
+    from generator.database.registered import ObjectEntry, RegisteredObject
+    from generator.layout.placement import FaceLayout, Placement
 
 
 def listed(entries: Sequence[ObjectEntry], url: str, *, as_json: bool) -> None:
@@ -36,7 +38,7 @@ def listed(entries: Sequence[ObjectEntry], url: str, *, as_json: bool) -> None:
     table = report.table(*titles, *(["retired (UTC)"] if some_retired else []))
     for e in entries:
         array = f"{e.profile} {e.rows}x{e.columns}"
-        counts = str(e.number_of_faces), str(e.symbols)
+        counts = str(e.faces), str(e.symbols)
         row = [e.name, e.object_type, *counts, array, f"{e.pitch_mm:g} mm", _minute(e.utc)]
         table.add_row(*map(escape, row + ([_minute(e.retired_utc)] if some_retired else [])))
     report.show(table)
@@ -50,7 +52,7 @@ def shown(held: RegisteredObject, files: Sequence[PartState], url: str, *, as_js
     e, style, alphabet = held.entry, held.style, held.alphabet.get("name", "")
     lengths = f"height {style.height_mm:g}, stroke {style.stroke_mm:g}"
     lines = [
-        f"{e.name}: {e.object_type}, {e.number_of_faces} faces, {e.symbols} symbols",
+        f"{e.name}: {e.object_type}, {e.faces} faces, {e.symbols} symbols",
         f"  array        {e.profile} {e.rows}x{e.columns}, layout {held.layout.kind}",
         f"  symbols      {alphabet}, pitch {style.pitch_mm:g}, {lengths} mm",
         f"  registered   {_minute(e.utc)} UTC by version {e.tool_version}, spec {e.spec_hash[:12]}",
@@ -61,11 +63,12 @@ def shown(held: RegisteredObject, files: Sequence[PartState], url: str, *, as_js
         lines.append(f"  retired      {_minute(e.retired_utc)} UTC; its cells stay taken")
     lines += [f"  warning      {warning}" for warning in held.layout.warnings]
     report.write("\n".join(lines))
-    table = report.table("face", "outline", "area", "symbols", "places", "first cell")
-    for face, on in _faces(held):
+    table = report.table("face", "kind", "area", "symbols", "places", "first cell")
+    for face in _faces(held):
+        on = face.layout
         first = f"({on.rows[0]}, {on.columns[0]})" if len(on.rows) else "blank"
         counts = str(len(on.rows)), str(on.places)
-        row = face.name, face.face_type, f"{face.area_mm2:.0f} mm2", *counts, first
+        row = face.name, face.kind, f"{face.area_mm2:.0f} mm2", *counts, first
         table.add_row(*map(escape, row))
     report.show(table)
     if not files:
@@ -98,7 +101,7 @@ def retired(entries: Sequence[ObjectEntry], done: str, url: str, *, as_json: boo
 def warning_before(entries: Sequence[ObjectEntry]) -> str:
     """Return what is to be known before objects are removed."""
     lines = [
-        f"{e.name}: {e.number_of_faces} faces, {e.symbols} cells, registered {_minute(e.utc)} UTC"
+        f"{e.name}: {e.faces} faces, {e.symbols} cells, registered {_minute(e.utc)} UTC"
         for e in entries
     ]
     lines.append("Parts of them that still exist will be taken for other objects.")
@@ -112,7 +115,7 @@ def exported(done: Carried, file: Path, url: str, *, as_json: bool) -> None:
             {"exported": list(done.copied), "file": str(file), "database": without_password(url)}
         )
         return
-    there = f"in the other lab: encode-object import {file.name}"
+    there = f"in the other lab, before it makes its next object: encode-object import {file.name}"
     report.write(f"{_counted(done.copied)} of {without_password(url)} exported to {file}; {there}")
 
 
@@ -140,10 +143,38 @@ def _counted(names: Sequence[str]) -> str:
     return "1 object" if len(names) == 1 else f"{len(names)} objects"
 
 
-def _faces(held: RegisteredObject) -> list[tuple[RegisteredFace, FaceLayout]]:
+@dataclass(frozen=True, slots=True)
+class _Face:
+    """A face as people count them: a round one is one, with the symbols of its first facet."""
+
+    name: str
+    kind: str  #: of its outline, or cylinder, cone
+    area_mm2: float  #: of a round face, of all its facets
+    placement: Placement | None
+    layout: FaceLayout
+
+
+def _faces(held: RegisteredObject) -> list[_Face]:
     """Return the faces of an object with their symbols; layouts may be in another order."""
     layouts = {layout.face: layout for layout in held.layout.faces}
-    return [(face, layouts[face.face_id]) for face in held.faces if face.face_id in layouts]
+    area = {face.face_id: face.area_mm2 for face in held.faces}
+    surfaces = {surface.carrier: surface for surface in surfaces_of(held.spec)}
+    facets = {facet for surface in surfaces.values() for facet in surface.facets[1:]}
+    found = []
+    for face in held.faces:
+        if face.face_id not in layouts or face.face_id in facets:
+            continue
+        surface = surfaces.get(face.face_id)
+        found.append(
+            _Face(
+                name=face.name,
+                kind=surface.kind if surface else face.face_type,
+                area_mm2=sum(area[n] for n in surface.facets) if surface else face.area_mm2,
+                placement=face.placement,
+                layout=layouts[face.face_id],
+            )
+        )
+    return found
 
 
 def _entry_values(entry: ObjectEntry) -> dict[str, Any]:
@@ -151,7 +182,7 @@ def _entry_values(entry: ObjectEntry) -> dict[str, Any]:
     return {
         "name": entry.name,
         "shape": entry.object_type,
-        "faces": entry.number_of_faces,
+        "faces": entry.faces,
         "symbols": entry.symbols,
         "profile": entry.profile,
         "array": {"rows": entry.rows, "columns": entry.columns},
@@ -167,7 +198,7 @@ def _object_values(held: RegisteredObject, files: Sequence[PartState]) -> dict[s
     """Return all about an object as plain values; `faces` are the faces, not their number."""
     entry = held.entry
     return _entry_values(entry) | {
-        "faces": [_face_values(face, on) for face, on in _faces(held)],
+        "faces": [_face_values(face) for face in _faces(held)],
         "layout": held.layout.kind,
         "warnings": list(held.layout.warnings),
         "files": [
@@ -191,13 +222,13 @@ def _object_values(held: RegisteredObject, files: Sequence[PartState]) -> dict[s
     }
 
 
-def _face_values(face: RegisteredFace, on: FaceLayout) -> dict[str, Any]:
+def _face_values(face: _Face) -> dict[str, Any]:
     """Return a face as plain values; each cell is row, column, label."""
-    place = face.placement
+    place, on = face.placement, face.layout
     cells = zip(on.rows.tolist(), on.columns.tolist(), on.labels.tolist(), strict=True)
     return {
         "name": face.name,
-        "type": face.face_type,
+        "type": face.kind,
         "area_mm2": face.area_mm2,
         "symbols": len(on.labels),
         "places": on.places,

@@ -7,12 +7,13 @@
     tables.py       the schema, with its version history
     migrate.py      an older schema -> this one, whole or not at all (migrations/vN.py)
     transaction.py  writers one after another, readers on one state; what failures mean
+    unreached.py    why a server was not reached
     race.py         place and register in one transaction; who loses a race does it anew
     register.py     an object -> its rows, all or none
     retire.py       an object out of use, its cells kept or freed
     read.py         rows -> objects and layouts, bit for bit
     cells.py        which cells are taken, and by which object and face
-    occupancy.py    taken cells as bits, for the placing of the next object
+    occupancy.py    taken cells as bits, in tiles, for the placing of the next object
     carry.py        objects of one database -> another one (carry_check.py: whether they may)
     exchange.py     export to a file, import from one
     part_state.py   whether registered files are there and unchanged

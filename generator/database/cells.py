@@ -11,7 +11,8 @@ from sqlalchemy import Connection, select
 from generator.array.contract import SymbolArray
 from generator.database import tables
 from generator.database.canonical import canonical, digest
-from generator.database.occupancy import Cells, taken_cells
+from generator.database.occupancy import taken_tiles
+from generator.layout.occupancy import Cells, Occupancy, cells_of_tiles
 
 _CHUNK = 64  #: cells looked up in one statement
 
@@ -34,22 +35,19 @@ def find_array(connection: Connection, array: SymbolArray) -> int | None:
     ).scalar_one_or_none()
 
 
-def occupied(
-    connection: Connection, array_id: int | None, *, without: int | None = None
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def occupancy(connection: Connection, array: SymbolArray) -> Occupancy:
+    """Return which cells of an array objects hold; none of one that is new to the database."""
+    array_id = find_array(connection, array)
+    tiles = {} if array_id is None else taken_tiles(connection, array_id)
+    return Occupancy.from_tiles(tiles, array)
+
+
+def occupied(connection: Connection, array_id: int | None) -> Cells:
     """Return the cells of an array that objects hold: rows (n,) and columns (n,), sorted.
 
-    Parameters
-    ----------
-    array_id
-        The array; None, for one that the database does not know yet, has no cells taken.
-    without
-        An object whose cells do not count, because it is about to be replaced.
+    An array that the database does not know yet, None, has no cells taken.
     """
-    if array_id is None:
-        return np.empty(0, np.int64), np.empty(0, np.int64)
-    spared = None if without is None else cells_of(connection, without, array_id)
-    return taken_cells(connection, array_id, without=spared)
+    return cells_of_tiles({} if array_id is None else taken_tiles(connection, array_id))
 
 
 def cells_of(connection: Connection, object_id: int, array_id: int) -> Cells:

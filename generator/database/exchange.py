@@ -4,6 +4,11 @@ An exported file is a database like any other (SQLite), whatever engine it comes
 command reads it. Importing works on a copy, so that a file is never changed, whichever
 schema version it has, and brings in all objects or none. Files of parts are not carried:
 they are named from where they lie, and made again from the same spec on the same cells.
+
+Every new database fills its array from the same corner, since the same spec gives the same
+bytes in every lab. Two labs that both made objects so hold the same cells, and what one imports
+of the other is refused; who imports first and makes then goes around the cells. Labs that
+make and exchange for years share one database on a server.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ turns, a deadlock on the server. The loser's work is undone and done again on th
 the winner left::
 
     def placed_and_registered(connection: Connection) -> int:
-        taken = occupied(connection, find_array(connection, array))
+        taken = occupancy(connection, array)
         return register(connection, Registration(..., layout=lay_out(..., taken)))
 
     number = in_turn(engine, placed_and_registered)

@@ -29,7 +29,9 @@ from generator.database.registered import (
 from generator.database.transaction import place_of
 from generator.errors import DatabaseError
 from generator.layout.placement import FaceLayout, Layout, Placement
+from generator.polyhedron.developable import Developable, developable_from
 from generator.polyhedron.frame import face_frame, face_polygon
+from generator.polyhedron.tangent import round_face
 from generator.polyhedron.winged import Face, Polyhedron, WingedEdge
 
 __all__ = [
@@ -42,6 +44,7 @@ __all__ = [
     "read_object",
     "read_parts",
     "read_styles",
+    "read_surfaces",
 ]
 
 
@@ -89,10 +92,11 @@ def read_object(connection: Connection, name: str) -> RegisteredObject:
         .join(tables.provenance)
         .where(tables.objects.c.object_id == entry.object_id)
     ).one()
+    spec = json.loads(row.spec)
     return RegisteredObject(
         entry=entry,
         polyhedron=polyhedron,
-        faces=_read_faces(connection, entry, polyhedron, layout),
+        faces=_read_faces(connection, entry, polyhedron, layout, surfaces_of(spec)),
         layout=layout,
         style=SymbolStyle(
             pitch_mm=row.pitch_mm,
@@ -104,8 +108,22 @@ def read_object(connection: Connection, name: str) -> RegisteredObject:
         array=read_array(connection, entry.array_id),
         alphabet=json.loads(row.definition),
         parts=read_parts(connection, entry.object_id),
-        spec=json.loads(row.spec),
+        spec=spec,
     )
+
+
+def surfaces_of(spec: Any) -> tuple[Developable, ...]:
+    """Return the round faces of an object from the plain values it was registered with."""
+    known = spec.get("surfaces", ()) if isinstance(spec, dict) else ()
+    return tuple(developable_from(one) for one in known)
+
+
+def read_surfaces(connection: Connection) -> dict[int, tuple[Developable, ...]]:
+    """Return the round faces of all objects that have some, by their numbers."""
+    known = tables.provenance.c
+    query = select(known.object_id, known.spec).where(known.spec.like('%"surfaces":[%'))
+    found = {number: surfaces_of(json.loads(spec)) for number, spec in connection.execute(query)}
+    return {number: surfaces for number, surfaces in found.items() if surfaces}
 
 
 def read_layout(connection: Connection, name: str) -> Layout:
@@ -211,6 +229,13 @@ def read_parts(connection: Connection, object_id: int) -> tuple[RegisteredPart, 
 
 def _select_entries() -> Select[Any]:
     objects, arrays, provenance = tables.objects.c, tables.arrays.c, tables.provenance.c
+    faces = (
+        select(func.count())
+        .select_from(tables.faces)
+        .where(tables.faces.c.object_id == objects.object_id)
+        .where(tables.faces.c.name.not_like("%.%"))  # F2.2, F2.3, ...: facets of round F2
+        .scalar_subquery()
+    )
     symbols = (
         select(func.count())
         .select_from(tables.cells)
@@ -224,6 +249,7 @@ def _select_entries() -> Select[Any]:
             objects.object_type,
             objects.number_of_vertices,
             objects.number_of_faces,
+            faces,
             symbols,
             objects.array_id,
             arrays.profile,
@@ -286,11 +312,16 @@ def _read_polyhedron(connection: Connection, entry: ObjectEntry) -> Polyhedron:
 
 
 def _read_faces(
-    connection: Connection, entry: ObjectEntry, polyhedron: Polyhedron, layout: Layout
+    connection: Connection,
+    entry: ObjectEntry,
+    polyhedron: Polyhedron,
+    layout: Layout,
+    surfaces: tuple[Developable, ...],
 ) -> tuple[RegisteredFace, ...]:
     placements = {
         face.face: face.placement for face in layout.faces if face.face not in layout.blank_faces
     }
+    rounds = {one.carrier: round_face(polyhedron, one) for one in surfaces}
     faces = []
     for row in connection.execute(_of(tables.faces, entry, "face_id")):
         faces.append(
@@ -304,6 +335,7 @@ def _read_faces(
                     _frozen(loop, np.float64) for loop in face_polygon(polyhedron, row.face_id)
                 ),
                 placement=placements.get(row.face_id),
+                round=rounds.get(row.face_id),
             )
         )
     return tuple(faces)

@@ -4,8 +4,7 @@
 
     with writing(engine) as connection:                 # nobody else writes from here on
         known = find_object(connection, name)
-        taken = occupied(connection, find_array(connection, array))
-        layout = ...                                    # place the faces beside `taken`
+        layout = lay_out(..., occupancy(connection, array))  # beside what is taken
         register(connection, Registration(...))
                                                         # committed here, undone on any error
 
@@ -30,12 +29,13 @@ from generator.array.contract import SymbolArray
 from generator.database import tables
 from generator.database.canonical import canonical, digest
 from generator.database.cells import array_key, cells_of, find_array, occupied
-from generator.database.occupancy import Cells, free_cells, take_cells
+from generator.database.occupancy import free_cells, take_cells
 from generator.database.read import find_object, read_layout
 from generator.database.registered import ObjectEntry, RegisteredPart
 from generator.database.rows import insert_rows, layout_rows, polyhedron_rows
 from generator.database.transaction import place_of, writing
 from generator.errors import DatabaseError
+from generator.layout.occupancy import Cells
 from generator.layout.placement import Layout
 from generator.polyhedron.winged import Polyhedron
 

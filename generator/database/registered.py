@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from generator.alphabet.outline import SymbolStyle
 from generator.database.canonical import spec_hash
 from generator.layout.placement import Layout, Placement
+from generator.polyhedron.tangent import RoundFace
 from generator.polyhedron.winged import Polyhedron
 
 
@@ -26,7 +27,8 @@ class ObjectEntry:
     name: str
     object_type: str  #: cube, box, tetrahedron, ..., file
     number_of_vertices: int
-    number_of_faces: int
+    number_of_faces: int  #: of the polyhedron: each facet of a round face is one
+    faces: int  #: as people count them: a round face is one
     symbols: int  #: cells that the object holds
     array_id: int
     profile: str
@@ -78,6 +80,7 @@ class RegisteredFace:
     T_object_face: NDArray[np.float64]  #: (4, 4)
     polygon_mm: tuple[NDArray[np.float64], ...]  #: loops (k, 2), face frame; holes after the first
     placement: Placement | None  #: None where the face is blank
+    round: RoundFace | None = None  #: the round face of which this facet carries the symbols
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from sqlalchemy import URL, Connection, Engine, text
 from sqlalchemy.exc import DBAPIError
 
+from generator.database.unreached import unreached
 from generator.errors import DatabaseError
 
 WAIT_S = 60.0  #: how long a writer waits for its turn, and a reader for a commit to end
@@ -80,7 +81,7 @@ def place_of(url: URL) -> str:
     """Return how messages name a database: a SQLite file by its path, others without password."""
     if url.get_backend_name() == "sqlite":
         return url.database or "sqlite"
-    return url.render_as_string(hide_password=True)
+    return url.set(drivername=url.get_backend_name()).render_as_string(hide_password=True)
 
 
 def explained(error: DBAPIError, url: URL) -> DatabaseError:
@@ -110,9 +111,8 @@ def explained(error: DBAPIError, url: URL) -> DatabaseError:
                 place=place,
             )
         return DatabaseError(f"the database refuses the object: {first_line}", place=place)
-    if code is None:  # PostgreSQL was not reached at all
-        fix = "check that the server runs, and host, port, user and name in the URL"
-        return DatabaseError(f"cannot connect: {first_line}", fix=fix, place=place)
+    if code is None:
+        return unreached(str(error.orig), url, place)
     return DatabaseError(f"the database failed: {first_line} ({code})", place=place)
 
 
@@ -149,15 +149,5 @@ _MEANINGS: tuple[tuple[tuple[str, ...], str, str], ...] = (
         ("SQLITE_FULL", "53100"),
         "no space is left for the database",
         "free some space, then run the same command again",
-    ),
-    (
-        ("28",),
-        "the server refuses the user or the password",
-        "correct them in the URL, or in PGUSER and ~/.pgpass",
-    ),
-    (
-        ("3D000",),
-        "the server has no database of this name",
-        "create it with `createdb`, or correct the name in the URL",
     ),
 )

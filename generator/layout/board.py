@@ -1,8 +1,9 @@
 """The torus as bits of one integer, so that every position of a piece is tried at once.
 
 Taken cells + mask -> position. Shifting the integer moves the array under one cell of the
-piece; or-ing the shifts of all its cells leaves zeros where it fits. Contacts (taken cells
-beside the piece) are added up by full adders made of bits, position by position.
+piece; or-ing the shifts of all its cells leaves zeros where it fits. A mask is a few blocks,
+and the shifts of a block are doubled until it is covered. Contacts (taken cells beside the
+piece) are counted only where it fits and touches some.
 """
 
 from __future__ import annotations
@@ -10,10 +11,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Mask = NDArray[np.bool_]
+from generator.layout.occupancy import TILE, Mask, Occupancy
 
 WHOLE = 1 << 17  #: an array with no more cells is looked at as a whole
 CORNER = 192  #: first extent of the corner of a larger array, rows and columns
+STEPS = 32  #: the corner's shorter side grows by this part of it, in whole tiles
 NEIGHBOURS = 512  #: of a piece with more cells around it only every second, third, ... counts
 
 
@@ -21,40 +23,23 @@ class Board:
     """The part of the torus that is looked at, as bits, with a margin around it.
 
     Bit (y + 1) stride + x + 1 is cell (y, x). Where the extent is the whole side of the array
-    the margin repeats the other side; elsewhere it counts as taken.
+    the margin repeats the other side; elsewhere it counts as taken. Of a large array the opened
+    corner is looked at (`opened`), which grows when nothing fits any more.
     """
 
-    def __init__(
-        self,
-        size: tuple[int, int],
-        taken: tuple[NDArray[np.int64], NDArray[np.int64]],
-        margin: int,
-        needed: int,
-    ) -> None:
-        """Look at enough of an array of `size` to hold `needed` cells beside the taken ones."""
-        self._whole, self._before = size, taken
+    def __init__(self, occupancy: Occupancy, margin: int) -> None:
+        """Look at the part of an array that is in use."""
+        self._whole = occupancy.rows, occupancy.columns
+        self._occupancy = occupancy
         self._margin = margin
-        self._new: list[tuple[NDArray[np.intp], NDArray[np.intp]]] = []
-        rows, columns = size
-        if rows * columns <= WHOLE:
-            self._resize(rows, columns)
-            return
-        side = CORNER
-        self._resize(min(rows, side), min(columns, side))
-        while self._taken.size - np.count_nonzero(self._taken) < needed and self.grow():
-            pass
+        self._resize(*opened(occupancy))
 
     def grow(self) -> bool:
-        """Double the smaller side that can still grow; False if the whole array is in sight."""
-        rows, columns = self._taken.shape
-        if rows == self._whole[0] and columns == self._whole[1]:
+        """Open more of the array; False if the whole of it is in sight."""
+        extent = _larger(self._extent, self._whole)
+        if extent == self._extent:
             return False
-        taller = columns == self._whole[1] or (rows <= columns and rows < self._whole[0])
-        if taller:
-            rows = min(2 * rows, self._whole[0])
-        else:
-            columns = min(2 * columns, self._whole[1])
-        self._resize(rows, columns)
+        self._resize(*extent)
         return True
 
     def best(self, forms: dict[int, Mask]) -> tuple[int, int, int] | None:
@@ -64,123 +49,144 @@ class Board:
             free = self._free(form)
             if free == 0:
                 continue
-            contact, free = _most(free, self._neighbours(form))
+            at, contact = self._most(form, free)
             if best is None or contact > best[0]:
-                at = (free & -free).bit_length() - 1
                 best = contact, (at // self._stride, at % self._stride, quarter)
         return None if best is None else best[1]
 
     def take(self, form: Mask, row: int, column: int) -> None:
         """Take the cells of a form that has been turned already."""
         r, c = np.nonzero(form)
-        rows, columns = self._taken.shape
+        rows, columns = self._extent
         cells = (r + row) % rows, (c + column) % columns
-        self._new.append(cells)
-        self._taken[cells] = True
+        self._occupancy = self._occupancy.with_cells(*cells)
+        self._sheet[cells[0] + 1, cells[1] + 1] = True
         self._draw()
 
     def _resize(self, rows: int, columns: int) -> None:
-        self._taken = np.zeros((rows, columns), dtype=bool)
-        r, c = self._before
-        seen = (r < rows) & (c < columns)
-        self._taken[r[seen], c[seen]] = True
-        for cells in self._new:
-            self._taken[cells] = True
+        self._extent = rows, columns
         self._stride = columns + 1 + self._margin
-        self._height = rows + 1 + self._margin
-        self._y, self._x = np.arange(self._height) - 1, np.arange(self._stride) - 1
-        self._outside_y = (self._y < 0) | (self._y >= rows)
-        self._outside_x = (self._x < 0) | (self._x >= columns)
-        if rows == self._whole[0]:
-            self._outside_y[:] = False
-        if columns == self._whole[1]:
-            self._outside_x[:] = False
-        origins = np.zeros((self._height, self._stride), dtype=bool)
-        origins[:rows, :columns] = True
-        self._origins = _bits(origins)
+        self._sheet = np.ones((rows + 1 + self._margin, self._stride), dtype=bool)
+        self._sheet[1 : rows + 1, 1 : columns + 1] = False
+        self._origins = _bits(~self._sheet) >> self._stride + 1
+        self._sheet[1 : rows + 1, 1 : columns + 1] = self._occupancy.corner(rows, columns)
         self._draw()
 
     def _draw(self) -> None:
-        rows, columns = self._taken.shape
-        board = self._taken[np.ix_(self._y % rows, self._x % columns)]
-        board[self._outside_y] = True
-        board[:, self._outside_x] = True
-        self._bits = _bits(board)
-        self._runs = {1: self._bits}
-
-    def _run(self, length: int) -> int:
-        """Return the bits at which at least one of `length` cells in a row is taken."""
-        if length not in self._runs:
-            half = length // 2
-            self._runs[length] = self._run(half) | self._run(length - half) >> half
-        return self._runs[length]
+        """Repeat the other side in the margin, and make bits of the sheet."""
+        rows, columns = self._extent
+        if columns == self._whole[1]:
+            x = np.r_[0, columns + 1 : self._sheet.shape[1]]
+            self._sheet[:, x] = self._sheet[:, (x - 1) % columns + 1]
+        if rows == self._whole[0]:
+            y = np.r_[0, rows + 1 : self._sheet.shape[0]]
+            self._sheet[y] = self._sheet[(y - 1) % rows + 1]
+        self._blocks = {(1, 1): _bits(self._sheet)}
 
     def _free(self, form: Mask) -> int:
         """Return the origins (bit y stride + x) at which every cell of a form is free."""
-        if form.shape[0] > self._taken.shape[0] or form.shape[1] > self._taken.shape[1]:
+        if form.shape[0] > self._extent[0] or form.shape[1] > self._extent[1]:
             return 0
+        return self._origins & ~(self._taken(form) >> self._stride + 1)
+
+    def _most(self, form: Mask, free: int) -> tuple[int, int]:
+        """Return the first of the free origins with the most taken cells beside, and how many."""
+        around = np.pad(form, 1)
+        ring = around.copy()
+        ring[1:] |= around[:-1]
+        ring[:-1] |= around[1:]
+        ring[:, 1:] |= around[:, :-1]
+        ring[:, :-1] |= around[:, 1:]
+        touching = free & self._taken(ring)
+        if touching == 0:
+            return (free & -free).bit_length() - 1, 0
+        beside = np.argwhere(ring & ~around) @ (self._stride, 1)
+        beside = beside[:: -(-len(beside) // NEIGHBOURS)]
+        origins = _positions(touching)
+        contact = np.zeros(len(origins), np.int64)
+        sheet = self._sheet.ravel()
+        for cell in beside.tolist():
+            contact += sheet[origins + cell]
+        k = int(contact.argmax())
+        return int(origins[k]), int(contact[k])
+
+    def _taken(self, form: Mask) -> int:
+        """Return the bits at which some cell of a form, its corner being there, is taken."""
         taken = 0
-        for y, x, length in _row_runs(form):
-            taken |= self._run(length) >> ((y + 1) * self._stride + x + 1)
-        return self._origins & ~taken
+        for y, x, height, width in _blocks_of(form):
+            taken |= self._block(height, width) >> (y * self._stride + x)
+        return taken
 
-    def _neighbours(self, form: Mask) -> list[int]:
-        """Return, for each cell beside a form, the origins at which that cell is taken."""
-        ring = _ring(form)
-        ring = ring[:: -(-len(ring) // NEIGHBOURS)]
-        return [self._bits >> shift for shift in (ring @ (self._stride, 1)).tolist()]
-
-
-def _most(free: int, neighbours: list[int]) -> tuple[int, int]:
-    """Return the greatest number of neighbours over the free origins, and where it is reached."""
-    planes = _counted(neighbours)
-    most = 0
-    for k in range(len(planes) - 1, -1, -1):
-        reached = free & planes[k]
-        if reached:
-            most |= 1 << k
-            free = reached
-    return most, free
-
-
-def _counted(bits: list[int]) -> list[int]:
-    """Add up bits position by position: binary digits of the sums, by full and half adders."""
-    planes = []
-    column = bits
-    while column:
-        carries = []
-        while len(column) > 1:
-            a, b = column.pop(), column.pop()
-            either = a ^ b
-            if column:
-                c = column.pop()
-                column.append(either ^ c)
-                carries.append(a & b | either & c)
+    def _block(self, height: int, width: int) -> int:
+        """Return the bits at which some cell of a block of height x width is taken."""
+        known = self._blocks.get((height, width))
+        if known is None:
+            if height > 1:
+                half = height // 2
+                low = self._block(height - half, width) >> half * self._stride
+                known = self._block(half, width) | low
             else:
-                column.append(either)
-                carries.append(a & b)
-        planes.append(column[0])
-        column = carries
-    return planes
+                half = width // 2
+                known = self._block(1, half) | self._block(1, width - half) >> half
+            self._blocks[height, width] = known
+        return known
 
 
-def _row_runs(form: Mask) -> list[tuple[int, int, int]]:
-    """Return the runs of a mask: row, first column, length."""
+def opened(occupancy: Occupancy) -> tuple[int, int]:
+    """Return rows and columns of the part of an array in which objects lie.
+
+    A small array is opened as a whole. Of a larger one it is a corner that grows by steps, and
+    the first beyond which the next step to either side adds no taken cell: what another lab's
+    objects hold far away opens nothing.
+    """
+    size = occupancy.rows, occupancy.columns
+    if size[0] * size[1] <= WHOLE:
+        return size
+    extent = min(size[0], CORNER), min(size[1], CORNER)
+    low = np.array([(y * TILE, x * TILE) for y, x in occupancy.tiles]).reshape(-1, 2)
+    while extent != (following := _larger(extent, size)):
+        inside = (low < _larger(following, size)).all(axis=1)  # a step for each side
+        if not (inside & (low >= extent).any(axis=1)).any():
+            break
+        extent = following
+    return extent
+
+
+def _larger(extent: tuple[int, int], size: tuple[int, int]) -> tuple[int, int]:
+    """Return the next extent of the corner of an array, the same where it is the whole."""
+    rows, columns = extent
+    if columns == size[1] or (rows <= columns and rows < size[0]):
+        return min(_step(rows), size[0]), columns
+    return rows, min(_step(columns), size[1])
+
+
+def _step(side: int) -> int:
+    return side + TILE * -(-side // (STEPS * TILE))
+
+
+def _blocks_of(form: Mask) -> list[tuple[int, int, int, int]]:
+    """Return the blocks that make a mask up: first row, first column, height, width."""
     edge = np.diff(np.pad(form, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     row, first = np.nonzero(edge == 1)
     _, past = np.nonzero(edge == -1)
-    return list(zip(row.tolist(), first.tolist(), (past - first).tolist(), strict=True))
+    blocks: list[tuple[int, int, int, int]] = []
+    open_ones: dict[tuple[int, int], int] = {}  # (first, past) -> number of a block so far
+    for y, *run in zip(row.tolist(), first.tolist(), past.tolist(), strict=True):
+        k = open_ones.get((run[0], run[1]))
+        if k is not None and blocks[k][0] + blocks[k][2] == y:
+            blocks[k] = (*blocks[k][:2], blocks[k][2] + 1, blocks[k][3])
+        else:
+            open_ones[run[0], run[1]] = len(blocks)
+            blocks.append((y, run[0], 1, run[1] - run[0]))
+    return blocks
 
 
-def _ring(form: Mask) -> NDArray[np.intp]:
-    """Return the cells that share a side with a mask (n, 2), its corner being at (1, 1)."""
-    inside = np.pad(form, 1)
-    ring = np.zeros_like(inside)
-    ring[1:] |= inside[:-1]
-    ring[:-1] |= inside[1:]
-    ring[:, 1:] |= inside[:, :-1]
-    ring[:, :-1] |= inside[:, 1:]
-    return np.argwhere(ring & ~inside)
+def _positions(bits: int) -> NDArray[np.intp]:
+    """Return the numbers of the bits that are set, rising."""
+    plain = np.frombuffer(bits.to_bytes((bits.bit_length() + 7) // 8, "little"), np.uint8)
+    some = np.flatnonzero(plain)
+    k, bit = np.nonzero(np.unpackbits(plain[some, None], axis=1, bitorder="little"))
+    return some[k] * 8 + bit
 
 
 def _bits(board: Mask) -> int:

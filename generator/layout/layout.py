@@ -42,7 +42,7 @@ def lay_out(
     pitch_mm: float,
     footprint_half_mm: float,
     clearances_mm: Clearances,
-    occupied: tuple[ArrayLike, ArrayLike],
+    occupied: Occupancy | tuple[ArrayLike, ArrayLike],
     kind: str = "auto",
     *,
     blank_faces: Collection[int] = (),
@@ -65,7 +65,7 @@ def lay_out(
         Per face and loop an array (k,): least distance from a footprint to each edge; entry e
         belongs to the edge from vertex e to vertex e + 1 of the loop.
     occupied
-        Rows and columns (n,) of the cells that are taken.
+        What is taken of the array, or rows and columns (n,) of the cells that are taken.
     kind
         `auto`, `faces` or `net`.
     blank_faces
@@ -91,7 +91,8 @@ def lay_out(
         for face in range(len(polyhedron.faces))
     ]
     _check(polyhedron, outlines, pitch_mm, footprint_half_mm, clearances_mm, kind)
-    if developed and kind == "net":
+    round_faces = bool(developed or polyhedron.surfaces or polyhedron.blank)
+    if round_faces and kind == "net":
         raise LayoutError(
             "an object with round faces has no net", fix="set layout to faces, or leave it out"
         )
@@ -111,21 +112,22 @@ def lay_out(
     plans = []
     if kind != "net":
         plans.append(faces_plan(task))
-    if kind != "faces" and not developed:
+    if kind != "faces" and not round_faces:
         plans.append(net_plan(task, unfold(polyhedron)))
     plans.sort(key=lambda plan: plan.worth, reverse=True)  # stable: faces first among equals
 
     warning = _without_place(task, plans[0], allow_blank_faces)
-    occupancy = Occupancy.from_cells(*occupied, array)
+    if not isinstance(occupied, Occupancy):
+        occupied = Occupancy.from_cells(*occupied, array)
     for plan in plans:
         if plan.worth[0] < plans[0].worth[0]:
             continue  # a full array is no reason to lose a face
-        placed = _placed(task, plan, occupancy)
+        placed = _placed(task, plan, occupied)
         if placed is not None:
             if placed[0] is not plans[0]:  # other pieces may show other faces
                 warning = _without_place(task, placed[0], allow_blank_faces)
             return _layout(task, *placed, warning)
-    raise _full(plans[0], occupancy)
+    raise _full(plans[0], occupied)
 
 
 def _without_place(task: Task, plan: Plan, allowed: bool) -> tuple[str, ...]:
@@ -219,7 +221,7 @@ def _full(plan: Plan, occupancy: Occupancy) -> LayoutError:
     )
     if needed <= occupancy.free:
         cause += ", but not in blocks that hold its faces"
-    fix = "take a larger array, such as profile large"
+    fix = "take a larger array, such as profile large, or profile auto, which chooses one"
     return LayoutError(cause, fix=f"{fix}, or start a new database" if occupancy.used else fix)
 
 

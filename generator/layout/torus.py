@@ -12,49 +12,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from generator.array.contract import SymbolArray
-from generator.layout.board import Board, Mask
+from generator.layout.board import Board
+from generator.layout.occupancy import Mask, Occupancy, on_torus
 
-
-@dataclass(frozen=True, slots=True)
-class Occupancy:
-    """Which cells of a torus are taken."""
-
-    rows: int
-    columns: int
-    taken_rows: NDArray[np.int64]  #: (n,) each cell once
-    taken_columns: NDArray[np.int64]  #: (n,)
-
-    @classmethod
-    def from_cells(cls, rows: ArrayLike, columns: ArrayLike, array: SymbolArray) -> Occupancy:
-        """Return the occupancy of an array by cells (n,), taken on the torus."""
-        return _occupancy(array.rows, array.columns, np.asarray(rows), np.asarray(columns))
-
-    def with_cells(self, rows: ArrayLike, columns: ArrayLike) -> Occupancy:
-        """Return the occupancy with more cells taken."""
-        return _occupancy(
-            self.rows,
-            self.columns,
-            np.concatenate([self.taken_rows, np.asarray(rows)]),
-            np.concatenate([self.taken_columns, np.asarray(columns)]),
-        )
-
-    @property
-    def used(self) -> int:
-        """Number of taken cells."""
-        return len(self.taken_rows)
-
-    @property
-    def free(self) -> int:
-        """Number of free cells."""
-        return self.rows * self.columns - self.used
-
-    @property
-    def density(self) -> float:
-        """Share of the array that is used."""
-        return self.used / (self.rows * self.columns)
+__all__ = ["Occupancy", "Spot", "cells_at", "place_pieces"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,13 +53,7 @@ def place_pieces(
     if not order:
         return spots
     margin = max(max(mask.shape) for mask, _ in pieces) + 1
-    needed = sum(int(pieces[k][0].sum()) for k in order)
-    board = Board(
-        (occupancy.rows, occupancy.columns),
-        (occupancy.taken_rows, occupancy.taken_columns),
-        margin,
-        needed,
-    )
+    board = Board(occupancy, margin)
     hopeless: set[bytes] = set()
     for k in order:
         mask, turns = pieces[k]
@@ -119,7 +76,7 @@ def place_pieces(
 def cells_at(mask: Mask, spot: Spot, rows: int, columns: int) -> tuple[NDArray[np.int64], ...]:
     """Return the array rows and columns of a mask (not yet turned) at a spot, on the torus."""
     r, c = np.nonzero(np.rot90(mask, spot.quarter))
-    return _on_torus(r + spot.row, rows), _on_torus(c + spot.column, columns)
+    return on_torus(r + spot.row, rows), on_torus(c + spot.column, columns)
 
 
 def _forms(mask: Mask, turns: Iterable[int]) -> dict[int, Mask]:
@@ -130,29 +87,3 @@ def _forms(mask: Mask, turns: Iterable[int]) -> dict[int, Mask]:
         if not any(np.array_equal(form, known) for known in forms.values()):
             forms[quarter] = form
     return forms
-
-
-def _occupancy(
-    rows: int, columns: int, taken_rows: NDArray[np.int64], taken_columns: NDArray[np.int64]
-) -> Occupancy:
-    r, c = _on_torus(taken_rows, rows), _on_torus(taken_columns, columns)
-    if _rising(r, c):  # as a database gives them
-        return Occupancy(rows, columns, r, c)
-    order = np.lexsort((c, r))
-    r, c = r[order], c[order]
-    new = np.ones(len(r), dtype=bool)
-    new[1:] = (np.diff(r) != 0) | (np.diff(c) != 0)
-    return Occupancy(rows, columns, r[new], c[new])
-
-
-def _rising(r: NDArray[np.int64], c: NDArray[np.int64]) -> bool:
-    """Return whether cells come row by row, each once."""
-    down, right = np.diff(r), np.diff(c)
-    return bool(((down > 0) | ((down == 0) & (right > 0))).all())
-
-
-def _on_torus(values: NDArray[np.int64], size: int) -> NDArray[np.int64]:
-    """Return values modulo a size, which may be too large for the array's own arithmetic."""
-    if size > np.iinfo(np.int64).max:
-        values = values.astype(object)
-    return np.mod(values, size).astype(np.int64).ravel()

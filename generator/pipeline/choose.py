@@ -14,9 +14,9 @@ from typing import Any
 
 from sqlalchemy import Connection
 
-from generator.array import array_from
+from generator.array.contract import SymbolArray
 from generator.array.profiles import DEFAULT_PROFILE, PROFILES, Profile, enlarged
-from generator.database.cells import find_array, occupied
+from generator.database.cells import occupancy
 from generator.database.open import database_exists, open_database
 from generator.database.read import find_object
 from generator.database.transaction import reading
@@ -79,42 +79,55 @@ def _chosen(
             known = find_object(connection, one.spec.name)
             for candidate in _candidates() if known else ():
                 if known and known.profile == candidate.name:
-                    return Choice(tuple(_with(each, candidate) for each in specs))
-    found: tuple[tuple[Located, ...], int] | None = None
+                    array = candidate.array()
+                    return Choice(tuple(_with(each, candidate, array) for each in specs))
+    short: list[str] = []  # why each smaller array does not do
     for candidate in _candidates():
-        tried = tuple(_with(one, candidate) for one in specs)
+        array = candidate.array()
+        tried = tuple(_with(one, candidate, array) for one in specs)
         needed, blank = _needs(tried, solid)
-        if needed is not None and _fits(tried, needed, connection):
-            found = (tried, blank)
-            break
-    if found is None:
-        raise LayoutError(
-            "the objects fit no array that is made here", fix="make them in several databases"
-        )
-    tried, blank = found
-    if not blank:
-        return Choice(tried)
-    return _finer(tried, blank, connection, solid)
+        room = _room(array, connection)
+        size = f"{candidate.name} {array.rows}x{array.columns}"
+        if needed is None:
+            short.append(f"one object alone does not fit into {size}")
+        elif needed > room:
+            short.append(f"{needed} cells are needed, and {size} has room for {room}")
+        else:
+            notes = (_larger(candidate, array, short[-1]),) if short else ()
+            found = Choice(tried, notes)
+            return _finer(found, blank, connection, solid) if blank else found
+    raise LayoutError(
+        f"the objects fit no array that is made here: {short[-1]}",
+        fix="make them in several databases",
+    )
+
+
+def _larger(chosen: Profile, array: SymbolArray, why: str) -> str:
+    """Return the note that a larger array was taken than the smallest one."""
+    rows, columns = array.window
+    of_smallest = "x".join(map(str, PROFILES[DEFAULT_PROFILE].window))
+    window = f"window {rows}x{columns} in place of {of_smallest}"
+    return f"profile {chosen.name} is taken ({window}): {why}"
 
 
 def _finer(
-    specs: tuple[Located, ...],
-    blank: int,
-    connection: Connection | None,
-    solid: Polyhedron | None,
+    coarse: Choice, blank: int, connection: Connection | None, solid: Polyhedron | None
 ) -> Choice:
     """Take the finer symbols where they show faces that stay blank otherwise."""
+    fine = PROFILES["fine"]
+    array = fine.array()
     try:
-        finer = tuple(_with(one, PROFILES["fine"]) for one in specs)
+        finer = tuple(_with(one, fine, array) for one in coarse.specs)
         needed, left = _needs(finer, solid)
     except GeneratorError:  # the printer that the spec names cannot make them
-        return Choice(specs)
-    if needed is None or left >= blank or not _fits(finer, needed, connection):
-        return Choice(specs)
-    if all(_names_printer(one) for one in specs):
+        return coarse
+    if needed is None or left >= blank or needed > _room(array, connection):
+        return coarse
+    if all(_names_printer(one) for one in coarse.specs):
         return Choice(finer)
     faces = f"{blank - left} of the {blank} blank faces"
-    return Choice(specs, (f"profile fine, for resin printers, would show places on {faces}",))
+    note = f"profile fine, for resin printers, would show places on {faces}"
+    return Choice(coarse.specs, (*coarse.notes, note))
 
 
 def _candidates() -> Iterator[Profile]:
@@ -131,9 +144,9 @@ def _candidates() -> Iterator[Profile]:
         yield replace(larger, name=f"large-{rows}x{columns}")
 
 
-def _with(located: Located, profile: Profile) -> Located:
+def _with(located: Located, profile: Profile, array: SymbolArray) -> Located:
     defaults = "large" if profile.name.startswith("large") else profile.name
-    return with_profile(located, profile.name, defaults, profile.array().definition())
+    return with_profile(located, profile.name, defaults, array.definition())
 
 
 def _followed(
@@ -169,12 +182,10 @@ def _counts(plan: Plan, layout: Layout) -> tuple[int, int]:
     return cells, len(set(layout.blank_faces) - plan.blank_faces)
 
 
-def _fits(specs: Sequence[Located], needed: int, connection: Connection | None) -> bool:
-    array = array_from(specs[0].spec.encoding)
-    taken = 0
-    if connection is not None:
-        taken = len(occupied(connection, find_array(connection, array))[0])
-    return needed + taken <= FULL * array.rows * array.columns
+def _room(array: SymbolArray, connection: Connection | None) -> int:
+    """Return how many more cells of an array faces of all shapes can have."""
+    taken = 0 if connection is None else occupancy(connection, array).used
+    return max(0, int(FULL * array.rows * array.columns) - taken)
 
 
 def _names_printer(located: Located) -> bool:

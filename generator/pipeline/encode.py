@@ -16,16 +16,15 @@ from pathlib import Path
 
 from sqlalchemy import Connection, Engine
 
-from generator.database.cells import find_array, occupied
+from generator.database.cells import occupancy
 from generator.database.open import database_exists, open_database
 from generator.database.transaction import reading
-from generator.layout.placement import Layout
 from generator.pipeline.choose import chosen
 from generator.pipeline.faces import face_reports
 from generator.pipeline.files import parts_of
 from generator.pipeline.made import Encoded, Made, made_of
 from generator.pipeline.make import Order, Product, made_under_lock
-from generator.pipeline.place import placed
+from generator.pipeline.place import beside, placed, taken_by_all
 from generator.pipeline.plan import Plan, planned
 from generator.pipeline.progress import Progress, silent, within
 from generator.pipeline.sets import made_as_set, set_folder
@@ -102,7 +101,7 @@ def encode(
         else:
             made, files = made_as_set(engine, url, orders, set_folder(orders, folder), jobs, rest)
         with reading(engine) as connection:
-            used = len(occupied(connection, find_array(connection, plans[0].array))[0])
+            used = occupancy(connection, plans[0].array).used
     array = plans[0].array
     seconds = time.perf_counter() - began
     return Encoded(tuple(made), url, array.rows, array.columns, used, seconds, files)
@@ -149,12 +148,12 @@ def _rehearse(
     reports: bool = False,
 ) -> tuple[list[Made], int]:
     made: list[Made] = []
-    new: list[Layout] = []
+    taken = taken_by_all(connection, plans[0])
     used = 0
     for number, plan in enumerate(plans):
         step = within(progress, number / len(plans), (number + 1) / len(plans))
         step(f"placing {plan.spec.name}", 0.0)
-        place = placed(connection, plan, replace, new)
+        place = placed(connection, plan, replace, taken)
         step(f"building {plan.spec.name}", 0.5)
         parts, warnings = parts_of(plan, place.layout)
         one = made_of(plan, place.layout, len(parts), warnings, (), reused=place.reused)
@@ -162,7 +161,7 @@ def _rehearse(
             one = dataclasses.replace(one, face_reports=face_reports(plan, place.layout))
         made.append(one)
         if not place.reused:
-            new.append(place.layout)
+            taken = beside(taken, place.layout)
         used = place.taken + made[-1].symbols
     return made, used
 

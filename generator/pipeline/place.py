@@ -5,24 +5,21 @@ Plan + cells of others -> Placed. Thesis 6.3.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from sqlalchemy import Connection
 
-from generator.database.cells import find_array, occupied
+from generator.database.cells import cells_of, find_array, occupancy
 from generator.database.read import find_object, read_layout
 from generator.database.register import require_same_spec
 from generator.layout.layout import lay_out
+from generator.layout.occupancy import Cells, Occupancy
 from generator.layout.placement import Layout
 from generator.pipeline.blame import blaming
 from generator.pipeline.plan import Plan
 
-Cells = tuple[NDArray[np.int64], NDArray[np.int64]]  #: rows (n,) and columns (n,)
-
-NO_CELLS: Cells = (np.empty(0, np.int64), np.empty(0, np.int64))
+NO_CELLS = (np.empty(0, np.int64), np.empty(0, np.int64))
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +33,7 @@ class Placed:
 
 
 def placed(
-    connection: Connection | None, plan: Plan, replace: bool, beside: Sequence[Layout] = ()
+    connection: Connection | None, plan: Plan, replace: bool, taken: Occupancy | None = None
 ) -> Placed:
     """Find the object's cells in the database, or choose free ones.
 
@@ -48,8 +45,8 @@ def placed(
         The object.
     replace
         Whether a changed spec may take the place of the registered one.
-    beside
-        Layouts that are not in the database but take cells all the same.
+    taken
+        Of the array, where that is known already: by the database and by what comes beside it.
 
     Raises
     ------
@@ -57,32 +54,37 @@ def placed(
         The array is full, no place of the object can be told, or another spec is registered
         under its name.
     """
-    spec = plan.spec
-    others, replaces = NO_CELLS, False
-    if connection is not None:
-        known = find_object(connection, spec.name)
-        number = known.object_id if known else None
-        others = occupied(connection, find_array(connection, plan.array), without=number)
-        if known and not (replace and not known.same_spec(plan.meaning)):
+    others = taken_by_all(connection, plan) if taken is None else taken
+    replaces = False
+    known = None if connection is None else find_object(connection, plan.spec.name)
+    if connection is not None and known is not None:
+        if (array_id := find_array(connection, plan.array)) is not None:
+            others = others.without_cells(*cells_of(connection, known.object_id, array_id))
+        if not replace or known.same_spec(plan.meaning):
             require_same_spec(connection, known, plan.meaning)
-            layout = read_layout(connection, spec.name)
-            return Placed(layout, len(others[0]), reused=True, replaces=False)
-        replaces = known is not None
-    others = joined(others, beside)
+            layout = read_layout(connection, plan.spec.name)
+            return Placed(layout, others.used, reused=True, replaces=False)
+        replaces = True
     with blaming(plan.located, "shape"):
-        return Placed(laid_out(plan, others), len(others[0]), reused=False, replaces=replaces)
+        return Placed(laid_out(plan, others), others.used, reused=False, replaces=replaces)
 
 
-def joined(cells: Cells, layouts: Sequence[Layout]) -> Cells:
-    """Return cells together with those of some layouts."""
-    faces = [face for layout in layouts for face in layout.faces]
-    return (
-        np.concatenate([cells[0], *(face.rows for face in faces)]),
-        np.concatenate([cells[1], *(face.columns for face in faces)]),
+def taken_by_all(connection: Connection | None, plan: Plan) -> Occupancy:
+    """Return what the objects of a database hold of a plan's array."""
+    if connection is None:
+        return Occupancy.from_cells(*NO_CELLS, plan.array)
+    return occupancy(connection, plan.array)
+
+
+def beside(taken: Occupancy, layout: Layout) -> Occupancy:
+    """Return what is taken together with a layout."""
+    return taken.with_cells(
+        np.concatenate([face.rows for face in layout.faces]),
+        np.concatenate([face.columns for face in layout.faces]),
     )
 
 
-def laid_out(plan: Plan, others: Cells) -> Layout:
+def laid_out(plan: Plan, others: Occupancy | Cells) -> Layout:
     """Lay the object out; faces too small to be told stay blank, unless all are."""
 
     def attempt(allow_blank_faces: bool) -> Layout:

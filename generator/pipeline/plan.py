@@ -6,6 +6,8 @@ Every error is given the line of the setting that causes it. Lengths in mm.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -113,11 +115,17 @@ def planned(located: Located, solid: Polyhedron | None = None) -> Plan:
 
 def _polyhedron(shape: ShapeSpec) -> Polyhedron:
     if shape.file is not None:
-        from generator.polyhedron.read import read_shape  # readers load only for files
-
-        return read_shape(shape.file)
+        return _model(shape.file, shape.parameters["sha256"], shape.parameters.get("scale", 1.0))
     known = {**SHAPES, **ROUND_SHAPES}
     return known[shape.kind](**shape.parameters)
+
+
+@lru_cache(maxsize=8)
+def _model(file: Path, sha256: str, scale: float) -> Polyhedron:  # noqa: ARG001 - tells contents apart
+    """Read a model once for all its copies and for all arrays that are tried."""
+    from generator.polyhedron.read import read_shape  # readers load only for files
+
+    return read_shape(file, scale)
 
 
 def _check_order(alphabet: Alphabet, array: SymbolArray) -> None:

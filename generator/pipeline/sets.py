@@ -18,11 +18,10 @@ from generator.database.part_state import part_state
 from generator.database.read import find_object, read_layout, read_parts
 from generator.database.register import require_in_use
 from generator.database.transaction import reading
-from generator.layout.placement import Layout
 from generator.pipeline.made import Made, made_of
 from generator.pipeline.make import Order, Product, made_at
 from generator.pipeline.parallel import Engines, Task, Workers
-from generator.pipeline.place import Placed, placed
+from generator.pipeline.place import Placed, beside, placed, taken_by_all
 from generator.pipeline.plates import SetObject, written_set
 from generator.pipeline.progress import Progress, within
 
@@ -60,8 +59,8 @@ def made_as_set(
     products: list[Product | None] = [None] * len(orders)
     tasks: list[Task[Product]] = []
     numbers: list[int] = []
-    new: list[Layout] = []
     with reading(engine) as connection:
+        taken = taken_by_all(connection, orders[0].plan)
         for number, order in enumerate(orders):
             name = order.plan.spec.name
             if (skipped := _intact(connection, order)) is not None:
@@ -69,9 +68,9 @@ def made_as_set(
                 progress(f"{name} is there, with all its files: skipped", 0.0)
                 continue
             progress(f"placing {name}", 0.1 * number / len(orders))
-            place = placed(connection, order.plan, order.replace, new)
+            place = placed(connection, order.plan, order.replace, taken)
             if not place.reused:
-                new.append(place.layout)
+                taken = beside(taken, place.layout)
             numbers.append(number)
             tasks.append(Task(f"making {name}", _make, (url, order, place)))
     with Workers(jobs) as workers:

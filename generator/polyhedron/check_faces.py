@@ -26,7 +26,7 @@ from generator.polyhedron.surface import (
     face_axes,
 )
 
-PLANARITY = 1e-5  #: most a vertex may lie off its face's plane, as a share of the size
+PLANARITY = 1e-4  #: most a vertex may lie off its face's plane, as a share of the size
 CLOSENESS = 1e-6  #: two points, or a point and an edge, nearer than this touch; same share
 
 

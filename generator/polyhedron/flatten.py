@@ -29,6 +29,9 @@ def flattened(vertices: Points, faces: Sequence[Sequence[Sequence[int]]]) -> tup
     cannot be corrected by less than a thousandth of its size.
     """
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    faces = [loops for loops in faces if len(loops) > 1 or len(loops[0]) > 3]
+    if not faces:
+        return vertices.copy(), 0.0  # a triangle is planar
     face_of, vertex_of = _incidences(faces)
     moved = vertices
     best = np.abs(_residual(vertices, faces, face_of, vertex_of)[0]).max()

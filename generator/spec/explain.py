@@ -84,7 +84,8 @@ def _unknown_setting(place: Place, mark: Mark, model: type[BaseModel]) -> Proble
     elif near := did_you_mean(word, known):
         fix = f"did you mean '{near}'?"
     else:
-        fix = f"use {'one of ' if len(known) > 1 else ''}{', '.join(known)}"
+        listed = KINDS if what == "shape" else known
+        fix = f"use {'one of ' if len(listed) > 1 else ''}{', '.join(listed)}"
     return Problem(cause, fix, mark)
 
 

@@ -41,6 +41,9 @@ def resolved_shape(shape: Shape, tree: Tree, refuse: Refuse) -> ShapeSpec | None
         return None
     kind = given[0]
     value = getattr(shape, kind)
+    if shape.scale is not None and kind != "file":
+        refuse("shape.scale", f"a {kind} has a size, no scale", "leave it out, and write the size")
+        return None
     if kind == "box":
         return ShapeSpec(kind, {"size": list(value)})
     if kind == "polyhedron":
@@ -48,7 +51,7 @@ def resolved_shape(shape: Shape, tree: Tree, refuse: Refuse) -> ShapeSpec | None
         faces = [[list(loop) for loop in face] for face in value.faces]
         return ShapeSpec(kind, {"vertices": [list(v) for v in value.vertices], "faces": faces})
     if kind == "file":
-        return _model_file(value, tree.folder, refuse)
+        return _model_file(value, shape.scale or 1.0, tree.folder, refuse)
     if isinstance(value, float):
         return ShapeSpec(kind, {"side": value})
     sizes = value.model_dump(exclude_none=True)
@@ -71,7 +74,7 @@ def _check_faces(faces: list[tuple[tuple[int, ...], ...]], vertices: int, refuse
             )
 
 
-def _model_file(name: str, folder: Path, refuse: Refuse) -> ShapeSpec | None:
+def _model_file(name: str, scale: float, folder: Path, refuse: Refuse) -> ShapeSpec | None:
     """Return a shape that is read from a model file, which must be there."""
     path = folder / name
     if path.suffix.lower() not in MODEL_SUFFIXES:
@@ -88,7 +91,8 @@ def _model_file(name: str, folder: Path, refuse: Refuse) -> ShapeSpec | None:
         reason = getattr(error, "strerror", None) or str(error)
         refuse("shape.file", f"cannot read '{path}': {reason}", _similar_model(path))
         return None
-    return ShapeSpec("file", {"sha256": digest}, path)
+    scaled = {} if scale == 1.0 else {"scale": scale}  # as if it had been left out
+    return ShapeSpec("file", {"sha256": digest, **scaled}, path)
 
 
 def _similar_model(path: Path) -> str:

@@ -28,7 +28,8 @@ class ShapeSpec:
     cone                                          diameter, height, top_diameter (0 if left out)
     polyhedron                                    vertices: [[x, y, z], ...],
                                                   faces: [[loop, hole, ...], ...]
-    file                                          sha256 (of the content of `file`)
+    file                                          sha256 (of the content of `file`), scale (1 if
+                                                  left out)
     solid                                         sha256 (of the faces of a solid from a script)
     ============================================  ===============================================
 

@@ -27,7 +27,9 @@ def spec_schema() -> dict[str, Any]:
     """Return the JSON schema (draft 2020-12) of a spec file: an object, or a set."""
     schema = TypeAdapter(ObjectSettings | SetSettings).json_schema(schema_generator=_SpecSchema)
     shape = schema["$defs"][Shape.__name__]
-    shape |= {"minProperties": 1, "maxProperties": 1}
+    one_kind = {"minProperties": 1, "maxProperties": 1}
+    file_with_scale = {"required": ["file"], "maxProperties": 2}
+    shape |= {"if": {"required": ["scale"]}, "then": file_with_scale, "else": one_kind}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "encoded object",

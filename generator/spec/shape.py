@@ -16,6 +16,27 @@ from generator.spec.quantity import Coordinate, Length, coordinates, refuse, sid
 SIDES_MAX = 64
 Sides = Annotated[int, Field(ge=3, le=SIDES_MAX), whole_number(3, SIDES_MAX, "sides")]
 
+SCALES = (1e-6, 1e6)
+
+
+def scale_factor(value: Any) -> float:
+    """Return how many times larger a model is made."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise refuse("a scale must be a number", "write 25.4 for a model in inches")
+    if not SCALES[0] <= value <= SCALES[1]:
+        low, high = SCALES
+        raise refuse(
+            f"a scale of {value:g} is not {low:g} to {high:g}", "write 25.4 for a model in inches"
+        )
+    return float(value)
+
+
+Scale = Annotated[
+    float,
+    BeforeValidator(scale_factor),
+    WithJsonSchema({"type": "number", "minimum": SCALES[0], "maximum": SCALES[1]}),
+]
+
 
 def face_loops(value: Any) -> tuple[tuple[int, ...], ...]:
     """Return the loops of a face: `[0, 1, 2]`, or `[[0, 1, 2, 3], [4, 5, 6]]` with a hole."""
@@ -118,7 +139,7 @@ class VerticesAndFaces(Block):
 
 
 class Shape(Block):
-    """The object's shape: exactly one of these."""
+    """The object's shape: exactly one of these; a file may have a scale beside it."""
 
     cube: Length | None = None
     """Edge of a cube."""
@@ -139,9 +160,12 @@ class Shape(Block):
     file: PathText | None = None
     """A model, relative to the spec: a .stl or .obj file with planar faces, or a .step file, whose
     cylinder and cone faces are unrolled; other round faces stay blank."""
+    scale: Scale | None = None
+    """How many times larger the model of `file` is made: 25.4 for a .stl in inches, 1000 for one
+    in metres. A .step file says its unit, which is honoured without a scale."""
 
 
-KINDS = tuple(Shape.model_fields)
+KINDS = tuple(name for name in Shape.model_fields if name != "scale")
 MODEL_SUFFIXES = (".step", ".stp", ".stl", ".obj")
 EXAMPLES = {
     "cube": "{cube: 60 mm}",

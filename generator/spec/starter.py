@@ -55,6 +55,7 @@ def starter(shape: str) -> str:
     line = _POLYHEDRON if shape == "polyhedron" else f"shape: {EXAMPLES[shape]}"
     if shape == "file":
         line += "    # .step, .stl or .obj, relative to this file"
+        line += "\n# shape: {file: part.stl, scale: 25.4}    # a model in inches"
     return _TEMPLATE.format(name=name, file=f"{folder}.yaml", shape=line, folder=folder)
 
 

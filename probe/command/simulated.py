@@ -165,7 +165,7 @@ def _touched(
     for i in range(asked.touches or 1):
         rng = np.random.default_rng([asked.seed, i])
         touch = _touch(scene, asked, rng)
-        contact = press(scene.surface, sensor, touch, accuracy=level)
+        contact = press(scene.under(touch).surface, sensor, touch, accuracy=level)
         state, frames = None, []
         for beat in range(asked.frames):
             counts, state = read_counts(contact.forces_n, board, fsr, state, rng)
@@ -207,8 +207,9 @@ def _told(scene: Scene, felt: Felt) -> dict[str, Any]:
     touching = math.isfinite(contact.z_mm)
     T_face_probe = pose_of(touch, contact) if touching else None
     T_object_probe = None
-    if T_face_probe is not None and scene.T_object_surface is not None:
-        T_object_probe = scene.T_object_surface @ T_face_probe
+    T_object_surface = scene.under(touch).T_object_surface
+    if T_face_probe is not None and T_object_surface is not None:
+        T_object_probe = T_object_surface @ T_face_probe
     return {
         "seq": felt.frames[0].seq,
         "x_mm": touch.x_mm,
@@ -231,7 +232,7 @@ def _picture(scene: Scene, sensor: Sensor, felt: Felt, png: Path, noise: str) ->
     if noise == "quiet":
         what += ", without noise"
     with staged(png) as draft:
-        touch_picture(scene.surface, sensor, felt.touch, felt.contact.forces_n,
+        touch_picture(scene.under(felt.touch).surface, sensor, felt.touch, felt.contact.forces_n,
                       felt.frames[0].counts, draft, title=what)  # fmt: skip
 
 

@@ -16,6 +16,7 @@ from generator.database.registered import RegisteredFace, RegisteredObject, Regi
 from generator.database.url import normal_url, part_file
 from probe.errors import SurfaceError
 from probe.simulate.registered import UP, face_of, registered_object, registered_objects
+from probe.simulate.round import round_part
 from probe.simulate.scene import Scene
 from probe.surface.mesh import part_mesh
 from probe.surface.polygon import polygon
@@ -56,6 +57,8 @@ def part_surface(
         return Scene(surface, polygon([np.array(box)]), path.name)
     held, part = _registered_part(database, path, object_name)
     up = _face_up(held, part, face)
+    if up.round is not None:
+        return round_part(path, held, part, up).scene()
     T_face_part = np.linalg.inv(up.T_object_face) @ part.T_object_part
     return Scene(
         surface=part_mesh(path, T_face_part),

@@ -22,6 +22,7 @@ from generator.database.registered import RegisteredFace, RegisteredObject
 from generator.database.transaction import reading
 from generator.errors import DatabaseError
 from probe.errors import SurfaceError
+from probe.simulate.round import round_scene
 from probe.simulate.scene import Scene
 from probe.surface.face import Face
 from probe.surface.lattice import Lattice, listed
@@ -65,6 +66,8 @@ def registered_surface(database: str, object_name: str, face: str = "") -> Scene
     """
     held = registered_object(database, object_name)
     found = face_of(held, face)
+    if found.round is not None:
+        return round_scene(database, held, found)
     return Scene(
         surface=_surface(held, found),
         region=polygon(found.polygon_mm),

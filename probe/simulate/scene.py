@@ -1,16 +1,19 @@
 """What a simulated touch meets: a surface, where on it a sensor may stand, and whose it is.
 
 The surface frame of a registered face is its face frame (origin at the first vertex, x along
-the first edge, z outward); of a part alone it is the frame of its file.
+the first edge, z outward); of a part alone it is the frame of its file. A round face is touched
+in the plane that is tangent where the touch is: `Scene.under` gives the scene of that touch.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from probe.contact.contract import Touch
 from probe.surface.contract import Surface
 from probe.surface.polygon import Polygon
 
@@ -27,6 +30,11 @@ class Scene:
     object_name: str = ""  #: empty: not known
     face: str = ""  #: empty: not known
     T_object_surface: NDArray[np.float64] | None = None  #: (4, 4) mm; None: not known
+    rolled: Callable[[Touch], Scene] | None = None  #: of a round face: the scene of a touch
+
+    def under(self, touch: Touch) -> Scene:
+        """Return what a touch meets; on a flat face that is always this."""
+        return self if self.rolled is None else self.rolled(touch)
 
     def centre_mm(self) -> NDArray[np.float64]:
         """Return the region's middle (2,): the mean of its area, or its inmost point."""

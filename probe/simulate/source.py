@@ -150,7 +150,8 @@ def load(share: float) -> float:
 
 def _pressed(scene: Scene, options: Options, touch: Touch, share: float) -> Image:
     pressed = replace(touch, force_n=touch.force_n * share)
-    return press(scene.surface, options.sensor, pressed, accuracy=options.accuracy).forces_n
+    surface = scene.under(touch).surface
+    return press(surface, options.sensor, pressed, accuracy=options.accuracy).forces_n
 
 
 def _wandering(scene: Scene, options: Options, rng: np.random.Generator) -> Iterator[Touch]:

@@ -66,7 +66,7 @@ class Beats:
             raise BenchError(
                 f"a force of {touch.force_n:g} N", fix=f"give more than 0, at most {LARGEST_N:g} N"
             )
-        full = press(scene.surface, self.sensor, touch).forces_n
+        full = press(scene.under(touch).surface, self.sensor, touch).forces_n
         held = self._beats(self.manner.hold_s)
         steps = [(1, share * full) for share in STEPS]
         self._play([*steps, (held, full), *reversed(steps), (1, self._rest)])

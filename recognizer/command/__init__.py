@@ -20,10 +20,12 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from probe.command.ending import BAD_INPUT, FAILED, leave, misuse, unwritten
+from recognizer.threads import one_thread
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run `recognize-object` and leave with its exit code."""
+    one_thread()
     leave("recognize-object", run, arguments)
 
 

@@ -27,10 +27,11 @@ from recognizer.recognition import (
     RunnerUp,
     refused,
 )
+from recognizer.round import SHARES, bend_at
 from recognizer.scan.composite import Composite
 from recognizer.scan.settings import ScanSettings
 from recognizer.symbols.fit import Fit, scored
-from recognizer.symbols.gain import Image
+from recognizer.symbols.gain import Image, bent
 from recognizer.symbols.refine import explained_share, refined, started
 from recognizer.symbols.template import Template
 
@@ -95,9 +96,16 @@ def posed(
     def shown(cells: Ints) -> Ints:
         return left_at(encoding, place, worn, cells)
 
-    start = started(fit.pose[None], fit.gain[None])
+    bend = bend_at(encoding, place, fit)
+    shares = (1.0,) if bend is None else SHARES
+    if bend is not None:
+        image = bent(image, reader.sensor, bend, shares)
+    start = started(np.tile(fit.pose, (len(shares), 1)), np.tile(fit.gain, (len(shares), 1)))
     lattices = refined(image, template, start, steps=limits.verify_steps, shown=shown)
-    again = scored(image, template, lattices, reader.settings)[0]
+    best = int(np.argmax(lattices.value))
+    again = scored(image, template, lattices, reader.settings)[best]
+    if bend is not None:
+        image = bent(image, reader.sensor, bend, shares[best : best + 1])
     finer = replace(
         fit,
         x_mm=again.x_mm,

@@ -22,6 +22,7 @@ from recognizer.scan.views import (
     View,
     Views,
     fits_of,
+    round_views,
     stands_of,
     tells_place,
     views_of,
@@ -110,6 +111,8 @@ def extended(scan: Scan, touch: PlacedTouch) -> Scan:
         new = fits_of(
             image, template, bank, reader, near, limits.clean, known=known, hard=scan.told is None
         )
+        if encoding.radii_mm:
+            new = (*new, *round_views(image, template, bank, reader, encoding, near))
         each = (*scan.views[k], tuple(v for v in new if v.fit.noise <= limits.noise))
         sums = _composites(
             views_of(each), stands, scan.lattices[k], encoding.style.pitch_mm, limits

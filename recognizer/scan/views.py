@@ -13,13 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from recognizer.lab import Encoding
 from recognizer.mosaic.grow import added
 from recognizer.mosaic.mosaic import Mosaic, MosaicSettings, no_touches
 from recognizer.mosaic.planar import wrapped
 from recognizer.mosaic.touch import PlacedTouch
 from recognizer.pipeline import Reader
+from recognizer.round import BENDS
+from recognizer.symbols.bent import bends_of
 from recognizer.symbols.fit import Fit, Settings, fits, scored
-from recognizer.symbols.gain import Image, first_gain
+from recognizer.symbols.gain import Image, bent, first_gain
 from recognizer.symbols.refine import refined, started
 from recognizer.symbols.search import Bank
 from recognizer.symbols.template import Template
@@ -133,6 +136,34 @@ def fits_of(
         if not any(_same(pose, view.fit, template.pitch_mm) for view in views):
             views = (*views, View(fit, led=True))
     return views
+
+
+def round_views(
+    image: Image,
+    template: Template,
+    bank: Bank,
+    reader: Reader,
+    encoding: Encoding,
+    near: Array,
+) -> tuple[View, ...]:
+    """Return the likeliest lattices of an image of a round face, and those near given ones.
+
+    Parameters
+    ----------
+    image
+        As of a flat face.
+    near
+        (k, 3) as for `fits_of`.
+    """
+    views: list[View] = []
+    for guess in bends_of(image, reader.sensor, encoding.radii_mm, template.ink, BENDS):
+        under = bent(image, reader.sensor, guess.bend)
+        found = fits(under, template, bank, reader.settings, [guess.gain])
+        views += [View(fit, led=False) for fit in found]
+        rest = [pose for pose in near if not any(_same(pose, f, template.pitch_mm) for f in found)]
+        led = _near(under, template, reader.settings, np.array(rest).reshape(-1, 3), found)
+        views += [View(fit, led=True) for fit in led]
+    return tuple(views)
 
 
 def _near(

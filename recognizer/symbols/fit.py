@@ -10,6 +10,7 @@ axes are the frame's. A sensor point s lies at R(theta) s + (x, y). Thesis 6.2.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,9 +71,20 @@ class Fit:
         return np.array([self.x_mm, self.y_mm, self.theta_rad, *self.nuisance])
 
 
-def fits(image: Image, template: Template, bank: Bank, settings: Settings) -> tuple[Fit, ...]:
-    """Return the likeliest lattices of an image, best first; none if nothing is pressed."""
-    gains = [g for g in (first_gain(image, template.ink), tilted_gain(image)) if g is not None]
+def fits(
+    image: Image,
+    template: Template,
+    bank: Bank,
+    settings: Settings,
+    gains: Sequence[Array] | None = None,
+) -> tuple[Fit, ...]:
+    """Return the likeliest lattices of an image, best first; none if nothing is pressed.
+
+    Gains to begin with, (4,) each, are guessed from the image if they are not given.
+    """
+    if gains is None:
+        guessed = (first_gain(image, template.ink), tilted_gain(image))
+        gains = [gain for gain in guessed if gain is not None]
     starts = [_searched(image, template, bank, gain, settings.candidates) for gain in gains]
     if sum(len(start) for start in starts) == 0:
         return ()

@@ -2,17 +2,19 @@
 
 A gain is a plane of depths under a force scale (`pressing`): (logarithm of the scale, depth at
 the centre, its slopes per half width). It is guessed from the forces alone, as if symbols
-stood all over, or as if a part of the sensor came down on the bare face. Sensor frame, mm.
+stood all over, or as if a part of the sensor came down on the bare face. A round face falls
+away under the plane by what its bend tells. Sensor frame, mm.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from generator.polyhedron.tangent import Bend
 from probe.sensor import Sensor
 from recognizer.symbols.noise import Felt
 from recognizer.symbols.pressing import Pressing
@@ -34,19 +36,23 @@ _FEW = 10  # tactels, at least
 class Image:
     """What is fitted: forces of the tactels that tell something."""
 
-    points_mm: Array  #: (n, 2) sensor frame
+    points_mm: Array  #: (n, 2) sensor frame; of a round face, as it is unrolled
     forces: Array  #: (n,) newtons, or anything proportional
     trust: Array  #: (n,) 0 ... 1, 0 for bad tactels
     shape: tuple[int, int]  #: rows and columns
     pressing: Pressing
     newtons: bool  #: whether the scale of the pressing is that of the forces
     plane: Array  #: (n, 3) basis of planes: 1, x and y over the half widths
+    falls: Array | None = None  #: (1 or b, n) of a round face under b planes, overlay heights
 
 
 def image_of(
     sensor: Sensor, forces: Array, trust: Array, pressing: Pressing, *, newtons: bool
 ) -> Image:
-    """Return what is fitted of a frame: forces (rows, columns), trust (rows, columns)."""
+    """Return what is fitted of a frame: forces (rows, columns), trust (rows, columns).
+
+    The face is taken as flat; `bent` gives the same image of a round one.
+    """
     points = sensor.centres_mm().reshape(-1, 2)
     return Image(
         points_mm=points,
@@ -56,6 +62,25 @@ def image_of(
         pressing=pressing,
         newtons=newtons,
         plane=np.column_stack([np.ones(len(points)), points / np.array(sensor.half_mm)]),
+    )
+
+
+def bent(image: Image, sensor: Sensor, bend: Bend, shares: tuple[float, ...] = (1.0,)) -> Image:
+    """Return an image of a flat face as one of a face with a bend, in the axes of the sensor.
+
+    Parameters
+    ----------
+    shares
+        By how much less than the bend says the face falls away, of each of the gains under
+        which the image is seen; one for all of them.
+    """
+    height = sensor.overlay.height_mm
+    points = sensor.centres_mm().reshape(-1, 2)
+    symbol = image.pressing.symbol * height
+    return replace(
+        image,
+        points_mm=bend.unrolled_mm(points, symbol),
+        falls=np.multiply.outer(np.array(shares), bend.raised(symbol).falls_mm(points) / height),
     )
 
 
@@ -118,6 +143,8 @@ def bounded_gain(gain: Array, steepest: float = STEEPEST) -> Array:
 def felt_under(image: Image, gain: Array) -> Felt:
     """Return the image as it is under gains (b, 4)."""
     depth = gain[:, 1:] @ image.plane.T
+    if image.falls is not None:
+        depth = depth - image.falls
     plain = image.pressing.force(depth)
     lower = image.pressing.force(depth - image.pressing.symbol)
     least = LEAST_GAIN * plain.max(axis=1, keepdims=True)

@@ -14,7 +14,6 @@ heavy is imported before it is needed.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, NoReturn
@@ -22,6 +21,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from probe.command.ending import BAD_INPUT, FAILED, leave, misuse, unwritten
+from recognizer.threads import one_thread
 
 TOOLS = ("compare", "repeat", "report")
 HELP = """Touch a set of objects in simulation, read every touch, and report how far the answers \
@@ -62,8 +62,7 @@ tools = typer.Typer(
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run `validate-set` and leave with its exit code."""
-    for library in ("OMP", "OPENBLAS", "MKL"):  # work is shared by touches, not within one
-        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+    one_thread()
     leave("validate-set", run, arguments, advice="; go on with --resume")
 
 

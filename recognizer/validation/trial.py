@@ -109,7 +109,7 @@ def drawn(plan: Plan, number: int, reader: Reader) -> Drawn:
             scene = scene_of(plan.database, face.object, face.face, plan.files)
             most = _inmost(plan.database, face.object, face.face, plan.files)
             touch = _on(scene, plan.kind, most, rng, ranges)
-            surface = scene.surface
+            surface = scene.under(touch).surface
             if plan.kind == "worn" and isinstance(surface, Face):
                 surface = worn(surface, plan.worn, rng)
             elif plan.kind == "worn":

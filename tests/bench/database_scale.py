@@ -1,19 +1,25 @@
-"""How a lab's database bears years of objects: placing, registering, looking up.
+"""How a lab's database bears years of objects: placing, registering, looking up, density.
 
-    python tests/bench/database_scale.py [--engine sqlite|postgresql] [--fill blocks|placed]
-                                         [--objects 10 100 1000 10000 16667]
+    python tests/bench/database_scale.py [--engine sqlite|postgresql|both] [--fill blocks|placed]
+                                         [--objects 2 10 167 1000 10000 16667] [--array 4095]
+    python tests/bench/database_scale.py --full [--array 1023] [--size 1.0]
+    python tests/bench/database_scale.py --copies 100 1000
 
-The array is 4095 x 4097 (GF(4), one of `large` "and up"), the objects are 60 mm cubes of 384
-symbols. `blocks` fills it with 8 x 8 cells per face in growing squares: nothing is left
-between them, so the search for a free place must look at all of it. `placed` has every
-object of a mixture (cubes, boxes, prisms, tetrahedra) found its place by the layout: true
-densities, for patient people.
+The array is 4095 x 4097 (GF(4), one of `large` "and up"), the next object a 60 mm cube of 384
+symbols. `blocks` fills the array with such cubes, 8 x 8 cells per face in growing squares: nothing
+is left between them, so the search for a free place must look at all of it. `placed` has every
+object of a mixture (cubes, boxes, prisms, tetrahedra) found its place by the layout, beside all
+before it. The same objects are registered on each engine, 100 in a transaction.
 
-At each number of objects it prints medians of wall time: one more cube placed and registered
-by `in_turn` (open, taken cells, layout, rows, commit), also as CPU time of this process (a
-server's is its own), reading the taken cells alone, and the object and face of a 3 x 4 window
-of cells, on an open connection and with opening it. Density is used cells by those of the
-smallest rectangle that holds them, and of the array.
+At each number of objects it prints medians: one more cube placed and registered by `in_turn`
+(open, taken cells, layout, rows, commit), wall time and CPU time of this process (a server's is
+its own), reading the taken cells alone, and the object and face of a 3 x 4 window of cells, on an
+open connection and with opening it. `opened` is used cells by those of the corner that placing
+has opened (`generator.layout.board.opened`: it grows when nothing fits into it any more), `array`
+by those of the array.
+
+`--full` places the mixture, edges `--size` times as long, until none of its shapes fits anywhere,
+without a database. `--copies` chooses the places of a set of copies of a 30 mm cube.
 """
 
 from __future__ import annotations
@@ -23,53 +29,63 @@ import subprocess
 import sys
 import tempfile
 import time
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import numpy as np
+from sqlalchemy import func, select
 
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle
 from generator.array.profiles import enlarged, profile
-from generator.database.cells import faces_at, find_array, occupied
+from generator.database import tables
+from generator.database.cells import faces_at, find_array, occupancy
 from generator.database.open import open_database
 from generator.database.race import in_turn
 from generator.database.read import list_objects, read_layout
 from generator.database.register import Registration, register
 from generator.database.retire import remove
 from generator.database.transaction import reading, writing
+from generator.errors import LayoutError
+from generator.layout.board import opened
 from generator.layout.layout import lay_out
+from generator.layout.occupancy import Occupancy
 from generator.layout.placement import FaceLayout, Layout, Placement
+from generator.pipeline import encode
+from generator.pipeline.place import beside
 from generator.polyhedron import shapes
+from generator.spec import read_specs
 
 CUBE = shapes.cube(60.0)
-MIXTURE = (
-    CUBE,
-    shapes.box([60.0, 40.0, 30.0]),
-    shapes.triangular_prism(60.0, 45.0),
-    shapes.tetrahedron(75.0),
-)
 STYLE = SymbolStyle()
 SIDE = 8  # symbols along an edge of the cube
 
 
-def array_4095():
+def mixture(size=1.0):
+    return (
+        shapes.cube(60.0 * size),
+        shapes.box([60.0 * size, 40.0 * size, 30.0 * size]),
+        shapes.triangular_prism(60.0 * size, 45.0 * size),
+        shapes.tetrahedron(75.0 * size),
+    )
+
+
+def array_of(rows):
+    """Return the array of `large` and its next sizes with at least `rows` rows."""
     known = profile("large")
-    while known.array().rows < 4095:
+    while known.array().rows < rows:
         known = enlarged(known)
     return known.array()
 
 
-ARRAY = array_4095()
-
-
-def laid_out(solid, taken):
+def laid_out(solid, array, taken):
     clearances = [[np.full(len(loop), 1.0) for loop in face.loops] for face in solid.faces]
-    return lay_out(solid, ARRAY, 7.0, 2.7, clearances, taken, allow_blank_faces=True)
+    return lay_out(solid, array, 7.0, 2.7, clearances, taken, allow_blank_faces=True)
 
 
-def registration(name, solid, layout):
+def registration(name, solid, layout, array):
     return Registration(
-        name, solid, layout, ARRAY, "large", alphabet_named("dense-4"), STYLE, {"name": name}, "0"
+        name, solid, layout, array, "large", alphabet_named("dense-4"), STYLE, {"name": name}, "0"
     )
 
 
@@ -82,62 +98,95 @@ def spots():
         side += 1
 
 
-def block_layout(where):
+def block_layout(array, where):
     r, c = (index.ravel() for index in np.mgrid[:SIDE, :SIDE])
     centres = np.column_stack([(c + 0.5) * 7.0 + 2.0, -(r + 0.5) * 7.0 + 58.0])
     faces = []
     for face in range(6):
         row, column = (SIDE * k for k in next(where))
         rows, columns = row + r, column + c
-        labels = ARRAY.symbols(rows, columns)
+        labels = array.symbols(rows, columns)
         place = Placement(row, column, 0.0, -2.0, -58.0)
         faces.append(FaceLayout(face, place, rows, columns, labels, centres, 30))
     return Layout("faces", 7.0, tuple(faces), (), ())
 
 
-def fill(engine, have, want, where):
+def blocks(array):
+    """Yield solids with layouts that leave no cell between them."""
+    where = spots()
+    while True:
+        yield CUBE, block_layout(array, where)
+
+
+def mixed(array, size=1.0, taken=None):
+    """Yield solids with the layouts that are found for them, until no shape fits."""
+    taken = taken or Occupancy.from_cells([], [], array)
+    shapes_left = list(mixture(size))
+    number = 0
+    while shapes_left:
+        solid = shapes_left[number % len(shapes_left)]
+        try:
+            layout = laid_out(solid, array, taken)
+        except LayoutError:
+            shapes_left.remove(solid)
+            continue
+        taken = beside(taken, layout)
+        number += 1
+        yield solid, layout
+
+
+def fill(engines, array, objects, have, want):
+    """Register more objects, the same on each engine; return the seconds of each."""
+    spent = [0.0] * len(engines)
     for first in range(have, want, 100):
-        with writing(engine) as connection:
-            for number in range(first, min(first + 100, want)):
-                layout = block_layout(where)
-                register(connection, registration(f"object {number}", CUBE, layout))
+        numbers = range(first, min(first + 100, want))
+        found = [next(objects) for _ in numbers]
+        for k, engine in enumerate(engines):
+            began = time.perf_counter()
+            with writing(engine) as connection:
+                for number, (solid, layout) in zip(numbers, found, strict=True):
+                    new = registration(f"object {number}", solid, layout, array)
+                    register(connection, new)
+            spent[k] += time.perf_counter() - began
+    return spent
 
 
-def place(url, name, solid):
-    """Place and register one object as a command does, the opening of the database included."""
+def place(url, name, array):
+    """Place and register a cube as a command does, the opening of the database included."""
 
     def work(connection):
-        taken = occupied(connection, find_array(connection, ARRAY))
-        return register(connection, registration(name, solid, laid_out(solid, taken)))
+        layout = laid_out(CUBE, array, occupancy(connection, array))
+        return register(connection, registration(name, CUBE, layout, array))
 
     return in_turn(open_database(url), work)
 
 
-def timed(action, times, clock=time.perf_counter):
-    """Return the median of the times of a clock, seconds."""
+def timed(action, times):
+    """Return the medians of wall and CPU time, seconds."""
     spent = []
     for number in range(times):
-        began = clock()
+        wall, cpu = time.perf_counter(), time.process_time()
         action(number)
-        spent.append(clock() - began)
-    return float(np.median(spent))
+        spent.append((time.perf_counter() - wall, time.process_time() - cpu))
+    return np.median(spent, axis=0).tolist()
 
 
-def measured(url, objects):
+def measured(url, array, objects):
     engine = open_database(url)
-    names = [f"next {number}" for number in range(10)]
-    placing = timed(lambda k: place(url, names[k], CUBE), 5)
-    cpu = timed(lambda k: place(url, names[5 + k], CUBE), 5, time.process_time)
+    names = [f"next {number}" for number in range(7)]
+    placing, cpu = timed(lambda k: place(url, names[k], array), len(names))
     with writing(engine) as connection:
         for name in names:
             remove(connection, name)
     with reading(engine) as connection:
-        array_id = find_array(connection, ARRAY)
-        taken = timed(lambda _: occupied(connection, array_id), 3)
-        rows, columns = occupied(connection, array_id)
-        listing = timed(lambda _: list_objects(connection), 1)
+        array_id = find_array(connection, array)
+        taken = timed(lambda _: occupancy(connection, array), 3)[0]
+        held = occupancy(connection, array)
+        listing = timed(lambda _: list_objects(connection), 1)[0]
+        faces = connection.execute(select(func.count()).select_from(tables.faces)).scalar_one()
     chance = np.random.default_rng(3)
     window_r, window_c = (index.ravel() for index in np.mgrid[:3, :4])
+    rows, columns = held.cells()
     corners = chance.integers(0, len(rows), 300)
 
     def look(connection, k):
@@ -150,62 +199,120 @@ def measured(url, objects):
             look(connection, k)
 
     with reading(engine) as connection:
-        looking = timed(lambda k: look(connection, k), len(corners))
+        looking = timed(lambda k: look(connection, k), len(corners))[0]
         for k in range(20):
             assert look(connection, k)[0][0] > 0
-    opening = timed(look_opening, 20)
-    used = len(rows)
-    corner = used / ((rows.max() + 1) * (columns.max() + 1))
+    opening = timed(look_opening, 20)[0]
+    high, wide = opened(held)
     print(
-        f"{objects:8d} {6 * objects:8d} {used:9d} {placing:9.3f} {cpu:9.3f} {1e3 * taken:9.1f} "
-        f"{1e3 * looking:9.2f} {1e3 * opening:9.1f} {listing:8.2f} "
-        f"{corner:8.3f} {used / (ARRAY.rows * ARRAY.columns):8.3f}",
+        f"{engine.dialect.name:>10} {objects:8d} {faces:8d} {held.used:9d} {placing:8.3f} "
+        f"{cpu:8.3f} {1e3 * taken:9.1f} {1e3 * looking:8.2f} {1e3 * opening:9.1f} {listing:7.2f} "
+        f"{held.used / (high * wide):7.3f} {held.density:7.3f}",
         flush=True,
     )
 
 
-def run(url, how, steps):
-    engine = open_database(url)
-    where, have = spots(), 0
+def scaled(urls, array, how, steps):
+    engines = [open_database(url) for url in urls]
+    objects, have = (blocks if how == "blocks" else mixed)(array), 0
     print(
-        f"{'objects':>8} {'faces':>8} {'cells':>9} {'place s':>9} {'CPU s':>9} {'taken ms':>9} "
-        f"{'look ms':>9} {'+open ms':>9} {'list s':>8} {'corner':>8} {'array':>8}"
+        f"{'engine':>10} {'objects':>8} {'faces':>8} {'cells':>9} {'place s':>8} {'CPU s':>8} "
+        f"{'taken ms':>9} {'look ms':>8} {'+open ms':>9} {'list s':>7} {'opened':>7} {'array':>7}"
     )
     for want in steps:
-        began = time.perf_counter()
-        if how == "blocks":
-            fill(engine, have, want, where)
-        else:
-            for number in range(have, want):
-                place(url, f"object {number}", MIXTURE[number % len(MIXTURE)])
-        if want > have:
-            each = (time.perf_counter() - began) / (want - have)
-            print(f"  registering {want - have} objects: {1e3 * each:.1f} ms each", flush=True)
+        spent = fill(engines, array, objects, have, want)
+        each = ", ".join(f"{1e3 * seconds / max(want - have, 1):.1f}" for seconds in spent)
+        print(f"  registering {want - have} more objects: {each} ms each", flush=True)
         have = want
-        measured(url, want)
-    with reading(engine) as connection:
-        assert len(read_layout(connection, "object 0").faces) >= 4
+        for url in urls:
+            measured(url, array, want)
+    for engine in engines:
+        with reading(engine) as connection:
+            assert len(read_layout(connection, "object 0").faces) >= 4
+
+
+def filled(array, size):
+    """Print how full the array gets when nothing fits any more."""
+    taken, number, began = Occupancy.from_cells([], [], array), 0, time.process_time()
+    print(
+        f"mixture x {size:g}\n{'objects':>8} {'cells':>9} {'opened':>7} {'array':>7} {'CPU s':>8}"
+    )
+
+    def told():
+        high, wide = opened(taken)
+        share = taken.used / (high * wide)
+        spent = time.process_time() - began
+        print(f"{number:8d} {taken.used:9d} {share:7.3f} {taken.density:7.3f} {spent:8.0f}")
+
+    for _, layout in mixed(array, size):
+        taken = beside(taken, layout)
+        number += 1
+        if number % 1000 == 0:
+            told()
+            sys.stdout.flush()
+    told()
+
+
+class PlacesChosenError(Exception):
+    """Ends the making of a set where its parts would be built."""
+
+
+def copied(numbers):
+    """Print what choosing the places of a set of copies costs."""
+    print(f"{'copies':>8} {'placing CPU s':>14} {'per copy ms':>12}")
+    for number in numbers:
+        marks = []
+
+        def progress(what, _, marks=marks):
+            if what.startswith("making"):
+                raise PlacesChosenError
+            if what.startswith("placing"):
+                marks.append(time.process_time())
+
+        with tempfile.TemporaryDirectory() as folder, suppress(PlacesChosenError):
+            file = Path(folder) / "set.yaml"
+            file.write_text(f"name: A\nprofile: auto\nshape: {{cube: 30 mm}}\ncopies: {number}\n")
+            url = f"sqlite:///{folder}/lab.db"
+            encode(read_specs([file]), database=url, formats=(), jobs=1, progress=progress)
+        spent = marks[-1] - marks[0]
+        print(f"{number:8d} {spent:14.2f} {1e3 * spent / (len(marks) - 1):12.1f}", flush=True)
 
 
 def main() -> int:
     options = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    options.add_argument("--engine", choices=("sqlite", "postgresql"), default="sqlite")
+    options.add_argument("--engine", choices=("sqlite", "postgresql", "both"), default="both")
     options.add_argument("--fill", choices=("blocks", "placed"), default="blocks")
-    options.add_argument("--objects", type=int, nargs="+", default=[10, 167, 1000, 10000, 16667])
+    options.add_argument("--objects", type=int, nargs="+", default=[2, 10, 167, 1000, 10000, 16667])
+    options.add_argument("--array", type=int, default=4095, help="rows")
+    options.add_argument("--full", action="store_true", help="how full the array gets")
+    options.add_argument("--size", type=float, default=1.0, help="of the objects of --full")
+    options.add_argument("--copies", type=int, nargs="+", help="places of a set")
     chosen = options.parse_args()
-    print(f"{chosen.engine}, fill {chosen.fill}, array {ARRAY.rows} x {ARRAY.columns}")
-    if chosen.engine == "sqlite":
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "lab.db"
-            run(str(path), chosen.fill, sorted(chosen.objects))
-            print(f"{path.stat().st_size / 1e6:.0f} MB")
+    if chosen.copies:
+        copied(chosen.copies)
         return 0
-    script = Path(__file__).parents[1] / "postgres.py"
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-    with subprocess.Popen([sys.executable, script, "--durable"], text=True, **pipes) as server:
-        run(server.stdout.readline().strip(), chosen.fill, sorted(chosen.objects))
+    array = array_of(chosen.array)
+    print(f"array {array.rows} x {array.columns}")
+    if chosen.full:
+        filled(array, chosen.size)
+        return 0
+    print(f"fill {chosen.fill}")
+    with ExitStack() as stack:
+        urls = []
+        if chosen.engine != "postgresql":
+            folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+            urls.append(str(folder / "lab.db"))
+        if chosen.engine != "sqlite":
+            script = Path(__file__).parents[1] / "postgres.py"
+            pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+            command = [sys.executable, script, "--durable"]
+            server = stack.enter_context(subprocess.Popen(command, text=True, **pipes))
+            urls.append(server.stdout.readline().strip())
+        scaled(urls, array, chosen.fill, sorted(chosen.objects))
+        if chosen.engine != "postgresql":
+            print(f"{Path(urls[0]).stat().st_size / 1e6:.0f} MB")
     return 0
 
 

@@ -1,10 +1,11 @@
-"""Cylinder and cone from spec to file: registered, sliced, and read off the printed surface.
+"""Cylinder and cone from spec to file and back: registered, sliced, read by simulated touch.
 
 Needs the Debian package `prusa-slicer`; without it one of these tests fails.
 """
 
 from __future__ import annotations
 
+import math
 import re
 import shutil
 import subprocess
@@ -24,6 +25,14 @@ from generator.pipeline import encode
 from generator.polyhedron.developable import developable_from
 from generator.polyhedron.development import development
 from generator.spec import read_specs
+from probe.sensor import Sensor
+from probe.simulate.registered import registered_object
+from probe.simulate.round import round_part
+from probe.simulate.touch import Touches, random_touches
+from recognizer.lab import open_lab
+from recognizer.pipeline import reader_for, recognise
+from recognizer.signal import signal_of
+from recognizer.validation.levels import LEVELS, read
 
 SHAPES = {
     "cylinder": "{cylinder: {diameter: 36 mm, height: 30 mm}}",
@@ -151,3 +160,102 @@ def test_the_slicer_repairs_nothing_and_prints_the_symbols(made, tmp_path):
     out = [np.hypot(*(np.array(points) - middle).T).max() - base
            for level, points in layers.items() if 3.0 < level < height - 3.0]  # fmt: skip
     assert np.mean(np.array(out) > 0.4) > 0.33
+
+
+#: Large enough that one touch shows symbols enough; smaller ones need a scan.
+TOUCHED = """
+objects:
+  - {name: Tube, shape: {cylinder: {diameter: 90 mm, height: 40 mm}}}
+  - {name: Cone, shape: {cone: {diameter: 100 mm, top_diameter: 70 mm, height: 40 mm}}}
+"""
+INSIDE_MM = 12.0
+
+
+@pytest.fixture(scope="module")
+def touched(tmp_path_factory):
+    """A database, and the round face of each of its objects as it was written."""
+    folder = tmp_path_factory.mktemp("touched")
+    spec, database = folder / "two.yaml", str(folder / "lab.db")
+    spec.write_text(TOUCHED)
+    encode(read_specs([spec]), folder=folder, database=database, formats=("stl",))
+    parts = {}
+    for name in ("Tube", "Cone"):
+        held = registered_object(database, name)
+        (face,) = [face for face in held.faces if face.round is not None]
+        (part,) = [part for part in held.parts if part.format == "stl"]
+        parts[name] = round_part(folder / part.file, held, part, face)
+    return database, parts
+
+
+@pytest.mark.parametrize("name", ["Tube", "Cone"])
+def test_a_plate_sees_the_written_face_fall_away_under_it(touched, name):
+    part = touched[1][name]
+    rng = np.random.default_rng(5)
+    drawn = random_touches(part.region, rng, Touches(margin_mm=INSIDE_MM))
+    for _, touch in zip(range(3), drawn, strict=False):
+        about = rng.uniform(-8.0, 8.0, (400, 2))
+        at = np.array([touch.x_mm, touch.y_mm])
+        heights = part.under(touch).surface.heights_mm(at + about)
+        over = heights + part.face.round.bend(*at).falls_mm(about)
+        assert over.min() > -0.05
+        assert over.max() < 1.05
+        assert np.mean(np.abs(over) < 0.05) > 0.3  # between symbols
+        assert np.mean(np.abs(over - 1.0) < 0.05) > 0.2  # on their tops
+
+
+@pytest.mark.parametrize("name", ["Tube", "Cone"])
+def test_one_touch_of_the_written_part_tells_object_face_and_pose(touched, name):
+    database, parts = touched
+    reader, part = reader_for(open_lab(database), Sensor()), parts[name]
+    surface = part.face.round.surface
+    rng, answered = np.random.default_rng(8), 0
+    drawn = random_touches(part.region, rng, Touches((40.0, 120.0), margin_mm=INSIDE_MM))
+    for _, touch in zip(range(5), drawn, strict=False):
+        counts, _ = read(part.under(touch).surface, reader.sensor, touch, LEVELS["typical"], rng)
+        answer = recognise(reader, signal_of(counts.astype(np.float64)))
+        if not answer:
+            continue
+        answered += 1
+        assert (answer.object, answer.face) == (name, "F2")
+        T = answer.T_face_probe
+        turn = math.atan2(T[1, 0], T[0, 0])
+        assert T[:2, 3] == pytest.approx([touch.x_mm, touch.y_mm], abs=0.2)
+        assert math.degrees(math.remainder(turn - touch.theta_rad, 2 * math.pi)) == pytest.approx(
+            0.0, abs=1.0
+        )
+        # Seen from the object: on the tops of the symbols, and flat on the round face.
+        x, y, z = answer.T_object_probe[:3, 3]
+        alpha = surface.half_angle_rad
+        outside = (math.hypot(x, y) - surface.radius_mm) * math.cos(alpha) + z * math.sin(alpha)
+        assert outside == pytest.approx(1.0, abs=0.05)
+        radial = np.array([x, y, 0.0]) / math.hypot(x, y)
+        outward = math.cos(alpha) * radial + math.sin(alpha) * np.array([0.0, 0.0, 1.0])
+        assert answer.T_object_probe[:3, 2] == pytest.approx(outward, abs=1e-3)
+        there = part.tangent(touch.x_mm, touch.y_mm) @ (touch.x_mm, touch.y_mm, 1.0, 1.0)
+        assert answer.T_object_probe[:3, 3] == pytest.approx(there[:3], abs=0.25)
+    assert answered >= 4
+
+
+def test_the_reader_takes_no_blank_round_face_for_an_encoded_one(touched):
+    database, parts = touched
+    reader, part = reader_for(open_lab(database), Sensor()), parts["Tube"]
+    radius = part.face.round.surface.radius_mm
+    rng = np.random.default_rng(2)
+    drawn = random_touches(part.region, rng, Touches(margin_mm=INSIDE_MM))
+    for _, touch in zip(range(3), drawn, strict=False):
+        blank = Blank(radius, (touch.x_mm, touch.y_mm))
+        counts, _ = read(blank, reader.sensor, touch, LEVELS["typical"], rng)
+        assert not recognise(reader, signal_of(counts.astype(np.float64)))
+
+
+class Blank:
+    """A cylinder without symbols, its axis along y, touched at a place."""
+
+    top_mm = 0.0
+
+    def __init__(self, radius_mm: float, at_mm: tuple[float, float]) -> None:
+        self.radius_mm, self.x_mm = radius_mm, at_mm[0]
+
+    def heights_mm(self, points_mm: np.ndarray) -> np.ndarray:
+        across = points_mm[:, 0] - self.x_mm
+        return np.sqrt(np.maximum(self.radius_mm**2 - across**2, 0.0)) - self.radius_mm

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from generator.errors import ShapeError
 from generator.polyhedron.read.merge import merged
 from generator.polyhedron.read.obj import read_obj
@@ -18,31 +20,35 @@ from generator.polyhedron.read.stl import read_stl
 from generator.polyhedron.winged import Polyhedron, polyhedron
 
 LARGEST_BYTES = 64 * 2**20
+LARGEST_MM = 1e4  #: as of a length in a spec
 
 MESHES: dict[str, Callable[[bytes, str], Soup]] = {".stl": read_stl, ".obj": read_obj}
 READERS = (*MESHES, ".step", ".stp")
 
 
-def read_shape(path: str | Path) -> Polyhedron:
+def read_shape(path: str | Path, scale: float = 1.0) -> Polyhedron:
     """Read one solid from a file.
 
     Parameters
     ----------
     path
         A file that ends in .stl (binary or ASCII), .obj, .step or .stp.
+    scale
+        How many times larger the model is made about its origin, in [1e-6, 1e6]; round faces
+        are divided at that size.
 
     Returns
     -------
     Polyhedron
         Of kind `file`; its faces F1, F2, ... are in the order in which the file first shows
-        them, coordinates as in the file, mm. Cylinder and cone faces of STEP are runs of facets,
-        its `surfaces`; other round faces are facets that stay `blank`.
+        them, coordinates as in the file times `scale`, mm. Cylinder and cone faces of STEP are
+        runs of facets, its `surfaces`; other round faces are facets that stay `blank`.
 
     Raises
     ------
     ShapeError
         With file, place, cause and way out: no such file, too large, truncated, not closed,
-        several bodies, a mesh with curved surfaces.
+        several bodies, a mesh with curved surfaces, larger than 10 m.
     """
     file = Path(path)
     suffix = file.suffix.lower()
@@ -57,13 +63,26 @@ def read_shape(path: str | Path) -> Polyhedron:
     try:
         content = _content(file, place)
         if suffix not in MESHES:
-            return read_step(content, place)
-        return polyhedron("file", *merged(MESHES[suffix](content, place)))
+            solid = read_step(content, place, scale)
+        else:
+            vertices, faces = merged(MESHES[suffix](content, place))
+            solid = polyhedron("file", scale * vertices, faces)
+        _check_size(solid)
+        return solid
     except ShapeError as error:
         if error.place.startswith(place):
             raise
         where = f"{place}, {error.place}" if error.place else place
         raise ShapeError(error.cause, fix=error.fix, place=where) from None
+
+
+def _check_size(solid: Polyhedron) -> None:
+    largest = float(np.ptp(solid.vertices, axis=0).max())
+    if largest > LARGEST_MM:
+        raise ShapeError(
+            f"the model is {largest / 1000:.3g} m long; {LARGEST_MM / 1000:g} m are allowed",
+            fix="check its unit: shape: {file: ..., scale: 0.001} makes it a thousandth",
+        )
 
 
 def _content(file: Path, place: str) -> bytes:

@@ -3,7 +3,8 @@
 The kernel divides every edge once, into steps of one angle for all circles, so faces meet in
 the same points. A planar face becomes a polygon. A cylinder or cone face between two circles
 and two straight lines (or all around) becomes a run of facets that unroll; everything else is
-taken as the kernel's triangles, which no symbol stands on. Lengths in mm, angles in rad.
+taken as the kernel's triangles, which no symbol stands on. A solid of very many facets is divided
+more coarsely, and says so. Lengths in mm, angles in rad.
 """
 
 from __future__ import annotations
@@ -16,9 +17,13 @@ from generator.errors import ShapeError
 from generator.polyhedron.read.strip import run_of
 
 CHORD_ERROR_MM = 0.02  #: of the largest cylinder or cone
+BLANK_ERROR_MM = 0.1  #: of other faces, which carry no symbols: half a printed layer
 STEPS = (24, 240)  #: fewest and most to a full circle
-MOST_FACETS = 4000
 INTERIOR_RAD = 0.35  #: between triangles of faces that carry no symbols
+COARSER = (1.0, 2.0, 5.0, 10.0)  #: times these errors, until there are few enough facets
+MOST_FACETS = 6000
+
+_REMAKE = "check the model in a CAD program, make that face anew, and export it again"
 
 
 @dataclass(slots=True)
@@ -55,19 +60,24 @@ def curved_faces(solid: Any, faces: list[Any], kinds: list[str]) -> dict[str, An
     ShapeError
         There are too many facets, or the kernel cannot divide a face.
     """
-    from OCP.BRepMesh import BRepMesh_IncrementalMesh
-    from OCP.IMeshTools import IMeshTools_Parameters
-
-    # Linear limits that never count: the angle alone divides circles, so those of a cone match.
-    limits = IMeshTools_Parameters()
-    limits.Deflection = limits.DeflectionInterior = 1e6
-    limits.Angle = 2.0 * _step(faces, kinds)  # which the kernel halves on edges
-    limits.AngleInterior = INTERIOR_RAD
-    limits.MinSize = 1e-6
-    BRepMesh_IncrementalMesh(solid, limits)
-    divided: set[int] = set()  # straight edges whose inner points triangles need
-    while (found := _gathered(faces, kinds, divided)) is None:
-        pass  # a face fell back to triangles, so its neighbours must take its points
+    counts: list[int] = []
+    for coarser in COARSER:
+        found = _divided(solid, faces, kinds, coarser)
+        counts.append(len(found.faces))
+        if counts[-1] <= MOST_FACETS:
+            break
+    else:
+        raise ShapeError(
+            f"its round faces need {min(counts)} facets, to {BLANK_ERROR_MM * COARSER[-1]:g} mm; "
+            f"{MOST_FACETS} are allowed",
+            fix="leave out threads, small fillets and other round parts that carry no symbols",
+        )
+    notes = []
+    if coarser > 1.0:
+        notes.append(
+            f"round faces were divided to {BLANK_ERROR_MM * coarser:g} mm, those with symbols to "
+            f"{CHORD_ERROR_MM * coarser:g} mm: finer, they have {counts[-2]} facets"
+        )
     return {
         "points": [list(map(float, point)) for point in found.points],
         "faces": found.faces,
@@ -75,7 +85,31 @@ def curved_faces(solid: Any, faces: list[Any], kinds: list[str]) -> dict[str, An
         "surfaces": found.surfaces,
         "blank": found.blank,
         "kinds": found.kinds,
+        "notes": notes,
+        "error_mm": BLANK_ERROR_MM * coarser,
     }
+
+
+def _divided(solid: Any, faces: list[Any], kinds: list[str], coarser: float) -> _Found:
+    """Return all facets at so many times the chord errors."""
+    from OCP.BRepMesh import BRepMesh_IncrementalMesh
+    from OCP.BRepTools import BRepTools
+    from OCP.IMeshTools import IMeshTools_Parameters
+
+    step, radius = _step(faces, kinds, coarser)
+    limits = IMeshTools_Parameters()
+    # On circles of cylinders and cones the angle alone may count, so that those of a cone match.
+    limits.Deflection = max(BLANK_ERROR_MM * coarser, 2.0 * _chord_error(radius, step))
+    limits.DeflectionInterior = limits.Deflection
+    limits.Angle = 2.0 * step  # which the kernel halves on edges
+    limits.AngleInterior = INTERIOR_RAD * math.sqrt(coarser)
+    limits.MinSize = 1e-6
+    BRepTools.Clean_s(solid)
+    BRepMesh_IncrementalMesh(solid, limits)
+    divided: set[int] = set()  # straight edges whose inner points triangles need
+    while (found := _gathered(faces, kinds, divided)) is None:
+        pass  # a face fell back to triangles, so its neighbours must take its points
+    return found
 
 
 def _gathered(faces: list[Any], kinds: list[str], divided: set[int]) -> _Found | None:
@@ -85,7 +119,10 @@ def _gathered(faces: list[Any], kinds: list[str], divided: set[int]) -> _Found |
     before = len(divided)
     for number, (face, kind) in enumerate(zip(faces, kinds, strict=True), 1):
         name = f"F{number}"
-        wires = nodes.wires(face)
+        try:
+            wires = nodes.wires(face)
+        except ShapeError as error:
+            raise ShapeError(f"{error.cause} {name} ({kind})", fix=error.fix) from None
         if kind == "plane":
             found.add(name, [[_ids(wire) for wire in wires]])
             continue
@@ -98,16 +135,11 @@ def _gathered(faces: list[Any], kinds: list[str], divided: set[int]) -> _Found |
             divided |= nodes.dropped
             found.blank += found.add(name, [[t] for t in nodes.triangles(face)])
             found.kinds[name] = kind
-        if len(found.faces) > MOST_FACETS:
-            raise ShapeError(
-                f"its round faces need more than {MOST_FACETS} facets",
-                fix="leave out small fillets and other round parts that carry no symbols",
-            )
     return found if len(divided) == before else None
 
 
-def _step(faces: list[Any], kinds: list[str]) -> float:
-    """Return the angle between two points of a circle."""
+def _step(faces: list[Any], kinds: list[str], coarser: float) -> tuple[float, float]:
+    """Return the angle between two points of a circle, and the radius of the largest one."""
     from OCP.BRepAdaptor import BRepAdaptor_Surface
 
     radii = [1.0]
@@ -119,9 +151,14 @@ def _step(faces: list[Any], kinds: list[str]) -> float:
             ends = (surface.FirstVParameter(), surface.LastVParameter())
             sine = math.sin(surface.Cone().SemiAngle())
             radii += [abs(surface.Cone().RefRadius() + v * sine) for v in ends]
-    steps = math.pi / math.acos(max(0.0, 1.0 - CHORD_ERROR_MM / max(radii)))
-    wanted = min(max(4 * math.ceil(steps / 4), STEPS[0]), STEPS[1])
-    return 2.0 * math.pi / wanted * (1.0 + 1e-9)  # so that a rounding adds no step
+    steps = math.pi / math.acos(max(0.0, 1.0 - coarser * CHORD_ERROR_MM / max(radii)))
+    fewest = STEPS[0] / math.sqrt(coarser)
+    wanted = min(4 * math.ceil(max(steps, fewest) / 4), STEPS[1])
+    return 2.0 * math.pi / wanted * (1.0 + 1e-9), max(radii)  # so that a rounding adds no step
+
+
+def _chord_error(radius: float, step: float) -> float:
+    return radius * (1.0 - math.cos(step / 2.0))
 
 
 def _ids(wire: list[tuple[Any, list[int]]]) -> list[int]:
@@ -156,7 +193,7 @@ class _Nodes:
         self.location = TopLoc_Location()
         self.mesh = BRep_Tool.Triangulation_s(face, self.location)
         if self.mesh is None:
-            raise ShapeError("the CAD kernel cannot divide a face", fix="export the model again")
+            raise ShapeError("the CAD kernel cannot divide face", fix=_REMAKE)
         self.of_face, self.dropped = {}, set()
         outer = BRepTools.OuterWire_s(face)
         explorer, wires = TopExp_Explorer(face, TopAbs_WIRE), []
@@ -196,7 +233,7 @@ class _Nodes:
 
         polygon = BRep_Tool.PolygonOnTriangulation_s(edge, self.mesh, self.location)
         if polygon is None:
-            raise ShapeError("the CAD kernel cannot divide an edge", fix="export the model again")
+            raise ShapeError("the CAD kernel cannot divide an edge of face", fix=_REMAKE)
         nodes = [polygon.Node(k) for k in range(1, polygon.NbNodes() + 1)]
         key = self.edges.Add(edge)
         if len(nodes) > 2 and key not in self.divided and _straight(edge):

@@ -1,6 +1,6 @@
 """The CAD kernel's part of reading STEP, in a process of its own: file -> planar faces in mm.
 
-    python -m generator.polyhedron.read.kernel model.step answer.json
+    python -m generator.polyhedron.read.kernel model.step answer.json SCALE
 
 A damaged file can crash the kernel; here it takes only this process with it. The answer
 holds `points` and `faces` (loops of point numbers), and for round faces what `curved` adds, or
@@ -23,18 +23,18 @@ PLANAR_MM = 1e-5  #: a spline surface this flat is a plane; kernel tolerances ar
 AGAIN = "export the model again; the file may be damaged"
 
 
-def main(model: str, answer: str) -> None:
-    """Read `model` and write `answer`."""
+def main(model: str, answer: str, scale: str) -> None:
+    """Read `model`, make it `scale` times larger and write `answer`."""
     with open(os.devnull, "wb") as nowhere:  # the kernel prints beneath Python
         os.dup2(nowhere.fileno(), 1)
     try:
-        found = _read(model)
+        found = _read(model, float(scale))
     except ShapeError as error:
         found = {"cause": error.cause, "fix": error.fix}
     Path(answer).write_text(json.dumps(found))
 
 
-def _read(model: str) -> dict[str, Any]:
+def _read(model: str, scale: float) -> dict[str, Any]:
     try:
         import OCP.Standard
     except ImportError:  # a library of the system may be missing
@@ -43,7 +43,7 @@ def _read(model: str) -> dict[str, Any]:
             fix='run: pip install "encoded-objects[cad]", or save the model as STL',
         ) from None
     try:
-        return described(_model(model))
+        return described(_scaled(_model(model), scale))
     except OCP.Standard.Standard_Failure as error:
         reason = str(error).strip().splitlines()
         cause = f"the CAD kernel cannot read it: {reason[0] if reason else 'no reason given'}"
@@ -62,12 +62,23 @@ def described(shape: Any) -> dict[str, Any]:
 
     solids = [] if shape is None or shape.IsNull() else _explored(shape, TopAbs_SOLID)
     if len(solids) != 1:
-        found = f"{len(solids)} solids" if solids else "no solid, at most surfaces"
         raise ShapeError(
-            f"it holds {found}; one is needed",
+            f"it holds {_held(shape, len(solids))}; one solid is needed",
             fix="join them into one solid, or save each in a file of its own",
         )
     return _faces(solids[0])
+
+
+def _held(shape: Any, solids: int) -> str:
+    """Return what a shape holds in place of one solid."""
+    from OCP.TopAbs import TopAbs_FACE
+
+    if solids:
+        return f"{solids} solids"
+    faces = 0 if shape is None or shape.IsNull() else len(_explored(shape, TopAbs_FACE))
+    if faces:
+        return f"no solid, but {faces} loose {'face' if faces == 1 else 'faces'}"
+    return "no faces: it may be an assembly whose parts are in other files"
 
 
 def _model(model: str) -> Any:
@@ -79,6 +90,18 @@ def _model(model: str) -> Any:
         raise ShapeError("the CAD kernel finds no STEP data in it", fix=AGAIN)
     reader.TransferRoots()
     return reader.OneShape()
+
+
+def _scaled(shape: Any, scale: float) -> Any:
+    """Return a shape made larger about the origin, so that round faces are divided at that size."""
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
+    from OCP.gp import gp_Pnt, gp_Trsf
+
+    if scale == 1.0 or shape is None or shape.IsNull():
+        return shape
+    larger = gp_Trsf()
+    larger.SetScale(gp_Pnt(0.0, 0.0, 0.0), scale)
+    return BRepBuilderAPI_Transform(shape, larger, True).Shape()
 
 
 def _faces(solid: Any) -> dict[str, Any]:

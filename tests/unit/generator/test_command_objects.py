@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import math
 import os
 import shutil
 import subprocess
@@ -63,6 +64,36 @@ def test_show_names_faces_cells_files_and_origin(capsys):
     text = capsys.readouterr().out
     for word in ("one-touch 63x65", "dense-4", "square", "900 mm2", "Cube-F1", "ok"):
         assert word in text
+
+
+@pytest.mark.parametrize(
+    ("shape", "round_area"),
+    [
+        ("cylinder: {diameter: 40 mm, height: 30 mm}", 2 * math.pi * 20 * 30),
+        ("cone: {diameter: 60 mm, top_diameter: 30 mm, height: 40 mm}",
+         math.pi * (30 + 15) * math.hypot(40, 15)),
+    ],
+    ids=["cylinder", "cone"],
+)  # fmt: skip
+def test_a_round_face_is_one_face(capsys, shape, round_area):
+    Path("round.yaml").write_text(f"name: Round\nshape: {{{shape}}}\noutput: {{formats: stl}}\n")
+    assert run(["round.yaml", "--database", "round.db"]) == 0
+    (entry,) = said(capsys, "list", "--database", "round.db")["objects"]
+    assert entry["faces"] == 3
+    value = said(capsys, "show", "Round", "--database", "round.db")
+    faces = {face["name"]: face for face in value["faces"]}
+    assert list(faces) == ["F1", "F2", "F3"]
+    kind = shape.partition(":")[0]
+    assert [face["type"] for face in faces.values()] == ["polygon", kind, "polygon"]
+    assert faces["F2"]["area_mm2"] == pytest.approx(round_area, rel=0.01)
+    assert sum(face["symbols"] for face in faces.values()) == value["symbols"] == entry["symbols"]
+    assert run(["show", "Round", "--database", "round.db"]) == 0
+    text = capsys.readouterr().out
+    assert f"Round: {kind}, 3 faces" in text
+    assert "F2.2" not in text
+    assert run(["list", "--database", "round.db"]) == 0
+    (line,) = [line for line in capsys.readouterr().out.splitlines() if "Round" in line]
+    assert line.split()[:3] == ["Round", kind, "3"]
 
 
 def test_show_tells_missing_and_changed_files(capsys):
@@ -181,6 +212,23 @@ def test_the_commands_run_on_a_server(capsys, database_on):
         assert said(capsys, "show", "Cube", "--database", url)["files"][0]["state"] == "ok"
         assert run(["retire", "Cube", "--free", "--yes", "--database", url]) == 0
         assert said(capsys, "list", "--database", url)["objects"] == []
+
+
+@pytest.mark.parametrize(
+    "command",
+    [["Cube.yaml"], ["list"], ["show", "Cube"], ["retire", "Cube"], ["export", "x.db"],
+     ["import", "lab.db"]],
+    ids=lambda command: command[0],
+)  # fmt: skip
+def test_every_command_says_in_one_message_that_no_server_runs(capsys, command):
+    capsys.readouterr()
+    assert run([*command, "--database", "postgresql://lab:secret@127.0.0.1:9/x"]) == 4
+    text, messages = capsys.readouterr()
+    assert text == ""
+    assert messages == (
+        "postgresql://lab:***@127.0.0.1:9/x: error: no PostgreSQL server runs on 127.0.0.1:9\n"
+        "  fix: start it, or correct host and port in the URL\n"
+    )
 
 
 def test_passwords_are_not_shown(capsys, database_on):

@@ -118,6 +118,19 @@ def test_files_of_parts_are_named_from_the_other_databases_folder(tmp_path):
     assert held(str(tmp_path / "lab.db"), "Cube").parts[0].file == "a/out/F1.stl"
 
 
+def test_who_imports_first_makes_beside_and_can_give_back(new_database, lab_url, file):
+    theirs = new_database("sqlite")
+    make(theirs, "Cube")
+    export_objects(theirs, file)
+    import_objects(lab_url, str(file))
+    make(lab_url, "Other")
+    done = export_objects(lab_url, file, force=True)
+    assert done.copied == ("Cube", "Other")
+    done = import_objects(theirs, str(file))
+    assert (done.copied, done.known) == (("Other",), ("Cube",))
+    sound(theirs)
+
+
 def test_an_object_on_cells_that_are_held_is_refused_by_name(new_database, lab_url, file):
     theirs = new_database("sqlite")
     make(theirs, "Cube")
@@ -128,6 +141,7 @@ def test_an_object_on_cells_that_are_held_is_refused_by_name(new_database, lab_u
         import_objects(lab_url, str(file))
     assert "cells that 'Other' holds here" in str(caught.value)
     assert "make 'Cube' again here" in caught.value.fix
+    assert "same corner: import before objects are made" in caught.value.fix
     assert "Tetra" not in str(caught.value)
     assert names(lab_url) == ["Other"]
     done = import_objects(lab_url, str(file), skip_refused=True)

@@ -5,6 +5,7 @@ import sqlite3
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 import pytest
@@ -235,9 +236,60 @@ def test_many_may_make_a_database_at_once(tmp_path):
         assert len(connection.execute(select(meta)).all()) == 2
 
 
-def test_a_server_that_does_not_answer_is_named_without_its_password():
-    # Port 9 (discard) of the loopback: nothing listens there.
-    said = refused("postgresql://lab:secret@127.0.0.1:9/objects")
-    assert "cannot connect" in said
-    assert "127.0.0.1:9" in said
-    assert "secret" not in said
+@pytest.fixture(scope="module")
+def guarded_server(postgresql_server):
+    """Address of the server, on which lab needs a password and eve is not let in."""
+    import psycopg
+
+    with psycopg.connect(postgresql_server, autocommit=True) as connection:
+        file = Path(connection.execute("SHOW hba_file").fetchone()[0])
+        before = file.read_text()
+        rules = "host all lab all scram-sha-256\nhost all eve all reject\n"
+        file.write_text(rules + before)
+        connection.execute("CREATE ROLE lab LOGIN PASSWORD 'right'")
+        connection.execute("CREATE ROLE guest LOGIN")
+        connection.execute("SELECT pg_reload_conf()")
+        address = postgresql_server.partition("@")[2].partition("/")[0]
+        for _ in range(200):  # the server takes the rules over in its own time
+            try:
+                psycopg.connect(f"postgresql://lab:wrong@{address}/postgres").close()
+            except psycopg.OperationalError:
+                break
+            time.sleep(0.05)
+        yield address
+        file.write_text(before)
+        connection.execute("DROP ROLE lab")
+        connection.execute("DROP ROLE guest")
+        connection.execute("SELECT pg_reload_conf()")
+
+
+# Port 9 (discard) of the loopback: nothing listens there.
+@pytest.mark.parametrize(
+    ("url", "cause", "fix"),
+    [
+        ("lab:secret@127.0.0.1:9/postgres", "no PostgreSQL server runs on 127.0.0.1:9", "start it"),
+        ("lab:secret@{}/postgres", "refuses the user 'lab' or the password", "correct them"),
+        ("lab@{}/postgres", "refuses the user 'lab' or the password", "~/.pgpass"),
+        ("eve:secret@{}/postgres", "does not let the user 'eve' in", "correct the user"),
+        ("nobody:secret@{}/postgres", "does not let the user 'nobody' in", "administrator"),
+        ("postgres:secret@{}/nowhere", "has no database 'nowhere'", "createdb nowhere"),
+        ("lab:secret@no.such.host.invalid/x", "there is no host 'no.such.host.invalid'", "host"),
+        ("lab:secret@127.0.0.1:99999/x", "invalid port number", "port"),
+        ("guest:secret@{}/postgres", "may not be written", "choose another"),
+    ],
+)  # fmt: skip
+def test_a_server_that_is_not_reached_says_why(guarded_server, url, cause, fix):
+    whole = f"postgresql://{url.format(guarded_server)}"
+    with pytest.raises(DatabaseError) as caught:
+        open_database(whole)
+    error = caught.value
+    assert error.exit_code == 4
+    assert cause in error.cause
+    assert fix in error.fix
+    assert error.place == whole.replace("secret", "***")
+    assert "secret" not in str(error)
+
+
+def test_the_right_password_opens_the_server(guarded_server):
+    with pytest.raises(DatabaseError, match="no objects are registered"):
+        open_database(f"postgresql://lab:right@{guarded_server}/postgres", writable=False)

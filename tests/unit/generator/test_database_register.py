@@ -13,6 +13,7 @@ from generator.array.definition import array_from
 from generator.array.profiles import PROFILES
 from generator.database import tables
 from generator.database.canonical import canonical, spec_hash
+from generator.database.cells import cells_of, occupancy
 from generator.database.face_type import face_type
 from generator.database.open import open_database
 from generator.database.read import faces_at, list_objects, read_layout, read_object
@@ -204,8 +205,9 @@ def test_a_changed_spec_is_refused_and_replaced_on_request(engine):
     assert "--replace" in caught.value.fix
     assert held(engine) == [*range(384), *range(1000, 1384)]
     with reading(engine) as connection:
-        array_id = find_array(connection, ARRAY)
-        assert len(occupied(connection, array_id, without=number)[0]) == 384
+        own = cells_of(connection, number, find_array(connection, ARRAY))
+        taken = occupancy(connection, ARRAY)
+        assert (taken.used, taken.without_cells(*own).used) == (768, 384)
     assert register_one(engine, cube_on(200), replace=True) == number
     assert held(engine) == [*range(200, 584), *range(1000, 1384)]
 

@@ -32,11 +32,18 @@ def profiles(found) -> set[str]:
 
 def test_auto_takes_the_smallest_array_that_holds_the_objects(tmp_path):
     text = "name: A\nprofile: auto\nshape: {cube: 60 mm}\ncopies: "
-    assert profiles(choice(tmp_path, text + "2")) == {"one-touch"}
-    assert profiles(choice(tmp_path, text + "9")) == {"large"}
+    smallest = choice(tmp_path, text + "2")
+    assert (profiles(smallest), smallest.notes) == ({"one-touch"}, ())
+    large = choice(tmp_path, text + "9")
+    assert profiles(large) == {"large"}
+    (note,) = large.notes
+    assert note.startswith("profile large is taken (window 4x2 in place of 3x2)")
+    assert note.endswith("3456 cells are needed, and one-touch 63x65 has room for 3276")
     larger = choice(tmp_path, text + "200")
     assert profiles(larger) == {"large-511x513"}
     assert planned(larger.specs[0]).array.rows == 511
+    (note,) = larger.notes
+    assert "76800 cells are needed, and large 255x257 has room for 52428" in note
     assert larger.specs[199].spec.name == "A-200"
 
 
@@ -44,7 +51,9 @@ def test_auto_goes_on_where_the_database_is_full(tmp_path):
     text = "name: {}\nprofile: auto\nshape: {{cube: 140 mm}}\nprint: {{parts: whole}}\n"
     first = dry(tmp_path, text.format("A"), dry_run=False, formats=())
     assert (first.rows, first.columns) == (63, 65)
-    assert profiles(choice(tmp_path, text.format("B"))) == {"large"}
+    second = choice(tmp_path, text.format("B"))
+    assert profiles(second) == {"large"}
+    assert "one-touch 63x65 has room for" in second.notes[0]  # beside A
     again = dry(tmp_path, text.format("A"))
     assert again.objects[0].reused
     assert (again.rows, again.columns) == (63, 65)
@@ -98,3 +107,17 @@ def test_panels_of_a_round_object_are_refused_where_they_are_asked_for(tmp_path)
     text = "name: A\nshape: {cylinder: {diameter: 40 mm, height: 30 mm}}\nprint: {parts: panels}\n"
     with pytest.raises(SpecError, match=r":3:16: error: a round face cannot be printed as a flat"):
         dry(tmp_path, text)
+
+
+def test_what_is_made_with_a_larger_array_is_told(tmp_path):
+    text = "name: A\nprofile: auto\nshape: {cube: 30 mm}\ncopies: 60\n"
+    result = dry(tmp_path, text)
+    assert (result.rows, result.columns) == (255, 257)
+    assert "profile large is taken" in result.objects[0].warnings[0]
+    assert not any("is taken" in w for made in result.objects[1:] for w in made.warnings)
+
+
+def test_a_set_too_large_for_the_profile_it_names_is_told_of_auto(tmp_path):
+    with pytest.raises(SpecError, match="array 63x65 is full") as caught:
+        dry(tmp_path, "name: A\nshape: {cube: 60 mm}\ncopies: 12\n")
+    assert "or profile auto" in caught.value.problems[0].fix

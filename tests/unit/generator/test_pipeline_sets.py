@@ -11,10 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from generator.database import cells as cells_module
+from generator.database.occupancy import taken_tiles
 from generator.database.open import open_database
 from generator.database.read import read_layout
 from generator.database.transaction import reading
 from generator.errors import DatabaseError
+from generator.layout import occupancy
+from generator.layout.occupancy import tiles_of
 from generator.pipeline import encode
 from generator.pipeline.make import Order, made_at, made_under_lock
 from generator.pipeline.parallel import Task, Workers
@@ -133,6 +137,40 @@ def test_every_part_has_a_place_of_its_own_on_its_printers_bed(once):
             assert apart.sum() == len(boxes) - 1
     assert {path.name for path in result.set_files} == names
     assert sum(int(row["symbols"]) for row in listed) == sum(m.symbols for m in result.objects)
+
+
+class PlacesChosenError(Exception):
+    """Ends a run before anything is made."""
+
+
+def counted(folder: Path, copies: int, monkeypatch) -> tuple[int, int]:
+    """Return how many cells are worked on to place copies, and how often the database is read."""
+
+    def progress(what: str, _: float) -> None:
+        if what.startswith("making"):
+            raise PlacesChosenError
+
+    cells, reads = [], []
+    count = lambda rows, columns: cells.append(len(rows)) or tiles_of(rows, columns)  # noqa: E731
+    run(folder, "name: C\nshape: {cube: 22 mm}\n", formats=())
+    with monkeypatch.context() as patched:
+        patched.setattr(occupancy, "tiles_of", count)
+        read = lambda *given: reads.append(1) or taken_tiles(*given)  # noqa: E731
+        patched.setattr(cells_module, "taken_tiles", read)
+        text = f"name: D\nshape: {{cube: 22 mm}}\ncopies: {copies}\n"
+        with pytest.raises(PlacesChosenError):
+            run(folder, text, jobs=1, progress=progress)
+    return sum(cells), len(reads)
+
+
+def test_placing_many_copies_costs_in_proportion_to_their_number(tmp_path, monkeypatch):
+    folders = [tmp_path / name for name in "ab"]
+    for folder in folders:
+        folder.mkdir()
+    few, some = (counted(f, n, monkeypatch) for f, n in zip(folders, (5, 20), strict=True))
+    assert few[0] > 0
+    assert some[0] == 4 * few[0]  # 16 times, were each placed beside a list of all before it
+    assert some[1] == few[1]  # the database is read for the set, not for each copy
 
 
 def test_the_overview_is_a_pdf_without_a_date(once):

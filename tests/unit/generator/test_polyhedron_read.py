@@ -27,9 +27,9 @@ f 3 1 4
 """
 
 
-def refused(path):
+def refused(path, scale=1.0):
     with pytest.raises(ShapeError) as caught:
-        read_shape(path)
+        read_shape(path, scale)
     return caught.value
 
 
@@ -86,6 +86,27 @@ def test_unit_of_a_step_file_is_honoured(tmp_path):
     assert volume(read_shape(centimetres)) == pytest.approx(
         1000 * (60**3 - 60 * HEXAGON), rel=1e-12
     )
+
+
+@pytest.mark.parametrize("name", ["l_bracket.stl", "prism.obj", "cube_with_hole.step"])
+def test_scale(name):
+    plain, inches = (read_shape(SHAPES_FOLDER / name, scale) for scale in (1.0, 25.4))
+    assert volume(inches) == pytest.approx(25.4**3 * volume(plain), rel=1e-12)
+    assert [f.loops for f in inches.faces] == [f.loops for f in plain.faces]
+
+
+def test_round_faces_are_divided_at_their_scale():
+    sizes = [read_shape(SHAPES_FOLDER / "block_with_bore.step", scale) for scale in (0.1, 1, 10)]
+    counts = [len(solid.surfaces[0].facets) for solid in sizes]
+    assert counts == sorted(set(counts))
+    assert max(solid.surfaces[0].chord_error_mm for solid in sizes) <= 0.02
+
+
+def test_scale_that_makes_a_model_too_large():
+    error = refused(SHAPES_FOLDER / "l_bracket.stl", 1000.0)
+    assert error.place.endswith("l_bracket.stl")
+    assert error.cause.endswith("m long; 10 m are allowed")
+    assert "scale" in error.fix
 
 
 def test_obj_with_non_convex_polygons_negative_numbers_and_textures(tmp_path):

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
-from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Cut
 from OCP.BRepFilletAPI import BRepFilletAPI_MakeFillet
 from OCP.BRepPrimAPI import (
     BRepPrimAPI_MakeBox,
     BRepPrimAPI_MakeCone,
     BRepPrimAPI_MakeCylinder,
+    BRepPrimAPI_MakeSphere,
     BRepPrimAPI_MakeTorus,
 )
 from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
@@ -20,8 +22,12 @@ from OCP.TopoDS import TopoDS
 
 from generator import encode
 from generator.cad.read import polyhedron_from
+from generator.errors import ShapeError
 from generator.polyhedron import volume
 from generator.polyhedron.development import development
+from generator.polyhedron.read import curved
+from generator.polyhedron.read.facets import polyhedron_of_facets
+from generator.polyhedron.read.kernel import described
 from generator.spec import SpecError
 
 
@@ -102,8 +108,50 @@ def test_triangles_take_the_points_of_a_cones_straight_edges():
     assert solid.blank  # and it is closed, or it would have been refused
 
 
+def shell(wall: float):
+    outer = BRepPrimAPI_MakeSphere(60.0).Shape()
+    inner = BRepPrimAPI_MakeSphere(axes(0, 0, 0, (1, 2, 9)), 60.0 - wall).Shape()  # divided apart
+    half = BRepPrimAPI_MakeBox(gp_Pnt(0, -99, -99), 99, 198, 198).Solid()
+    return BRepAlgoAPI_Common(BRepAlgoAPI_Cut(outer, inner).Shape(), half).Shape()
+
+
+def test_a_thin_round_shell_is_divided_finely_enough_not_to_cut_itself():
+    solid = polyhedron_from(shell(1.0))
+    assert volume(solid) == pytest.approx(math.pi * 2 / 3 * (60**3 - 59**3), rel=0.1)
+
+
+def test_a_wall_thinner_than_the_division_says_so():
+    with pytest.raises(ShapeError, match=r"into \d+ facets to \d.* mm, make no") as error:
+        polyhedron_from(shell(0.1))
+    assert "walls thicker" in error.value.fix
+
+
+def test_a_solid_of_many_facets_is_divided_more_coarsely_and_says_so(monkeypatch):
+    monkeypatch.setattr(curved, "MOST_FACETS", 600)
+    solid = polyhedron_from(BRepPrimAPI_MakeTorus(20, 6).Shape())
+    assert len(solid.faces) <= 600
+    assert solid.notes[0].startswith("round faces were divided to ")
+    assert volume(solid) == pytest.approx(2 * math.pi**2 * 20 * 6**2, rel=0.1)
+    monkeypatch.setattr(curved, "MOST_FACETS", 60)
+    with pytest.raises(ShapeError, match=r"need \d+ facets, to 1 mm; 60 are allowed"):
+        polyhedron_from(BRepPrimAPI_MakeTorus(20, 6).Shape())
+
+
+def test_points_that_are_one_are_joined():
+    # A cylinder whose top meets its side in points that are off by less than the tolerance.
+    found = described(BRepPrimAPI_MakeCylinder(30, 80).Shape())
+    points = np.array(found["points"])
+    top = found["faces"][found["names"].index("F2")][0]
+    moved = [len(points) + k for k in range(len(top))]
+    found["points"] = [*found["points"], *(points[top] + 1e-5).tolist()]
+    found["faces"][found["names"].index("F2")] = [moved]
+    solid = polyhedron_of_facets(found, "file")
+    assert len(solid.vertices) == len(points)
+    assert kinds(solid) == [("cylinder", True, False)]
+
+
 def test_a_solid_that_is_round_all_over_is_refused(tmp_path):
-    torus = BRepPrimAPI_MakeTorus(40, 10).Shape()
+    torus = BRepPrimAPI_MakeTorus(20, 5).Shape()
     with pytest.raises(SpecError, match="no face of the object carries symbols"):
         encode(torus, name="T", database=str(tmp_path / "lab.db"), folder=tmp_path)
     assert not list(tmp_path.iterdir())

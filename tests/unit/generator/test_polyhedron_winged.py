@@ -120,7 +120,7 @@ def test_bent_face_gives_the_measure():
     error = refused(vertices, FACES)
     assert error.place == "face F6"
     assert error.cause == (
-        "not planar: its vertices lie up to 0.25 mm off their plane, 0.001 mm is allowed; "
+        "not planar: its vertices lie up to 0.25 mm off their plane, 0.01 mm is allowed; "
         "the farthest is vertex 4 (0, 0, 60)"
     )
 

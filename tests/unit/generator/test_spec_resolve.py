@@ -131,6 +131,16 @@ def test_files_are_relative_to_the_spec_and_count_by_content():
     assert read_specs(["parts/b.yaml"])[0].spec.meaning != a.meaning
 
 
+def test_scale_of_a_file_counts_unless_it_is_one():
+    Path("a.stl").write_bytes(b"one")
+    plain, one, inches = (
+        spec(f"name: A\nshape: {{file: a.stl{scale}}}\n").meaning
+        for scale in ("", ", scale: 1", ", scale: 25.4")
+    )
+    assert plain == one
+    assert inches["shape"] == {**plain["shape"], "scale": 25.4}
+
+
 @pytest.mark.parametrize(
     "same",
     [

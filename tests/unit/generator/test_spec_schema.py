@@ -42,7 +42,10 @@ def test_schema_says_what_a_person_may_write():
     assert cube["required"] == ["name", "shape"]
     assert cube["properties"]["copies"]["minimum"] == 1
     assert cube["properties"]["profile"]["enum"][0] == "one-touch"
-    assert definitions["Shape"]["maxProperties"] == 1
+    shape = definitions["Shape"]
+    assert shape["if"] == {"required": ["scale"]}
+    assert shape["then"] == {"required": ["file"], "maxProperties": 2}
+    assert shape["else"] == {"minProperties": 1, "maxProperties": 1}
     length, text = definitions["Symbols"]["properties"]["pitch"]["anyOf"]
     assert length == {"type": "number", "exclusiveMinimum": 0}
     for written in ("40", "40 mm", "1.6 in", "4cm", " .5 um "):
@@ -56,7 +59,7 @@ def test_schema_says_what_a_person_may_write():
 
 def test_examples_cover_all_shapes():
     assert tuple(EXAMPLES) == KINDS
-    assert list(spec_schema()["$defs"]["Shape"]["properties"]) == list(KINDS)
+    assert list(spec_schema()["$defs"]["Shape"]["properties"]) == [*KINDS, "scale"]
 
 
 @pytest.mark.parametrize("shape", [shape for shape in KINDS if shape != "file"])

@@ -1,0 +1,100 @@
+"""Round faces under the sensor: the image with its bend, and the bend from forces alone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from generator.polyhedron.developable import Developable
+from generator.polyhedron.tangent import Bend
+from probe.contact.contract import Touch
+from probe.contact.press import press
+from probe.sensor import Sensor
+from probe.surface.face import endless
+from recognizer.lab import FINER, LEAST_MM, MOST_MM, radii_of
+from recognizer.symbols.bent import bends_of
+from recognizer.symbols.gain import Image, bent, felt_under, image_of
+from recognizer.symbols.pressing import pressing_of
+
+SENSOR = Sensor()
+INK = 0.35  # about the mean response of the symbols of the default alphabet
+BARS = ((((-0.9, 0.9), (0.9, 0.9)), ((-0.9, -0.9), (0.9, -0.9))),)  # fmt: skip
+
+
+def image(forces: np.ndarray) -> Image:
+    pressing = pressing_of(SENSOR, 1.0)
+    return image_of(SENSOR, forces, np.ones(forces.shape), pressing, newtons=True)
+
+
+class Rolled:
+    """Symbols all over a cylinder that touches the plane along a line through the origin."""
+
+    top_mm = 1.0
+
+    def __init__(self, radius_mm: float, towards_rad: float) -> None:
+        self.bend = Bend(radius_mm, towards_rad)
+        self.face = endless([[0]], BARS)
+
+    def heights_mm(self, points_mm: np.ndarray) -> np.ndarray:
+        return self.face.heights_mm(points_mm) - self.bend.falls_mm(points_mm)
+
+
+def test_a_very_wide_bend_is_no_bend():
+    flat = image(np.random.default_rng(1).uniform(0, 2, (16, 16)))
+    gain = np.array([[0.1, 0.4, 0.1, -0.05], [0.0, 0.6, 0.0, 0.0]])
+    round_one = felt_under(bent(flat, SENSOR, Bend(1e9, 0.4)), gain)
+    for name in ("psi", "press", "bare", "contact", "measure"):
+        plain = getattr(felt_under(flat, gain), name)
+        assert getattr(round_one, name) == pytest.approx(plain, rel=1e-4, abs=1e-5)
+
+
+def test_shares_are_gains_of_one_image():
+    flat = image(np.random.default_rng(2).uniform(0, 2, (16, 16)))
+    gain = np.array([0.1, 0.5, 0.1, 0.0])
+    shares = (0.6, 1.0)
+    several = felt_under(bent(flat, SENSOR, Bend(40, 0.4), shares), np.tile(gain, (2, 1)))
+    for k, share in enumerate(shares):
+        alone = felt_under(bent(flat, SENSOR, Bend(40, 0.4), (share,)), gain[None])
+        assert (several.psi[k] == alone.psi[0]).all()
+        assert several.measure[k] == pytest.approx(alone.measure[0], rel=1e-12)
+
+
+def test_beside_the_strip_nothing_is_expected():
+    flat = image(np.ones((16, 16)))
+    felt = felt_under(bent(flat, SENSOR, Bend(20.0, math.pi / 2)), np.array([[0.0, 0.4, 0, 0]]))
+    across = np.abs(SENSOR.centres_mm().reshape(-1, 2)[:, 0])
+    assert (felt.contact[0][across > 9] == 0).all()
+    assert (felt.contact[0][across < 4] == 1).all()
+
+
+@pytest.mark.parametrize("radius", [20.0, 40.0, 80.0])
+@pytest.mark.parametrize("degrees", [0.0, 37.0, 90.0, 141.0])
+def test_forces_tell_along_which_line_a_cylinder_lies(radius, degrees):
+    surface = Rolled(radius, math.radians(degrees))
+    forces = press(surface, SENSOR, Touch(0, 0, 0, 60.0)).forces_n
+    found = bends_of(image(forces), SENSOR, (20.0, 40.0, 80.0), INK, 3)
+    assert 1 <= len(found) <= 3
+    turns = [math.remainder(b.bend.towards_rad - math.radians(degrees), math.pi) for b in found]
+    assert min(map(abs, turns)) < math.radians(12)
+    assert found[0].left <= found[-1].left
+    assert np.isfinite(found[0].gain).all()
+
+
+def test_no_forces_no_bend():
+    assert bends_of(image(np.zeros((16, 16))), SENSOR, (40.0,), INK, 3) == []
+
+
+def test_radii_are_near_to_those_of_the_faces():
+    tube = Developable("cylinder", (1, 2), 47.0, 0.0, True, False, 0.02)
+    (radius,) = radii_of([tube])
+    assert 1 / FINER < radius / 47.0 < FINER
+    assert radii_of([replace(tube, concave=True)]) == ()
+    wide, narrow = (radii_of([replace(tube, radius_mm=r)]) for r in (1e6, 0.5))
+    assert wide[0] == pytest.approx(MOST_MM, rel=FINER - 1)
+    assert narrow == (LEAST_MM,)
+    cone = Developable("cone", (1, 2), 47.0, 0.4, True, False, 0.02)
+    assert len(radii_of([cone])) > 3
+    assert radii_of([cone])[0] == LEAST_MM
