@@ -25,6 +25,7 @@ CAP = 8.0  #: nats that one cell can cost at most
 CORNER = 8.0  #: tactels on a cell below which it can cost less than that
 WORN = 4.0  #: nats that a symbol costs that is registered but not felt at all
 ANCHORS = 3  #: cells tried as the one that is surely registered, where no window is seen whole
+AGAIN = 2  #: the same, when the best place is known
 WINDOWS = 4  #: whole windows that are looked up, the surest ones
 SURE = 6.0  #: nats by which each of their cells shows its symbol rather than any other
 MANY = 1024  #: candidates, from which on those count that two windows agree on
@@ -49,6 +50,32 @@ def places(encoding: Encoding, fits: tuple[Fit, ...], keep: int) -> list[Place]:
     for number, fit in enumerate(fits):
         found += _places_of(encoding, fit, number, keep)
     return sorted(found, key=lambda place: -place.score)
+
+
+def rivals(encoding: Encoding, fit: Fit, place: Place, number: int, keep: int) -> list[Place]:
+    """Return the likeliest other places of the whole database under a fit, best first.
+
+    `places` looks where a few windows point to; a place that differs from the best one in a
+    cell of such a window is found here, under scores that the best place has made sharp.
+
+    Parameters
+    ----------
+    place
+        The best one.
+    number
+        Of the fit, which the places get.
+    keep
+        How many at most.
+    """
+    scores = _worn(fit)
+    held = shown_at(encoding, place, fit.cells)
+    sure = np.where(held < encoding.array.order, scores.max(axis=1) - scores[:, -1], 0.0)
+    found = _candidates(encoding, fit, scores, sure, AGAIN)
+    return [
+        other
+        for other in _scored(encoding, fit, number, scores, found, keep + 1)
+        if (other.row, other.column, other.face) != (place.row, place.column, place.face)
+    ]
 
 
 def place_scores(encoding: Encoding, fit: Fit, place: Place) -> float:
@@ -93,10 +120,16 @@ def _worn(fit: Fit) -> Array:
 def _places_of(encoding: Encoding, fit: Fit, number: int, keep: int) -> list[Place]:
     scores = _worn(fit)
     found = _by_windows(encoding, fit)
-    if found is None and len(encoding.keys) > LARGE:
-        return []
     if found is None:
-        found = _by_anchors(encoding, fit, scores)
+        told = scores[:, :-1].max(axis=1) - scores[:, -1]  # a symbol rather than none
+        found = _candidates(encoding, fit, scores, told, ANCHORS)
+    return _scored(encoding, fit, number, scores, found, keep)
+
+
+def _scored(
+    encoding: Encoding, fit: Fit, number: int, scores: Array, found: _Candidates, keep: int
+) -> list[Place]:
+    """Return the likeliest candidates, best first."""
     rows, columns, owners = found
     if len(rows) == 0:
         return []
@@ -142,14 +175,23 @@ def _by_windows(encoding: Encoding, fit: Fit) -> _Candidates | None:
     return _zeros(encoding, np.concatenate(found), np.concatenate(shifts))
 
 
-def _by_anchors(encoding: Encoding, fit: Fit, scores: Array) -> _Candidates:
-    """Return where (0, 0) can lie if one of the likeliest cells is a registered one."""
+def _candidates(
+    encoding: Encoding, fit: Fit, scores: Array, told: Array, anchors: int
+) -> _Candidates:
+    """Return where (0, 0) can lie if one of a few cells is a registered one.
+
+    None in a lab that is too large for that.
+
+    Parameters
+    ----------
+    told
+        (m,) nats by which cells hold a symbol; the first `anchors` of them are tried.
+    """
     order = encoding.array.order
-    told = scores[:, :order].max(axis=1) - scores[:, order]  # a symbol rather than none
-    anchors = np.argsort(-told, kind="stable")[:ANCHORS]
     found: list[Ints] = [np.zeros(0, np.int64)]
     shifts: list[Ints] = [np.zeros((0, 2), np.int64)]
-    for anchor in anchors[told[anchors] > 0]:
+    tried = np.argsort(-told, kind="stable")[: anchors if len(encoding.keys) <= LARGE else 0]
+    for anchor in tried[told[tried] > 0]:
         likely = scores[anchor, :order] > -CAP
         at = np.flatnonzero(likely[encoding.labels[:-1]])
         found.append(at)

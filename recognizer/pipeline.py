@@ -14,7 +14,7 @@ centre lies on the face.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from probe.sensor import Sensor
 from recognizer.belief import Support, Thresholds, support
 from recognizer.lab import Encoding, Lab
-from recognizer.locate import Place, neighbours, place_scores, places, shown_at, under_centre
+from recognizer.locate import Place, neighbours, place_scores, places, rivals, shown_at, under_centre
 from recognizer.pose import face_covariance, face_pose, inside_mm
 from recognizer.recognition import (
     AMBIGUOUS,
@@ -114,9 +114,7 @@ def explained(reader: Reader, signal: Signal, seq: int = 0) -> tuple[Recognition
     second, _ = _answer(reader, again, seq)
     if answer and second and not _same(found[0], again[0]):
         return refused(seq, AMBIGUOUS, margin=0.0, runner_up=answer.runner_up), again[0]
-    if answer or second:
-        return second, again[0] if again else None
-    return answer, found[0] if found else None
+    return second, again[0] if again else None
 
 
 def readings(reader: Reader, signal: Signal, settings: Settings) -> list[Reading]:
@@ -135,13 +133,40 @@ def readings(reader: Reader, signal: Signal, settings: Settings) -> list[Reading
 def _verified(
     reader: Reader, image: Image, encoding: Encoding, template: Template, found: tuple[Fit, ...]
 ) -> list[Reading]:
-    """Return the likeliest places with pose and gain fitted to what the database holds there."""
+    """Return the likeliest places, best first, fitted to what the database holds there."""
     limits = reader.thresholds
     candidates = places(encoding, found, limits.places)[: limits.places]
     if not candidates:
         return []
     near = [place.score > candidates[0].score - limits.near for place in candidates]
     candidates = candidates[: max(2, sum(near))]
+    verified = _fitted(reader, image, encoding, template, candidates, found)
+    best = verified[0]
+    others = [
+        place
+        for place in rivals(encoding, best.fit, best.place, len(found), limits.places)
+        if place.score > best.score - limits.near and not _among(verified, place)
+    ]
+    if others:
+        everything = [replace(best.place, fit=len(found)), *others]
+        verified += _fitted(reader, image, encoding, template, everything, (*found, best.fit))
+    return sorted(verified, key=lambda reading: -reading.score)
+
+
+def _among(verified: list[Reading], place: Place) -> bool:
+    at = (place.face, place.row, place.column)
+    return any((r.place.face, r.place.row, r.place.column) == at for r in verified)
+
+
+def _fitted(
+    reader: Reader,
+    image: Image,
+    encoding: Encoding,
+    template: Template,
+    candidates: list[Place],
+    found: tuple[Fit, ...],
+) -> list[Reading]:
+    """Return places with pose and gain fitted to their symbols, best first."""
     starts = [found[place.fit] for place in candidates]
     lattices = started(
         np.array([fit.pose for fit in starts]),
@@ -158,7 +183,7 @@ def _verified(
         image,
         template,
         lattices,
-        steps=limits.verify_steps,
+        steps=reader.thresholds.verify_steps,
         shown=shown,
     )
     again = scored(image, template, fitted, reader.settings)
@@ -170,7 +195,7 @@ def _verified(
         scores = [place_scores(encoding, fit, place) for fit in fair]
         best = int(np.argmax(scores))
         verified.append(Reading(image, template, encoding, place, fair[best], scores[best]))
-    return verified
+    return sorted(verified, key=lambda reading: -reading.score)
 
 
 def _answer(reader: Reader, found: list[Reading], seq: int) -> tuple[Recognition, int]:

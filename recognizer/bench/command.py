@@ -13,6 +13,8 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from recognizer.threads import one_thread
+
 HELP = """See the part, the touch and the answer in a web page.
 
 Try it without a probe: [bold]open-bench --database lab.db[/], open the page, click on the part.
@@ -30,6 +32,7 @@ app = typer.Typer(
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run `open-bench` and leave with its exit code."""
+    one_thread()
     from generator.errors import GeneratorError
     from probe.errors import ProbeError
     from recognizer.errors import RecognizerError
