@@ -22,7 +22,15 @@ from numpy.typing import NDArray
 from probe.sensor import Sensor
 from recognizer.belief import Support, Thresholds, support
 from recognizer.lab import Encoding, Lab
-from recognizer.locate import Place, neighbours, place_scores, places, rivals, shown_at, under_centre
+from recognizer.locate import (
+    Place,
+    neighbours,
+    place_scores,
+    places,
+    rivals,
+    shown_at,
+    under_centre,
+)
 from recognizer.pose import face_covariance, face_pose, inside_mm
 from recognizer.recognition import (
     AMBIGUOUS,
