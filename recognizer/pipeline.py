@@ -53,7 +53,7 @@ from recognizer.symbols.template import Template, template_of
 Array = NDArray[np.float64]
 
 #: For touches that the first try does not answer.
-THOROUGH = Settings(candidates=24, steps=4, finalists=6, final_steps=6, crossed=3)
+THOROUGH = Settings(candidates=12, steps=4, finalists=6, final_steps=6, crossed=3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
