@@ -152,10 +152,11 @@ def test_the_reading_behind_an_answer(url, reader):
 @pytest.mark.parametrize(
     "change",
     [{"surprise": 2.0}, {"explained": 0.5}, {"clear": 2}, {"plain": 1},
-     {"explained": 0.65, "cells": 8}, {"surprise": 6.0, "explained": 0.75}],
+     {"explained": 0.65, "cells": 8}, {"surprise": 6.0, "explained": 0.75},
+     {"wider": 1.1, "explained": 0.75}, {"wider": -1.1, "explained": 0.75}],
 )  # fmt: skip
 def test_what_is_not_believed(change):
-    good = Support(surprise=12.0, explained=0.8, cells=12, clear=0, plain=0)
+    good = Support(surprise=12.0, explained=0.8, cells=12, clear=0, plain=0, wider=0.3)
     assert good.holds(Thresholds())
     assert not replace(good, **change).holds(Thresholds())
 
