@@ -38,7 +38,7 @@ class Thresholds:
     margin: float = 10.0  #: nats over the best other place
     surprise: float = 3.0  #: nats over symbols of no registered place
     sure: float = 7.0  #: nats below which a share of `well` must be explained
-    wide: float = 0.9  #: tenths of a mm beyond which the same holds, as strokes are hardly printed
+    wide: float = 0.9  #: tenths of a mm by which strokes are hardly printed wider; the same holds
     well: float = 0.8
     explained: float = 0.72  #: share of the image's variance
     explained_by_many: float = 0.58  #: the same where `many` cells agree
@@ -65,7 +65,7 @@ class Support:
     def holds(self, limits: Thresholds) -> bool:
         """Return whether an encoded surface is believed."""
         few = self.cells < limits.many
-        doubtful = self.surprise < limits.sure or abs(self.wider) > limits.wide
+        doubtful = self.surprise < limits.sure or self.wider > limits.wide
         return (
             self.surprise >= limits.surprise
             and (self.explained >= limits.well or not doubtful)

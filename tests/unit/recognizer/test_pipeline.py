@@ -153,7 +153,7 @@ def test_the_reading_behind_an_answer(url, reader):
     "change",
     [{"surprise": 2.0}, {"explained": 0.5}, {"clear": 2}, {"plain": 1},
      {"explained": 0.65, "cells": 8}, {"surprise": 6.0, "explained": 0.75},
-     {"wider": 1.1, "explained": 0.75}, {"wider": -1.1, "explained": 0.75}],
+     {"wider": 1.1, "explained": 0.75}],
 )  # fmt: skip
 def test_what_is_not_believed(change):
     good = Support(surprise=12.0, explained=0.8, cells=12, clear=0, plain=0, wider=0.3)
