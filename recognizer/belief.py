@@ -37,7 +37,8 @@ class Thresholds:
 
     margin: float = 10.0  #: nats over the best other place
     surprise: float = 3.0  #: nats over symbols of no registered place
-    sure: float = 7.0  #: nats from which on less than `well` may be explained
+    sure: float = 7.0  #: nats below which a share of `well` must be explained
+    wide: float = 0.9  #: tenths of a mm by which strokes are hardly printed wider; the same holds
     well: float = 0.8
     explained: float = 0.72  #: share of the image's variance
     explained_by_many: float = 0.58  #: the same where `many` cells agree
@@ -59,13 +60,15 @@ class Support:
     cells: int  #: seen, with a registered symbol that is not worn
     clear: int  #: cells that speak clearly for another symbol
     plain: int  #: and plainly
+    wider: float  #: tenths of a mm by which strokes would be wider than asked
 
     def holds(self, limits: Thresholds) -> bool:
         """Return whether an encoded surface is believed."""
         few = self.cells < limits.many
+        doubtful = self.surprise < limits.sure or self.wider > limits.wide
         return (
             self.surprise >= limits.surprise
-            and (self.surprise >= limits.sure or self.explained >= limits.well)
+            and (self.explained >= limits.well or not doubtful)
             and self.explained >= (limits.explained if few else limits.explained_by_many)
             and self.clear <= limits.contradicted
             and self.plain == 0
@@ -86,6 +89,7 @@ def support(
         cells=int(cells.told.sum()),
         clear=int((cells.seen & (cells.against > CLEARLY)).sum()),
         plain=int((cells.seen & (cells.against > PLAINLY)).sum()),
+        wider=float(fit.nuisance[0]),
     )
 
 

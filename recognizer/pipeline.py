@@ -22,7 +22,15 @@ from numpy.typing import NDArray
 from probe.sensor import Sensor
 from recognizer.belief import Support, Thresholds, support
 from recognizer.lab import Encoding, Lab
-from recognizer.locate import Place, neighbours, place_scores, places, rivals, shown_at, under_centre
+from recognizer.locate import (
+    Place,
+    neighbours,
+    place_scores,
+    places,
+    rivals,
+    shown_at,
+    under_centre,
+)
 from recognizer.pose import face_covariance, face_pose, inside_mm, pose_on_object
 from recognizer.recognition import (
     AMBIGUOUS,
@@ -46,7 +54,7 @@ from recognizer.symbols.template import Template, template_of
 Array = NDArray[np.float64]
 
 #: For touches that the first try does not answer.
-THOROUGH = Settings(candidates=24, steps=4, finalists=6, final_steps=6, crossed=3)
+THOROUGH = Settings(candidates=12, steps=4, finalists=6, final_steps=6, crossed=3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

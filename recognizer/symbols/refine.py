@@ -212,9 +212,10 @@ def chosen(cells: NDArray[np.int64], tables: Floats, scores: Array, felt: Felt) 
 def tables_at(template: Template, offsets: Array, pose: Array, felt: Felt) -> Floats:
     """Return templates (b, n, q, 6) at offsets, for what is fitted of form and gain."""
     tables = template.at(offsets)
-    by = pose[:, 3:6].astype(np.float32)[:, None, :, None]
-    tables[..., 0] += (tables[..., 3:] @ by)[..., 0]
-    tables *= felt.contact[..., None, None].astype(np.float32)
+    for slope, by in enumerate(pose[:, 3:6, None, None].astype(np.float32).swapaxes(0, 1), 3):
+        tables[..., 0] += tables[..., slope] * by
+    if (felt.contact < 1).any():
+        tables *= felt.contact[..., None, None].astype(np.float32)
     if felt.bare.any():
         bare = felt.bare[..., None].astype(np.float32)
         response = _response(tables[..., 0]).astype(np.float32)
@@ -241,12 +242,14 @@ def _labelled(tables: Floats, labels: NDArray[np.int64], felt: Felt) -> Array:
 
     Beyond the edge of a face nothing is felt: a tactel without a symbol shows what is nearer.
     """
-    values = np.take_along_axis(tables, labels.clip(min=0)[..., None, None], axis=2)[:, :, 0]
-    found = np.where((labels >= 0)[..., None], values, 0).astype(np.float64)
+    every = np.arange(labels.size) * tables.shape[2] + labels.clip(min=0).ravel()
+    found = tables.reshape(-1, tables.shape[3]).take(every, axis=0).astype(np.float64)
+    found = found.reshape(*labels.shape, -1)
+    found[labels < 0] = 0.0
     floor = psi(felt.bare)
     bare = (labels < 0) & (felt.psi > floor / 2)
     found[bare, 0] = floor[bare]
-    return found
+    return np.asarray(found)
 
 
 def _response(table: Array | Floats) -> Array:

@@ -51,24 +51,26 @@ class Template:
     pitch_mm: float
     order: int  #: number of symbols
     half_mm: float  #: the grid covers offsets -half ... half in x and y
-    values: Floats  #: (n, n, order, 6) psi, slopes by x, y (mm), width, cross-talk, exponent
+    rimmed: Floats  #: (n + 2, n + 2, order, 6) psi, slopes by x, y (mm), width, ...; 0 on the rim
     ink: float  #: mean response over a cell
 
     @property
     def size(self) -> int:
         """Number of grid points along one side."""
-        return int(self.values.shape[0])
+        return int(self.rimmed.shape[0]) - 2
+
+    @property
+    def values(self) -> Floats:
+        """(n, n, order, 6) psi and its slopes by x, y (mm), width, cross-talk and exponent."""
+        return self.rimmed[1:-1, 1:-1]
 
     def at(self, offsets_mm: NDArray[np.float64]) -> Floats:
         """Return psi and slopes (..., order, 6) at offsets (..., 2); 0 outside the grid."""
-        index = np.rint((offsets_mm + self.half_mm) / STEP_MM).astype(np.intp)
-        inside = np.all((index >= 0) & (index < self.size), axis=-1)
-        index[np.logical_not(inside)] = 0
-        return np.where(
-            np.asarray(inside)[..., None, None],
-            self.values[index[..., 1], index[..., 0]],
-            np.float32(0),
-        )
+        index = np.rint((offsets_mm + self.half_mm) / STEP_MM)
+        np.clip(index, -1, self.size, out=index)
+        place = ((index[..., 1] + 1) * (self.size + 2) + index[..., 0] + 1).astype(np.intp)
+        found = self.rimmed.reshape(-1, self.order * 6).take(place, axis=0)
+        return found.reshape(*place.shape, self.order, 6)
 
 
 @lru_cache(maxsize=16)
@@ -83,7 +85,8 @@ def template_of(alphabet: Alphabet, style: SymbolStyle, sensor: Sensor) -> Templ
         felt(alphabet, replace(style, stroke_mm=style.stroke_mm + by), sensor, axis)
         for by in (0.0, WIDER_MM)
     )
-    values = np.zeros((len(axis), len(axis), alphabet.order, 6), np.float32)
+    rimmed = np.zeros((len(axis) + 2, len(axis) + 2, alphabet.order, 6), np.float32)
+    values = rimmed[1:-1, 1:-1]
     for label in range(alphabet.order):
         middle = _heard(usual[label], CROSS_TALK, sensor)
         values[..., label, 0] = psi(middle)
@@ -95,8 +98,8 @@ def template_of(alphabet: Alphabet, style: SymbolStyle, sensor: Sensor) -> Templ
         )
         values[..., label, 5] = (psi(middle**HIGH) - psi(middle**LOW)) / (HIGH - LOW)
     ink = float(usual.sum() * STEP_MM**2 / style.pitch_mm**2) / alphabet.order
-    values.setflags(write=False)
-    return Template(style.pitch_mm, alphabet.order, steps * STEP_MM, values, ink)
+    rimmed.setflags(write=False)
+    return Template(style.pitch_mm, alphabet.order, steps * STEP_MM, rimmed, ink)
 
 
 def _tab_felt(alphabet: Alphabet, style: SymbolStyle, sensor: Sensor, axis: Array) -> Array:

@@ -17,7 +17,7 @@ from probe.sensor import Sensor
 from probe.simulate.registered import registered_surface
 from recognizer.belief import Support, Thresholds
 from recognizer.lab import open_lab
-from recognizer.locate import CAP, Place, place_scores, places, shown_at
+from recognizer.locate import CAP, Place, place_scores, places, rivals, shown_at
 from recognizer.pipeline import explained, reader_for, readings, recognise
 from recognizer.pose import inside_mm
 from recognizer.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, OUTSIDE, TOO_FEW
@@ -152,10 +152,11 @@ def test_the_reading_behind_an_answer(url, reader):
 @pytest.mark.parametrize(
     "change",
     [{"surprise": 2.0}, {"explained": 0.5}, {"clear": 2}, {"plain": 1},
-     {"explained": 0.65, "cells": 8}, {"surprise": 6.0, "explained": 0.75}],
+     {"explained": 0.65, "cells": 8}, {"surprise": 6.0, "explained": 0.75},
+     {"wider": 1.1, "explained": 0.75}],
 )  # fmt: skip
 def test_what_is_not_believed(change):
-    good = Support(surprise=12.0, explained=0.8, cells=12, clear=0, plain=0)
+    good = Support(surprise=12.0, explained=0.8, cells=12, clear=0, plain=0, wider=0.3)
     assert good.holds(Thresholds())
     assert not replace(good, **change).holds(Thresholds())
 
@@ -213,6 +214,24 @@ def test_a_sure_lattice_is_placed_and_a_wrong_cell_costs_its_cap(reader):
     assert place_scores(encoding, spoiled, place) == pytest.approx(-5.0 - CAP)
     best = places(encoding, (spoiled,), 5)[0]
     assert (best.row, best.column, best.face) == (place.row, place.column, place.face)
+
+
+@pytest.mark.parametrize("other", [90, 150, 333])
+def test_a_place_that_fits_nearly_as_well_is_found_wherever_it_is(reader, other):
+    encoding = reader.lab.encodings[0]
+    place, fit = place_of(encoding)
+    row, column = divmod(int(encoding.keys[other]), encoding.array.columns)
+    second = Place(0, row, column, int(encoding.owners[other]), 0.0)
+    shown = shown_at(encoding, second, fit.cells)
+    rows = np.arange(len(shown))
+    scores = fit.scores.copy()
+    scores[rows, shown] = np.maximum(scores[rows, shown], -0.25)
+    alike = replace(fit, scores=scores)
+    found = rivals(encoding, alike, place, 3, 8)
+    best = found[0]
+    assert (best.row, best.column, best.face, best.fit) == (row, column, second.face, 3)
+    assert best.score == pytest.approx(place_scores(encoding, alike, second))
+    assert all((p.row, p.column) != (place.row, place.column) for p in found)
 
 
 def test_a_point_in_a_face(reader):
