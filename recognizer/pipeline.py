@@ -158,9 +158,9 @@ def _verified(
         for place in _flat(
             encoding, rivals(encoding, best.fit, best.place, len(found), limits.places)
         )
-        if place.score > best.score - limits.near and not _among(verified, place)
+        if place.score > best.score - limits.near
     ]
-    if others:
+    if others:  # also such as were verified before, under a fit that is not as good
         everything = [replace(best.place, fit=len(found)), *others]
         verified += _fitted(reader, image, encoding, template, everything, (*found, best.fit))
     return sorted(verified, key=lambda reading: -reading.score)
@@ -188,11 +188,6 @@ def _on_round_faces(
             image, reader.sensor, encoding, template, bank, settings, reader.settings, limits
         )
     ]
-
-
-def _among(verified: list[Reading], place: Place) -> bool:
-    at = (place.face, place.row, place.column)
-    return any((r.place.face, r.place.row, r.place.column) == at for r in verified)
 
 
 def _fitted(
