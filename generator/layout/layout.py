@@ -73,8 +73,9 @@ def lay_out(
     allow_blank_faces
         Leave a face without an identifiable place blank and warn, instead of refusing.
     developed
-        Faces that stand for a round one, with the outline of all of it, unrolled; it counts in
-        place of their own. Such an object has no net: every face has a lattice of its own.
+        Outlines that count in place of a face's own: all of a round face, unrolled, for the
+        facet that stands for it; a face less what others cover. Such an object has no net:
+        every face has a lattice of its own.
 
     Returns
     -------
@@ -94,7 +95,8 @@ def lay_out(
     round_faces = bool(developed or polyhedron.surfaces or polyhedron.blank)
     if round_faces and kind == "net":
         raise LayoutError(
-            "an object with round faces has no net", fix="set layout to faces, or leave it out"
+            "an object with round or covered faces has no net",
+            fix="set layout to faces, or leave it out",
         )
     unknown = sorted(set(blank_faces) - set(range(len(polyhedron.faces))))
     if unknown:

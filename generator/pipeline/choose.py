@@ -25,7 +25,7 @@ from generator.layout.placement import Layout
 from generator.pipeline.place import NO_CELLS, laid_out
 from generator.pipeline.plan import Plan, planned
 from generator.polyhedron import Polyhedron
-from generator.spec import Located
+from generator.spec import Located, blamed
 from generator.spec.profile import AUTO
 from generator.spec.script import with_profile
 
@@ -170,7 +170,7 @@ def _needs(specs: Sequence[Located], solid: Polyhedron | None) -> tuple[int | No
                 layout = laid_out(plan, NO_CELLS)
             except LayoutError as error:
                 if "is full" not in error.cause:
-                    raise
+                    raise blamed(one, error, "shape") from error
                 return None, 0
             known[key] = _counts(plan, layout)
         needed, blank = needed + known[key][0], blank + known[key][1]

@@ -5,6 +5,7 @@ Every error is given the line of the setting that causes it. Lengths in mm.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -19,8 +20,9 @@ from generator.array import SymbolArray, array_from
 from generator.errors import ArrayError
 from generator.layout.layout import Clearances, Outlines
 from generator.pipeline.blame import blaming
-from generator.pipeline.round import RoundFaces, made_whole, round_faces
-from generator.polyhedron import Polyhedron, dihedral
+from generator.pipeline.round import RoundFaces, made_whole, reach_mm, round_faces
+from generator.polyhedron import Polyhedron, dihedral, face_polygon
+from generator.polyhedron.front import Loop, covered_parts
 from generator.polyhedron.round import ROUND_SHAPES
 from generator.polyhedron.shapes import SHAPES
 from generator.printers import Printer, printer_named
@@ -44,7 +46,7 @@ class Plan:
     printer: Printer
     developed: Outlines = field(
         default_factory=dict
-    )  #: round faces by the facet that carries them, unrolled
+    )  #: round faces by the facet that carries them, unrolled; faces less what is covered
     blank_faces: frozenset[int] = frozenset()  #: that carry no symbols of their own
     notes: tuple[str, ...] = ()  #: what was decided for the person who asked
 
@@ -97,7 +99,12 @@ def planned(located: Located, solid: Polyhedron | None = None) -> Plan:
         half = footprint_half_mm(alphabet, spec.style)
     with blaming(located, "shape"):
         faces = round_faces(polyhedron, shapes, spec, printer)
-    clearances = _clearances(polyhedron, spec, printer, faces)
+    plain = [k for k in range(len(polyhedron.faces)) if k not in faces.blank]
+    plain = [k for k in plain if k not in faces.developments]
+    covered = covered_parts(polyhedron, plain, reach_mm(spec, printer))
+    clearances = _clearances(polyhedron, spec, printer, faces, covered)
+    outlines_of = {k: (*face_polygon(polyhedron, k), *loops) for k, loops in covered.items()}
+    outlines_of |= {number: (face.outline,) for number, face in faces.developments.items()}
     return Plan(
         located,
         polyhedron,
@@ -107,9 +114,9 @@ def planned(located: Located, solid: Polyhedron | None = None) -> Plan:
         half,
         clearances,
         printer,
-        {number: (face.outline,) for number, face in faces.developments.items()},
+        outlines_of,
         faces.blank,
-        faces.notes,
+        (*faces.notes, *_covered_note(polyhedron, covered, reach_mm(spec, printer))),
     )
 
 
@@ -137,8 +144,21 @@ def _check_order(alphabet: Alphabet, array: SymbolArray) -> None:
         )
 
 
+def _covered_note(
+    polyhedron: Polyhedron, covered: Mapping[int, tuple[Loop, ...]], reach: float
+) -> tuple[str, ...]:
+    if not covered:
+        return ()
+    names = ", ".join(polyhedron.faces[face].name for face in covered)
+    return (f"no symbols where another face is nearer than {reach:.2g} mm in front of: {names}",)
+
+
 def _clearances(
-    polyhedron: Polyhedron, spec: ObjectSpec, printer: Printer, faces: RoundFaces
+    polyhedron: Polyhedron,
+    spec: ObjectSpec,
+    printer: Printer,
+    faces: RoundFaces,
+    covered: Mapping[int, tuple[Loop, ...]],
 ) -> Clearances:
     """Return what printer, mitre and the neighbouring face's symbols need along each edge."""
     apart = {
@@ -154,5 +174,6 @@ def _clearances(
         if spec.parts == "panels":
             insets = top_insets_mm(polyhedron, number, spec.wall_mm, printer)
             needs = [np.maximum(need, inset) for need, inset in zip(needs, insets, strict=True)]
+        needs += [np.zeros(len(loop)) for loop in covered.get(number, ())]
         clearances.append(tuple(printer.edge_min_mm + need for need in needs))
     return tuple(clearances)

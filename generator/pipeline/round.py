@@ -15,6 +15,7 @@ from generator.errors import LayoutError, SolidError
 from generator.pipeline.blame import blaming
 from generator.polyhedron import Polyhedron
 from generator.polyhedron.development import Development, development
+from generator.polyhedron.front import covered_parts
 from generator.printers import Printer
 from generator.solid.wrap import bend_problem
 from generator.spec import Located, ObjectSpec
@@ -29,6 +30,11 @@ class RoundFaces:
     developments: Mapping[int, Development]  #: by the facet that carries them
     blank: frozenset[int]
     notes: tuple[str, ...]
+
+
+def reach_mm(spec: ObjectSpec, printer: Printer) -> float:
+    """Return the distance in front of a face that is left to symbols: its own and another's."""
+    return 2.0 * spec.style.height_mm + printer.gap_min_mm
 
 
 def made_whole(located: Located, polyhedron: Polyhedron) -> Located:
@@ -67,6 +73,9 @@ def round_faces(
         name = polyhedron.faces[surface.carrier].name
         unrolled = development(polyhedron, surface)
         problem = bend_problem(unrolled, tiers, spec.style, printer)
+        reach = reach_mm(spec, printer)
+        if not problem and covered_parts(polyhedron, surface.facets, reach):
+            problem = f"another face is nearer than {reach:.2g} mm in front of it"
         if problem:
             notes.append(f"{surface.kind} {name} stays blank: {problem}")
             blank |= set(surface.facets)

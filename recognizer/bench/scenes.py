@@ -30,7 +30,7 @@ def objects_told(connection: Connection) -> list[dict[str, Any]]:
         {
             "name": entry.name,
             "type": entry.object_type,
-            "faces": entry.number_of_faces,
+            "faces": entry.faces,
             "symbols": entry.symbols,
             "profile": entry.profile,
             "array": [entry.rows, entry.columns],

@@ -78,7 +78,7 @@ def members_of(database: str) -> tuple[Member, ...]:
         Member(
             name=entry.name,
             spec_sha256=entry.spec_hash,
-            faces=entry.number_of_faces,
+            faces=entry.faces,
             symbols=entry.symbols,
             array=f"{entry.profile} {entry.rows}x{entry.columns}",
             pitch_mm=entry.pitch_mm,

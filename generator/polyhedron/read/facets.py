@@ -86,8 +86,8 @@ def _refused(error: ShapeError, found: dict[str, Any]) -> ShapeError:
     return ShapeError(
         f"its round faces, divided into {len(found['faces'])} facets to {found['error_mm']:g} mm, "
         f"make no solid: {where}{first}",
-        fix="check that the model is one valid solid, make walls thicker than that, or set scale "
-        "for a larger part",
+        fix="check that the model is one valid solid, fill inner voids, make walls thicker than "
+        "that, or set scale for a larger part",
     )
 
 

@@ -85,3 +85,26 @@ def test_what_is_no_single_solid_is_refused_and_leaves_nothing(tmp_path):
 def test_nothing_heavy_is_loaded_before_it_is_used():
     code = "import sys, generator; sys.exit('OCP' in sys.modules or 'numpy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_symbols_keep_out_of_a_slot_that_is_too_narrow_for_them(tmp_path):
+    lid = BRepPrimAPI_MakeBox(gp_Pnt(20, 0, 41.5), 60, 60, 20).Solid()
+    post = BRepPrimAPI_MakeBox(gp_Pnt(0, 0, 0), 20, 60, 61.5).Solid()
+    floor = BRepPrimAPI_MakeBox(gp_Pnt(0, 0, 0), 80, 60, 40).Solid()
+    solid = BRepAlgoAPI_Fuse(BRepAlgoAPI_Fuse(floor, post).Shape(), lid).Shape()
+    result = encoded(tmp_path, solid, print={"parts": "whole"}, formats=("stl",), verify=True)
+    assert any("nearer than 2.8 mm in front of" in warning for warning in result.warnings)
+    normals = {face_of(result, z) for z in (40.0, 41.5)}
+    assert len(normals) == 2
+    assert not any(len(result.layout.faces[face].labels) for face in normals)
+
+
+def face_of(result, z):
+    """Number of the face that lies in the plane of this height."""
+    polyhedron = result.polyhedron
+    (face,) = (
+        number
+        for number, face in enumerate(polyhedron.faces)
+        if (abs(polyhedron.vertices[list(face.loops[0])][:, 2] - z) < 1e-9).all()
+    )
+    return face
