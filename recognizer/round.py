@@ -20,7 +20,7 @@ from generator.polyhedron.tangent import Bend
 from probe.sensor import Sensor
 from recognizer.belief import Thresholds
 from recognizer.lab import Encoding
-from recognizer.locate import Place, place_scores, places, shown_at
+from recognizer.locate import Place, place_scores, places, rivals, shown_at
 from recognizer.pose import face_pose
 from recognizer.symbols.bent import bends_of
 from recognizer.symbols.fit import Fit, Settings, fits, scored
@@ -91,12 +91,24 @@ def round_places(
         if _may_be(encoding, place, shown[place.fit], under[place.fit])
     ][: limits.places]
     near = [place.score > candidates[0].score - limits.near for place in candidates]
-    verified = [
-        _verified(image, sensor, encoding, template, place, shown[place.fit], final, limits)
-        for place in candidates[: max(2, sum(near))]
-    ]
-    found = [one for one in verified if one is not None]
-    return [_fair(encoding, one, found) for one in found]
+
+    def verified(place: Place, fit: Fit) -> list[RoundPlace]:
+        one = _verified(image, sensor, encoding, template, place, fit, final, limits)
+        return [] if one is None else [one]
+
+    found: list[RoundPlace] = []
+    for place in candidates[: max(2, sum(near))]:
+        found += verified(place, shown[place.fit])
+    found = [_fair(encoding, one, found) for one in found]
+    if found:
+        best = max(found, key=lambda one: one.score)
+        for place in rivals(encoding, best.fit, best.place, len(shown), limits.places):
+            if place.score > best.score - limits.near and _may_be(
+                encoding, place, best.fit, best.bend
+            ):
+                found.append(RoundPlace(best.image, best.bend, place, best.fit, place.score))
+                found += verified(place, best.fit)
+    return found
 
 
 def bend_at(encoding: Encoding, place: Place, fit: Fit) -> Bend | None:

@@ -69,18 +69,20 @@ def round_faces(
     developments: dict[int, Development] = {}
     blank = set(polyhedron.blank)
     notes: list[str] = []
-    for surface in polyhedron.surfaces:
+    unrolled = [development(polyhedron, surface) for surface in polyhedron.surfaces]
+    problems = [bend_problem(each, tiers, spec.style, printer) for each in unrolled]
+    bent = [s for s, problem in zip(polyhedron.surfaces, problems, strict=True) if not problem]
+    reach = reach_mm(spec, printer)
+    covered = covered_parts(polyhedron, [facet for s in bent for facet in s.facets], reach)
+    for surface, flat, problem in zip(polyhedron.surfaces, unrolled, problems, strict=True):
         name = polyhedron.faces[surface.carrier].name
-        unrolled = development(polyhedron, surface)
-        problem = bend_problem(unrolled, tiers, spec.style, printer)
-        reach = reach_mm(spec, printer)
-        if not problem and covered_parts(polyhedron, surface.facets, reach):
+        if not problem and not covered.keys().isdisjoint(surface.facets):
             problem = f"another face is nearer than {reach:.2g} mm in front of it"
         if problem:
             notes.append(f"{surface.kind} {name} stays blank: {problem}")
             blank |= set(surface.facets)
         else:
-            developments[surface.carrier] = unrolled
+            developments[surface.carrier] = flat
             blank |= set(surface.facets[1:])
     if polyhedron.kind in STANDING:
         blank.add(0)

@@ -187,10 +187,8 @@ def explained_share(
     labels = shown(cells)
     values, seen = _labelled(tables, labels, felt)[0, :, 0], felt.psi[0]
     trust = image.trust * (labels[0] >= 0)
-    if image.falls is not None:
-        trust = (
-            trust * felt.contact[0]
-        )  # where the face has fallen away there is nothing to explain
+    if image.falls is not None:  # where the face has fallen away there is nothing to explain
+        trust = trust * felt.contact[0]
     mean = (trust * seen).sum() / max(trust.sum(), 1e-12)
     whole = float((trust * (seen - mean) ** 2).sum())
     return 1.0 - float((trust * (seen - values) ** 2).sum()) / max(whole, 1e-12)
