@@ -1,6 +1,6 @@
 """Encode public CAD models: made and verified, or refused with a reason; none may crash.
 
-    python tests/campaigns/cad_models.py --fetch /tmp/cad-models
+    python tests/campaigns/cad_models.py --fetch cad-models
 
 Models of `cad_sources.py` go through the whole command, `encode-object --verify`, in a process
 of their own with a limit of processor time: STEP is read back by the CAD kernel, STL by
