@@ -6,7 +6,10 @@ The best of all registered places always exists; it is an answer only if
 - it explains the image better than symbols of no registered place (`surprise`),
 - the symbols that are registered there, worn ones excepted, explain most of the image
   (`explained`), enough of them are in view, and no cell speaks clearly for another symbol
-  (`contradicted`).
+  (`contradicted`),
+- where few symbols are in view, they are at least so many that they can name one of the
+  registered cells (`naming`), and leave other places farther behind: bare cells, which are
+  as well beyond an edge, between two edges or worn, then weigh as much as the symbols.
 """
 
 from __future__ import annotations
@@ -36,6 +39,7 @@ class Thresholds:
     """When an answer is given."""
 
     margin: float = 10.0  #: nats over the best other place
+    margin_by_few: float = 14.0  #: the same where fewer than `many` cells speak
     surprise: float = 3.0  #: nats over symbols of no registered place
     sure: float = 7.0  #: nats below which a share of `well` must be explained
     wide: float = 0.9  #: tenths of a mm by which strokes are hardly printed wider; the same holds
@@ -119,6 +123,14 @@ def left_at(encoding: Encoding, place: Place, worn: Ints, cells: Ints) -> Ints:
     found = shown_at(encoding, place, cells.reshape(-1, 2)).reshape(cells.shape[:-1])
     gone = (cells[..., None, :] == worn).all(axis=-1).any(axis=-1)
     return np.where(gone | (found == encoding.array.order), -1, found)
+
+
+def naming(encoding: Encoding) -> int:
+    """Return how many symbols it takes to name one of the registered cells."""
+    symbols, names = 0, 1
+    while names < len(encoding.keys):
+        symbols, names = symbols + 1, names * encoding.array.order
+    return symbols
 
 
 def unplaced(encoding: Encoding, fit: Fit) -> float:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import Sensor
-from recognizer.belief import Support, Thresholds, support
+from recognizer.belief import Support, Thresholds, naming, support
 from recognizer.lab import Encoding, Lab
 from recognizer.locate import (
     Place,
@@ -120,9 +120,11 @@ def explained(reader: Reader, signal: Signal, seq: int = 0) -> tuple[Recognition
         return answer, found[0]
     # Spend more where it is needed: no answer yet, or one that few cells speak for.
     again = readings(reader, signal, reader.thorough)
-    second, _ = _answer(reader, again, seq)
+    second, cells = _answer(reader, again, seq)
     if answer and second and not _same(found[0], again[0]):
         return refused(seq, AMBIGUOUS, margin=0.0, runner_up=answer.runner_up), again[0]
+    if second and cells < reader.thresholds.many:
+        second = _by_few(reader.thresholds, again[0].encoding, second, cells)
     return second, again[0] if again else None
 
 
@@ -254,6 +256,18 @@ def _answer(reader: Reader, found: list[Reading], seq: int) -> tuple[Recognition
         reason=reason, margin=margin, runner_up=runner_up,
     )  # fmt: skip
     return told, speaks.cells
+
+
+def _by_few(limits: Thresholds, encoding: Encoding, told: Recognition, cells: int) -> Recognition:
+    """Return an answer that few cells speak for, if they can name a place and do so plainly."""
+    reason = ""
+    if cells < naming(encoding):
+        reason = TOO_FEW
+    elif told.margin is not None and told.margin < limits.margin_by_few:
+        reason = AMBIGUOUS
+    if not reason:
+        return told
+    return refused(told.seq, reason, margin=told.margin, runner_up=told.runner_up)
 
 
 def placed(
