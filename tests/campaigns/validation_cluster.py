@@ -57,12 +57,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("spec")
     parser.add_argument("--touches", type=int, default=4000)
+    parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--like", type=Path)
     options = parser.parse_args()
     wanted = -(-options.touches // 1000)
     with tempfile.TemporaryDirectory() as temporary:
         mine, like = Path(temporary, "cluster"), options.like or Path(temporary, "plain")
-        work = [*COMMAND, options.spec, "--touches", str(options.touches), "--study", "0", "-o"]
+        work = [*COMMAND, options.spec, "--touches", str(options.touches), "--study", "0",
+                "--seed", str(options.seed), "-o"]  # fmt: skip
         if options.like is None:
             subprocess.run([*work, str(like), "-j", "2"], check=True)
         with cluster(Path(temporary)) as (address, workers):

@@ -15,10 +15,10 @@ from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.sensor import Sensor
 from probe.simulate.registered import registered_surface
-from recognizer.belief import Support, Thresholds
+from recognizer.belief import Support, Thresholds, naming
 from recognizer.lab import open_lab
 from recognizer.locate import CAP, Place, place_scores, places, rivals, shown_at
-from recognizer.pipeline import explained, reader_for, readings, recognise
+from recognizer.pipeline import _by_few, explained, reader_for, readings, recognise
 from recognizer.pose import inside_mm
 from recognizer.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, OUTSIDE, TOO_FEW
 from recognizer.signal import CONTACT_N, signal_of
@@ -232,6 +232,42 @@ def test_a_place_that_fits_nearly_as_well_is_found_wherever_it_is(reader, other)
     assert (best.row, best.column, best.face, best.fit) == (row, column, second.face, 3)
     assert best.score == pytest.approx(place_scores(encoding, alike, second))
     assert all((p.row, p.column) != (place.row, place.column) for p in found)
+
+
+def at_the_rim(url, reader):
+    """Clean touches ever nearer to an edge and a corner: recognition and cells that speak."""
+    for x, y in [(6.0, 30.0), (3.0, 30.0), (0.5, 30.0), (6.0, 6.0), (3.0, 5.0), (2.0, 1.0)]:
+        forces = felt(url, "Cube", "F1", Touch(x, y, 0.5, 80.0))
+        found, reading = explained(reader, signal_of(forces, newtons=True))
+        yield found, reading.support().cells
+
+
+def test_few_symbols_answer_only_if_they_can_name_a_place(url, reader):
+    encoding = reader.lab.encodings[0]
+    fewest, order = naming(encoding), encoding.array.order
+    assert order ** (fewest - 1) < len(encoding.keys) <= order**fewest
+    limits = reader.thresholds
+    seen = [(bool(found), cells) for found, cells in at_the_rim(url, reader)]
+    assert all(cells >= fewest for told, cells in seen if told)
+    assert any(told and cells < limits.many for told, cells in seen)
+    assert not all(told for told, _ in seen)
+
+
+def test_few_symbols_must_leave_other_places_far_behind(url, reader):
+    strict = replace(reader, thresholds=Thresholds(margin_by_few=1e6))
+    for found, cells in at_the_rim(url, strict):
+        assert not found or cells >= strict.thresholds.many
+        assert found or found.reason in (AMBIGUOUS, NOT_ENCODED)
+
+
+def test_what_few_symbols_say_is_refused_by_their_number_first(url, reader):
+    encoding, limits = reader.lab.encodings[0], reader.thresholds
+    told = recognise(reader, signal_of(felt(url, "Cube", "F1", Touch(32.0, 24.0, 0.7, 80.0)),
+                                       newtons=True))  # fmt: skip
+    near, fewest = replace(told, margin=limits.margin_by_few - 0.1), naming(encoding)
+    assert _by_few(limits, encoding, told, fewest) is told
+    assert _by_few(limits, encoding, told, fewest - 1).reason == TOO_FEW
+    assert _by_few(limits, encoding, near, fewest).reason == AMBIGUOUS
 
 
 def test_a_point_in_a_face(reader):
