@@ -6,6 +6,7 @@ depends on, margins, the worst touches. `precision`, `extremes` and `left_out` a
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from itertools import pairwise
 from typing import Any
@@ -152,7 +153,7 @@ def _verdict(rows: Columns, fair: Mask) -> list[dict[str, Any]]:
 
 def _confusion(rows: Columns, on_face: Mask) -> dict[str, Any]:
     """Return who was taken for whom: objects as a matrix, faces as the pairs that occurred."""
-    names = sorted(set(rows["object"][on_face].tolist()))
+    names = sorted(set(rows["object"][on_face].tolist()), key=_counted)
     answers = [str(answer).rpartition("/")[0] for answer in rows["answer"]]
     place = {name: i for i, name in enumerate(names)}
     matrix = np.zeros((len(names), len(names) + 1), int)
@@ -172,12 +173,17 @@ def _confusion(rows: Columns, on_face: Mask) -> dict[str, Any]:
         "matrix": matrix.tolist(),
         "faces": [
             {"object": a, "face": b, **{v: count[v] for v in (RIGHT, WRONG, REJECTED)}}
-            for (a, b), count in sorted(faces.items())
+            for (a, b), count in sorted(faces.items(), key=lambda one: [*map(_counted, one[0])])
         ],
         "confused": [
             {"touched": a, "answered": b, "count": n} for (a, b), n in sorted(confused.items())
         ],
     }
+
+
+def _counted(name: str) -> tuple[str | int, ...]:
+    """Return a name's key in an order in which Box-2 comes before Box-10."""
+    return tuple(int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", name))
 
 
 def _pose(rows: Columns) -> dict[str, Any]:

@@ -99,6 +99,15 @@ def test_a_wrong_answer_on_a_foreign_surface_is_named(tmp_path):
     assert found["totals"]["wrong"] == 1
 
 
+def test_copies_stand_in_the_order_of_their_numbers(tmp_path):
+    copies = [("Box-10", "F2"), ("Box-2", "F10"), ("Box-2", "F9"), ("Box-1", "F1")]
+    rows = [row(i, object=name, face=face) for i, (name, face) in enumerate(copies)]
+    found = results_of(columns(rows, tmp_path))["objects"]
+    assert found["names"] == ["Box-1", "Box-2", "Box-10"]
+    faces = [(line["object"], line["face"]) for line in found["faces"]]
+    assert faces == [("Box-1", "F1"), ("Box-2", "F9"), ("Box-2", "F10"), ("Box-10", "F2")]
+
+
 def test_touches_of_nothing_but_foreign_surfaces(tmp_path):
     rows = [
         row(i, "rejected", kind="blank", surface="blank", object="", face="", enough=False,
