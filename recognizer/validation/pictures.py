@@ -247,11 +247,11 @@ def _scattered(axis: Axes, points: list[tuple[float, float, str]]) -> None:
 
 
 def _name(axis: Axes, points: list[tuple[float, float, str]]) -> None:
-    """Write names beside points, those of neighbours at different heights."""
+    """Write names beside points, in turn to the right above and to the left below."""
     for k, (x, y, text) in enumerate(sorted(points)):
         if np.isfinite((x, y)).all():
-            above = (3, 4) if k % 2 == 0 else (3, -11)
-            axis.annotate(text, (x, y), above, textcoords="offset points", fontsize=7.5)
+            aside, side = ((3, 4), "left") if k % 2 == 0 else ((-3, -11), "right")
+            axis.annotate(text, (x, y), aside, textcoords="offset points", fontsize=7.5, ha=side)
 
 
 def _share(axis: Axes, at: Any, shares: list[dict[str, Any]], marker: str = ".") -> None:
