@@ -57,7 +57,7 @@ def fitted(force_n: Array, read_s: Array, error_s: Array, used: NDArray[np.bool_
     weight = np.where(used, 1.0 / error_s, 0.0)
     firm = used & (read_s > _FIRM * error_s) & (force_n > 0)
     least = np.where(firm, force_n, np.inf).min(axis=0)  # smallest force that is clearly felt
-    least = np.where(np.isfinite(least), least, 1.0)
+    least = np.where(np.isfinite(least), np.maximum(least, _TINY_N), 1.0)
     theta = _started(force_n, read_s, weight, firm, least, preloaded)
     damping, cost = np.full(least.size, 1e-3), _cost(theta, force_n, read_s, weight, least)
     for _ in range(_STEPS):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from probe.calibration import (
@@ -102,6 +102,7 @@ def test_a_clean_law_is_found(seed, gain, exponent, broken, number):
 
 @settings(deadline=None, max_examples=40)
 @given(seeds, st.lists(st.floats(0, 5), max_size=6), st.floats(0, 5))
+@example(53976, [1.0, 2.0, 0.5, 5e-324], 1.0)  # a load as small as a number can be
 def test_loads_either_determine_every_law_or_are_refused(seed, levels, noise):
     rng = np.random.default_rng(seed)
 
