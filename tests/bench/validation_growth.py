@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from database_scale import fill, spots
+from database_scale import array_of, blocks, fill
 
 from generator.database.open import open_database
 from recognizer.validation.campaign import Campaign, Piece
@@ -33,9 +33,10 @@ def main() -> None:
     print(" objects     cells  open s  simulate ms  read ms  touches/s  right of")
     with tempfile.TemporaryDirectory() as folder:
         url = str(Path(folder) / "lab.db")
-        engine, where, have = open_database(url), spots(), 0
+        engine, array, have = open_database(url), array_of(4095), 0
+        objects = blocks(array)
         for want in sorted(options.objects):
-            fill(engine, have, want, where)
+            fill([engine], array, objects, have, want)
             have = want
             campaign = Campaign(
                 options.touches, options.seed, (("face", 1.0),), (("typical", 1.0),), files=False
