@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection
 
 from generator.database.open import open_database
-from generator.database.read import list_objects, read_object
+from generator.database.read import find_object, list_objects, read_object
 from generator.database.registered import RegisteredFace, RegisteredObject
 from generator.database.transaction import reading
 from generator.errors import DatabaseError
@@ -87,11 +87,11 @@ def registered_object(database: str, name: str) -> RegisteredObject:
         As `registered_surface`.
     """
     with _opened(database) as connection:
+        if name and find_object(connection, name) is not None:
+            return read_object(connection, name)
         known = [entry.name for entry in list_objects(connection)]
         if not name and len(known) == 1:
-            name = known[0]
-        if name in known:
-            return read_object(connection, name)
+            return read_object(connection, known[0])
     shown = ", ".join(known[:12]) + (", ..." if len(known) > 12 else "")
     raise SurfaceError(
         f"no object is called '{name}'" if name else f"{len(known)} objects, none is named",
