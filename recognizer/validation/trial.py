@@ -23,6 +23,7 @@ from probe.simulate.scene import Scene
 from probe.simulate.touch import Touches, random_touches
 from probe.surface.contract import Surface
 from probe.surface.face import Face
+from recognizer.lab import Encoding
 from recognizer.pipeline import Reader, recognise
 from recognizer.recognition import Recognition
 from recognizer.signal import signal_of
@@ -105,7 +106,7 @@ def drawn(plan: Plan, number: int, reader: Reader) -> Drawn:
             surface = FOREIGN[plan.kind](encoding, rng)
             touch = _anywhere(rng, ranges)
         else:
-            face = encoding.face(int(rng.integers(len(encoding.faces))))
+            face = encoding.face(_by_name(encoding)[int(rng.integers(len(encoding.faces)))])
             scene = scene_of(plan.database, face.object, face.face, plan.files)
             most = _inmost(plan.database, face.object, face.face, plan.files)
             touch = _on(scene, plan.kind, most, rng, ranges)
@@ -174,6 +175,16 @@ def judged(plan: Plan, number: int, found: Drawn, answer: Recognition, seconds: 
         noise=math.nan if answer.noise is None else answer.noise,
         seconds=seconds,
     )
+
+
+@lru_cache(maxsize=8)
+def _by_name(encoding: Encoding) -> list[int]:
+    """Return the faces in the order of their objects' names.
+
+    Their numbers follow the order of registration, which a set made in parallel leaves to chance.
+    """
+    faces, names = encoding.faces.tolist(), encoding.names
+    return sorted(range(len(faces)), key=lambda n: (names[faces[n][0]], faces[n][1]))
 
 
 @lru_cache(maxsize=512)
