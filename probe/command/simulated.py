@@ -56,6 +56,7 @@ class Asked:
 class Felt:
     """One touch and its frames."""
 
+    scene: Scene  #: that it met
     touch: Touch
     contact: Contact
     frames: tuple[Frame, ...]
@@ -116,12 +117,12 @@ def simulate_touches(
                     recorder.append(frame)
             if i == 0:
                 first = felt
-            kept.append(_told(scene, felt))
+            kept.append(_told(felt))
             told.show(i + 1, f"{i + 1:,} of {number:,}")
             if interrupted.is_set():
                 break
     if png is not None:
-        _picture(scene, sensor, first, png, noise)
+        _picture(first, sensor, png, noise)
     result = {
         "target": target, "object": scene.object_name or None, "face": scene.face or None,
         "overlay": overlay, "level": level, "seed": asked.seed,
@@ -165,13 +166,14 @@ def _touched(
     for i in range(asked.touches or 1):
         rng = np.random.default_rng([asked.seed, i])
         touch = _touch(scene, asked, rng)
-        contact = press(scene.under(touch).surface, sensor, touch, accuracy=level)
+        met = scene.under(touch)
+        contact = press(met.surface, sensor, touch, accuracy=level)
         state, frames = None, []
         for beat in range(asked.frames):
             counts, state = read_counts(contact.forces_n, board, fsr, state, rng)
             seq = i * asked.frames + beat
             frames.append(frame_from(counts, t_ns=round(seq * board.frame_s * 1e9), seq=seq))
-        yield Felt(touch, contact, tuple(frames))
+        yield Felt(met, touch, contact, tuple(frames))
 
 
 def _touch(scene: Scene, asked: Asked, rng: np.random.Generator) -> Touch:
@@ -201,13 +203,13 @@ def _or(given: float | None, drawn: float) -> float:
     return drawn if given is None else given
 
 
-def _told(scene: Scene, felt: Felt) -> dict[str, Any]:
+def _told(felt: Felt) -> dict[str, Any]:
     """Return the truth of one touch."""
     touch, contact = felt.touch, felt.contact
     touching = math.isfinite(contact.z_mm)
     T_face_probe = pose_of(touch, contact) if touching else None
     T_object_probe = None
-    T_object_surface = scene.under(touch).T_object_surface
+    T_object_surface = felt.scene.T_object_surface
     if T_face_probe is not None and T_object_surface is not None:
         T_object_probe = T_object_surface @ T_face_probe
     return {
@@ -225,14 +227,14 @@ def _told(scene: Scene, felt: Felt) -> dict[str, Any]:
     }
 
 
-def _picture(scene: Scene, sensor: Sensor, felt: Felt, png: Path, noise: str) -> None:
+def _picture(felt: Felt, sensor: Sensor, png: Path, noise: str) -> None:
     from probe.plot.touch import touch_picture
 
-    what = f"{scene.name}, {felt.touch.force_n:g} N, {sensor.overlay.kind} overlay"
+    what = f"{felt.scene.name}, {felt.touch.force_n:g} N, {sensor.overlay.kind} overlay"
     if noise == "quiet":
         what += ", without noise"
     with staged(png) as draft:
-        touch_picture(scene.under(felt.touch).surface, sensor, felt.touch, felt.contact.forces_n,
+        touch_picture(felt.scene.surface, sensor, felt.touch, felt.contact.forces_n,
                       felt.frames[0].counts, draft, title=what)  # fmt: skip
 
 
