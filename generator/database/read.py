@@ -39,6 +39,7 @@ __all__ = [
     "faces_at",
     "find_object",
     "list_objects",
+    "object_names",
     "read_array",
     "read_layout",
     "read_object",
@@ -53,6 +54,12 @@ def list_objects(connection: Connection) -> tuple[ObjectEntry, ...]:
     return tuple(_entries(connection, _select_entries().order_by(tables.objects.c.name)))
 
 
+def object_names(connection: Connection) -> tuple[str, ...]:
+    """Return the names of all objects, in order; without the counts of `list_objects`."""
+    names = tables.objects.c.name
+    return tuple(connection.execute(select(names).order_by(names)).scalars())
+
+
 def find_object(connection: Connection, name: str) -> ObjectEntry | None:
     """Return the entry of the object called `name`, None if there is none."""
     found = _entries(connection, _select_entries().where(tables.objects.c.name == name))
@@ -63,10 +70,7 @@ def existing(connection: Connection, name: str) -> ObjectEntry:
     """Return the entry of the object called `name`; raises as `read_object`."""
     entry = find_object(connection, name)
     if entry is None:
-        names = connection.execute(
-            select(tables.objects.c.name).order_by(tables.objects.c.name).limit(8)
-        ).scalars()
-        known = ", ".join(names) or "none yet"
+        known = ", ".join(object_names(connection)[:8]) or "none yet"
         raise DatabaseError(
             f"no object is called '{name}'",
             fix=f"registered objects: {known}",
@@ -85,7 +89,7 @@ def read_object(connection: Connection, name: str) -> RegisteredObject:
     """
     entry = existing(connection, name)
     polyhedron = _read_polyhedron(connection, entry)
-    layout = read_layout(connection, name)
+    layout = _layout_of(connection, entry)
     row = connection.execute(
         select(tables.objects, tables.alphabets.c.definition, tables.provenance.c.spec)
         .join(tables.alphabets)
@@ -128,7 +132,10 @@ def read_surfaces(connection: Connection) -> dict[int, tuple[Developable, ...]]:
 
 def read_layout(connection: Connection, name: str) -> Layout:
     """Return the layout of the object called `name`, bit for bit what was registered."""
-    entry = existing(connection, name)
+    return _layout_of(connection, existing(connection, name))
+
+
+def _layout_of(connection: Connection, entry: ObjectEntry) -> Layout:
     known = connection.execute(
         select(tables.objects.c.layout, tables.objects.c.layout_warnings).where(
             tables.objects.c.object_id == entry.object_id

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection
 
 from generator.database.open import open_database
-from generator.database.read import find_object, list_objects, read_object
+from generator.database.read import find_object, object_names, read_object
 from generator.database.registered import RegisteredFace, RegisteredObject
 from generator.database.transaction import reading
 from generator.errors import DatabaseError
@@ -89,7 +89,7 @@ def registered_object(database: str, name: str) -> RegisteredObject:
     with _opened(database) as connection:
         if name and find_object(connection, name) is not None:
             return read_object(connection, name)
-        known = [entry.name for entry in list_objects(connection)]
+        known = object_names(connection)
         if not name and len(known) == 1:
             return read_object(connection, known[0])
     shown = ", ".join(known[:12]) + (", ..." if len(known) > 12 else "")
@@ -100,10 +100,10 @@ def registered_object(database: str, name: str) -> RegisteredObject:
     )
 
 
-def registered_objects(database: str) -> list[str]:
+def registered_objects(database: str) -> tuple[str, ...]:
     """Return the names of all registered objects, in order."""
     with _opened(database) as connection:
-        return [entry.name for entry in list_objects(connection)]
+        return object_names(connection)
 
 
 @contextmanager

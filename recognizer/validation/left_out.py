@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from generator.database.open import open_database
-from generator.database.read import list_objects, read_object
+from generator.database.read import object_names, read_object
 from generator.database.transaction import reading
 from probe.contact.press import LEVELS, level_for, table
 from probe.contact.tips import Tips, tip_points
@@ -54,7 +54,7 @@ def left_out(reader: Reader, plan: Plan, readers: Study) -> Study:
 def _objects(study: Study, reader: Reader) -> None:
     """Objects read from the database: that whose cells were met."""
     with reading(open_database(reader.lab.url, writable=False)) as connection:
-        names = [entry.name for entry in list_objects(connection)]
+        names = object_names(connection)
         spent = [_spent(partial(read_object, connection, name), 1) for name in names[:OBJECTS]]
     one = float(np.median(spent))
     _add(study, "objects read from the database: the one that is touched", 1, len(names),

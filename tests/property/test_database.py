@@ -11,7 +11,7 @@ from generator.array.profiles import PROFILES
 from generator.database.canonical import canonical
 from generator.database.cells import held_cells
 from generator.database.open import open_database
-from generator.database.read import faces_at, list_objects, read_object
+from generator.database.read import faces_at, list_objects, object_names, read_object
 from generator.database.register import (
     Registration,
     find_array,
@@ -182,6 +182,7 @@ def shares_no_cell(engine, steps):
                 held[name], spec[name] = asked, (first, count)
         with reading(engine) as connection:
             assert [e.name for e in list_objects(connection)] == sorted(held)
+            assert object_names(connection) == tuple(sorted(held))
             rows, columns = occupied(connection, find_array(connection, ARRAY))
             cells = (rows * 65 + columns).tolist()
             assert cells == sorted(c for cells in held.values() for c in cells)
