@@ -29,7 +29,8 @@ from recognizer.lab import open_lab
 from recognizer.mosaic.grow import added
 from recognizer.mosaic.mosaic import Mosaic, no_touches
 from recognizer.mosaic.touch import PlacedTouch, decoded_place
-from recognizer.pipeline import Reader, reader_for, recognise
+from recognizer.pipeline import recognise
+from recognizer.reader import Reader, reader_for
 from recognizer.recognition import Recognition
 from recognizer.signal import Signal, signal_of
 

@@ -21,7 +21,8 @@ from recognizer.command import report
 from recognizer.command.placed import object_in_base
 from recognizer.command.source import Source, at_port, listened, recorded
 from recognizer.lab import open_lab
-from recognizer.pipeline import Reader, reader_for, recognise
+from recognizer.pipeline import recognise
+from recognizer.reader import Reader, reader_for
 from recognizer.recognition import Recognition
 from recognizer.robot import ObjectPose
 from recognizer.touches import Touch

@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from probe.plot.canvas import page
-from recognizer.pipeline import Reader
 from recognizer.plot.symbols import draw_touch
 from recognizer.plot.window import draw_window
 from recognizer.plot.winning import Winning, winning
 from recognizer.plot.wireframe import draw_object
+from recognizer.reader import Reader
 from recognizer.recognition import Recognition
 from recognizer.signal import Signal
 

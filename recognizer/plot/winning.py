@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from recognizer.lab import EncodedFace, Encoding
 from recognizer.locate import Place, shown_at
-from recognizer.pipeline import Reader, explained
+from recognizer.pipeline import explained
+from recognizer.reader import Reader
 from recognizer.signal import Signal
 
 Array = NDArray[np.float64]

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from recognizer.belief import CLEARLY, left_at, unplaced, weighed
 from recognizer.lab import Encoding
 from recognizer.locate import Place, neighbours, place_scores, places, under_centre
-from recognizer.pipeline import Reader, placed
+from recognizer.pipeline import placed
+from recognizer.reader import Reader
 from recognizer.recognition import (
     AMBIGUOUS,
     NOT_ENCODED,

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from recognizer.belief import WHOLE
 from recognizer.mosaic.touch import PlacedTouch
-from recognizer.pipeline import Reader, recognise
+from recognizer.pipeline import recognise
+from recognizer.reader import Reader
 from recognizer.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, TOO_FEW, Recognition, refused
 from recognizer.scan.answer import Located, answered, located, posed
 from recognizer.scan.composite import Composite, composite, expected_fit

@@ -18,7 +18,7 @@ from recognizer.mosaic.grow import added
 from recognizer.mosaic.mosaic import Mosaic, MosaicSettings, no_touches
 from recognizer.mosaic.planar import wrapped
 from recognizer.mosaic.touch import PlacedTouch
-from recognizer.pipeline import Reader
+from recognizer.reader import Reader
 from recognizer.round import BENDS
 from recognizer.symbols.bent import bends_of
 from recognizer.symbols.fit import Fit, Settings, fits, scored

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from recognizer.pipeline import THOROUGH, Reader
+from recognizer.reader import THOROUGH, Reader
 from recognizer.symbols.fit import Settings
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.levels import LEVELS

@@ -21,7 +21,8 @@ from probe.errors import ProbeError
 from probe.sensor import Overlay, Sensor
 from probe.surface.contract import Surface
 from probe.surface.indenters import Cross, Plate, Rough, Strip, TiltedPlane
-from recognizer.pipeline import Reader, recognise
+from recognizer.pipeline import recognise
+from recognizer.reader import Reader
 from recognizer.signal import signal_of
 from recognizer.validation.statistics import rounded
 

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.alphabet import Alphabet
-from recognizer.pipeline import Reader, recognise
+from recognizer.pipeline import recognise
+from recognizer.reader import Reader
 from recognizer.recognition import Recognition
 from recognizer.signal import signal_of
 from recognizer.symbols.fit import Fit, fits

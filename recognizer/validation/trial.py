@@ -24,7 +24,8 @@ from probe.simulate.touch import Touches, random_touches
 from probe.surface.contract import Surface
 from probe.surface.face import Face
 from recognizer.lab import Encoding
-from recognizer.pipeline import Reader, recognise
+from recognizer.pipeline import recognise
+from recognizer.reader import Reader
 from recognizer.recognition import Recognition
 from recognizer.signal import signal_of
 from recognizer.validation.levels import LEVELS, read

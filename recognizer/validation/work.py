@@ -14,7 +14,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from recognizer.lab import open_lab
-from recognizer.pipeline import Reader, reader_for
+from recognizer.reader import Reader, reader_for
 from recognizer.validation.campaign import Campaign, Piece, plan_of, reader_with, series_of
 from recognizer.validation.errors import WorkersError
 from recognizer.validation.made import set_digest

@@ -54,7 +54,8 @@ from recognizer.mosaic.planar import (
 )
 from recognizer.mosaic.product import product_shift
 from recognizer.mosaic.touch import Placed, PlacedTouch, decoded_place, placed
-from recognizer.pipeline import reader_for, recognise
+from recognizer.pipeline import recognise
+from recognizer.reader import reader_for
 from recognizer.signal import Signal, signal_of
 
 SPECS = Path(__file__).parents[2] / "fixtures" / "specs"

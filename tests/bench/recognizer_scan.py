@@ -41,7 +41,8 @@ from recognizer.classical_scan import read_scan as read_classically
 from recognizer.lab import open_lab
 from recognizer.mosaic.planar import inverse, moved, planar_covariance, planar_pose
 from recognizer.mosaic.touch import PlacedTouch, placed
-from recognizer.pipeline import reader_for, recognise
+from recognizer.pipeline import recognise
+from recognizer.reader import reader_for
 from recognizer.scan.grow import begun, extended
 from recognizer.signal import signal_of
 from recognizer.validation.levels import BIAS, LEVELS, read

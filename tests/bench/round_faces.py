@@ -48,7 +48,8 @@ from probe.simulate.round import RoundPart, round_part  # noqa: E402
 from probe.simulate.touch import Touches, random_touches  # noqa: E402
 from recognizer.lab import open_lab  # noqa: E402
 from recognizer.mosaic.touch import PlacedTouch, placed  # noqa: E402
-from recognizer.pipeline import Reader, reader_for, recognise  # noqa: E402
+from recognizer.pipeline import recognise  # noqa: E402
+from recognizer.reader import Reader, reader_for  # noqa: E402
 from recognizer.recognition import Recognition  # noqa: E402
 from recognizer.scan.grow import begun, extended  # noqa: E402
 from recognizer.signal import signal_of  # noqa: E402

@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from recognizer.lab import open_lab
-from recognizer.pipeline import reader_for
+from recognizer.reader import reader_for
 from recognizer.validation.command import run
 from recognizer.validation.errors import SetError
 from recognizer.validation.trial import Plan, drawn, sensor_of

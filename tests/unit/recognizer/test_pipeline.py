@@ -18,8 +18,9 @@ from probe.simulate.registered import registered_surface
 from recognizer.belief import Support, Thresholds, naming
 from recognizer.lab import open_lab
 from recognizer.locate import CAP, Place, place_scores, places, rivals, shown_at
-from recognizer.pipeline import _by_few, explained, reader_for, readings, recognise
+from recognizer.pipeline import _by_few, explained, recognise
 from recognizer.pose import inside_mm
+from recognizer.reader import reader_for
 from recognizer.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, OUTSIDE, TOO_FEW
 from recognizer.signal import CONTACT_N, signal_of
 from recognizer.symbols.fit import Fit
@@ -27,6 +28,7 @@ from recognizer.symbols.template import psi, template_of
 from recognizer.validation.levels import LEVELS
 from recognizer.validation.surfaces import FOREIGN
 from recognizer.validation.trial import INSIDE_MM, Plan, drawn, sensor_of, trial
+from recognizer.verify import readings
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from probe.sensor import Sensor
 from probe.simulate.registered import registered_surface
 from recognizer.lab import open_lab
 from recognizer.mosaic.touch import PlacedTouch, placed
-from recognizer.pipeline import reader_for
+from recognizer.reader import reader_for
 from recognizer.recognition import NO_CONTACT, TOO_FEW
 from recognizer.scan.grow import begun, extended, read_scan
 from recognizer.signal import signal_of
