@@ -158,9 +158,9 @@ def scenes(given):
                    Cross(rng.uniform(0.3, 3), 15.0), TiltedPlane(*rng.uniform(-0.15, 0.15, 2)),
                    Rough(int(rng.integers(100)), 10 ** rng.uniform(-4, 0)), HalfPlane(),
                    HalfPlane(-0.6), Strip(1.0, 10.0, -0.5))[rng.integers(9)]  # fmt: skip
-        tilts = rng.uniform(-0.17, 0.17, 2) * (rng.random() < 0.6)
+        tilt_x, tilt_y = rng.uniform(-0.17, 0.17, 2) * (rng.random() < 0.6)
         x, y = rng.uniform(-9, 9, 2)
-        touch = Touch(x, y, rng.uniform(0, 6.3), force, *tilts, wrist)
+        touch = Touch(x, y, rng.uniform(0, 6.3), force, tilt_x, tilt_y, wrist)
         start = time.process_time()
         try:
             found = layer(surface, sensor, touch, cells_per_tactel=int(rng.choice([2, 3, 4])))

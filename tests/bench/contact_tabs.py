@@ -62,10 +62,12 @@ def main() -> None:
     for name, (surface, reach, tilt) in scenes.items():
         touches = [
             Touch(
-                *rng.uniform(-reach, reach, 2),
+                rng.uniform(-reach, reach),
+                rng.uniform(-reach, reach),
                 rng.uniform(0, 2 * math.pi),
                 80.0,
-                *rng.uniform(-tilt, tilt, 2),
+                rng.uniform(-tilt, tilt),
+                rng.uniform(-tilt, tilt),
             )
             for _ in range(options.touches)
         ]

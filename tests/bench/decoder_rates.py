@@ -131,9 +131,9 @@ def measured(name, array, shape, damage, number, seed):
         right = is_at(ranked.rows[:, 0], ranked.columns[:, 0], truth[part])
         single = ranked.values[:, 0] - ranked.values[:, 1] > 1e-3
         answered = doubts <= decoder.doubt
-        yield Outcome(name, label, *damage, percent(answered & right), percent(answered & ~right),
-                      percent(~answered), percent(single & right), percent(single & ~right),
-                      spent)  # fmt: skip
+        yield Outcome(name, label, damage[0], damage[1], percent(answered & right),
+                      percent(answered & ~right), percent(~answered), percent(single & right),
+                      percent(single & ~right), spent)  # fmt: skip
 
 
 def good_tuple(name, array, windows, truth, damage) -> Outcome:
@@ -142,8 +142,9 @@ def good_tuple(name, array, windows, truth, damage) -> Outcome:
     spent = (time.process_time() - start) / len(windows) * 1e6
     right = is_at(found.rows, found.columns, truth) & found.answered
     wrong = found.answered & ~right
-    return Outcome(name, "good tuple", *damage, percent(right), percent(wrong),
-                   percent(~found.answered), percent(right), percent(wrong), spent)  # fmt: skip
+    return Outcome(name, "good tuple", damage[0], damage[1], percent(right),
+                   percent(wrong), percent(~found.answered), percent(right), percent(wrong),
+                   spent)  # fmt: skip
 
 
 def seen(array, shape: tuple[int, int], places: np.ndarray) -> np.ndarray:

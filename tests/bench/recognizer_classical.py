@@ -173,7 +173,8 @@ def scanned(scene, level, rng, theta, sigma_tactels):
     skin = Skin(rng, level)
     plan = raster([scene.region.starts], SENSOR, theta_rad=theta, least_cover=0.4)
     middle = scene.centre_mm()
-    T_base_face = surface_to_sensor(300, 0, 0.2, 100) @ surface_to_sensor(*-middle, 0)
+    x, y = middle.tolist()
+    T_base_face = surface_to_sensor(300, 0, 0.2, 100) @ surface_to_sensor(-x, -y, 0)
     wanted = np.array([T_base_face @ surface_to_sensor(x, y, theta) for x, y in plan.places_mm])
     if sigma_tactels is None:
         arm = kinesthetic(Arm(), wanted, JointErrors(), rng)

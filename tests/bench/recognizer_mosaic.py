@@ -92,8 +92,9 @@ def scanned(database: str, name: str, pitch_mm: float, tactels: float, counts: b
     fsr, state, signals, true = fsr_of(), None, [], []
     for stand in track.true:
         pose = planar_pose(np.linalg.inv(T_BASE_FACE) @ stand)
-        tilt = rng.uniform(-0.5, 0.5, 2) * DEG
-        touch = Touch(*pose.tolist(), 80 * rng.uniform(0.9, 1.1), *tilt.tolist())
+        x, y, theta = pose.tolist()
+        tilt_x, tilt_y = rng.uniform(-0.5, 0.5, 2) * DEG
+        touch = Touch(x, y, theta, 80 * rng.uniform(0.9, 1.1), tilt_x, tilt_y)
         forces = press(surface, SENSOR, touch).forces_n
         if counts:
             read, _ = read_counts(forces, Electronics(), fsr, state, rng)
@@ -155,8 +156,8 @@ def pairs(scan: Scan, patches: list[Patch]) -> None:
             ms += time.process_time() - start
             start = time.process_time()
             window = min(7.5, 3 * math.sqrt(max(sure[0, 0], sure[1, 1])) / P)
-            forces = [np.asarray(scan.signals[k].forces) for k in (a, b)]
-            shift = product_shift(*forces, tuple(belief[:2] / P), window)
+            one, two = (np.asarray(scan.signals[k].forces) for k in (a, b))
+            shift = product_shift(one, two, tuple(belief[:2] / P), window)
             their_ms += time.process_time() - start
             theirs.append(math.hypot(*(shift - true[:2] / P)))
             why[found.reason] += 1

@@ -147,8 +147,8 @@ def scanned(scene, encoding, kind, level, sigma_tactels, most, rng, manner=None)
         lines = [plan.places_mm[plan.lines == n] for n in np.unique(plan.lines)]
         places = np.concatenate([line[:: (-1) ** n] for n, line in enumerate(lines)])
         places = places[:: 1 if rng.random() < 0.5 else -1][:most]
-    middle = scene.centre_mm()
-    T_base_face = surface_to_sensor(300, 0, 0.2, 100) @ surface_to_sensor(*-middle, 0)
+    x, y = scene.centre_mm().tolist()
+    T_base_face = surface_to_sensor(300, 0, 0.2, 100) @ surface_to_sensor(-x, -y, 0)
     wanted = [T_base_face @ surface_to_sensor(x, y, theta) for x, y in places]
     if sigma_tactels is None:
         lift = surface_to_sensor(0, 0, 0, 10.0)
@@ -171,9 +171,10 @@ def scanned(scene, encoding, kind, level, sigma_tactels, most, rng, manner=None)
     stood = []
     for k, stand in enumerate(true):
         at = planar_pose(back @ stand)
+        x, y, turn = at.tolist()
         tilt = math.radians(manner.tilt_deg) * math.sqrt(rng.random())
         towards = rng.uniform(-math.pi, math.pi)
-        touch = Touch(*at.tolist(), float(rng.uniform(*manner.force_n)),
+        touch = Touch(x, y, turn, float(rng.uniform(*manner.force_n)),
                       tilt * math.cos(towards), tilt * math.sin(towards))  # fmt: skip
         try:
             counts, _ = read(surface, SENSOR, touch, LEVELS[level], np.random.default_rng(number))
@@ -195,8 +196,9 @@ def in_view(encoding, face, felt):
     return (np.abs(away) < reach).all(axis=2).any(axis=0)
 
 
-def named(scan, encoding, face, felt):
+def named(scan, face_of, felt):
     """Right, wrong and rejected symbols in view, by the composite alone."""
+    encoding, face = face_of
     count, seen = Counter(), in_view(encoding, face, felt)
     if scan.leading is None:
         return count
@@ -230,7 +232,7 @@ def joint(reader, felt, name, faces, tally):
     tally.scans += 1
     tally.first.append(first)
     if name in faces:
-        tally.symbols += named(scan, *faces[name], felt)
+        tally.symbols += named(scan, faces[name], felt)
 
 
 def alone(reader, felt, name, tally):
@@ -264,8 +266,9 @@ def classical(lab, felt, name, sigma, tally):
     return found
 
 
-def counted(found, encoding, face, felt):
+def counted(found, face_of, felt):
     """Right, wrong and rejected symbols in view, of the thesis's way."""
+    encoding, face = face_of
     symbols = found.reading.symbols
     at = moved(felt.true[0], np.array([[s.x_mm, s.y_mm] for s in symbols]).reshape(-1, 2))
     count = Counter()
@@ -342,7 +345,7 @@ def compare(given, url, lab, reader, faces, profile, kind, level, error):
             if "classical" in tallies:
                 found = classical(lab, felt, name, sigma, tallies["classical"])
                 if name in faces:
-                    tallies["classical"].symbols += counted(found, *faces[name], felt)
+                    tallies["classical"].symbols += counted(found, faces[name], felt)
     for way, tally in tallies.items():
         label = f"{profile} {kind} {level} {error} {way}"
         print(f"{label:34}{tally.line()}", flush=True)

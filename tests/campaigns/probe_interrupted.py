@@ -13,6 +13,7 @@ recording can be made beside it. Exit code 1 otherwise.
 from __future__ import annotations
 
 import argparse
+import io
 import random
 import shutil
 import signal
@@ -81,7 +82,7 @@ def killed(folder: Path, hz: float, seconds: float, roll_over_s: float, pose: bo
         [sys.executable, "-c", WRITER, *arguments, "poses" if pose else "plain"],
         stdout=subprocess.PIPE,
     )
-    assert process.stdout is not None
+    assert isinstance(process.stdout, io.BufferedReader)
     handed = len(process.stdout.read(1))
     end = time.monotonic() + seconds
     while time.monotonic() < end:

@@ -26,8 +26,8 @@ from generator.errors import GeneratorError
 from generator.export.check import verify
 from generator.export.step import step_chunks
 from generator.export.stl import stl_chunks
-from generator.pipeline.encode import NO_CELLS, laid_out
 from generator.pipeline.files import parts_of
+from generator.pipeline.place import NO_CELLS, laid_out
 from generator.pipeline.plan import planned
 from generator.polyhedron import Polyhedron
 from generator.polyhedron.random_shapes import random_convex, random_nonconvex
