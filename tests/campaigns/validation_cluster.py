@@ -21,8 +21,9 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
+from validation_shards import differing, shards
+
 COMMAND = [sys.executable, "-m", "recognizer.validation.command"]
-SHARDS = "shards/touches/*.parquet"
 
 
 @contextmanager
@@ -70,19 +71,18 @@ def main() -> int:
         with cluster(Path(temporary)) as (address, workers):
             start = time.monotonic()
             process = subprocess.Popen([*work, str(mine), "--cluster", address])
-            while process.poll() is None and len(list(mine.glob(SHARDS))) < wanted / 2:
+            while process.poll() is None and len(shards(mine)) < wanted / 2:
                 time.sleep(0.2)
             workers[0].kill()
-            shards = len(list(mine.glob(SHARDS)))
-            print(f"one worker killed after {shards} of {wanted} shards", flush=True)
+            done = len(shards(mine))
+            print(f"one worker killed after {done} of {wanted} shards", flush=True)
             code = process.wait()
             seconds = time.monotonic() - start
-        made = sorted(mine.glob(SHARDS))
-        differ = [
-            p.name for p in made if p.read_bytes() != (like / p.relative_to(mine)).read_bytes()
-        ]
+        made, differ = shards(mine), differing(mine, like)
         whole = code == 0 and len(made) == wanted
-        print(f"exit code {code}, {len(made)} shards in {seconds:.0f} s, {len(differ)} differ")
+        print(
+            f"exit code {code}, {len(made)} shards in {seconds:.0f} s, {len(differ)} files differ"
+        )
         return 0 if whole and not differ else 1
 
 
