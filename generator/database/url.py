@@ -22,6 +22,9 @@ def normal_url(url: str) -> URL:
     if not url.strip():
         raise DatabaseError("no database is named", fix="give a file such as lab.db")
     if "://" not in url:
+        if url.startswith(("sqlite:", "postgresql:", "postgres:")):
+            fix = "write sqlite:///lab.db or postgresql://user@host:5432/name"
+            raise DatabaseError(f"'{url}' is half an address", fix=fix)
         return URL.create("sqlite", database=str(Path(url).expanduser()))
     try:
         parsed = make_url(url)

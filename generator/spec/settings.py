@@ -17,6 +17,7 @@ from generator.spec.shape import EXAMPLES, Shape
 
 SPEC_VERSION = 1
 COPIES_MAX = 1000
+SCHEMES = ("sqlite", "postgresql", "postgres", "postgresql+psycopg")  #: of databases
 
 ProfileName = Literal["one-touch", "thesis", "product", "large", "fine", "auto"]
 AlphabetName = Literal["thesis-2", "dense-4", "letters-4", "dense-8"]
@@ -57,8 +58,14 @@ def database_url(value: Any) -> str:
         raise refuse("a database is a file name or an address", "write, for example, lab.db")
     scheme, separator, _ = value.partition("://")
     if not separator:
+        start, colon, _ = value.partition(":")
+        if colon and start in SCHEMES:
+            raise refuse(
+                f"'{value}' is half an address",
+                "write sqlite:///lab.db or postgresql://user@host/name",
+            )
         return f"sqlite:///{value}"
-    if scheme not in ("sqlite", "postgresql", "postgres", "postgresql+psycopg"):
+    if scheme not in SCHEMES:
         raise refuse(
             f"objects cannot be kept in '{scheme}', only in sqlite or postgresql",
             "write sqlite:///lab.db or postgresql://user@host/name",

@@ -49,6 +49,8 @@ def test_urls(given, backend, database):
     [
         ("", "no database is named"),
         ("mysql://h/objects", "allowed are sqlite and postgresql"),
+        ("postgresql:/objects", "half an address"),
+        ("sqlite:lab.db", "half an address"),
         ("sqlite://", "names no file"),
         ("sqlite:///:memory:", "names no file"),
         ("sqlite://lab.db", "sqlite:///lab.db"),

@@ -101,3 +101,5 @@ def test_options():
         format_option(" , ")
     with pytest.raises(SpecError, match="--database: error: objects cannot be kept in 'mysql'"):
         database_option("mysql://host/name")
+    with pytest.raises(SpecError, match="--database: error: 'postgresql:/name' is half an address"):
+        database_option("postgresql:/name")
