@@ -78,6 +78,7 @@ def _look(axes: Any, solid: Polyhedron, T_object_probe: Array) -> None:
     for k, (name, _) in enumerate(AXES):
         getattr(axes, f"set_{name}lim")(middle[k] - half, middle[k] + half)
         getattr(axes, f"set_{name}label")(f"{name} (mm)")
+    axes.locator_params(nbins=4)  # more of them cover each other where an axis is foreshortened
     axes.set_box_aspect((1, 1, 1), zoom=0.85)
     x, y, z = T_object_probe[:3, 2]
     up = math.degrees(math.asin(max(-1.0, min(1.0, z))))
