@@ -7,7 +7,7 @@ The best of all registered places always exists; it is an answer only if
 - the symbols that are registered there, worn ones excepted, explain most of the image
   (`explained`), enough of them are in view, and no cell speaks clearly for another symbol
   (`contradicted`),
-- where few symbols are in view, they are at least so many that they can name one of the
+- where few symbols are plainly read, they are at least so many that they can name one of the
   registered cells (`naming`), and leave other places farther behind: bare cells, which are
   as well beyond an edge, between two edges or worn, then weigh as much as the symbols.
 """
@@ -103,7 +103,7 @@ class Cells:
 
     worn: Flags  #: hold a symbol that is not felt at all
     seen: Flags  #: tactels enough look at them
-    told: Flags  #: seen, with a symbol that is not worn
+    told: Flags  #: seen, with a symbol that is likelier than all other ones and none together
     against: NDArray[np.float64]  #: nats by which they speak for another symbol
 
 
@@ -115,7 +115,8 @@ def weighed(encoding: Encoding, fit: Fit, place: Place) -> Cells:
     worn = np.asarray((held < order) & (fit.scores[:, order] > own))
     seen = np.asarray(fit.seen >= WHOLE)
     against = np.where(worn, 0.0, fit.scores[:, :order].max(axis=1) - own)
-    return Cells(worn, seen, seen & (held < order) & ~worn, against)
+    tells = own > np.log(np.exp(fit.scores).sum(axis=1)) - math.log(2.0)
+    return Cells(worn, seen, seen & (held < order) & tells, against)
 
 
 def left_at(encoding: Encoding, place: Place, worn: Ints, cells: Ints) -> Ints:

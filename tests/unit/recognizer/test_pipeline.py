@@ -15,7 +15,7 @@ from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.sensor import Sensor
 from probe.simulate.registered import registered_surface
-from recognizer.belief import Support, Thresholds, naming
+from recognizer.belief import Support, Thresholds, naming, weighed
 from recognizer.lab import open_lab
 from recognizer.locate import CAP, Place, place_scores, places, rivals, shown_at
 from recognizer.pipeline import _by_few, explained, recognise
@@ -253,6 +253,27 @@ def test_few_symbols_answer_only_if_they_can_name_a_place(url, reader):
     assert all(cells >= fewest for told, cells in seen if told)
     assert any(told and cells < limits.many for told, cells in seen)
     assert not all(told for told, _ in seen)
+
+
+def test_a_cell_that_says_hardly_anything_does_not_speak_for_a_place(url, reader):
+    forces = felt(url, "Cube", "F1", Touch(32.0, 24.0, 0.7, 80.0))
+    _, reading = explained(reader, signal_of(forces, newtons=True))
+    encoding, fit, place = reading.encoding, reading.fit, reading.place
+    told = weighed(encoding, fit, place).told
+    held = shown_at(encoding, place, fit.cells)
+    assert told.sum() >= reader.thresholds.many
+    assert (held[told] < encoding.array.order).all()
+    scores = fit.scores.copy()
+    mute, torn = np.flatnonzero(told)[:2]
+    scores[mute] = [0.0, -0.2, -0.2, -0.7, -0.5]  # looked at, and nearly as likely anything
+    scores[torn] = -9.0
+    scores[torn, [held[torn], (held[torn] + 1) % encoding.array.order]] = 0.0, -0.1
+    again = weighed(encoding, replace(fit, scores=scores), place)
+    assert again.seen[mute]
+    assert np.flatnonzero(told ^ again.told).tolist() == [mute]
+    scores[torn, (held[torn] + 1) % encoding.array.order] = 0.1
+    again = weighed(encoding, replace(fit, scores=scores), place)
+    assert np.flatnonzero(told ^ again.told).tolist() == sorted([mute, torn])
 
 
 def test_few_symbols_must_leave_other_places_far_behind(url, reader):
