@@ -24,7 +24,7 @@ from pathlib import Path
 from validation_shards import differing, shards
 
 COMMAND = [sys.executable, "-m", "recognizer.validation.command"]
-RATE = 25.0  #: touches a second, about: interruptions are spread over the time that takes
+RATE = 25.0  #: touches a second, about, where no run is made first
 
 
 def main() -> int:
@@ -43,15 +43,17 @@ def main() -> int:
         work = [*COMMAND, options.spec, "--touches", str(options.touches), "--study", "0",
                 "--seed", str(options.seed), "--shard", str(options.shard), "-j", str(options.j),
                 "-o"]  # fmt: skip
+        start, seconds = time.monotonic(), options.touches / RATE
         if options.like is None:
             subprocess.run([*work, str(like)], check=True)
+            seconds = time.monotonic() - start
         start = time.monotonic()
         for number in range(options.times):
             resume = ["--resume"] if (broken / "asked.json").exists() else []
             process = subprocess.Popen(
                 [*work, str(broken), *resume], start_new_session=True, stderr=subprocess.DEVNULL
             )
-            wait = rng.uniform(0.1, 1.5) * options.touches / RATE / options.times
+            wait = rng.uniform(0.1, 1.5) * seconds / options.times
             how = rng.choice((signal.SIGKILL, signal.SIGINT))
             try:
                 process.wait(wait)
