@@ -115,7 +115,7 @@ def weighed(encoding: Encoding, fit: Fit, place: Place) -> Cells:
     worn = np.asarray((held < order) & (fit.scores[:, order] > own))
     seen = np.asarray(fit.seen >= WHOLE)
     against = np.where(worn, 0.0, fit.scores[:, :order].max(axis=1) - own)
-    tells = own > np.log(np.exp(fit.scores).sum(axis=1)) - math.log(2.0)
+    tells = own > _anything(fit) - math.log(2.0)
     return Cells(worn, seen, seen & (held < order) & tells, against)
 
 
@@ -141,5 +141,11 @@ def unplaced(encoding: Encoding, fit: Fit) -> float:
     one over their number.
     """
     options = encoding.array.order + 1
-    each = np.log(np.exp(fit.scores).sum(axis=1)) - math.log(options)
+    each = _anything(fit) - math.log(options)
     return float(each.sum()) + fit.value + math.log(len(encoding.keys))
+
+
+def _anything(fit: Fit) -> NDArray[np.float64]:
+    """Return the log of each cell's likelihoods (m,), summed over all that it may show."""
+    total: NDArray[np.float64] = np.log(np.exp(fit.scores).sum(axis=1))
+    return total
