@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from generator.errors import GeneratorError
+from encoded_objects.errors import EncodedObjectsError
 
 if TYPE_CHECKING:
     from decoder.decoded import Candidate, Decoded
@@ -66,7 +66,7 @@ def run(arguments: list[str]) -> int:
         return int(code or 0) if arguments else BAD_INPUT
     except typer.Exit as leaving:
         return leaving.exit_code
-    except GeneratorError as error:
+    except EncodedObjectsError as error:
         cause = f"{error.place}: {error.cause}" if error.place else error.cause
         _report(cause, error.fix, as_json=as_json)
         return error.exit_code

@@ -2,7 +2,7 @@
 
 ::
 
-    GeneratorError          exit code 2
+    EncodedObjectsError     exit code 2
     └── DecoderError
         ├── WindowError     a window that is no window of this array's symbols
         └── MethodError     a method that does not serve this array, or not at this size
@@ -12,10 +12,10 @@ A window that cannot be decoded is no error: it is a `Decoded` with a reason.
 
 from __future__ import annotations
 
-from generator.errors import GeneratorError
+from encoded_objects.errors import EncodedObjectsError
 
 
-class DecoderError(GeneratorError):
+class DecoderError(EncodedObjectsError):
     """Base of all errors of `decoder`."""
 
 

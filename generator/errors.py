@@ -2,45 +2,26 @@
 
 ::
 
-    GeneratorError        exit code 2
-    ├── SpecError         the YAML file: one or more problems, each with its place
-    ├── ShapeError        a polyhedron or a file that holds one
-    ├── ArrayError        an encoding that cannot be built or does not identify
-    ├── AlphabetError     a symbol that cannot be embossed as asked
-    ├── LayoutError       a face that shows no place, or an array that is full
-    ├── SolidError        a part that cannot be made or did not pass its proof
-    └── DatabaseError     exit code 4: cannot be opened, newer, or holds another object
+    EncodedObjectsError       exit code 2
+    └── GeneratorError
+        ├── SpecError         the YAML file: one or more problems, each with its place
+        ├── ShapeError        a polyhedron or a file that holds one
+        ├── ArrayError        an encoding that cannot be built or does not identify
+        ├── AlphabetError     a symbol that cannot be embossed as asked
+        ├── LayoutError       a face that shows no place, or an array that is full
+        ├── SolidError        a part that cannot be made or did not pass its proof
+        └── DatabaseError     exit code 4: cannot be opened, newer, or holds another object
 
 Every error says what was given, what is allowed, and the way out (`fix`).
 """
 
 from __future__ import annotations
 
+from encoded_objects.errors import EncodedObjectsError
 
-class GeneratorError(Exception):
-    """Base of all errors of `generator`.
 
-    Parameters
-    ----------
-    cause
-        What is wrong, with the value that was given and what is allowed.
-    fix
-        The way out, as an instruction ("set pitch to 5.7 mm or less").
-    place
-        Where: a file, `file:line:column`, or the name of a face.
-    """
-
-    exit_code = 2
-
-    def __init__(self, cause: str, *, fix: str = "", place: str = "") -> None:
-        super().__init__(cause)
-        self.cause = cause
-        self.fix = fix
-        self.place = place
-
-    def __str__(self) -> str:
-        head = f"{self.place}: {self.cause}" if self.place else self.cause
-        return f"{head}; {self.fix}" if self.fix else head
+class GeneratorError(EncodedObjectsError):
+    """Base of all errors of `generator`."""
 
 
 class ShapeError(GeneratorError):

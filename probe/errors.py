@@ -2,46 +2,27 @@
 
 ::
 
-    ProbeError            exit code 2
-    ├── FrameError        an image that is not 16x16 readings
-    ├── PortError         exit code 3: no such device, busy, gone, or not our probe
-    ├── RecordingError    a file that is no recording, damaged, or of a newer format
-    ├── CalibrationError  too few loads, loads that do not determine the law
-    ├── SurfaceError      a mesh or a face that gives no height map
-    ├── ContactError      a scene without an equilibrium, or out of a model's range
-    ├── CircuitError      a network that cannot be read or inverted as asked
-    └── PoseError         wrist or arm outside its range, or near a singularity
+    EncodedObjectsError       exit code 2
+    └── ProbeError
+        ├── FrameError        an image that is not 16x16 readings
+        ├── PortError         exit code 3: no such device, busy, gone, or not our probe
+        ├── RecordingError    a file that is no recording, damaged, or of a newer format
+        ├── CalibrationError  too few loads, loads that do not determine the law
+        ├── SurfaceError      a mesh or a face that gives no height map
+        ├── ContactError      a scene without an equilibrium, or out of a model's range
+        ├── CircuitError      a network that cannot be read or inverted as asked
+        └── PoseError         wrist or arm outside its range, or near a singularity
 
 Every error says what was given, what is allowed, and the way out (`fix`).
 """
 
 from __future__ import annotations
 
+from encoded_objects.errors import EncodedObjectsError
 
-class ProbeError(Exception):
-    """Base of all errors of `probe`.
 
-    Parameters
-    ----------
-    cause
-        What is wrong, with the value that was given and what is allowed.
-    fix
-        The way out, as an instruction ("close the other programme").
-    place
-        Where: a port URL, a file, or a part of the scene.
-    """
-
-    exit_code = 2
-
-    def __init__(self, cause: str, *, fix: str = "", place: str = "") -> None:
-        super().__init__(cause)
-        self.cause = cause
-        self.fix = fix
-        self.place = place
-
-    def __str__(self) -> str:
-        head = f"{self.place}: {self.cause}" if self.place else self.cause
-        return f"{head}; {self.fix}" if self.fix else head
+class ProbeError(EncodedObjectsError):
+    """Base of all errors of `probe`."""
 
 
 class FrameError(ProbeError):

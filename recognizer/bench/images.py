@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import Sensor
-from recognizer.filters import median, sobel, touch_image, unbiased
+from recognizer.thesis.filters import median, sobel, touch_image, unbiased
 
 Array = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from probe.sensor import Sensor
 from recognizer.bench.images import FILTERS, filtered
-from recognizer.mosaic.image import GlobalImage
+from recognizer.scan.mosaic.image import GlobalImage
 
 Array = NDArray[np.float64]
 

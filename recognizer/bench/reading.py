@@ -25,14 +25,14 @@ from recognizer.bench.message import MosaicPicture, mosaic_picture
 from recognizer.bench.telling import told
 from recognizer.bench.watch import Watch
 from recognizer.errors import RecognizerError
-from recognizer.lab import open_lab
-from recognizer.mosaic.grow import added
-from recognizer.mosaic.mosaic import Mosaic, no_touches
-from recognizer.mosaic.touch import PlacedTouch, decoded_place
-from recognizer.pipeline import recognise
-from recognizer.reader import Reader, reader_for
-from recognizer.recognition import Recognition
-from recognizer.signal import Signal, signal_of
+from recognizer.scan.mosaic.grow import added
+from recognizer.scan.mosaic.mosaic import Mosaic, no_touches
+from recognizer.scan.mosaic.touch import PlacedTouch, decoded_place
+from recognizer.touch.lab import open_lab
+from recognizer.touch.reader import Reader, reader_for
+from recognizer.touch.recognise import recognise
+from recognizer.touch.recognition import Recognition
+from recognizer.touch.signal import Signal, signal_of
 
 LEAST_N = 0.05  #: of the strongest tactels, for a contact
 FACES = 24  #: mosaics that are kept

@@ -19,7 +19,7 @@ from generator.database.read import list_objects, read_object
 from generator.database.registered import RegisteredObject
 from probe.surface.solids import filled, symbol_triangles
 from probe.surface.symbols import Relief, embossed
-from recognizer.lab import Encoding, Lab
+from recognizer.touch.lab import Encoding, Lab
 
 DIGITS = 4  #: after the point, of mm: a tenth of a micrometre
 

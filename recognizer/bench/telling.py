@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import Sensor
-from recognizer.lab import EncodedFace, Encoding, Lab
-from recognizer.recognition import Recognition
+from recognizer.touch.lab import EncodedFace, Encoding, Lab
+from recognizer.touch.recognition import Recognition
 
 Array = NDArray[np.float64]
 

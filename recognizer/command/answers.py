@@ -20,12 +20,12 @@ from probe.frame import Frame
 from recognizer.command import report
 from recognizer.command.placed import object_in_base
 from recognizer.command.source import Source, at_port, listened, recorded
-from recognizer.lab import open_lab
-from recognizer.pipeline import recognise
-from recognizer.reader import Reader, reader_for
-from recognizer.recognition import Recognition
-from recognizer.robot import ObjectPose
-from recognizer.touches import Touch
+from recognizer.touch.contacts import Touch
+from recognizer.touch.lab import open_lab
+from recognizer.touch.reader import Reader, reader_for
+from recognizer.touch.recognise import recognise
+from recognizer.touch.recognition import Recognition
+from recognizer.touch.robot import ObjectPose
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,7 +182,7 @@ def _draw_all(
 
 
 def _draw(reader: Reader, source: Source, answer: Answer, path: Path) -> None:
-    from recognizer.plot.touch import touch_picture
+    from recognizer.command.plot.touch import touch_picture
 
     pose = None if answer.placed is None else answer.placed.T_robot_object
     with staged(path) as draft:

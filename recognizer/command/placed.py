@@ -10,9 +10,9 @@ from probe.arm.carried import SensorPose
 from probe.arm.links import Arm
 from probe.errors import PoseError
 from probe.wrist.geometry import Wrist
-from recognizer.recognition import Recognition
-from recognizer.robot import ObjectPose, carried_pose, object_pose
-from recognizer.touches import Touch
+from recognizer.touch.contacts import Touch
+from recognizer.touch.recognition import Recognition
+from recognizer.touch.robot import ObjectPose, carried_pose, object_pose
 
 
 def object_in_base(

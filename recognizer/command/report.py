@@ -11,9 +11,9 @@ if TYPE_CHECKING:
     from generator.errors import GeneratorError
     from probe.errors import ProbeError
     from recognizer.errors import RecognizerError
-    from recognizer.recognition import Recognition
-    from recognizer.robot import ObjectPose
-    from recognizer.touches import Touch
+    from recognizer.touch.contacts import Touch
+    from recognizer.touch.recognition import Recognition
+    from recognizer.touch.robot import ObjectPose
 
 #: what a person does about a reason for which there is no answer
 WAYS_OUT = {

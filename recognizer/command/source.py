@@ -26,8 +26,8 @@ from probe.port.url import address_of
 from probe.recording.layout import Origin
 from probe.recording.read import read_recording
 from probe.sensor import Overlay, Sensor
-from recognizer.signal import Signal, signal_of
-from recognizer.touches import Touch, every_frame, touches
+from recognizer.touch.contacts import Touch, every_frame, touches
+from recognizer.touch.signal import Signal, signal_of
 
 LEAST_N = 0.05  #: N over the lowest reading by which the strongest tactels must rise
 _SLICE_S = 0.1

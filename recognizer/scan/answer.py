@@ -1,9 +1,10 @@
 """Composites -> places of the database -> Recognition. Thesis 6.3.
 
-A composite is located as the fit of one touch is (`recognizer.locate`), places being listed by
-its most telling cells and compared by all of them. The pose of the last touch is fitted once
-more with the symbols that the database holds there. The conditions of an answer are those of
-`recognizer.belief`, on all cells together; what a composite may contradict grows with its size.
+A composite is located as the fit of one touch is (`recognizer.touch.locate`), places being
+listed by its most telling cells and compared by all of them. The pose of the last touch is
+fitted once more with the symbols that the database holds there. The conditions of an answer are
+those of `recognizer.touch.belief`, on all cells together; what it may contradict grows with its
+size.
 """
 
 from __future__ import annotations
@@ -15,12 +16,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.belief import CLEARLY, left_at, unplaced, weighed
-from recognizer.lab import Encoding
-from recognizer.locate import Place, neighbours, place_scores, places, under_centre
-from recognizer.pipeline import placed
-from recognizer.reader import Reader
-from recognizer.recognition import (
+from recognizer.scan.composite import Composite
+from recognizer.scan.settings import ScanSettings
+from recognizer.touch.belief import CLEARLY, left_at, unplaced, weighed
+from recognizer.touch.lab import Encoding
+from recognizer.touch.locate import Place, neighbours, place_scores, places, under_centre
+from recognizer.touch.reader import Reader
+from recognizer.touch.recognise import placed
+from recognizer.touch.recognition import (
     AMBIGUOUS,
     NOT_ENCODED,
     TOO_FEW,
@@ -28,13 +31,11 @@ from recognizer.recognition import (
     RunnerUp,
     refused,
 )
-from recognizer.round import SHARES, bend_at
-from recognizer.scan.composite import Composite
-from recognizer.scan.settings import ScanSettings
-from recognizer.symbols.fit import Fit, scored
-from recognizer.symbols.gain import Image, bent
-from recognizer.symbols.refine import explained_share, refined, started
-from recognizer.symbols.template import Template
+from recognizer.touch.round import SHARES, bend_at
+from recognizer.touch.symbols.fit import Fit, scored
+from recognizer.touch.symbols.gain import Image, bent
+from recognizer.touch.symbols.refine import explained_share, refined, started
+from recognizer.touch.symbols.template import Template
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from recognizer.scan.lattice import Agreement, expected_at
 from recognizer.scan.settings import ScanSettings
 from recognizer.scan.views import Stands, Views
-from recognizer.symbols.fit import Fit
+from recognizer.touch.symbols.fit import Fit
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]

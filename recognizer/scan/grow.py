@@ -9,14 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.belief import WHOLE
-from recognizer.mosaic.touch import PlacedTouch
-from recognizer.pipeline import recognise
-from recognizer.reader import Reader
-from recognizer.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, TOO_FEW, Recognition, refused
 from recognizer.scan.answer import Located, answered, located, posed
 from recognizer.scan.composite import Composite, composite, expected_fit
 from recognizer.scan.lattice import PlaneLattice, agreed, alike, expected_at, seeded
+from recognizer.scan.mosaic.touch import PlacedTouch
 from recognizer.scan.settings import ScanSettings
 from recognizer.scan.views import (
     Stands,
@@ -29,8 +25,19 @@ from recognizer.scan.views import (
     views_of,
     widest_mm,
 )
-from recognizer.symbols.gain import Image, image_of
-from recognizer.symbols.pressing import pressing_of
+from recognizer.touch.belief import WHOLE
+from recognizer.touch.reader import Reader
+from recognizer.touch.recognise import recognise
+from recognizer.touch.recognition import (
+    AMBIGUOUS,
+    NO_CONTACT,
+    NOT_ENCODED,
+    TOO_FEW,
+    Recognition,
+    refused,
+)
+from recognizer.touch.symbols.gain import Image, image_of
+from recognizer.touch.symbols.pressing import pressing_of
 
 Array = NDArray[np.float64]
 

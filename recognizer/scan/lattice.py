@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.mosaic.planar import composed, inverse, wrapped
+from recognizer.scan.mosaic.planar import composed, inverse, wrapped
 from recognizer.scan.settings import ScanSettings
 from recognizer.scan.views import Stands, Views
 

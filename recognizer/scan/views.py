@@ -13,19 +13,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.lab import Encoding
-from recognizer.mosaic.grow import added
-from recognizer.mosaic.mosaic import Mosaic, MosaicSettings, no_touches
-from recognizer.mosaic.planar import wrapped
-from recognizer.mosaic.touch import PlacedTouch
-from recognizer.reader import Reader
-from recognizer.round import BENDS
-from recognizer.symbols.bent import bends_of
-from recognizer.symbols.fit import Fit, Settings, fits, scored
-from recognizer.symbols.gain import Image, bent, first_gain
-from recognizer.symbols.refine import refined, started
-from recognizer.symbols.search import Bank
-from recognizer.symbols.template import Template
+from recognizer.scan.mosaic.grow import added
+from recognizer.scan.mosaic.mosaic import Mosaic, MosaicSettings, no_touches
+from recognizer.scan.mosaic.planar import wrapped
+from recognizer.scan.mosaic.touch import PlacedTouch
+from recognizer.touch.lab import Encoding
+from recognizer.touch.reader import Reader
+from recognizer.touch.round import BENDS
+from recognizer.touch.symbols.bent import bends_of
+from recognizer.touch.symbols.fit import Fit, Settings, fits, scored
+from recognizer.touch.symbols.gain import Image, bent, first_gain
+from recognizer.touch.symbols.refine import refined, started
+from recognizer.touch.symbols.search import Bank
+from recognizer.touch.symbols.template import Template
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from recognizer.reader import THOROUGH, Reader
-from recognizer.symbols.fit import Settings
+from recognizer.touch.reader import THOROUGH, Reader
+from recognizer.touch.symbols.fit import Settings
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.levels import LEVELS
 from recognizer.validation.surfaces import FOREIGN

@@ -21,9 +21,9 @@ from probe.errors import ProbeError
 from probe.sensor import Overlay, Sensor
 from probe.surface.contract import Surface
 from probe.surface.indenters import Cross, Plate, Rough, Strip, TiltedPlane
-from recognizer.pipeline import recognise
-from recognizer.reader import Reader
-from recognizer.signal import signal_of
+from recognizer.touch.reader import Reader
+from recognizer.touch.recognise import recognise
+from recognizer.touch.signal import signal_of
 from recognizer.validation.statistics import rounded
 
 BALANCE = 1e-6  #: of the load

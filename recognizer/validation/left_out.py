@@ -18,7 +18,7 @@ from generator.database.read import object_names, read_object
 from generator.database.transaction import reading
 from probe.contact.press import LEVELS, level_for, table
 from probe.contact.tips import Tips, tip_points
-from recognizer.reader import Reader
+from recognizer.touch.reader import Reader
 from recognizer.validation.precision import Study
 from recognizer.validation.trial import Plan, drawn
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from decoder import Decodings, Likelihood, decode_exact, decode_good_tuple
 from generator.array import FoldedArray
 from probe.contact.press import table
-from recognizer.lab import Encoding
+from recognizer.touch.lab import Encoding
 from recognizer.validation.campaign import Campaign, series_of, settings_of
 from recognizer.validation.results import line_of
 from recognizer.validation.shards import TIMES, columns_of, read_series

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.alphabet import Alphabet
-from recognizer.pipeline import recognise
-from recognizer.reader import Reader
-from recognizer.recognition import Recognition
-from recognizer.signal import signal_of
-from recognizer.symbols.fit import Fit, fits
-from recognizer.symbols.gain import image_of
-from recognizer.symbols.pressing import pressing_of
+from recognizer.touch.reader import Reader
+from recognizer.touch.recognise import recognise
+from recognizer.touch.recognition import Recognition
+from recognizer.touch.signal import signal_of
+from recognizer.touch.symbols.fit import Fit, fits
+from recognizer.touch.symbols.gain import image_of
+from recognizer.touch.symbols.pressing import pressing_of
 from recognizer.validation.campaign import plan_of, series_of
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.pictures import figure_on

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from probe.sensor import Sensor
-from recognizer.lab import EncodedFace, Lab
+from recognizer.touch.lab import EncodedFace, Lab
 from recognizer.validation.trial import Trial
 
 Row = dict[str, Any]

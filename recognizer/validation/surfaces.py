@@ -18,7 +18,7 @@ from probe.surface.contract import Surface
 from probe.surface.face import Face, endless
 from probe.surface.indenters import Plate, Rough
 from probe.surface.symbols import Relief
-from recognizer.lab import Encoding
+from recognizer.touch.lab import Encoding
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -23,11 +23,11 @@ from probe.simulate.scene import Scene
 from probe.simulate.touch import Touches, random_touches
 from probe.surface.contract import Surface
 from probe.surface.face import Face
-from recognizer.lab import Encoding
-from recognizer.pipeline import recognise
-from recognizer.reader import Reader
-from recognizer.recognition import Recognition
-from recognizer.signal import signal_of
+from recognizer.touch.lab import Encoding
+from recognizer.touch.reader import Reader
+from recognizer.touch.recognise import recognise
+from recognizer.touch.recognition import Recognition
+from recognizer.touch.signal import signal_of
 from recognizer.validation.levels import LEVELS, read
 from recognizer.validation.surfaces import FOREIGN, worn
 from recognizer.validation.written import worn_away, written_surface

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from recognizer.lab import open_lab
-from recognizer.reader import Reader, reader_for
+from recognizer.touch.lab import open_lab
+from recognizer.touch.reader import Reader, reader_for
 from recognizer.validation.campaign import Campaign, Piece, plan_of, reader_with, series_of
 from recognizer.validation.errors import WorkersError
 from recognizer.validation.made import set_digest

@@ -20,7 +20,7 @@ from probe.simulate.part import part_surface
 from probe.simulate.registered import registered_object
 from probe.simulate.scene import Scene
 from probe.surface.contract import Surface
-from recognizer.lab import EncodedFace
+from recognizer.touch.lab import EncodedFace
 from recognizer.validation.errors import SetError
 
 Array = NDArray[np.float64]

@@ -34,15 +34,15 @@ from probe.sensor import Sensor
 from probe.simulate.registered import registered_surface
 from probe.surface.face import Face
 from probe.surface.polygon import polygon
-from recognizer.classical import read_classically
-from recognizer.classical_image import Merging, merged
-from recognizer.classical_scan import read_while_scanning, spatial_pose
-from recognizer.edges.find import classical_edges, outline
-from recognizer.filters import median, touch_image, unbiased
-from recognizer.grid import grid
-from recognizer.lab import open_lab
-from recognizer.mosaic.planar import between, moved
-from recognizer.skeleton.symbols import symbols
+from recognizer.scan.mosaic.planar import between, moved
+from recognizer.thesis.edges.find import classical_edges, outline
+from recognizer.thesis.filters import median, touch_image, unbiased
+from recognizer.thesis.grid import grid
+from recognizer.thesis.image import Merging, merged
+from recognizer.thesis.read import read_classically
+from recognizer.thesis.scan import read_while_scanning, spatial_pose
+from recognizer.thesis.skeleton.symbols import symbols
+from recognizer.touch.lab import open_lab
 
 SENSOR = Sensor()
 LEVELS = ("typical", "mismatch")

@@ -39,12 +39,11 @@ from probe.scan.places import surface_to_sensor
 from probe.scan.raster import raster
 from probe.sensor import Sensor
 from probe.simulate.registered import registered_object, registered_surface
-from recognizer.lab import open_lab
-from recognizer.mosaic.grow import added, settled
-from recognizer.mosaic.mosaic import Mosaic, MosaicSettings, no_touches, outliers
-from recognizer.mosaic.pair import registered
-from recognizer.mosaic.patch import Patch, patch_of
-from recognizer.mosaic.planar import (
+from recognizer.scan.mosaic.grow import added, settled
+from recognizer.scan.mosaic.mosaic import Mosaic, MosaicSettings, no_touches, outliers
+from recognizer.scan.mosaic.pair import registered
+from recognizer.scan.mosaic.patch import Patch, patch_of
+from recognizer.scan.mosaic.planar import (
     between,
     between_covariance,
     composed,
@@ -52,11 +51,12 @@ from recognizer.mosaic.planar import (
     planar_pose,
     wrapped,
 )
-from recognizer.mosaic.product import product_shift
-from recognizer.mosaic.touch import Placed, PlacedTouch, decoded_place, placed
-from recognizer.pipeline import recognise
-from recognizer.reader import reader_for
-from recognizer.signal import Signal, signal_of
+from recognizer.scan.mosaic.touch import Placed, PlacedTouch, decoded_place, placed
+from recognizer.thesis.product import product_shift
+from recognizer.touch.lab import open_lab
+from recognizer.touch.reader import reader_for
+from recognizer.touch.recognise import recognise
+from recognizer.touch.signal import Signal, signal_of
 
 SPECS = Path(__file__).parents[2] / "fixtures" / "specs"
 SENSOR = Sensor()

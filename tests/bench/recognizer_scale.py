@@ -32,10 +32,10 @@ from probe.surface.lattice import Lattice, listed  # noqa: E402
 from probe.surface.polygon import polygon  # noqa: E402
 from probe.surface.symbols import Relief, embossed  # noqa: E402
 from probe.surface.template import template  # noqa: E402
-from recognizer.lab import EncodedFace, Encoding, Lab, cell_keys  # noqa: E402
-from recognizer.pipeline import recognise  # noqa: E402
-from recognizer.reader import reader_for  # noqa: E402
-from recognizer.signal import signal_of  # noqa: E402
+from recognizer.touch.lab import EncodedFace, Encoding, Lab, cell_keys  # noqa: E402
+from recognizer.touch.reader import reader_for  # noqa: E402
+from recognizer.touch.recognise import recognise  # noqa: E402
+from recognizer.touch.signal import signal_of  # noqa: E402
 from recognizer.validation.levels import TYPICAL, read  # noqa: E402
 
 SIDE = 8  # symbols along an edge

@@ -36,15 +36,15 @@ from probe.scan.places import surface_to_sensor
 from probe.scan.raster import raster
 from probe.sensor import Sensor
 from probe.simulate.registered import registered_surface
-from recognizer.classical_image import Merging
-from recognizer.classical_scan import read_scan as read_classically
-from recognizer.lab import open_lab
-from recognizer.mosaic.planar import inverse, moved, planar_covariance, planar_pose
-from recognizer.mosaic.touch import PlacedTouch, placed
-from recognizer.pipeline import recognise
-from recognizer.reader import reader_for
 from recognizer.scan.grow import begun, extended
-from recognizer.signal import signal_of
+from recognizer.scan.mosaic.planar import inverse, moved, planar_covariance, planar_pose
+from recognizer.scan.mosaic.touch import PlacedTouch, placed
+from recognizer.thesis.image import Merging
+from recognizer.thesis.scan import read_scan as read_classically
+from recognizer.touch.lab import open_lab
+from recognizer.touch.reader import reader_for
+from recognizer.touch.recognise import recognise
+from recognizer.touch.signal import signal_of
 from recognizer.validation.levels import BIAS, LEVELS, read
 from recognizer.validation.surfaces import FOREIGN, worn
 

@@ -17,17 +17,17 @@ for library in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 import numpy as np  # noqa: E402
 
-from recognizer.lab import open_lab  # noqa: E402
-from recognizer.locate import places  # noqa: E402
-from recognizer.pipeline import explained  # noqa: E402
-from recognizer.reader import reader_for  # noqa: E402
-from recognizer.signal import signal_of  # noqa: E402
-from recognizer.symbols.fit import Settings, fits  # noqa: E402
-from recognizer.symbols.gain import felt_under, first_gain, image_of  # noqa: E402
-from recognizer.symbols.pressing import pressing_of  # noqa: E402
-from recognizer.symbols.search import search  # noqa: E402
+from recognizer.touch.lab import open_lab  # noqa: E402
+from recognizer.touch.locate import places  # noqa: E402
+from recognizer.touch.reader import reader_for  # noqa: E402
+from recognizer.touch.recognise import explained  # noqa: E402
+from recognizer.touch.signal import signal_of  # noqa: E402
+from recognizer.touch.symbols.fit import Settings, fits  # noqa: E402
+from recognizer.touch.symbols.gain import felt_under, first_gain, image_of  # noqa: E402
+from recognizer.touch.symbols.pressing import pressing_of  # noqa: E402
+from recognizer.touch.symbols.search import search  # noqa: E402
+from recognizer.touch.verify import readings  # noqa: E402
 from recognizer.validation.trial import Plan, drawn, judged, sensor_of  # noqa: E402
-from recognizer.verify import readings  # noqa: E402
 
 SETTINGS = {
     "1 lattice, 1 + 1 steps": Settings(1, 1, 1, 1),

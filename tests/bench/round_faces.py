@@ -46,13 +46,13 @@ from probe.sensor import Sensor  # noqa: E402
 from probe.simulate.registered import registered_object  # noqa: E402
 from probe.simulate.round import RoundPart, round_part  # noqa: E402
 from probe.simulate.touch import Touches, random_touches  # noqa: E402
-from recognizer.lab import open_lab  # noqa: E402
-from recognizer.mosaic.touch import PlacedTouch, placed  # noqa: E402
-from recognizer.pipeline import recognise  # noqa: E402
-from recognizer.reader import Reader, reader_for  # noqa: E402
-from recognizer.recognition import Recognition  # noqa: E402
 from recognizer.scan.grow import begun, extended  # noqa: E402
-from recognizer.signal import signal_of  # noqa: E402
+from recognizer.scan.mosaic.touch import PlacedTouch, placed  # noqa: E402
+from recognizer.touch.lab import open_lab  # noqa: E402
+from recognizer.touch.reader import Reader, reader_for  # noqa: E402
+from recognizer.touch.recognise import recognise  # noqa: E402
+from recognizer.touch.recognition import Recognition  # noqa: E402
+from recognizer.touch.signal import signal_of  # noqa: E402
 from recognizer.validation.levels import LEVELS, read  # noqa: E402
 from recognizer.validation.trial import INSIDE_MM, NEAR_MM  # noqa: E402
 

@@ -18,8 +18,8 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 import numpy as np  # noqa: E402
 
-from recognizer.lab import open_lab  # noqa: E402
-from recognizer.reader import reader_for  # noqa: E402
+from recognizer.touch.lab import open_lab  # noqa: E402
+from recognizer.touch.reader import reader_for  # noqa: E402
 from recognizer.validation.surfaces import FOREIGN  # noqa: E402
 from recognizer.validation.trial import Plan, Trial, sensor_of, trial  # noqa: E402
 

@@ -26,10 +26,10 @@ from probe.sensor import Overlay, Sensor
 from probe.surface.face import endless
 from probe.surface.indenters import HalfPlane, Plate, Strip
 from probe.surface.polygon import polygon
-from recognizer.mosaic.pair import registered
-from recognizer.mosaic.patch import patch_of
-from recognizer.mosaic.planar import composed
-from recognizer.signal import signal_of
+from recognizer.scan.mosaic.pair import registered
+from recognizer.scan.mosaic.patch import patch_of
+from recognizer.scan.mosaic.planar import composed
+from recognizer.touch.signal import signal_of
 
 SENSORS = {kind: Sensor(overlay=Overlay(kind=kind)) for kind in ("tab", "pad")}
 TAB = SENSORS["tab"]

@@ -29,10 +29,10 @@ from probe.sensor import Sensor
 from probe.simulate.registered import registered_object
 from probe.simulate.round import round_part
 from probe.simulate.touch import Touches, random_touches
-from recognizer.lab import open_lab
-from recognizer.pipeline import recognise
-from recognizer.reader import reader_for
-from recognizer.signal import signal_of
+from recognizer.touch.lab import open_lab
+from recognizer.touch.reader import reader_for
+from recognizer.touch.recognise import recognise
+from recognizer.touch.signal import signal_of
 from recognizer.validation.levels import LEVELS, read
 
 SHAPES = {

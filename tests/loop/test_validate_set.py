@@ -15,8 +15,8 @@ import psutil
 import pyarrow.parquet as pq
 import pytest
 
-from recognizer.lab import open_lab
-from recognizer.reader import reader_for
+from recognizer.touch.lab import open_lab
+from recognizer.touch.reader import reader_for
 from recognizer.validation.command import run
 from recognizer.validation.errors import SetError
 from recognizer.validation.trial import Plan, drawn, sensor_of

@@ -10,14 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from probe.sensor import Sensor
-from recognizer.mosaic.canvas import Laid, empty_canvas, laid
-from recognizer.mosaic.correlation import correlated
-from recognizer.mosaic.graph import PLANE, Tie, covariances, solved
-from recognizer.mosaic.image import image_of
-from recognizer.mosaic.patch import patch_of
-from recognizer.mosaic.planar import between, composed, inverse, moved
-from recognizer.mosaic.raster import Raster
-from recognizer.signal import signal_of
+from recognizer.scan.mosaic.canvas import Laid, empty_canvas, laid
+from recognizer.scan.mosaic.correlation import correlated
+from recognizer.scan.mosaic.graph import PLANE, Tie, covariances, solved
+from recognizer.scan.mosaic.image import image_of
+from recognizer.scan.mosaic.patch import patch_of
+from recognizer.scan.mosaic.planar import between, composed, inverse, moved
+from recognizer.scan.mosaic.raster import Raster
+from recognizer.touch.signal import signal_of
 
 SENSOR = Sensor()
 lengths = st.floats(-500, 500)

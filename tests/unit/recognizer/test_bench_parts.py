@@ -26,7 +26,7 @@ from recognizer.bench.message import FramePicture, mosaic_picture
 from recognizer.bench.replay import ReplayFeed
 from recognizer.bench.simulated import manner_of
 from recognizer.bench.watch import AGAIN_S, RESTLESS_S, Watch
-from recognizer.mosaic.image import GlobalImage
+from recognizer.scan.mosaic.image import GlobalImage
 
 
 def recorded(path, counts, step_ns=10_000_000):

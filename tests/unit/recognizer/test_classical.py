@@ -16,14 +16,14 @@ from probe.scan.places import surface_to_sensor, touch_at
 from probe.scan.raster import raster
 from probe.sensor import Sensor
 from probe.simulate.registered import registered_surface
-from recognizer.classical import Settings, read_classically
-from recognizer.classical_image import Merging, laid, merged, relative_poses
-from recognizer.classical_scan import read_scan, read_while_scanning
-from recognizer.filters import ImageError, tactile_image, touch_image
-from recognizer.lab import open_lab
-from recognizer.mosaic.planar import between, moved
-from recognizer.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, TOO_FEW
-from recognizer.skeleton.symbols import symbols
+from recognizer.scan.mosaic.planar import between, moved
+from recognizer.thesis.filters import ImageError, tactile_image, touch_image
+from recognizer.thesis.image import Merging, laid, merged, relative_poses
+from recognizer.thesis.read import Settings, read_classically
+from recognizer.thesis.scan import read_scan, read_while_scanning
+from recognizer.thesis.skeleton.symbols import symbols
+from recognizer.touch.lab import open_lab
+from recognizer.touch.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, TOO_FEW
 
 SENSOR = Sensor()
 SET = """

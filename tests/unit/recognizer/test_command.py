@@ -318,11 +318,11 @@ def test_pictures(asked, lab, images):
 
 
 def test_the_symbols_of_the_picture_are_those_of_the_touch(lab, images):
-    from recognizer.lab import open_lab
-    from recognizer.pipeline import recognise
-    from recognizer.plot.winning import winning
-    from recognizer.reader import reader_for
-    from recognizer.signal import signal_of
+    from recognizer.command.plot.winning import winning
+    from recognizer.touch.lab import open_lab
+    from recognizer.touch.reader import reader_for
+    from recognizer.touch.recognise import recognise
+    from recognizer.touch.signal import signal_of
 
     reader = reader_for(open_lab(str(lab / "lab.db")), Sensor())
     signal = signal_of(images[0].astype(np.float64))

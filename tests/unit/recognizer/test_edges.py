@@ -12,14 +12,14 @@ from probe.contact.tips import Tips
 from probe.sensor import Overlay, Sensor
 from probe.surface.face import Face
 from probe.surface.polygon import polygon
-from recognizer.edges.find import Finding, classical_edges, face_edges, outline
-from recognizer.edges.hough import segments
-from recognizer.edges.line import meeting, through
-from recognizer.edges.points import EdgePoints, edge_points
-from recognizer.edges.pose import corner_poses
-from recognizer.edges.response import BLURS_MM, REACH_MM, felt_at, responses
-from recognizer.edges.syntax import fused, vertices
-from recognizer.filters import tactile_image, touch_image
+from recognizer.thesis.edges.find import Finding, classical_edges, face_edges, outline
+from recognizer.thesis.edges.hough import segments
+from recognizer.thesis.edges.line import meeting, through
+from recognizer.thesis.edges.points import EdgePoints, edge_points
+from recognizer.thesis.edges.pose import corner_poses
+from recognizer.thesis.edges.response import BLURS_MM, REACH_MM, felt_at, responses
+from recognizer.thesis.edges.syntax import fused, vertices
+from recognizer.thesis.filters import tactile_image, touch_image
 
 SENSOR = Sensor()
 SQUARE = np.array([[0.0, 0], [80, 0], [80, 80], [0, 80]])

@@ -5,7 +5,7 @@ import pytest
 from scipy import ndimage
 
 from probe.sensor import Sensor
-from recognizer.filters import (
+from recognizer.thesis.filters import (
     ImageError,
     magnified,
     median,
@@ -14,7 +14,7 @@ from recognizer.filters import (
     touch_image,
     unbiased,
 )
-from recognizer.mosaic.product import magnified as by_convolution
+from recognizer.thesis.product import magnified as by_convolution
 
 
 def noise(seed=0, shape=(16, 16)):

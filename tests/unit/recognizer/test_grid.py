@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from recognizer.grid import Acceptance, grid
-from recognizer.skeleton.count import Points
-from recognizer.skeleton.symbols import Symbol
+from recognizer.thesis.grid import Acceptance, grid
+from recognizer.thesis.skeleton.count import Points
+from recognizer.thesis.skeleton.symbols import Symbol
 
 NONE = Points(np.zeros((0, 2)), np.zeros((0, 2)), 0)
 PITCH = 12.0

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from recognizer.mosaic.graph import ARM, OUTLIER, PLANE, Tie, covariances, solved
-from recognizer.mosaic.planar import between, composed, wrapped
+from recognizer.scan.mosaic.graph import ARM, OUTLIER, PLANE, Tie, covariances, solved
+from recognizer.scan.mosaic.planar import between, composed, wrapped
 
 BELIEF, PAIR = np.diag([0.4, 0.4, 4e3]), np.diag([90.0, 60.0, 6e4])
 SURE = np.diag([1e3, 1e3, 3e5])

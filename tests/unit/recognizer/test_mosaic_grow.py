@@ -12,13 +12,13 @@ from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.sensor import Sensor
 from probe.surface.face import endless
-from recognizer.mosaic.errors import MosaicError
-from recognizer.mosaic.grow import added, mosaic_of, settled
-from recognizer.mosaic.mosaic import ALONE, no_touches, outliers
-from recognizer.mosaic.pair import AMBIGUOUS, CONSTANT
-from recognizer.mosaic.planar import between, composed
-from recognizer.mosaic.touch import PlacedTouch, placed
-from recognizer.signal import signal_of
+from recognizer.scan.mosaic.errors import MosaicError
+from recognizer.scan.mosaic.grow import added, mosaic_of, settled
+from recognizer.scan.mosaic.mosaic import ALONE, no_touches, outliers
+from recognizer.scan.mosaic.pair import AMBIGUOUS, CONSTANT
+from recognizer.scan.mosaic.planar import between, composed
+from recognizer.scan.mosaic.touch import PlacedTouch, placed
+from recognizer.touch.signal import signal_of
 
 SENSOR = Sensor()
 P = SENSOR.pitch_mm

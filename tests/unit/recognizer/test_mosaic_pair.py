@@ -11,10 +11,10 @@ from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.sensor import Sensor
 from probe.surface.face import endless
-from recognizer.mosaic.pair import AMBIGUOUS, APART, CONSTANT, NOISE, registered
-from recognizer.mosaic.patch import patch_of
-from recognizer.mosaic.planar import composed, inverse
-from recognizer.signal import signal_of
+from recognizer.scan.mosaic.pair import AMBIGUOUS, APART, CONSTANT, NOISE, registered
+from recognizer.scan.mosaic.patch import patch_of
+from recognizer.scan.mosaic.planar import composed, inverse
+from recognizer.touch.signal import signal_of
 
 SENSOR = Sensor()
 P = SENSOR.pitch_mm

@@ -9,12 +9,12 @@ import pytest
 
 from probe.scan.places import surface_to_sensor
 from probe.sensor import Sensor
-from recognizer.mosaic.canvas import Laid, empty_canvas, laid, reference
-from recognizer.mosaic.correlation import correlated, peaks
-from recognizer.mosaic.errors import MosaicError
-from recognizer.mosaic.image import as_tactile_image, image_of
-from recognizer.mosaic.patch import asked, patch_of
-from recognizer.mosaic.planar import (
+from recognizer.scan.mosaic.canvas import Laid, empty_canvas, laid, reference
+from recognizer.scan.mosaic.correlation import correlated, peaks
+from recognizer.scan.mosaic.errors import MosaicError
+from recognizer.scan.mosaic.image import as_tactile_image, image_of
+from recognizer.scan.mosaic.patch import asked, patch_of
+from recognizer.scan.mosaic.planar import (
     between,
     between_covariance,
     composed,
@@ -24,12 +24,12 @@ from recognizer.mosaic.planar import (
     planar_covariance,
     planar_pose,
 )
-from recognizer.mosaic.product import product_shift
-from recognizer.mosaic.raster import Raster, laid_under, magnified, points_mm
-from recognizer.mosaic.texture import kept, seen_motions
-from recognizer.mosaic.touch import PlacedTouch, decoded_place, placed
-from recognizer.recognition import Recognition, refused
-from recognizer.signal import Signal, signal_of
+from recognizer.scan.mosaic.raster import Raster, laid_under, magnified, points_mm
+from recognizer.scan.mosaic.texture import kept, seen_motions
+from recognizer.scan.mosaic.touch import PlacedTouch, decoded_place, placed
+from recognizer.thesis.product import product_shift
+from recognizer.touch.recognition import Recognition, refused
+from recognizer.touch.signal import Signal, signal_of
 
 SENSOR = Sensor()
 P = SENSOR.pitch_mm

@@ -15,20 +15,20 @@ from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.sensor import Sensor
 from probe.simulate.registered import registered_surface
-from recognizer.belief import Support, Thresholds, naming, weighed
-from recognizer.lab import open_lab
-from recognizer.locate import CAP, Place, place_scores, places, rivals, shown_at
-from recognizer.pipeline import _by_few, explained, recognise
-from recognizer.pose import inside_mm
-from recognizer.reader import reader_for
-from recognizer.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, OUTSIDE, TOO_FEW
-from recognizer.signal import CONTACT_N, signal_of
-from recognizer.symbols.fit import Fit
-from recognizer.symbols.template import psi, template_of
+from recognizer.touch.belief import Support, Thresholds, naming, weighed
+from recognizer.touch.lab import open_lab
+from recognizer.touch.locate import CAP, Place, place_scores, places, rivals, shown_at
+from recognizer.touch.pose import inside_mm
+from recognizer.touch.reader import reader_for
+from recognizer.touch.recognise import _by_few, explained, recognise
+from recognizer.touch.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, OUTSIDE, TOO_FEW
+from recognizer.touch.signal import CONTACT_N, signal_of
+from recognizer.touch.symbols.fit import Fit
+from recognizer.touch.symbols.template import psi, template_of
+from recognizer.touch.verify import readings
 from recognizer.validation.levels import LEVELS
 from recognizer.validation.surfaces import FOREIGN
 from recognizer.validation.trial import INSIDE_MM, Plan, drawn, sensor_of, trial
-from recognizer.verify import readings
 
 
 @pytest.fixture(scope="module")
@@ -322,7 +322,7 @@ def test_a_template_is_the_derivative_of_itself(reader, overlay):
 def test_reading_loads_no_cad_and_no_pictures():
     heavy = ("matplotlib", "build123d", "cadquery", "OCP", "pymeshlab", "dask", "fastapi", "skfem")
     asked = f"[name for name in {heavy!r} if name in sys.modules]"
-    program = f"import recognizer, recognizer.pipeline, sys; print({asked})"
+    program = f"import recognizer, recognizer.touch.recognise, sys; print({asked})"
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, env=os.environ
     )

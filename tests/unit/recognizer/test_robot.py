@@ -11,8 +11,8 @@ from probe.arm.links import Arm, forward
 from probe.errors import PoseError
 from probe.wrist.distances import counts_of, distances_at
 from probe.wrist.geometry import Wrist, gripper_to_plate, plate_to_sensor
-from recognizer.recognition import Recognition, refused
-from recognizer.robot import Seating, carried_pose, object_pose
+from recognizer.touch.recognition import Recognition, refused
+from recognizer.touch.robot import Seating, carried_pose, object_pose
 
 JOINTS = np.radians([20.0, -40.0, 70.0, -25.0, 15.0])
 PLANAR = np.array([[0.02, 0.004, 1e-4], [0.004, 0.01, -5e-5], [1e-4, -5e-5, 4e-5]])

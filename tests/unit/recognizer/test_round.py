@@ -14,10 +14,10 @@ from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.sensor import Sensor
 from probe.surface.face import endless
-from recognizer.lab import FINER, LEAST_MM, MOST_MM, radii_of
-from recognizer.symbols.bent import bends_of
-from recognizer.symbols.gain import Image, bent, felt_under, image_of
-from recognizer.symbols.pressing import pressing_of
+from recognizer.touch.lab import FINER, LEAST_MM, MOST_MM, radii_of
+from recognizer.touch.symbols.bent import bends_of
+from recognizer.touch.symbols.gain import Image, bent, felt_under, image_of
+from recognizer.touch.symbols.pressing import pressing_of
 
 SENSOR = Sensor()
 INK = 0.35  # about the mean response of the symbols of the default alphabet

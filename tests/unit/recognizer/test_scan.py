@@ -10,12 +10,12 @@ from generator.spec import read_specs
 from probe.contact.contract import Touch
 from probe.sensor import Sensor
 from probe.simulate.registered import registered_surface
-from recognizer.lab import open_lab
-from recognizer.mosaic.touch import PlacedTouch, placed
-from recognizer.reader import reader_for
-from recognizer.recognition import NO_CONTACT, TOO_FEW
 from recognizer.scan.grow import begun, extended, read_scan
-from recognizer.signal import signal_of
+from recognizer.scan.mosaic.touch import PlacedTouch, placed
+from recognizer.touch.lab import open_lab
+from recognizer.touch.reader import reader_for
+from recognizer.touch.recognition import NO_CONTACT, TOO_FEW
+from recognizer.touch.signal import signal_of
 from recognizer.validation.levels import MISMATCH, TYPICAL, read
 from recognizer.validation.surfaces import FOREIGN
 

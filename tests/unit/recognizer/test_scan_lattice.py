@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from recognizer.mosaic.planar import composed, inverse
 from recognizer.scan.composite import composite, expected_fit
 from recognizer.scan.lattice import agreed, alike, expected_at, seeded
+from recognizer.scan.mosaic.planar import composed, inverse
 from recognizer.scan.settings import ScanSettings
 from recognizer.scan.views import Stands, View, views_of
-from recognizer.symbols.fit import Fit
+from recognizer.touch.symbols.fit import Fit
 
 PITCH = 12.0
 LIMITS = ScanSettings()

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from generator.alphabet import SymbolStyle, alphabet_named
-from recognizer.filters import tactile_image
-from recognizer.skeleton.count import Counting, points_of_glyph, points_of_skeleton
-from recognizer.skeleton.graph import graph, length
-from recognizer.skeleton.symbols import COUNTS, CUT, Settings, symbols
+from recognizer.thesis.filters import tactile_image
+from recognizer.thesis.skeleton.count import Counting, points_of_glyph, points_of_skeleton
+from recognizer.thesis.skeleton.graph import graph, length
+from recognizer.thesis.skeleton.symbols import COUNTS, CUT, Settings, symbols
 
 STEP = 0.4
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from probe.frame import frame_from
-from recognizer.touches import Cutting, every_frame, touches
+from recognizer.touch.contacts import Cutting, every_frame, touches
 
 RNG = np.random.default_rng(8)
 A, B, C = (np.where(RNG.random((16, 16)) < 0.35, RNG.uniform(60, 300, (16, 16)), 0.0)

@@ -1,0 +1,144 @@
+"""How every command starts, shows progress, and ends. Imports nothing of ours but the errors.
+
+::
+
+    __init__.py   which exit code an error, a signal or a closed pipe means
+    output.py     results to stdout, messages to stderr, as text and as JSON
+    progress.py   a bar on a terminal, notices beside it
+
+A command is a typer application whose functions read options and return an `Action`; the
+action does the work and returns the exit code, or raises an `EncodedObjectsError`.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from types import FrameType
+from typing import TYPE_CHECKING, Any, NoReturn
+
+if TYPE_CHECKING:
+    from typer import Typer
+
+DONE, FAILED, BAD_INPUT, DEVICE, DATABASE, INTERRUPTED = 0, 1, 2, 3, 4, 130
+
+Action = Callable[[], int]
+"""What a command does once its options are read; returns the exit code."""
+
+Chosen = Callable[[list[str]], "Typer"]
+"""Arguments -> the application that reads them; heavy parts load when it is called."""
+
+MATRIX_LIBRARIES = ("OMP", "OPENBLAS", "MKL")
+
+
+def main(
+    name: str,
+    chosen: Chosen,
+    arguments: Sequence[str] | None = None,
+    *,
+    groups: Sequence[str] = (),
+    advice: str = "",
+) -> NoReturn:
+    """Run a command and leave with its exit code.
+
+    Parameters
+    ----------
+    name
+        As a person calls it.
+    chosen
+        Returns the application for the arguments.
+    arguments
+        In place of the process's own.
+    groups
+        Subcommands that have subcommands: given alone they show their help.
+    advice
+        Follows "interrupted" ("; go on with --resume").
+    """
+    signal.signal(signal.SIGTERM, _end)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a name the terminal cannot show
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        code = run(name, chosen, given, groups=groups)
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        sys.stderr.write(f"\n{name}: interrupted{advice}\n")
+        code = INTERRUPTED
+    except BrokenPipeError:  # the reader of our output has gone, as in `| head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = FAILED
+    sys.exit(code)
+
+
+def run(name: str, chosen: Chosen, arguments: list[str], *, groups: Sequence[str] = ()) -> int:
+    """Run one command; returns its exit code. Errors are reported, not raised."""
+    from typer import BadParameter, Exit
+
+    from encoded_objects.console import output
+    from encoded_objects.errors import EncodedObjectsError
+
+    usage_error: type[Exception] = BadParameter.__mro__[1]  # of every misused option
+    as_json = "--json" in arguments
+    unsaid = not arguments or arguments in [[group] for group in groups]  # which command is not
+    try:
+        asked = [*arguments, "--help"] if unsaid else arguments
+        action = chosen(arguments)(asked, prog_name=name, standalone_mode=False)
+        code = action() if callable(action) else int(action or 0)
+        return BAD_INPUT if unsaid else code
+    except Exit as leaving:
+        return BAD_INPUT if unsaid else leaving.exit_code
+    except EncodedObjectsError as error:
+        output.error(error, as_json=as_json)
+        return error.exit_code
+    except usage_error as error:
+        called = getattr(getattr(error, "ctx", None), "command_path", name)
+        problem = EncodedObjectsError(_misuse(error), fix=f"see {called} --help")
+        output.error(problem, as_json=as_json)
+        return BAD_INPUT
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        what = f"cannot write '{error.filename}'" if error.filename else "cannot write"
+        problem = EncodedObjectsError(
+            f"{what}: {error.strerror or error}", fix="check folder, space and rights"
+        )
+        output.error(problem, as_json=as_json)
+        return FAILED
+
+
+def application(**settings: Any) -> Typer:
+    """Return an empty application as all commands have it; `settings` as those of `Typer`."""
+    from typer import Typer
+
+    return Typer(
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode="rich",
+        context_settings={"help_option_names": ["-h", "--help"]},
+        **settings,
+    )
+
+
+def one_thread() -> None:
+    """Let matrix libraries use one thread; call before numpy is imported. Users may differ.
+
+    Matrices of a touch are small: several threads only wait for each other.
+    """
+    for library in MATRIX_LIBRARIES:
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
+
+def _misuse(error: Exception) -> str:
+    """Return what is wrong with an option, with the option's name."""
+    if getattr(error, "param", None) is None:  # a message of our own, which names it
+        return str(getattr(error, "message", error))
+    message = str(getattr(error, "format_message", error.__str__)())
+    return message.replace("Invalid value for ", "").removesuffix(".")
+
+
+def _end(number: int, _frame: FrameType | None) -> NoReturn:
+    """Leave on a request to end, so that what is half done is taken back."""
+    sys.exit(128 + number)

@@ -1,0 +1,104 @@
+"""What commands say: results to stdout, messages to stderr, as text or as JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from encoded_objects.errors import EncodedObjectsError
+
+WIDTH = 120  #: characters of a table that is written to a file
+
+
+def write(text: str) -> None:
+    """Write text to stdout."""
+    sys.stdout.write(text if text.endswith("\n") else text + "\n")
+
+
+def write_json(value: Any, *, line: bool = False) -> None:
+    """Write one JSON value to stdout, on a line of its own if asked; null for no number."""
+    write(json.dumps(plain(value), indent=None if line else 2, allow_nan=False))
+
+
+def version(name: str, *, as_json: bool) -> None:
+    """Say which version this is."""
+    from encoded_objects import __version__
+
+    if as_json:
+        write_json({"version": __version__})
+    else:
+        write(f"{name} {__version__}")
+
+
+def error(problem: EncodedObjectsError, *, as_json: bool) -> None:
+    """Say what is wrong: to stderr, or as JSON to stdout."""
+    if as_json:
+        write_json({"error": problem.as_json()})
+    else:
+        message(problem.as_text(), "error:", "red")
+
+
+def warning(text: str) -> None:
+    """Warn on stderr."""
+    message(f"warning: {text}", "warning:", "yellow")
+
+
+def message(text: str, word: str = "", colour: str = "yellow") -> None:
+    """Write a message to stderr; `word` in colour on a terminal."""
+    if word and sys.stderr.isatty() and not os.environ.get("NO_COLOR"):
+        from typer import style
+
+        text = text.replace(word, style(word, fg=colour, bold=True))
+    sys.stderr.write(text + "\n")
+
+
+def table(*titles: str, broken: tuple[str, ...] | None = None) -> Table:
+    """Return an empty table; only columns `broken` may be broken into lines, all by default."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    made = Table(box=SIMPLE_HEAD, pad_edge=False)
+    for title in titles:
+        whole = broken is not None and title not in broken
+        made.add_column(title, no_wrap=whole, overflow="ellipsis" if broken is None else "fold")
+    return made
+
+
+def show(made: Table) -> None:
+    """Write a table to stdout."""
+    from rich.console import Console
+
+    Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH).print(made)
+
+
+def pairs(values: dict[str, str]) -> None:
+    """Write names and values, one pair a line."""
+    wide = max(map(len, values), default=0)
+    for name, value in values.items():
+        write(f"{name:<{wide}}  {value}")
+
+
+def number(count: int, thing: str) -> str:
+    """Return a count in words: 1 frame, 2,000 frames."""
+    return f"{count:,} {thing}" if count == 1 else f"{count:,} {thing}s"
+
+
+def plain(value: Any) -> Any:
+    """Return a value as JSON has it: numbers of numpy as such, null for inf and nan."""
+    if isinstance(value, dict):
+        return {name: plain(item) for name, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if value is None or isinstance(value, (str, int, float, bool)):
+        return value
+    return str(value)

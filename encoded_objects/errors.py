@@ -1,0 +1,64 @@
+"""The root of every error that a person can cause; each package draws its own tree below it.
+
+::
+
+    EncodedObjectsError       exit code 2
+    ├── GeneratorError        generator.errors
+    ├── DecoderError          decoder.errors
+    ├── ProbeError            probe.errors
+    └── RecognizerError       recognizer.errors
+
+Imports nothing of ours, so that every package may stand on it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+class EncodedObjectsError(Exception):
+    """Something that was given cannot be used: what is wrong, where, and the way out.
+
+    Parameters
+    ----------
+    cause
+        What is wrong, with the value that was given and what is allowed.
+    fix
+        The way out, as an instruction ("set pitch to 5.7 mm or less").
+    place
+        Where: a file, `file:line:column`, the name of a face, a port's URL.
+    """
+
+    exit_code = 2
+
+    def __init__(self, cause: str, *, fix: str = "", place: str = "") -> None:
+        super().__init__(cause)
+        self.cause = cause
+        self.fix = fix
+        self.place = place
+
+    def __str__(self) -> str:
+        head = f"{self.place}: {self.cause}" if self.place else self.cause
+        return f"{head}; {self.fix}" if self.fix else head
+
+    def as_text(self) -> str:
+        """Return what a command writes to stderr: place, cause, and the way out in a line."""
+        place = printable(f"{self.place}: ") if self.place else ""
+        cause = "\n".join(printable(line) for line in self.cause.split("\n"))
+        fix = f"\n  fix: {printable(self.fix)}" if self.fix else ""
+        return f"{place}error: {cause}{fix}"
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what `--json` prints in its place, under the key `error`."""
+        return {
+            "kind": type(self).__name__,
+            "exit_code": self.exit_code,
+            "place": self.place,
+            "cause": self.cause,
+            "fix": self.fix,
+        }
+
+
+def printable(text: str) -> str:
+    """Return `text` without characters that would disturb a terminal."""
+    return "".join(c if c == " " or c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)

@@ -1,0 +1,262 @@
+"""Touch by touch, or all at once: mosaic + touch -> mosaic. Thesis 4.3.
+
+`added` costs what the touch's neighbours cost, and one solution of the graph; it may be called
+while the sensor is on its way to the next place. `settled` tries again what could not be
+placed when it came, evens out the gains and makes all covariances exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.sensor import Sensor
+from recognizer.scan.mosaic.canvas import Canvas, Laid, empty_canvas, laid
+from recognizer.scan.mosaic.errors import MosaicError
+from recognizer.scan.mosaic.graph import ARM, OUTLIER, Solved, Tie, covariances, solved
+from recognizer.scan.mosaic.mosaic import ALONE, PARTLY, Mosaic, MosaicSettings, no_touches
+from recognizer.scan.mosaic.pair import CONSTANT
+from recognizer.scan.mosaic.patch import Patch, patch_of
+from recognizer.scan.mosaic.place import placing
+from recognizer.scan.mosaic.planar import composed, inverse
+from recognizer.scan.mosaic.texture import far_apart
+from recognizer.scan.mosaic.touch import PlacedTouch
+
+Array = NDArray[np.float64]
+
+RELAID = 0.2  #: tactels, under one cell, by which a touch moves before it is laid anew
+SPREAD_LOG, SURE_LOG = 0.5, 0.05  #: of gains: from touch to touch, and by a pair
+ROUNDS = 3  #: in which touches are tried again
+_SHOWN = ("", ALONE, PARTLY, CONSTANT)  # reasons with which a touch is laid
+_AGREE = 16.0  # chi^2 of two decoded places about the arm
+
+
+def mosaic_of(
+    sensor: Sensor, touches: Iterable[PlacedTouch], settings: MosaicSettings | None = None
+) -> Mosaic:
+    """Return the mosaic of touches, in the order of the scan.
+
+    Raises
+    ------
+    MosaicError
+        Another sensor's image, or a touch that hangs on nothing.
+    """
+    mosaic = no_touches(sensor, settings)
+    for touch in touches:
+        mosaic = added(mosaic, touch)
+    return settled(mosaic)
+
+
+def added(mosaic: Mosaic, touch: PlacedTouch) -> Mosaic:
+    """Return the mosaic with one touch more.
+
+    Parameters
+    ----------
+    mosaic
+        Of one face; `no_touches` to begin with.
+    touch
+        The signal, and what is known of its place. The first decoded one turns the mosaic's
+        frame into that of the face; it needs a place in the old frame too.
+
+    Raises
+    ------
+    MosaicError
+        Another sensor's image, or a touch that hangs on nothing.
+    """
+    shape = touch.signal.forces.shape
+    if shape != (mosaic.sensor.rows, mosaic.sensor.columns):
+        raise MosaicError(
+            f"an image of {shape[0]} x {shape[1]} tactels",
+            fix=f"the sensor has {mosaic.sensor.rows} x {mosaic.sensor.columns}",
+            place=f"touch {touch.seq}",
+        )
+    number = len(mosaic)
+    patch = patch_of(mosaic.sensor, touch.signal)
+    mosaic = _framed(mosaic, touch, patch)
+    place = placing(mosaic, touch, patch, number)
+    ties = mosaic.ties + place.ties
+    grown = replace(
+        mosaic,
+        touches=(*mosaic.touches, touch),
+        patches=(*mosaic.patches, patch),
+        poses=np.concatenate([mosaic.poses, place.pose[None]]),
+        covariances=np.concatenate([mosaic.covariances, np.full((1, 3, 3), np.nan)]),
+        reasons=(*_joined(mosaic.reasons, place.ties), place.reason),
+        gains=np.append(mosaic.gains, place.gain),
+        laid=(*mosaic.laid, None),
+        ties=ties,
+    )
+    fresh = {number, *(tie.a for tie in place.ties if tie.a >= 0)}
+    found = _solved(grown)
+    doubted = [k for k, tie in enumerate(ties) if tie.kind == "decoded"]
+    if any(found.weights[k] < OUTLIER for k in doubted):
+        found = _revoted(grown, found)
+    return _updated(grown, found, fresh)
+
+
+def settled(mosaic: Mosaic) -> Mosaic:
+    """Return the mosaic with everything tried again that failed, and exact covariances."""
+    for _ in range(ROUNDS):
+        open_ = [n for n, reason in enumerate(mosaic.reasons) if reason not in ("", CONSTANT)]
+        before = mosaic.reasons
+        for number in open_:
+            mosaic = _again(mosaic, number)
+        if mosaic.reasons == before:
+            break
+    if not len(mosaic):
+        return mosaic
+    mosaic = replace(mosaic, gains=_gains(mosaic))
+    return _updated(mosaic, _solved(mosaic), set(range(len(mosaic))), anew=True)
+
+
+def _joined(reasons: tuple[str, ...], ties: tuple[Tie, ...]) -> tuple[str, ...]:
+    """Return reasons without "alone" for touches that were registered from a later one."""
+    met = {tie.a for tie in ties if tie.kind == "pair"}
+    return tuple("" if n in met and why == ALONE else why for n, why in enumerate(reasons))
+
+
+def _again(mosaic: Mosaic, number: int) -> Mosaic:
+    """Return the mosaic with one touch placed anew."""
+    touch = mosaic.touches[number]
+    place = placing(mosaic, touch, mosaic.patches[number], number)
+    known = {tie.b for tie in mosaic.ties if tie.a == number}
+    pairs = tuple(tie for tie in place.ties if tie.kind == "pair" and tie.a not in known)
+    if not pairs and place.reason != CONSTANT:
+        return mosaic
+    others = tuple(tie for tie in mosaic.ties if tie.kind != "pair" or tie.b != number)
+    poses, gains, reasons = mosaic.poses.copy(), mosaic.gains.copy(), list(mosaic.reasons)
+    poses[number], gains[number], reasons[number] = place.pose, place.gain, place.reason
+    tried = replace(mosaic, poses=poses, gains=gains, reasons=tuple(reasons), ties=others + pairs)
+    return _updated(tried, _solved(tried), {number})
+
+
+def _framed(mosaic: Mosaic, touch: PlacedTouch, patch: Patch) -> Mosaic:
+    """Return the mosaic in the frame in which a touch can be placed."""
+    if touch.decoded is None:
+        if not mosaic.on_face or touch.believed is None or _hangs(mosaic):
+            return mosaic
+        # the arm's frame is not known: nothing decoded was believed as well
+        return replace(mosaic, arm_covariance=np.full((3, 3), np.inf))
+    believed = touch.believed
+    if believed is not None and not _hangs(mosaic) and (mosaic.on_face or not len(mosaic)):
+        mosaic = replace(mosaic, arm=composed(touch.decoded.pose, inverse(believed.pose)))
+    if mosaic.on_face or not len(mosaic):
+        return mosaic
+    if believed is None and touch.stepped is None:
+        raise MosaicError(
+            "the first decoded touch does not say where it stands for the arm",
+            fix="give what the arm believes of it, too",
+            place=f"touch {touch.seq}",
+        )
+    stands = placing(mosaic, replace(touch, decoded=None), patch, len(mosaic)).pose
+    T_face_plane = composed(touch.decoded.pose, inverse(stands))
+    return _turned(mosaic, T_face_plane)
+
+
+def _turned(mosaic: Mosaic, T_new_old: Array) -> Mosaic:
+    """Return the mosaic in another frame, laid anew."""
+    c, s = np.cos(T_new_old[2]), np.sin(T_new_old[2])
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    canvas, lying = empty_canvas(mosaic.sensor.pitch_mm), list(mosaic.laid)
+    for n, how in enumerate(mosaic.laid):
+        if how is not None:
+            pose = composed(T_new_old, how.pose)
+            again = Laid(pose, turn @ how.covariance @ turn.T, how.gain)
+            lying[n] = again
+            canvas = laid(canvas, mosaic.patches[n], again)
+    return replace(
+        mosaic,
+        poses=composed(T_new_old, mosaic.poses),
+        covariances=turn @ mosaic.covariances @ turn.T,
+        arm=composed(T_new_old, mosaic.arm),
+        arm_covariance=turn @ mosaic.arm_covariance @ turn.T,
+        laid=tuple(lying),
+        canvas=canvas,
+    )
+
+
+def _hangs(mosaic: Mosaic) -> bool:
+    return any(tie.a == ARM for tie in mosaic.ties)
+
+
+def _solved(mosaic: Mosaic) -> Solved:
+    stands = not mosaic.on_face
+    return solved(mosaic.ties, mosaic.poses, mosaic.arm, arm_stands=stands)
+
+
+def _revoted(mosaic: Mosaic, found: Solved) -> Solved:
+    """Return a better solution, if the face lies where other decoded touches say.
+
+    The first decoded touch decides where everything lies. If it was wrong, all later ones look
+    wrong: so each of them may propose, and the cost decides.
+    """
+    for tie in mosaic.ties:
+        if tie.kind == "decoded":
+            shift = composed(tie.pose, inverse(found.poses[tie.b]))
+            if far_apart(shift, np.zeros(3), mosaic.sensor) < 0.1:
+                continue
+            moved_ = replace(
+                mosaic, poses=composed(shift, found.poses), arm=composed(shift, found.arm)
+            )
+            other = _solved(moved_)
+            if other.cost < found.cost - 1e-6:
+                found = other
+    return found
+
+
+def _updated(mosaic: Mosaic, found: Solved, fresh: set[int], *, anew: bool = False) -> Mosaic:
+    """Return the mosaic with the poses of a solution, touches laid where they stand now."""
+    numbers = sorted(fresh)
+    free = mosaic.on_face and _hangs(mosaic)
+    spread = covariances(found.normal, [*numbers, len(mosaic)] if free else numbers)
+    kept = mosaic.covariances.copy()
+    kept[numbers] = spread[: len(numbers)]
+    canvas = empty_canvas(mosaic.sensor.pitch_mm) if anew else mosaic.canvas
+    lying: list[Laid | None] = list(mosaic.laid)
+    for n in range(len(mosaic)):
+        canvas, lying[n] = _relaid(mosaic, canvas, found, n, None if anew else lying[n])
+    return replace(
+        mosaic,
+        poses=found.poses,
+        covariances=kept,
+        arm=found.arm,
+        arm_covariance=spread[-1] if free else np.zeros((3, 3)),
+        weights=found.weights,
+        chi2=found.chi2,
+        laid=tuple(lying),
+        canvas=canvas,
+    )
+
+
+def _relaid(
+    mosaic: Mosaic, canvas: Canvas, found: Solved, n: int, now: Laid | None
+) -> tuple[Canvas, Laid | None]:
+    """Return the canvas with a touch where it belongs, and how it lies there."""
+    pose, gain = found.poses[n], float(mosaic.gains[n])
+    shown = mosaic.reasons[n] in _SHOWN and mosaic.patches[n].scale >= 0
+    if now is not None:
+        near = far_apart(now.pose, pose, mosaic.sensor) < RELAID
+        if shown and near and abs(gain / now.gain - 1) < 0.02:
+            return canvas, now
+        canvas = laid(canvas, mosaic.patches[n], now, -1)
+    if not shown:
+        return canvas, None
+    block = found.normal[3 * n : 3 * n + 3, 3 * n : 3 * n + 3].toarray()
+    how = Laid(np.array(pose), np.asarray(np.linalg.inv(block), np.float64), gain)
+    return laid(canvas, mosaic.patches[n], how), how
+
+
+def _gains(mosaic: Mosaic) -> Array:
+    """Return gains (n,) that agree with all pairs at once, near 1 where nothing is known."""
+    n = len(mosaic)
+    normal, right = np.eye(n) / SPREAD_LOG**2, np.zeros(n)
+    for tie, weight in zip(mosaic.ties, mosaic.weights, strict=True):
+        if tie.kind == "pair" and weight > OUTLIER:
+            normal[[tie.a, tie.b], [tie.a, tie.b]] += 1 / SURE_LOG**2
+            normal[[tie.a, tie.b], [tie.b, tie.a]] -= 1 / SURE_LOG**2
+            right[tie.b] += tie.log_gain / SURE_LOG**2
+            right[tie.a] -= tie.log_gain / SURE_LOG**2
+    return np.asarray(np.exp(np.linalg.solve(normal, right)))

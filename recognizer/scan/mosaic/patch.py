@@ -1,0 +1,137 @@
+"""The image of a touch as a function: asked between the tactels, with its slopes. Thesis 4.3.
+
+Signal -> Patch. Bad tactels are filled from their neighbours and marked; a little smoothing
+takes off what the matrix cannot resolve (tabs leave gaps, so edges alias); a cubic spline goes
+through the rest. Values are in shares of the upper level of the image, so that touches of
+different force look alike. mm, sensor frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.sensor import Sensor
+from recognizer.touch.signal import Signal
+
+Array = NDArray[np.float64]
+
+SMOOTHING = 0.4  #: tactels; none to .4 register equally well, .5 and more worse
+TEXTURE = 0.8  #: tactels; smooths over the gaps between tabs (`texture`)
+LEAST_TRUST = 0.5  #: below, a tactel counts as bad
+RIM = 2  #: coefficients beyond the matrix, mirrored
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Patch:
+    """One image."""
+
+    sensor: Sensor
+    scale: float  #: reading that counts as 1; 0 where nothing was felt
+    raw: Array  #: (rows, columns) readings over the scale, bad ones filled
+    values: Array  #: (rows, columns) the same, smoothed
+    good: NDArray[np.bool_]  #: (rows, columns)
+    coefficients: Array  #: (rows + 4, columns + 4) of the cubic spline through `values`
+    points_mm: Array  #: (rows * columns, 2)
+    smooth: Array  #: (rows * columns,) values without what the gaps between tabs make
+    slopes: Array  #: (2, rows * columns) of them by x and y, 1/tactel
+
+
+def patch_of(sensor: Sensor, signal: Signal) -> Patch:
+    """Return the patch of a signal.
+
+    Examples
+    --------
+    >>> from recognizer.touch.signal import signal_of
+    >>> readings = np.zeros((16, 16))
+    >>> readings[:, 8:] = 100.0
+    >>> patch = patch_of(Sensor(), signal_of(readings))
+    >>> value, slope_x, _ = asked(patch, np.array([[0.0, 0.0]]))
+    >>> bool(0.4 < value[0] < 0.6 and slope_x[0] > 0)
+    True
+    """
+    from scipy.ndimage import gaussian_filter, spline_filter
+
+    good = signal.trust >= LEAST_TRUST
+    filled = _filled(signal.forces, good)
+    scale = float(np.quantile(filled, 0.95))
+    if scale <= 0:
+        scale = float(filled.max())
+    raw = filled / scale if scale > 0 else filled
+    values = gaussian_filter(raw, SMOOTHING, mode="nearest")
+    coefficients = np.pad(spline_filter(values, 3, mode="mirror"), RIM, mode="reflect")
+    points = sensor.centres_mm().reshape(-1, 2)
+    smooth = gaussian_filter(raw, TEXTURE, mode="nearest")
+    down, right = np.gradient(smooth)
+    slopes = np.stack([right.reshape(-1), -down.reshape(-1)])
+    for array in (raw, values, good, coefficients, points, smooth, slopes):
+        array.setflags(write=False)
+    return Patch(sensor, scale, raw, values, good, coefficients, points, smooth.reshape(-1), slopes)
+
+
+def asked(patch: Patch, points_mm: Array) -> tuple[Array, Array, Array]:
+    """Return values and slopes by x and y (1/mm) at points (n, 2) inside `covered`."""
+    sensor, pitch = patch.sensor, patch.sensor.pitch_mm
+    column = points_mm[:, 0] / pitch + ((sensor.columns - 1) / 2 + RIM)
+    row = (sensor.rows - 1) / 2 + RIM - points_mm[:, 1] / pitch
+    i, j = np.floor(row).astype(np.intp), np.floor(column).astype(np.intp)
+    along_y, change_y = basis(row - i)
+    along_x, change_x = basis(column - j)
+    width = sensor.columns + 2 * RIM
+    first = (i - 1) * width + (j - 1)
+    near = patch.coefficients.reshape(-1)[first[:, None] + _stencil(width)].reshape(-1, 4, 4)
+    by_x = (near @ np.stack([along_x, change_x], axis=-1)).swapaxes(1, 2)  # (n, 2, 4)
+    value = (by_x[:, 0] * along_y).sum(axis=1)
+    slope_x = (by_x[:, 1] * along_y).sum(axis=1) / pitch
+    slope_y = -(by_x[:, 0] * change_y).sum(axis=1) / pitch
+    return value, slope_x, slope_y
+
+
+def covered(sensor: Sensor, points_mm: Array, beyond: float = 0.0) -> NDArray[np.bool_]:
+    """Whether points lie between tactels' centres, or up to `beyond` tactels outside."""
+    half = (np.array([sensor.columns, sensor.rows]) - 1) / 2 + beyond
+    return np.asarray((np.abs(points_mm) <= half * sensor.pitch_mm + 1e-9).all(axis=-1))
+
+
+def nearest(sensor: Sensor, points_mm: Array) -> NDArray[np.intp]:
+    """Return the number of the tactel whose centre is nearest to each point inside the matrix."""
+    column = np.rint(points_mm[..., 0] / sensor.pitch_mm + (sensor.columns - 1) / 2)
+    row = np.rint((sensor.rows - 1) / 2 - points_mm[..., 1] / sensor.pitch_mm)
+    column = np.clip(column, 0, sensor.columns - 1).astype(np.intp)
+    row = np.clip(row, 0, sensor.rows - 1).astype(np.intp)
+    return np.asarray(row * sensor.columns + column)
+
+
+def _filled(forces: Array, good: NDArray[np.bool_]) -> Array:
+    """Return forces with bad tactels taken from good ones around, weighted by nearness."""
+    if good.all():
+        return forces.astype(np.float64)
+    if not good.any():
+        return np.zeros(forces.shape)
+    from scipy.ndimage import gaussian_filter
+
+    known = np.where(good, forces, 0.0)
+    filled = known.copy()
+    open_ = np.logical_not(good)
+    for width in (0.7, 2.0, 8.0):  # dead rows are wider than the nearest neighbours
+        weight = gaussian_filter(good.astype(np.float64), width, mode="constant")
+        some = open_ & (weight > 1e-3)
+        filled[some] = gaussian_filter(known, width, mode="constant")[some] / weight[some]
+        open_ = open_ & np.logical_not(some)
+    return filled
+
+
+def basis(t: Array) -> tuple[Array, Array]:
+    """Return the four cubic B-splines (n, 4) at t = 0 ... 1, and their slopes."""
+    u = 1.0 - t
+    values = np.stack(
+        [u**3 / 6, 2 / 3 - t * t + t**3 / 2, 2 / 3 - u * u + u**3 / 2, t**3 / 6], axis=-1
+    )
+    slopes = np.stack([-u * u / 2, -2 * t + 1.5 * t * t, 2 * u - 1.5 * u * u, t * t / 2], axis=-1)
+    return values, slopes
+
+
+def _stencil(width: int) -> NDArray[np.intp]:
+    return (np.arange(4)[:, None] * width + np.arange(4)).reshape(-1)

@@ -1,0 +1,255 @@
+"""Where one touch belongs among those that are there: its start, and its ties to them.
+
+A decoded touch stands where it says; images of neighbours only check it. Any other one is
+looked for on the mean of all touches near it, which shows more than each of them and so
+excludes more places that look alike; then it is registered with each neighbour. Thesis 4.3.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recognizer.scan.mosaic.canvas import laid, reference
+from recognizer.scan.mosaic.errors import MosaicError
+from recognizer.scan.mosaic.graph import ARM, FREE, PLANE, Kind, Tie
+from recognizer.scan.mosaic.mosaic import ALONE, PARTLY, Mosaic
+from recognizer.scan.mosaic.pair import AMBIGUOUS, CONSTANT, NOISE, Registration, registered, varies
+from recognizer.scan.mosaic.patch import Patch, covered
+from recognizer.scan.mosaic.planar import (
+    between,
+    between_covariance,
+    composed,
+    composed_covariance,
+    moved,
+    wrapped,
+)
+from recognizer.scan.mosaic.search import searched, window_mm
+from recognizer.scan.mosaic.texture import scales, seen_motions
+from recognizer.scan.mosaic.touch import Placed, PlacedTouch
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placing:
+    """What is known of a touch when it comes in."""
+
+    pose: Array  #: (3,) T_plane_touch to start from
+    ties: tuple[Tie, ...]
+    gain: float
+    reason: str  #: "" where decoded or registered in all directions
+
+
+def placing(mosaic: Mosaic, touch: PlacedTouch, patch: Patch, number: int) -> Placing:
+    """Return where a touch belongs in a mosaic that may hold it already under this number."""
+    given = _given(touch, number)
+    predicted = _predicted(mosaic, touch, number)
+    if touch.decoded is not None and _contradicted(mosaic, touch, number):
+        # neighbours shall say who is right
+        other = placing(mosaic, replace(touch, decoded=None), patch, number)
+        if not other.reason:
+            return replace(other, ties=(given[0], *other.ties))
+    near = _near(mosaic, patch, predicted, number)
+    reason, start = _found(mosaic, patch, predicted, near, number)
+    pairs: list[tuple[int, Registration]] = []
+    if not reason:
+        pairs = _registered(mosaic, patch, predicted, start, near)
+    softer = 1 / mosaic.settings.inflation
+    ties = given + [
+        Tie(j, number, pair.pose, pair.information * softer, "pair", math.log(pair.gain))
+        for j, pair in pairs
+        if pair
+    ]
+    tied = [tie for tie in ties if tie.kind == "pair"]
+    if touch.decoded is not None:
+        reason = ""
+    elif not reason and not tied:
+        reason = pairs[0][1].reason if pairs else ALONE
+    elif tied and _rank(mosaic, tied) < 3:
+        reason = PARTLY
+    starts = [predicted.pose, start]
+    starts += [composed(_pose(mosaic, tie.a), tie.pose) for tie in ties if tie.a != ARM]
+    pose = min(starts, key=lambda pose: _disagreement(mosaic, ties, pose))
+    return Placing(pose, tuple(ties), _gain(mosaic, pairs), reason)
+
+
+def _given(touch: PlacedTouch, number: int) -> list[Tie]:
+    """Return what arm, steps and reader say."""
+
+    def tie(a: int, place: Placed, kind: Kind) -> Tie:
+        return Tie(a, number, place.pose, np.asarray(np.linalg.inv(place.covariance)), kind)
+
+    ties = []
+    if touch.decoded is not None:
+        ties.append(tie(PLANE, touch.decoded, "decoded"))
+    if touch.believed is not None:
+        ties.append(tie(ARM, touch.believed, "believed"))
+    if touch.stepped is not None and number > 0:
+        ties.append(tie(number - 1, touch.stepped, "stepped"))
+    return ties
+
+
+def _contradicted(mosaic: Mosaic, touch: PlacedTouch, number: int) -> bool:
+    """Whether a decoded place is not where the touch should stand."""
+    if touch.decoded is None or not len(mosaic) or not (touch.believed or touch.stepped):
+        return False
+    expected = _predicted(mosaic, replace(touch, decoded=None), number)
+    away = touch.decoded.pose - expected.pose
+    away[2] = wrapped(away[2])
+    spread = expected.covariance + touch.decoded.covariance
+    return float(away @ np.linalg.solve(spread, away)) > FREE
+
+
+def _pose(mosaic: Mosaic, frame: int) -> Array:
+    if frame == PLANE:
+        return np.zeros(3)
+    return mosaic.arm if frame == ARM else np.asarray(mosaic.poses[frame])
+
+
+def _predicted(mosaic: Mosaic, touch: PlacedTouch, number: int) -> Placed:
+    """Return where a touch should stand, before its image is looked at."""
+    if touch.decoded is not None:
+        return touch.decoded
+    found: list[Placed] = []
+    if touch.believed is not None and np.isfinite(mosaic.arm_covariance).all():
+        pose, covariance = touch.believed.pose, touch.believed.covariance
+        spread = composed_covariance(mosaic.arm, pose, mosaic.arm_covariance, covariance)
+        found.append(Placed(composed(mosaic.arm, pose), spread))
+    if touch.stepped is not None and number > 0:
+        pose, covariance = touch.stepped.pose, touch.stepped.covariance
+        before, sure = mosaic.poses[number - 1], mosaic.covariances[number - 1]
+        spread = composed_covariance(before, pose, sure, covariance)
+        found.append(Placed(composed(before, pose), spread))
+    if not found:
+        raise MosaicError(
+            "a touch that hangs on nothing: no touch before it tells how its frame lies",
+            fix="let one touch have both a decoded place and what the arm believes",
+            place=f"touch {touch.seq}",
+        )
+    return min(found, key=lambda place: float(np.trace(place.covariance[:2, :2])))
+
+
+def _near(mosaic: Mosaic, patch: Patch, predicted: Placed, number: int) -> list[int]:
+    """Return neighbours that may be registered with, by overlap."""
+    sensor, least = mosaic.sensor, mosaic.settings.overlap
+    away = np.hypot(*(mosaic.poses[:, :2] - predicted.pose[:2]).T)
+    some = [j for j in np.flatnonzero(away < 2 * sensor.reach_mm).tolist() if j != number]
+    shares = {}
+    for j in some:
+        if mosaic.laid[j] is not None and mosaic.reasons[j] != CONSTANT:
+            T_j_touch = between(mosaic.poses[j], predicted.pose)
+            shares[j] = float(covered(sensor, moved(T_j_touch, patch.points_mm), 0.5).mean())
+    order = sorted(shares, key=lambda j: -shares[j])
+    decoded = float(np.trace(predicted.covariance[:2, :2])) < (0.2 * sensor.pitch_mm) ** 2
+    count = mosaic.settings.partners_decoded if decoded else mosaic.settings.partners
+    return [j for j in order if shares[j] >= least][:count]
+
+
+def _found(
+    mosaic: Mosaic,
+    patch: Patch,
+    predicted: Placed,
+    near: Sequence[int],
+    number: int,
+) -> tuple[str, Array]:
+    """Return a reason or none, and where the touch lies on the mean of the others."""
+    limits, pitch = mosaic.settings.search, mosaic.sensor.pitch_mm
+    good = patch.good.reshape(-1)
+    if patch.scale <= 0 or not varies(patch, good, limits.contrast):
+        return CONSTANT, predicted.pose
+    if not near:
+        return ALONE, predicted.pose
+    spread = predicted.covariance + mosaic.covariances[near[0]]
+    reach = window_mm(spread, limits)
+    turn = limits.sigmas * math.sqrt(spread[2, 2]) * mosaic.sensor.reach_mm
+    if max(*reach, turn) <= limits.near_tactels * pitch:
+        return "", predicted.pose
+    canvas = mosaic.canvas
+    if number < len(mosaic) and (own := mosaic.laid[number]) is not None:
+        canvas = laid(canvas, patch, own, -1)
+    around = mosaic.sensor.reach_mm + math.hypot(*reach) + pitch
+    shown = reference(canvas, float(predicted.pose[0]), float(predicted.pose[1]), around)
+    found = searched(shown, patch, predicted.pose, spread, limits)
+    if not found.candidates:
+        return NOISE, predicted.pose
+    best = found.candidates[0]
+    if best.images < limits.significance + math.log(found.tried):
+        return NOISE, predicted.pose
+    motions = seen_motions(patch, good, np.zeros(3))
+    c, s = math.cos(best.pose[2]), math.sin(best.pose[2])
+    back = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])  # to the patch's axes
+    beyond = max(reach) > mosaic.settings.period_mm / 2
+    least = limits.margin_beyond if beyond else limits.margin
+    for other in found.candidates[1:]:
+        away = other.pose - best.pose
+        away[2] = wrapped(away[2])
+        apart = float(np.linalg.norm(motions.T @ (back @ away / scales(mosaic.sensor))))
+        if apart > 1.0 and best.score - other.score < least:
+            return AMBIGUOUS, predicted.pose
+    return "", best.pose
+
+
+def _registered(
+    mosaic: Mosaic,
+    patch: Patch,
+    predicted: Placed,
+    start: Array,
+    near: Sequence[int],
+) -> list[tuple[int, Registration]]:
+    settings = mosaic.settings
+    loose = (settings.loose_tactels * scales(mosaic.sensor)) ** 2
+    limits = replace(settings.search, near_tactels=math.inf)
+    pairs = []
+    for j in near:
+        at, sure = mosaic.poses[j], mosaic.covariances[j]
+        belief = between_covariance(at, predicted.pose, sure, predicted.covariance)
+        pair = registered(
+            mosaic.patches[j],
+            patch,
+            between(at, predicted.pose),
+            belief + np.diag(loose),
+            starts=[between(at, start)],
+            period_mm=settings.period_mm,
+            settings=limits,
+        )
+        pairs.append((j, pair))
+    return pairs
+
+
+def _rank(mosaic: Mosaic, ties: Sequence[Tie]) -> int:
+    """Return how many motions of a touch its pairs define."""
+    unit = scales(mosaic.sensor)
+    total = np.zeros((3, 3))
+    for tie in ties:
+        angle = float(mosaic.poses[tie.a][2])
+        c, s = math.cos(angle), math.sin(angle)
+        turned = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        total += turned @ tie.information @ turned.T * np.outer(unit, unit)
+    values = np.linalg.eigvalsh(total)
+    return int((values > 4.0).sum())  # half a tactel
+
+
+def _disagreement(mosaic: Mosaic, ties: Sequence[Tie], pose: Array) -> float:
+    """Return the robust cost of a touch's ties at a pose."""
+    total = 0.0
+    for tie in ties:
+        away = between(_pose(mosaic, tie.a), pose) - tie.pose
+        away[2] = wrapped(away[2])
+        chi2 = float(away @ tie.information @ away)
+        scale = min(1.0, 2 * FREE / (FREE + chi2))
+        total += scale**2 * chi2 + FREE * (1 - scale) ** 2
+    return total
+
+
+def _gain(mosaic: Mosaic, pairs: Sequence[tuple[int, Registration]]) -> float:
+    """Return by what the readings of a touch are to be multiplied to be like its neighbours'."""
+    found = [(mosaic.gains[j] * pair.gain, pair.rho) for j, pair in pairs if pair]
+    if not found:
+        return 1.0
+    logs, weights = np.log([g for g, _ in found]), np.array([rho for _, rho in found]) ** 2
+    return float(np.exp(weights @ logs / weights.sum()))

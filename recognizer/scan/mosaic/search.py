@@ -1,0 +1,125 @@
+"""Where a touch may lie on a reference: the best few maxima of the correlation. Thesis 4.3.
+
+Reference + patch + belief -> candidates. The window is what the belief leaves, three standard
+deviations both ways, and as many turns as would move the matrix's rim by a tactel. Scores are
+log-likelihoods,
+
+    nats = -(n / 2) log(1 - rho^2) - d^T C^-1 d / 2,
+
+n the independent readings in the overlap, d the way from the belief. Beyond a few symbols a
+larger overlap counts no more: one pitch away, symbols of one alphabet on one lattice correlate
+by .8, and a large overlap there would outweigh a smaller one where they are the same.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recognizer.scan.mosaic.correlation import correlated, peaks
+from recognizer.scan.mosaic.patch import Patch
+from recognizer.scan.mosaic.planar import composed
+from recognizer.scan.mosaic.raster import MAGNIFIED, Raster, enlarged, laid_under, magnified
+
+Array = NDArray[np.float64]
+
+BEST = 0.94  #: correlation that true places have; more of it is chance, not evidence
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """When a place is told from the images."""
+
+    sigmas: float = 3.0  #: half width of the window, standard deviations of the belief
+    contrast: float = 0.15  #: least spread of a patch, planes taken out, in its upper levels
+    overlap: float = 0.2  #: least share of the matrix
+    significance: float = 8.0  #: nats over what the best of as many shifts of noise gives
+    margin: float = 3.0  #: nats over the next place, in a window within half a period
+    margin_beyond: float = 8.0  #: the same in a wider window
+    independent: float = 0.4  #: readings to a tactel: smoothing ties neighbours together
+    enough: float = 96.0  #: tactels of overlap, beyond which more do not count
+    candidates: int = 6  #: maxima that are looked at
+    near_tactels: float = 0.4  #: windows no wider than this need no search
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidate:
+    """A place that explains the images."""
+
+    pose: Array  #: (3,) T_reference_patch
+    score: float  #: nats, images and belief
+    images: float  #: nats, images alone
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Searched:
+    """What the search found."""
+
+    candidates: tuple[Candidate, ...]  #: best first
+    tried: float  #: independent places in the window
+
+
+def nats(rho: Array, tactels: Array, settings: Settings) -> Array:
+    """Return how much likelier images are if they show the same, by their correlation."""
+    known = np.clip(np.nan_to_num(rho), 0.0, BEST)
+    readings = settings.independent * np.minimum(tactels, settings.enough)
+    return np.asarray(-readings / 2 * np.log1p(-(known**2)))
+
+
+def window_mm(covariance: Array, settings: Settings) -> tuple[float, float]:
+    """Return how far from a belief the search reaches along x and y, mm."""
+    x, y = settings.sigmas * np.sqrt(np.diag(covariance)[:2])
+    return float(x), float(y)
+
+
+def searched(
+    reference: Raster, patch: Patch, believed: Array, covariance: Array, settings: Settings
+) -> Searched:
+    """Return where a patch may lie on a reference.
+
+    Parameters
+    ----------
+    reference
+        Cells of a quarter of a tactel.
+    believed, covariance
+        T_reference_patch (3,) and (3, 3).
+    """
+    image = magnified(patch)
+    h = image.cell_mm
+    # the window along the patch's axes
+    c, s = math.cos(believed[2]), math.sin(believed[2])
+    turned = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    inside = turned @ covariance @ turned.T
+    x_mm, y_mm = window_mm(inside, settings)
+    columns, rows = math.ceil(x_mm / h) + 1, math.ceil(y_mm / h) + 1
+    wide = enlarged(image, rows, columns)
+    prior = np.linalg.inv(inside)
+    down, right = np.mgrid[-rows : rows + 1, -columns : columns + 1]
+    found: list[Candidate] = []
+    turns = _turns(math.sqrt(covariance[2, 2]), patch, settings)
+    for turn in turns.tolist():
+        stands = np.array([believed[0], believed[1], believed[2] + turn])
+        # shifts are along the turned axes; for the prior that is the same to second order
+        away = np.stack([right * h, -down * h, np.full(right.shape, turn)], axis=-1)
+        seen = correlated(laid_under(reference, wide, stands), image)
+        tactels = seen.overlap / MAGNIFIED**2
+        images = nats(seen.rho, tactels, settings)
+        score = images - 0.5 * np.einsum("kni,ij,knj->kn", away, prior, away)
+        score[~(seen.rho > 0) | (tactels < settings.overlap * patch.good.size)] = -np.inf
+        for i, j, value in peaks(score, settings.candidates):
+            shift = np.array([(j - columns) * h, (rows - i) * h, 0.0])
+            alone = float(images[round(i), round(j)])
+            found.append(Candidate(composed(stands, shift), value, alone))
+    found.sort(key=lambda candidate: -candidate.score)
+    tried = down.size * len(turns) / MAGNIFIED**2
+    return Searched(tuple(found[: settings.candidates]), tried)
+
+
+def _turns(sigma_rad: float, patch: Patch, settings: Settings) -> Array:
+    """Return the turns to try about a belief: each moves the rim by a tactel more."""
+    step = patch.sensor.pitch_mm / patch.sensor.reach_mm
+    count = math.floor(min(settings.sigmas * sigma_rad, math.pi) / step + 0.5)
+    return np.asarray(np.arange(-count, count + 1) * step, np.float64)

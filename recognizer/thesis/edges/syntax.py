@@ -1,0 +1,89 @@
+"""Segments -> edges, edges -> corners, by production rules. Thesis 4.3.
+
+    EDGE   := EDGE1 or EDGE2     if they run on into each other
+    EDGE   := EDGE1 or BREAK     a short piece that runs on, too
+    VERTEX := EDGE1 and EDGE2    if they turn
+
+Angles are those between the two ways: straight on is 180 degrees, as the thesis has it. A
+BREAK that continues no EDGE is dropped.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from recognizer.thesis.edges.hough import Segment
+from recognizer.thesis.edges.line import Corner, Edge, meeting, through
+from recognizer.thesis.edges.points import EdgePoints
+
+
+@dataclass(frozen=True, slots=True)
+class Rules:
+    """When segments run on into each other, and when they turn."""
+
+    straight_rad: float = math.radians(155)  #: angle from which two are one edge
+    break_mm: float = 5.0  #: shorter segments are breaks
+    across_mm: float = 1.0  #: from one's line to the other's ends, for being one edge
+    apart_mm: float = 12.0  #: along the way, between their ends
+    spread_mm: float = 0.2  #: standard deviation of a point across an edge, at least
+    beyond_mm: float = 5.0  #: how far from its edges' seen parts a corner may lie
+
+
+def fused(segments: list[Segment], rules: Rules | None = None) -> tuple[Edge, ...]:
+    """Return the edges that segments are parts of, the longest first."""
+    chosen = rules or Rules()
+    parts = sorted(segments, key=lambda segment: -segment.edge.length_mm)
+    edges: list[Segment] = []
+    for part in parts:
+        k = next((k for k, e in enumerate(edges) if _one(e.edge, part.edge, chosen)), None)
+        if k is not None:
+            edges[k] = _union(edges[k], part, chosen)
+        elif part.edge.length_mm >= chosen.break_mm:
+            edges.append(part)
+    edges.sort(key=lambda segment: -segment.edge.length_mm)
+    return tuple(segment.edge for segment in edges)
+
+
+def vertices(edges: tuple[Edge, ...], rules: Rules | None = None) -> tuple[Corner, ...]:
+    """Return the corners where edges that are seen up to there meet."""
+    chosen = rules or Rules()
+    found = []
+    for first, second in itertools.combinations(edges, 2):
+        between = math.pi - abs(math.remainder(second.angle_rad - first.angle_rad, math.tau))
+        corner = meeting(first, second) if between < chosen.straight_rad else None
+        if corner is not None and all(_reaches(e, corner, chosen) for e in (first, second)):
+            found.append(corner)
+    return tuple(found)
+
+
+def _one(edge: Edge, part: Edge, rules: Rules) -> bool:
+    between = math.pi - abs(math.remainder(part.angle_rad - edge.angle_rad, math.tau))
+    if between < rules.straight_rad:
+        return False
+    ends = np.stack([part.start_mm, part.end_mm])
+    if np.abs(edge.inside_mm(ends)).max() > rules.across_mm:
+        return False
+    way = np.array([edge.normal[1], -edge.normal[0]])
+    own = sorted([float(edge.start_mm @ way), float(edge.end_mm @ way)])
+    others: list[float] = sorted((ends @ way).tolist())
+    return max(others[0] - own[1], own[0] - others[1]) <= rules.apart_mm
+
+
+def _union(a: Segment, b: Segment, rules: Rules) -> Segment:
+    points = EdgePoints(
+        np.concatenate([a.points.at_mm, b.points.at_mm]),
+        np.concatenate([a.points.normals, b.points.normals]),
+        np.concatenate([a.points.slopes, b.points.slopes]),
+    )
+    return Segment(points, through(points.at_mm, points.normals, rules.spread_mm))
+
+
+def _reaches(edge: Edge, corner: Corner, rules: Rules) -> bool:
+    way = edge.end_mm - edge.start_mm
+    length = max(float(np.linalg.norm(way)), 1e-9)
+    along = float((corner.at_mm - edge.start_mm) @ way) / length
+    return -rules.beyond_mm <= along <= length + rules.beyond_mm

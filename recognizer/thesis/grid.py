@@ -1,0 +1,228 @@
+"""Symbols -> the grid that they stand on, and the window of labels. Thesis 6.1, figure 6.8.
+
+A symbol's place and axes say where its four neighbours are expected. A symbol found there,
+within a threshold and turned alike, joins the grid; if there are several, the one that fits
+best; and the neighbours of the new member are expected in turn. So components of ink that were
+taken for symbols by mistake stay out. When nothing joins any more, the lattice is fitted to
+all members at once, and symbols beyond a gap join if they lie where it expects them. The grid
+may begin at any symbol; the largest one counts.
+
+Image frame and lattice frame: mm; cell (i, j) is the i-th column and the j-th row upwards, as
+in `symbols.fit`; an image point s lies at R(theta) s + (x, y) of the lattice.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recognizer.thesis.skeleton.symbols import Symbol
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Cell = tuple[int, int]
+
+SIDES: tuple[Cell, ...] = ((1, 0), (0, 1), (-1, 0), (0, -1))
+
+
+@dataclass(frozen=True, slots=True)
+class Acceptance:
+    """When a symbol is the neighbour that was expected."""
+
+    off: float = 0.25  #: pitches from where it is expected
+    turn_rad: float = math.radians(25)  #: of its axes against the grid's
+    gap: float = 3.5  #: cells from the nearest member, beyond which the lattice expects nothing
+    place_mm: float = 0.2  #: standard deviation of a symbol's place, at least
+    axes_rad: float = math.radians(4)  #: of its axes
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Grid:
+    """Symbols in their cells."""
+
+    window: Ints  #: (rows, columns) labels, -1 where none is seen; row 0 is the uppermost
+    first: Cell  #: cell (i, j) of the window's upper left corner
+    members: Ints  #: (m,) which of the symbols
+    cells: Ints  #: (m, 2) i and j of each
+    x_mm: float
+    y_mm: float
+    theta_rad: float
+    off_mm: float  #: rms distance of the members from their cells' centres
+    covariance: Array  #: (3, 3) of x, y and theta
+
+
+def grid(
+    found: Sequence[Symbol], pitch_mm: float, acceptance: Acceptance | None = None
+) -> Grid | None:
+    """Return the largest grid among symbols; None if there is no symbol.
+
+    Parameters
+    ----------
+    found
+        Symbols of an image; those that were rejected are passed over.
+    pitch_mm
+        Distance of neighbours.
+    """
+    chosen = acceptance or Acceptance()
+    named = [k for k, symbol in enumerate(found) if symbol.label >= 0]
+    best: dict[Cell, int] = {}
+    left = set(named)
+    for seed in sorted(named, key=lambda k: found[k].off_mm):
+        if seed in left and len(left) > len(best):
+            members = _grown(found, seed, named, pitch_mm, chosen)
+            left -= set(members.values())
+            best = members if len(members) > len(best) else best
+    return _windowed(found, best, pitch_mm, chosen) if best else None
+
+
+@dataclass(frozen=True, slots=True)
+class _Lattice:
+    """Cell centre c (complex, mm) lies at place (c - shift) / turn of the image."""
+
+    turn: complex
+    shift: complex
+    spread: float  # sum of squared distances of the members from their middle, mm^2
+    middle: complex  # of the members, image frame
+
+    def place(self, cell: Cell, pitch_mm: float) -> complex:
+        return (_centre(cell, pitch_mm) - self.shift) / self.turn
+
+
+def _grown(
+    found: Sequence[Symbol], seed: int, named: list[int], pitch_mm: float, acceptance: Acceptance
+) -> dict[Cell, int]:
+    members: dict[Cell, int] = {(0, 0): seed}
+    free = {k for k in named if k != seed}
+    waiting: list[Cell] = [(0, 0)]
+    while waiting:
+        i, j = waiting.pop(0)
+        symbol = found[members[i, j]]
+        # The axes of the neighbours already found are better known than a symbol's own.
+        around = {c: k for c, k in members.items() if max(abs(c[0] - i), abs(c[1] - j)) <= 2}
+        turn = _lattice(found, around, pitch_mm, acceptance).turn
+        for di, dj in SIDES:
+            cell = (i + di, j + dj)
+            expected = complex(symbol.x_mm, symbol.y_mm) + complex(di, dj) * pitch_mm / turn
+            if cell not in members:
+                joined = _accepted(found, free, expected, turn, pitch_mm, acceptance)
+                if joined is not None:
+                    members[cell] = joined
+                    free.discard(joined)
+                    waiting.append(cell)
+    return _joined(found, members, free, pitch_mm, acceptance)
+
+
+def _joined(
+    found: Sequence[Symbol],
+    members: dict[Cell, int],
+    free: set[int],
+    pitch_mm: float,
+    acceptance: Acceptance,
+) -> dict[Cell, int]:
+    """Return members with those beyond gaps that stand where the whole lattice expects them."""
+    while len(members) > 1:
+        lattice = _lattice(found, members, pitch_mm, acceptance)
+        expected: set[Cell] = set()
+        for k in free:
+            at = lattice.turn * complex(found[k].x_mm, found[k].y_mm) + lattice.shift
+            cell = (math.floor(at.real / pitch_mm), math.floor(at.imag / pitch_mm))
+            near = min(math.dist(cell, member) for member in members)
+            if cell not in members and near <= acceptance.gap:
+                expected.add(cell)
+        more = {}
+        for cell in sorted(expected):
+            place = lattice.place(cell, pitch_mm)
+            joined = _accepted(found, free, place, lattice.turn, pitch_mm, acceptance)
+            if joined is not None:
+                more[cell] = joined
+                free.discard(joined)
+        if not more:
+            return members
+        members = members | more
+    return members
+
+
+def _accepted(
+    found: Sequence[Symbol],
+    free: set[int],
+    expected: complex,
+    turn: complex,
+    pitch_mm: float,
+    acceptance: Acceptance,
+) -> int | None:
+    """Return the symbol that fits an expectation best, if one does."""
+    fits = [
+        (abs(complex(found[k].x_mm, found[k].y_mm) - expected), k)
+        for k in free
+        if abs(cmath.phase(cmath.exp(1j * found[k].theta_rad) * turn)) <= acceptance.turn_rad
+    ]
+    off, best = min(fits, default=(math.inf, -1))
+    return best if off <= acceptance.off * pitch_mm else None
+
+
+def _lattice(
+    found: Sequence[Symbol], members: dict[Cell, int], pitch_mm: float, acceptance: Acceptance
+) -> _Lattice:
+    """Return the lattice through members by least squares, from their places and their axes.
+
+    Symbols are felt at the middle of their ink; where their centres are follows from how they
+    are turned, which all of them together tell better than each alone.
+    """
+    cells = np.array([_centre(cell, pitch_mm) for cell in members])
+    axes = np.array([cmath.exp(-1j * found[k].theta_rad) for k in members.values()])
+    ink = np.array([complex(*found[k].middle_mm) for k in members.values()])
+    own = np.array([complex(found[k].x_mm, found[k].y_mm) for k in members.values()]) - ink
+    turn = complex(axes.sum())
+    for _ in range(2):
+        at = ink + own * axes / turn * abs(turn)
+        middle = complex(at.mean())
+        by_place = complex(((at - middle).conj() * (cells - cells.mean())).sum())
+        turn = by_place / acceptance.place_mm**2 + complex(axes.sum()) / acceptance.axes_rad**2
+    turn /= abs(turn)
+    spread = float((abs(at - middle) ** 2).sum())
+    return _Lattice(turn, complex(cells.mean()) - turn * middle, spread, middle)
+
+
+def _windowed(
+    found: Sequence[Symbol], members: dict[Cell, int], pitch_mm: float, acceptance: Acceptance
+) -> Grid:
+    lattice = _lattice(found, members, pitch_mm, acceptance)
+    cells = np.array(list(members), np.int64)
+    numbers = np.array(list(members.values()), np.int64)
+    low, high = cells.min(axis=0), cells.max(axis=0)
+    window = np.full((high[1] - low[1] + 1, high[0] - low[0] + 1), -1, np.int64)
+    window[high[1] - cells[:, 1], cells[:, 0] - low[0]] = [found[k].label for k in numbers]
+    away = [
+        abs(lattice.place(cell, pitch_mm) - complex(found[k].x_mm, found[k].y_mm))
+        for cell, k in members.items()
+    ]
+    off = math.sqrt(sum(a * a for a in away) / len(away))
+    return Grid(
+        window=window,
+        first=(int(low[0]), int(high[1])),
+        members=numbers,
+        cells=cells,
+        x_mm=lattice.shift.real,
+        y_mm=lattice.shift.imag,
+        theta_rad=cmath.phase(lattice.turn),
+        off_mm=off,
+        covariance=_covariance(lattice, len(members), off, acceptance),
+    )
+
+
+def _covariance(lattice: _Lattice, number: int, off_mm: float, acceptance: Acceptance) -> Array:
+    """Return the covariance (3, 3) of x, y and theta at the image's origin."""
+    variance = max(acceptance.place_mm, off_mm / math.sqrt(2)) ** 2
+    turning = 1 / (lattice.spread / variance + number / acceptance.axes_rad**2)
+    away = -lattice.turn * lattice.middle  # the origin from the middle, lattice frame
+    by_turn = np.array([-away.imag, away.real, 1.0])
+    return np.diag([variance / number] * 2 + [0.0]) + turning * np.outer(by_turn, by_turn)
+
+
+def _centre(cell: Cell, pitch_mm: float) -> complex:
+    return complex(cell[0] + 0.5, cell[1] + 0.5) * pitch_mm

@@ -1,0 +1,213 @@
+"""Overlapping touches -> the global tactile image, merged one after another. Thesis 4.3.
+
+The first touch is the reference: the image frame is its sensor frame. Every further one is
+laid on the touch before it that overlaps it most: where arm and wrist believe it, moved by the
+quarters of a tactel by which the correlation of products says that they err. Errors of single
+steps add up along the way, which is the price of merging one after another; they stay bounded
+if the belief is searched around that the arm has of the pose itself rather than of the step.
+`mosaic` knows a better way; its poses can be given as beliefs. Where touches overlap, the image
+is the mean of their magnified images.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from probe.sensor import Sensor
+from recognizer.scan.mosaic.planar import between, composed, inverse, moved, planar_pose
+from recognizer.scan.mosaic.raster import MAGNIFIED
+from recognizer.thesis.filters import (
+    ImageError,
+    TactileImage,
+    magnified,
+    tactile_image,
+    touch_image,
+)
+from recognizer.thesis.product import product_shift
+
+Array = NDArray[np.float64]
+
+Placing = Literal["product", "bounded", "believed"]
+
+
+@dataclass(frozen=True, slots=True)
+class Merging:
+    """How touches are laid on each other."""
+
+    placing: Placing = "product"  #: by products around the step, around the pose, or as believed
+    window_tactels: float = 0.75  #: how far a belief is searched around, both ways
+    overlap: float = 0.5  #: least share of the sensor's width and height in common
+    turn_rad: float = math.radians(3)  #: touches turned further against each other
+    faint: float = 0.2  #: of the strongest reading; zones without more show nothing
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GlobalImage:
+    """The thesis's GTI, and where its touches were laid."""
+
+    image: TactileImage  #: four samples to a tactel; frame: the sensor frame of the first touch
+    poses: Array  #: (n, 3) T_image_probe of each touch: x, y (mm), theta (rad)
+    corrected: NDArray[np.bool_]  #: (n,) whether a correlation had its say
+
+
+def relative_poses(poses: ArrayLike) -> Array:
+    """Return (n, 3) planar poses of touches in the sensor frame of the first one.
+
+    Parameters
+    ----------
+    poses
+        (n, 4, 4) T_base_probe in any base frame, mm; or (n, 3) x, y (mm) and theta (rad) in
+        any plane.
+
+    Raises
+    ------
+    ImageError
+        If they are neither.
+    MosaicError
+        If a touch is tilted out of the plane of the first one by more than 60 degrees.
+    """
+    given = np.asarray(poses, np.float64)
+    if given.ndim == 2 and given.shape[1:] == (3,) and len(given) and np.isfinite(given).all():
+        return between(given[0], given)
+    if given.ndim == 3 and given.shape[1:] == (4, 4) and len(given) and np.isfinite(given).all():
+        first = np.linalg.inv(given[0])
+        return np.array([planar_pose(first @ T) for T in given])
+    raise ImageError(
+        f"poses of shape {given.shape}",
+        fix="give T_base_probe (n, 4, 4) of n touches, or x, y and theta (n, 3)",
+    )
+
+
+def merged(
+    sensor: Sensor,
+    readings: Sequence[ArrayLike],
+    poses: ArrayLike,
+    merging: Merging | None = None,
+    trust: ArrayLike | None = None,
+) -> GlobalImage:
+    """Merge the touches of a scan.
+
+    Parameters
+    ----------
+    sensor
+        The one that felt them all.
+    readings
+        (rows, columns) of each touch, over its bias; pressed with about equal forces.
+    poses
+        As believed; see `relative_poses`.
+    merging
+        Limits.
+    trust
+        (rows, columns) 0 for bad tactels, which the image is made without.
+
+    Raises
+    ------
+    ImageError
+        If readings and poses do not belong together, or a reading is no number.
+    """
+    chosen = merging or Merging()
+    believed = relative_poses(poses)
+    images = [touch_image(sensor, values, trust) for values in readings]
+    if len(images) != len(believed):
+        raise ImageError(
+            f"{len(images)} touches with {len(believed)} poses", fix="give one pose to each"
+        )
+    placed = np.array(believed)
+    corrected = np.zeros(len(images), np.bool_)
+    origin = placed if chosen.placing == "bounded" else believed
+    for k in range(1, len(images) if chosen.placing != "believed" else 0):
+        near = _nearest(sensor, believed, k, chosen)
+        step = between(origin[k - 1 if near is None else near], believed[k])
+        shift = None if near is None else _shift(sensor, images[near], images[k], step, chosen)
+        if shift is not None:
+            step = np.array([*shift, step[2]])
+        placed[k] = composed(placed[k - 1 if near is None else near], step)
+        corrected[k] = shift is not None
+    return GlobalImage(laid(sensor, images, placed), placed, corrected)
+
+
+def laid(sensor: Sensor, images: Sequence[TactileImage], placed: Array) -> TactileImage:
+    """Return the mean of images laid at poses (n, 3), sampled four times as finely."""
+    cell = sensor.pitch_mm / MAGNIFIED
+    half = np.array(sensor.half_mm) - sensor.pitch_mm / 2
+    corners = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    ends = np.concatenate([moved(pose, corners) for pose in placed])
+    low, high = np.floor(ends.min(axis=0) / cell), np.ceil(ends.max(axis=0) / cell)
+    columns, rows = (high - low).astype(int) + 1
+    total, weight = np.zeros((rows, columns)), np.zeros((rows, columns))
+    for image, pose in zip(images, placed, strict=True):
+        fine = magnified(image)
+        box = moved(pose, corners) / cell
+        left, down = np.floor(box.min(axis=0) - low).astype(int)
+        right, up = np.ceil(box.max(axis=0) - low).astype(int) + 1
+        x, y = np.meshgrid((np.arange(left, right) + low[0]), (np.arange(down, up) + low[1]))
+        at = moved(inverse(pose), np.stack([x, y], axis=-1) * cell)
+        values, known = _asked(fine, at)
+        total[down:up, left:right] += values
+        weight[down:up, left:right] += known
+    values = np.divide(total, weight, out=np.zeros_like(total), where=weight > 0)
+    return tactile_image(
+        values[::-1],
+        step_mm=cell,
+        defined=weight[::-1] > 0,
+        corner_mm=(float(low[0]) * cell, float(high[1]) * cell),
+    )
+
+
+def _nearest(sensor: Sensor, believed: Array, k: int, merging: Merging) -> int | None:
+    """Return the earlier touch that overlaps most, of equals the latest; None if none does."""
+    steps = between(believed[:k], believed[k])
+    width = 2 * np.array(sensor.half_mm)
+    share = 1 - np.abs(steps[:, :2]) / width
+    fit = (share >= merging.overlap).all(axis=1) & (np.abs(steps[:, 2]) <= merging.turn_rad)
+    if not fit.any():
+        return None
+    common = np.where(fit, share.prod(axis=1), 0.0)
+    return int(np.flatnonzero(common >= common.max() - _EQUAL)[-1])
+
+
+def _shift(
+    sensor: Sensor, a: TactileImage, b: TactileImage, step: Array, merging: Merging
+) -> Array | None:
+    """Return where b lies on a, mm; None where what they have in common shows nothing."""
+    faint = merging.faint * max(a.values.max(), b.values.max())
+    for image, way in ((a, step), (b, inverse(step))):
+        centres = sensor.centres_mm() - way[:2]
+        common = (np.abs(centres) <= np.array(sensor.half_mm)).all(axis=-1)
+        if not (image.values[common] > faint).any():
+            return None
+    believed = (float(step[0]) / sensor.pitch_mm, float(step[1]) / sensor.pitch_mm)
+    found = product_shift(a.values, b.values, believed, merging.window_tactels)
+    return np.asarray(found * sensor.pitch_mm)
+
+
+def _asked(image: TactileImage, at_mm: Array) -> tuple[Array, Array]:
+    """Return values, 0 where not defined, and shares that are defined, by the four around."""
+    rows, columns = image.values.shape
+    column = (at_mm[..., 0] - image.corner_mm[0]) / image.step_mm
+    row = (image.corner_mm[1] - at_mm[..., 1]) / image.step_mm
+    inside = (column >= -_EQUAL) & (column <= columns - 1 + _EQUAL)
+    inside &= (row >= -_EQUAL) & (row <= rows - 1 + _EQUAL)
+    j = np.clip(np.floor(column).astype(np.intp), 0, columns - 2)
+    i = np.clip(np.floor(row).astype(np.intp), 0, rows - 2)
+    right, down = np.clip(column - j, 0, 1), np.clip(row - i, 0, 1)
+    value, known = np.zeros(row.shape), np.zeros(row.shape)
+    for di, dj, share in (
+        (0, 0, (1 - right) * (1 - down)),
+        (0, 1, right * (1 - down)),
+        (1, 0, (1 - right) * down),
+        (1, 1, right * down),
+    ):
+        known_here = np.where(inside & image.defined[i + di, j + dj], share, 0.0)
+        value += known_here * image.values[i + di, j + dj]
+        known += known_here
+    return value, known
+
+
+_EQUAL = 1e-6

@@ -1,0 +1,149 @@
+"""End-points and vertices: of a skeleton, and of the glyph it should be. Thesis 6.1, 6.2.
+
+A vertex is a junction of lines or a corner of one. Corners are where a line, replaced by as
+few straight pieces as stay near it (Douglas and Peucker), turns; vertices closer together
+than half a lattice unit are one that thinning has pulled apart.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.alphabet import Glyph
+from recognizer.thesis.skeleton.graph import Path, graph
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Points:
+    """What symbols are told apart by."""
+
+    ends: Array  #: (e, 2)
+    vertices: Array  #: (v, 2)
+    loops: int
+
+    @property
+    def counts(self) -> tuple[int, int, int]:
+        """End-points, vertices and closed loops."""
+        return len(self.ends), len(self.vertices), self.loops
+
+
+@dataclass(frozen=True, slots=True)
+class Counting:
+    """When a bend or a branch counts, in lattice units of the alphabet (reach x pitch)."""
+
+    spur: float = 0.4  #: branches with a free end that are shorter are pruned
+    hook: float = 0.3  #: of a free end, in which thinning may have bent the line
+    bow: float = 0.16  #: how far a line may bow from a straight one
+    turn_rad: float = math.radians(40)  #: from which a bend is a corner
+    near: float = 0.5  #: vertices nearer together are one
+
+
+def points_of_skeleton(skeleton: NDArray[np.bool_], unit: float, counting: Counting) -> Points:
+    """Return the end-points and vertices, (row, column), of a connected skeleton.
+
+    Parameters
+    ----------
+    unit
+        The alphabet's lattice unit, pixels.
+    """
+    found = graph(skeleton, counting.spur * unit)
+    ends = [at for node, at in found.nodes.items() if found.degree(node) == 1]
+    vertices = [at for node, at in found.nodes.items() if found.degree(node) > 2]
+    for branch in found.branches:
+        free = [found.degree(node) == 1 for node in (branch.start, branch.end)]
+        inner = _without_hooks(branch.path, free, counting.hook * unit)
+        vertices += _corners(inner, counting.bow * unit, counting.turn_rad)
+    loops = len(found.branches) - len(found.nodes) + 1
+    merged = _merged(vertices, counting.near * unit)
+    return Points(_stacked(ends), _stacked(merged), loops)
+
+
+def points_of_glyph(glyph: Glyph) -> Points:
+    """Return the end-points and vertices, (x, y) in lattice units, of a stroke graph."""
+    strokes = [(complex(*a), complex(*b)) for a, b in glyph.strokes]
+    places = {end for stroke in strokes for end in stroke}
+    for one, other in itertools.combinations(strokes, 2):
+        places |= _crossing(one, other)
+    ends, vertices = [], []
+    spokes = 0
+    for at in sorted(places, key=lambda z: (z.real, z.imag)):
+        leaving = {
+            _rounded((to - at) / abs(to - at))
+            for a, b in strokes
+            if _on(at, a, b)
+            for to in (a, b)
+            if abs(to - at) > _TINY
+        }
+        spokes += len(leaving)
+        straight = len(leaving) == 2 and abs(sum(leaving)) < _TINY
+        if len(leaving) == 1:
+            ends.append((at.real, at.imag))
+        elif not straight:
+            vertices.append((at.real, at.imag))
+    return Points(_stacked(ends), _stacked(vertices), spokes // 2 - len(places) + 1)
+
+
+_TINY = 1e-9
+
+
+def _corners(path: Path, bow: float, turn_rad: float) -> Path:
+    from skimage.measure import approximate_polygon
+
+    pieces = approximate_polygon(np.array(path), bow)
+    steps = np.diff(pieces, axis=0)
+    found = []
+    for k in range(1, len(pieces) - 1):
+        (a, b), (c, d) = steps[k - 1], steps[k]
+        if abs(math.atan2(a * d - b * c, a * c + b * d)) > turn_rad:
+            found.append((float(pieces[k, 0]), float(pieces[k, 1])))
+    return found
+
+
+def _without_hooks(path: Path, free: list[bool], hook: float) -> Path:
+    """Return a path without the last pixels at its free ends, length `hook` each."""
+    for is_free in free:
+        first, along = 0, 0.0
+        while is_free and first < len(path) - 2 and along < hook:
+            along += math.dist(path[first], path[first + 1])
+            first += 1
+        path = path[first:][::-1]
+    return path
+
+
+def _merged(points: Path, near: float) -> Path:
+    """Return points, those closer together than `near` as their mean."""
+    groups: list[Path] = []
+    for point in points:
+        touched = [g for g in groups if any(math.dist(point, other) < near for other in g)]
+        groups = [g for g in groups if g not in touched] + [[point, *itertools.chain(*touched)]]
+    return [(sum(p[0] for p in g) / len(g), sum(p[1] for p in g) / len(g)) for g in groups]
+
+
+def _crossing(one: tuple[complex, complex], other: tuple[complex, complex]) -> set[complex]:
+    (a, b), (c, d) = one, other
+    u, v, w = b - a, d - c, c - a
+    cross = (u.conjugate() * v).imag
+    if abs(cross) < _TINY:
+        return set()
+    at = a + u * (w.conjugate() * v).imag / cross
+    inside = _on(at, a, b) and _on(at, c, d)
+    return {_rounded(at)} if inside else set()
+
+
+def _on(at: complex, a: complex, b: complex) -> bool:
+    return abs(at - a) + abs(b - at) < abs(b - a) + _TINY
+
+
+def _rounded(z: complex) -> complex:
+    return complex(round(z.real, 9) + 0.0, round(z.imag, 9) + 0.0)
+
+
+def _stacked(points: Path) -> Array:
+    return np.array(points, np.float64).reshape(-1, 2)

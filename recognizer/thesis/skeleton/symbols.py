@@ -1,0 +1,188 @@
+"""Image -> symbols with their places and axes, the thesis's way. Thesis 6.1, 6.2.
+
+Ink is thinned; every component that the image shows wholly has its end-points and vertices
+counted, and the counts name the symbol, or no symbol. Then the points of that symbol are laid
+on those that were found, which gives the directions of its axes, and says how far the points
+are from where they should be: what has the right counts but not the shape can be rejected, too.
+The symbol's place is where its ink has its middle; ends, which blur and thinning shorten,
+would draw it to one side.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.alphabet import Alphabet, Glyph, SymbolStyle
+from recognizer.thesis.filters import TactileImage, magnified
+from recognizer.thesis.skeleton.count import Counting, Points, points_of_glyph, points_of_skeleton
+from recognizer.thesis.skeleton.ink import ink
+
+Array = NDArray[np.float64]
+
+CUT, COUNTS, SHAPE = "cut", "counts", "shape"
+THICK = 6  #: samples that a stroke is magnified to before it is thinned
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """When ink is a symbol."""
+
+    share: float = 0.58  #: of the strongest reading nearby, from which a sample is ink
+    least_area: float = 0.3  #: of a symbol's stroke area; smaller specks are no symbols
+    shape: float = 0.35  #: lattice units, rms, that the points may be off; inf: counts alone
+    counting: Counting = field(default_factory=Counting)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Symbol:
+    """A component of ink."""
+
+    label: int  #: -1 where it is rejected
+    x_mm: float  #: centre of the symbol, or of the ink where it is rejected; image frame
+    y_mm: float
+    theta_rad: float  #: of the symbol's x axis; NaN where it is rejected
+    middle_mm: tuple[float, float]  #: of its ink
+    off_mm: float  #: rms distance of the points from where they should be; NaN if not named
+    points: Points  #: image frame, mm
+    rejected: str  #: "", "cut", "counts" or "shape"
+
+
+def symbols(
+    image: TactileImage, alphabet: Alphabet, style: SymbolStyle, settings: Settings | None = None
+) -> list[Symbol]:
+    """Return what an image shows, whole symbols and what is none.
+
+    Parameters
+    ----------
+    image
+        Over its bias; of any resolution, it is magnified until strokes are `THICK` samples wide.
+    """
+    from scipy.ndimage import find_objects, label
+    from skimage.morphology import skeletonize
+
+    chosen = settings or Settings()
+    thin = THICK * image.step_mm / style.stroke_mm
+    image = magnified(image, max(0, math.ceil(math.log2(thin))))
+    unit_mm = alphabet.reach * style.pitch_mm
+    shown = ink(image, style.pitch_mm, chosen.share)
+    numbers, _ = label(shown, structure=np.ones((3, 3)))
+    beyond = np.pad(~image.defined, _RIM, constant_values=True)
+    values = np.pad(image.values, _RIM)
+    least = chosen.least_area * 2 * unit_mm * style.stroke_mm / image.step_mm**2
+    found = []
+    for number, (rows, columns) in enumerate(find_objects(numbers), 1):
+        part = np.pad(numbers[rows, columns] == number, _RIM)
+        if part.sum() < least:
+            continue
+        box = (
+            slice(rows.start, rows.stop + 2 * _RIM),
+            slice(columns.start, columns.stop + 2 * _RIM),
+        )
+        whole = _grown(part, _RIM)
+        cut = bool((_grown(part, 1) & beyond[box]).any())
+        points = points_of_skeleton(skeletonize(part), unit_mm / image.step_mm, chosen.counting)
+        weights = np.where(whole, values[box], 0.0)
+        middle = (
+            np.array(
+                [
+                    weights.sum(axis=1) @ np.arange(len(weights)),
+                    weights.sum(axis=0) @ np.arange(weights.shape[1]),
+                ]
+            )
+            / weights.sum()
+        )
+        corner = (rows.start - _RIM, columns.start - _RIM)
+        placed = Points(
+            image.xy_mm(*(points.ends + corner).T),
+            image.xy_mm(*(points.vertices + corner).T),
+            points.loops,
+        )
+        found.append(
+            _named(placed, image.xy_mm(*(middle + corner)), cut, alphabet, style, chosen.shape)
+        )
+    return found
+
+
+def _named(
+    points: Points,
+    middle: Array,
+    cut: bool,
+    alphabet: Alphabet,
+    style: SymbolStyle,
+    shape: float,
+) -> Symbol:
+    unit_mm = alphabet.reach * style.pitch_mm
+    x, y = middle.tolist()
+    if cut:
+        return Symbol(-1, x, y, math.nan, (x, y), math.nan, points, CUT)
+    fits = [
+        (*laid(points_of_glyph(glyph), points, unit_mm), label)
+        for label, glyph in enumerate(alphabet.glyphs)
+        if points_of_glyph(glyph).counts == points.counts
+    ]
+    if not fits:
+        return Symbol(-1, x, y, math.nan, (x, y), math.nan, points, COUNTS)
+    off, theta, label = min(fits)
+    if off > shape * unit_mm:
+        return Symbol(-1, x, y, math.nan, (x, y), off, points, SHAPE)
+    own = _middle(alphabet.glyphs[label], unit_mm, style.stroke_mm)
+    at = complex(x, y) - own * complex(math.cos(theta), math.sin(theta))
+    return Symbol(label, at.real, at.imag, theta, (x, y), off, points, "")
+
+
+def laid(glyph: Points, found: Points, unit_mm: float) -> tuple[float, float]:
+    """Lay a glyph's points on found ones of the same counts, by least squares.
+
+    Returns
+    -------
+    The rms distance that is left (mm) and the turn (rad); the best over all ways to pair ends
+    with ends and vertices with vertices.
+    """
+    ways = list(
+        itertools.product(
+            itertools.permutations(range(len(glyph.ends))),
+            itertools.permutations(range(len(glyph.vertices))),
+        )
+    )
+    order = np.array([[*ends, *(len(glyph.ends) + np.array(v, int))] for ends, v in ways], int)
+    model = np.concatenate([glyph.ends, glyph.vertices]) @ np.array([1, 1j]) * unit_mm
+    seen = np.concatenate([found.ends, found.vertices]) @ np.array([1, 1j])
+    paired = model[order]
+    middle, centre = paired.mean(axis=1, keepdims=True), seen.mean()
+    turn = ((paired - middle).conj() * (seen - centre)).sum(axis=1)
+    turn = np.where(abs(turn) > 0, turn, 1)
+    turn = turn / abs(turn)
+    away = seen - centre - turn[:, None] * (paired - middle)
+    off = np.sqrt((abs(away) ** 2).mean(axis=1))
+    best = int(off.argmin())
+    return float(off[best]), float(np.angle(turn[best]))
+
+
+@lru_cache(maxsize=256)
+def _middle(glyph: Glyph, unit_mm: float, stroke_mm: float) -> complex:
+    """Return the middle of a glyph's area, mm, in its own axes."""
+    half = unit_mm + stroke_mm
+    x, y = np.meshgrid(np.linspace(-half, half, _FINE), np.linspace(-half, half, _FINE))
+    at = x + 1j * y
+    covered = np.zeros(at.shape, np.bool_)
+    for a, b in glyph.strokes:
+        start, along = complex(*a) * unit_mm, (complex(*b) - complex(*a)) * unit_mm
+        share = np.clip(((at - start) * along.conjugate()).real / abs(along) ** 2, 0, 1)
+        covered |= abs(at - start - share * along) <= stroke_mm / 2
+    return complex(at[covered].mean())
+
+
+_RIM = THICK // 2  # samples around a component that belong to its blur
+_FINE = 101  # points along a symbol's box
+
+
+def _grown(part: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
+    from scipy.ndimage import binary_dilation
+
+    return np.asarray(binary_dilation(part, np.ones((3, 3)), iterations=steps))

@@ -1,0 +1,206 @@
+"""What the lab has registered, as the reader needs it. Thesis 6.3.
+
+Database -> Lab: for every array and way of embossing (an `Encoding`) the cells that objects
+hold, each with the face that holds it. Cells are looked up by their number row x columns +
+column; faces are read from the database when a touch first meets them.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import Connection, Engine
+
+from generator.alphabet import Alphabet, SymbolStyle, alphabet_from
+from generator.array import FoldedArray, ProductArray, array_from
+from generator.database.cells import held_cells
+from generator.database.open import open_database
+from generator.database.read import read_array, read_object, read_styles, read_surfaces
+from generator.database.registered import RegisteredObject, RegisteredStyle
+from generator.database.transaction import reading
+from generator.polyhedron.developable import Developable
+from generator.polyhedron.tangent import RoundFace
+from recognizer.errors import LabError
+from recognizer.touch.windows import Windows, windows_of
+
+Ints = NDArray[np.int64]
+
+DENSE = 1 << 22  #: arrays of at most so many cells are looked up in a table
+LEAST_MM, MOST_MM = 15.0, 400.0  #: radii of round faces that are told apart from flat ones
+FINER = 1.35  #: from one of them to the next
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EncodedFace:
+    """A face of an object with its symbols."""
+
+    object: str
+    face: str
+    T_object_face: NDArray[np.float64]  #: (4, 4)
+    polygon_mm: tuple[NDArray[np.float64], ...]  #: loops (k, 2), face frame; holes after the first
+    rotation_rad: float  #: turns face x into array x
+    rows: Ints  #: (n,) of the array
+    columns: Ints  #: (n,)
+    labels: Ints  #: (n,)
+    centres_mm: NDArray[np.float64]  #: (n, 2) face frame
+    round: RoundFace | None = None  #: of a round face; its frame is that of the unrolled plane
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Encoding:
+    """One array as embossed in one alphabet and style, and who holds its cells."""
+
+    array: FoldedArray | ProductArray
+    alphabet: Alphabet
+    style: SymbolStyle
+    keys: NDArray[np.uint64]  #: (n,) registered cells, `cell_keys`, rising
+    owners: NDArray[np.int32]  #: (n + 1,) number of the face in `faces`; the last is none, -1
+    labels: NDArray[np.int8]  #: (n + 1,); the last is -1
+    dense: NDArray[np.int32] | None  #: (rows * columns,) place in `owners`; None for large arrays
+    faces: Ints  #: (f, 2) object and face number in the database
+    names: dict[int, str]  #: of the objects, by their numbers
+    engine: Engine
+    radii_mm: tuple[float, ...] = ()  #: of round faces, nearly, rising; none: all faces are flat
+    indexed: list[Windows] = field(default_factory=list)  #: filled by `windows`
+    known: dict[int, EncodedFace] = field(default_factory=dict)
+
+    def at(self, rows: Ints, columns: Ints) -> tuple[NDArray[np.int32], NDArray[np.int8]]:
+        """Return the face (-1: none) that holds each cell on the torus, and the cell's label."""
+        wanted = cell_keys(self.array.columns, rows, columns)
+        if self.dense is not None:
+            place = self.dense[wanted]
+            return self.owners[place], self.labels[place]
+        place = np.searchsorted(self.keys, wanted).clip(max=len(self.keys) - 1)
+        held = self.keys[place] == wanted
+        none = np.int32(-1)
+        return np.where(held, self.owners[place], none), np.where(held, self.labels[place], none)
+
+    def windows(self) -> list[Windows]:
+        """Return the index of all small windows, made when it is first asked for."""
+        if not self.indexed:
+            self.indexed.extend(windows_of(self))
+        return self.indexed
+
+    def face(self, number: int) -> EncodedFace:
+        """Return a face by its number, from memory or from the database."""
+        if number not in self.known:
+            object_id = int(self.faces[number, 0])
+            numbers = np.flatnonzero(self.faces[:, 0] == object_id)
+            with reading(self.engine) as connection:
+                found = read_object(connection, self.names[object_id])
+            encoded = dict(_encoded_faces(found))
+            for near in numbers.tolist():
+                self.known[near] = encoded[int(self.faces[near, 1])]
+        return self.known[number]
+
+
+def cell_keys(columns: int, rows: Ints, columns_at: Ints) -> NDArray[np.uint64]:
+    """Return row * columns + column of cells on the torus, exact up to 2^64 cells."""
+    return rows.astype(np.uint64) * np.uint64(columns) + columns_at.astype(np.uint64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lab:
+    """Everything that a touch can be told apart from."""
+
+    url: str
+    encodings: tuple[Encoding, ...]
+
+
+def open_lab(url: str) -> Lab:
+    """Return what a database holds.
+
+    Raises
+    ------
+    DatabaseError
+        The database cannot be read.
+    LabError
+        It holds no encoded object.
+    """
+    engine = open_database(url, writable=False)
+    with reading(engine) as connection:
+        encodings = tuple(_encodings(connection, engine))
+    if not encodings:
+        raise LabError(
+            "the database holds no encoded object",
+            fix="register one first: encode-object SPEC.yaml --database " + url,
+            place=url,
+        )
+    return Lab(url, encodings)
+
+
+def _encodings(connection: Connection, engine: Engine) -> Iterable[Encoding]:
+    styles: dict[tuple[int, str, SymbolStyle], list[RegisteredStyle]] = {}
+    for entry in read_styles(connection):
+        styles.setdefault((entry.array_id, entry.alphabet, entry.style), []).append(entry)
+    cells: dict[int, Ints] = {}
+    surfaces = read_surfaces(connection)
+    for (array_id, alphabet, style), objects in sorted(styles.items(), key=lambda item: item[0][0]):
+        if array_id not in cells:
+            cells = {array_id: held_cells(connection, array_id)}
+        mine = cells[array_id]
+        mine = mine[np.isin(mine[:, 2], [entry.object_id for entry in objects])]
+        if len(mine) == 0:
+            continue
+        array = array_from(read_array(connection, array_id).definition)
+        faces, owners = np.unique(mine[:, 2:4], axis=0, return_inverse=True)
+        keys = cell_keys(array.columns, mine[:, 0], mine[:, 1])
+        dense = None
+        if array.rows * array.columns <= DENSE:
+            dense = np.full(array.rows * array.columns, len(mine), np.int32)
+            dense[keys] = np.arange(len(mine))
+        yield Encoding(
+            array=array,
+            alphabet=alphabet_from(json.loads(alphabet)),
+            style=style,
+            keys=keys,
+            owners=np.append(owners.reshape(-1), -1).astype(np.int32),
+            labels=np.append(mine[:, 4], -1).astype(np.int8),
+            dense=dense,
+            faces=faces,
+            names={entry.object_id: entry.name for entry in objects},
+            engine=engine,
+            radii_mm=radii_of(
+                one for entry in objects for one in surfaces.get(entry.object_id, ())
+            ),
+        )
+
+
+def radii_of(surfaces: Iterable[Developable]) -> tuple[float, ...]:
+    """Return radii of which one is near to each at which a plate can touch round faces.
+
+    A cone has all radii from its largest down.
+    """
+    steps: set[int] = set()
+    for surface in surfaces:
+        if surface.concave:
+            continue  # a flat plate feels nothing in a hole
+        largest = surface.radius_mm / math.cos(surface.half_angle_rad)
+        last = round(math.log(min(max(largest, LEAST_MM), MOST_MM) / LEAST_MM) / math.log(FINER))
+        steps |= set(range(last + 1)) if surface.half_angle_rad else {last}
+    return tuple(LEAST_MM * FINER**step for step in sorted(steps))
+
+
+def _encoded_faces(found: RegisteredObject) -> Iterable[tuple[int, EncodedFace]]:
+    for layout in found.layout.faces:
+        face = found.faces[layout.face]
+        yield (
+            layout.face,
+            EncodedFace(
+                object=found.entry.name,
+                face=face.name,
+                T_object_face=face.T_object_face,
+                polygon_mm=(face.round.outline_mm,) if face.round else face.polygon_mm,
+                rotation_rad=layout.placement.rotation_rad,
+                rows=layout.rows,
+                columns=layout.columns,
+                labels=layout.labels,
+                centres_mm=layout.centres_mm,
+                round=face.round,
+            ),
+        )

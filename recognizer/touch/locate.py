@@ -1,0 +1,248 @@
+"""Cells in view -> the places of the database that they can be. Thesis 6.3.
+
+A `Fit` names cells (i, j) of a lattice; a place says which array cell (row, column) the cell
+(0, 0) is, and which face holds the symbols: cell (i, j) is then (row - j, column + i) where
+that face holds it, and shows no symbol where it does not. Its score is the sum of the
+cells' log-likelihoods, none of them lower than a limit, so that a worn or wrong symbol costs
+what it should and no more.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recognizer.touch.lab import Encoding, cell_keys
+from recognizer.touch.symbols.fit import Fit
+
+Ints = NDArray[np.int64]
+Array = NDArray[np.float64]
+
+CAP = 8.0  #: nats that one cell can cost at most
+CORNER = 8.0  #: tactels on a cell below which it can cost less than that
+WORN = 4.0  #: nats that a symbol costs that is registered but not felt at all
+ANCHORS = 3  #: cells tried as the one that is surely registered, where no window is seen whole
+AGAIN = 2  #: the same, when the best place is known
+WINDOWS = 4  #: whole windows that are looked up, the surest ones
+SURE = 6.0  #: nats by which each of their cells shows its symbol rather than any other
+MANY = 1024  #: candidates, from which on those count that two windows agree on
+LARGE = 1 << 18  #: registered cells, from which on a touch must show four symbols surely
+FIRST, FOLLOWED = 6, 512  #: after so many cells only so many candidates go on
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """One reading of a fit."""
+
+    fit: int  #: which of the fits
+    row: int  #: array row of lattice cell (0, 0), on the torus
+    column: int
+    face: int  #: number in `Encoding.faces`
+    score: float  #: log-likelihood of the image, nats
+
+
+def places(encoding: Encoding, fits: tuple[Fit, ...], keep: int) -> list[Place]:
+    """Return the likeliest places over all fits, best first, at most `keep` of each fit."""
+    found: list[Place] = []
+    for number, fit in enumerate(fits):
+        found += _places_of(encoding, fit, number, keep)
+    return sorted(found, key=lambda place: -place.score)
+
+
+def rivals(encoding: Encoding, fit: Fit, place: Place, number: int, keep: int) -> list[Place]:
+    """Return the likeliest other places of the whole database under a fit, best first.
+
+    `places` looks where a few windows point to; a place that differs from the best one in a
+    cell of such a window is found here, under scores that the best place has made sharp.
+
+    Parameters
+    ----------
+    place
+        The best one.
+    number
+        Of the fit, which the places get.
+    keep
+        How many at most.
+    """
+    scores = _worn(fit)
+    held = shown_at(encoding, place, fit.cells)
+    sure = np.where(held < encoding.array.order, scores.max(axis=1) - scores[:, -1], 0.0)
+    found = _candidates(encoding, fit, scores, sure, AGAIN)
+    return [
+        other
+        for other in _scored(encoding, fit, number, scores, found, keep + 1)
+        if (other.row, other.column, other.face) != (place.row, place.column, place.face)
+    ]
+
+
+def place_scores(encoding: Encoding, fit: Fit, place: Place) -> float:
+    """Return the log-likelihood of the image if the fit lies at this place, nats."""
+    labels = shown_at(encoding, place, fit.cells)
+    scores = _worn(fit)[np.arange(len(labels)), labels]
+    return float(scores.sum()) + fit.value
+
+
+def shown_at(encoding: Encoding, place: Place, cells: Ints) -> Ints:
+    """Return the labels (m,) that cells (m, 2) of a lattice show at a place; `order` for none."""
+    array = encoding.array
+    held_by, label = encoding.at(
+        (place.row - cells[:, 1]) % array.rows, (place.column + cells[:, 0]) % array.columns
+    )
+    return np.where(held_by == place.face, label, array.order).astype(np.int64)
+
+
+def under_centre(encoding: Encoding, fit: Fit, place: Place) -> tuple[int, int]:
+    """Return row and column of the array's cell under the sensor's centre."""
+    pitch, array = encoding.style.pitch_mm, encoding.array
+    i, j = math.floor(fit.x_mm / pitch), math.floor(fit.y_mm / pitch)
+    return (place.row - j) % array.rows, (place.column + i) % array.columns
+
+
+def neighbours(encoding: Encoding, a: tuple[int, int], b: tuple[int, int]) -> bool:
+    """Whether two cells are one, up to a cell's rounding."""
+    array = encoding.array
+    return (a[0] - b[0] + 1) % array.rows <= 2 and (a[1] - b[1] + 1) % array.columns <= 2
+
+
+def _worn(fit: Fit) -> Array:
+    """Return scores (m, q + 1) in which a registered symbol may be worn away, or read wrong.
+
+    Of a cell of which the sensor sees only a corner, less is believed.
+    """
+    symbols = np.maximum(fit.scores[:, :-1], fit.scores[:, -1:] - WORN)
+    least = CAP * np.minimum(1.0, fit.seen / CORNER)[:, None]
+    return np.asarray(np.maximum(np.concatenate([symbols, fit.scores[:, -1:]], axis=1), -least))
+
+
+def _places_of(encoding: Encoding, fit: Fit, number: int, keep: int) -> list[Place]:
+    scores = _worn(fit)
+    found = _by_windows(encoding, fit)
+    if found is None:
+        told = scores[:, :-1].max(axis=1) - scores[:, -1]  # a symbol rather than none
+        found = _candidates(encoding, fit, scores, told, ANCHORS)
+    return _scored(encoding, fit, number, scores, found, keep)
+
+
+def _scored(
+    encoding: Encoding, fit: Fit, number: int, scores: Array, found: _Candidates, keep: int
+) -> list[Place]:
+    """Return the likeliest candidates, best first."""
+    rows, columns, owners = found
+    if len(rows) == 0:
+        return []
+    values = _values(encoding, fit, scores, rows, columns, owners)
+    best = np.argsort(-values, kind="stable")[:keep]
+    return [
+        Place(number, int(rows[k]), int(columns[k]), int(owners[k]), float(values[k]) + fit.value)
+        for k in best
+    ]
+
+
+def _by_windows(encoding: Encoding, fit: Fit) -> _Candidates | None:
+    """Return where (0, 0) can lie, from the surest whole windows; None if there is none."""
+    order = encoding.array.order
+    symbols = np.sort(fit.scores[:, :order], axis=1)
+    sure = np.minimum(symbols[:, -1] - symbols[:, -2], symbols[:, -1] - fit.scores[:, order])
+    labels = fit.scores[:, :order].argmax(axis=1)
+    named = {cell: n for n, cell in enumerate(map(tuple, fit.cells.tolist()))}
+    seen: list[tuple[float, int, list[int]]] = []
+    for k, index in enumerate(encoding.windows()):
+        down, right = index.shape
+        for i, j in named:
+            inside = [named.get((i + c, j - r)) for r in range(down) for c in range(right)]
+            cells = [n for n in inside if n is not None]
+            if len(cells) == len(inside) and (least := float(sure[cells].min())) > SURE:
+                seen.append((least, k, cells))
+    if not seen:
+        return None
+    largest = max(len(cells) for _, _, cells in seen)
+    seen = [window for window in seen if len(window[2]) == largest]
+    found: list[Ints] = []
+    shifts: list[Ints] = []
+    for _, k, cells in sorted(seen, reverse=True)[:WINDOWS]:
+        weakest = min(cells, key=lambda n: float(sure[n]))
+        second = int(np.argsort(fit.scores[weakest, :order])[-2])
+        for other in (int(labels[weakest]), second):
+            code = 0
+            for n in cells:
+                code = code * order + (other if n == weakest else int(labels[n]))
+            at = encoding.windows()[k].at(code).astype(np.int64)
+            found.append(at)
+            shifts.append(np.tile(fit.cells[cells[0]], (len(at), 1)))
+    return _zeros(encoding, np.concatenate(found), np.concatenate(shifts))
+
+
+def _candidates(
+    encoding: Encoding, fit: Fit, scores: Array, told: Array, anchors: int
+) -> _Candidates:
+    """Return where (0, 0) can lie if one of a few cells is a registered one.
+
+    None in a lab that is too large for that.
+
+    Parameters
+    ----------
+    told
+        (m,) nats by which cells hold a symbol; the first `anchors` of them are tried.
+    """
+    order = encoding.array.order
+    found: list[Ints] = [np.zeros(0, np.int64)]
+    shifts: list[Ints] = [np.zeros((0, 2), np.int64)]
+    tried = np.argsort(-told, kind="stable")[: anchors if len(encoding.keys) <= LARGE else 0]
+    for anchor in tried[told[tried] > 0]:
+        likely = scores[anchor, :order] > -CAP
+        at = np.flatnonzero(likely[encoding.labels[:-1]])
+        found.append(at)
+        shifts.append(np.tile(fit.cells[anchor], (len(at), 1)))
+    return _zeros(encoding, np.concatenate(found), np.concatenate(shifts))
+
+
+def _zeros(encoding: Encoding, at: Ints, cells: Ints) -> _Candidates:
+    """Return where (0, 0) lies, each place once, if cells (n, 2) are the registered ones `at`."""
+    array = encoding.array
+    rows, columns = np.divmod(encoding.keys[at], np.uint64(array.columns))
+    row = (rows.astype(np.int64) + cells[:, 1]) % array.rows
+    column = (columns.astype(np.int64) - cells[:, 0]) % array.columns
+    owners = encoding.owners[at]
+    _, place = np.unique(cell_keys(array.columns, row, column), return_inverse=True)
+    both = place.reshape(-1).astype(np.int64) * (len(encoding.faces) + 1) + owners
+    _, once, votes = np.unique(both, return_index=True, return_counts=True)
+    if len(once) > MANY and (votes > 1).any():
+        once = once[votes > 1]  # several windows say the same
+    return row[once], column[once], owners[once]
+
+
+def _values(
+    encoding: Encoding,
+    fit: Fit,
+    scores: Array,
+    rows: Ints,
+    columns: Ints,
+    owners: NDArray[np.int32],
+) -> Array:
+    """Return the log-likelihood of each candidate, 0 if every cell is at its best.
+
+    The surest cells come first; of many candidates only the best are followed to the end.
+    """
+    array = encoding.array
+    spread = scores.max(axis=1) - scores.min(axis=1)
+    order = np.argsort(-spread * np.minimum(fit.seen, 12.0), kind="stable")
+    total = np.zeros(len(rows))
+    kept = np.arange(len(rows))
+    for done, n in enumerate(order.tolist()):
+        if done == FIRST and len(kept) > FOLLOWED:
+            kept = np.argpartition(-total, FOLLOWED)[:FOLLOWED]
+            low = np.full(len(rows), -np.inf)
+            low[kept] = total[kept]
+            total = low
+        i, j = fit.cells[n].tolist()
+        held_by, label = encoding.at(
+            (rows[kept] - j) % array.rows, (columns[kept] + i) % array.columns
+        )
+        total[kept] += scores[n][np.where(held_by == owners[kept], label, array.order)]
+    return total
+
+
+_Candidates = tuple[Ints, Ints, NDArray[np.int32]]

@@ -1,0 +1,71 @@
+"""Place on the lattice -> pose on the face and on the object, with its covariance.
+
+A symbol that the face holds stands in the lattice frame at the centre of its cell and in the
+face frame where the layout put it; the two frames differ by the placement's turn. Thesis 6.3.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recognizer.touch.lab import EncodedFace, Encoding
+from recognizer.touch.locate import Place
+from recognizer.touch.symbols.fit import Fit
+
+Array = NDArray[np.float64]
+
+
+def face_pose(encoding: Encoding, face: EncodedFace, place: Place, fit: Fit) -> Array:
+    """Return T_face_probe (4, 4), mm: the sensor's tips in the plane of the symbols' tops."""
+    array, pitch = encoding.array, encoding.style.pitch_mm
+    # any symbol of the face ties the two frames together; the first one does
+    row, column = int(face.rows[0]), int(face.columns[0])
+    i = _nearest(column - place.column, array.columns, fit.x_mm / pitch)
+    j = _nearest(place.row - row, array.rows, fit.y_mm / pitch)
+    away = np.array([fit.x_mm - (i + 0.5) * pitch, fit.y_mm - (j + 0.5) * pitch])
+    c, s = math.cos(face.rotation_rad), math.sin(face.rotation_rad)
+    centre = face.centres_mm[0] + np.array([c * away[0] + s * away[1], c * away[1] - s * away[0]])
+    turn = fit.theta_rad - face.rotation_rad
+    pose = np.eye(4)
+    pose[:2, :2] = [[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]]
+    pose[:3, 3] = centre[0], centre[1], encoding.style.height_mm
+    return pose
+
+
+def pose_on_object(face: EncodedFace, T_face_probe: Array) -> Array:
+    """Return T_object_probe (4, 4), mm: on a round face the sensor stands in the tangent plane."""
+    if face.round is None:
+        return face.T_object_face @ T_face_probe
+    x, y = float(T_face_probe[0, 3]), float(T_face_probe[1, 3])
+    return face.round.tangent(x, y) @ T_face_probe
+
+
+def face_covariance(face: EncodedFace, covariance: Array) -> Array:
+    """Turn a covariance (3, 3) of x, y (mm) and theta (rad) from the lattice to the face frame."""
+    c, s = math.cos(face.rotation_rad), math.sin(face.rotation_rad)
+    turn = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    return np.asarray(turn @ covariance @ turn.T)
+
+
+def inside_mm(face: EncodedFace, x: float, y: float) -> float:
+    """Return how far a point lies inside the face's outline; negative outside. Holes count."""
+    distance, crossings = math.inf, 0
+    for loop in face.polygon_mm:
+        ends = np.roll(loop, -1, axis=0)
+        for (x0, y0), (x1, y1) in zip(loop.tolist(), ends.tolist(), strict=True):
+            dx, dy = x1 - x0, y1 - y0
+            t = min(1.0, max(0.0, ((x - x0) * dx + (y - y0) * dy) / (dx * dx + dy * dy)))
+            distance = min(distance, math.hypot(x - x0 - t * dx, y - y0 - t * dy))
+            if (y0 > y) != (y1 > y):  # the side is told from the lower end, so edges agree
+                low, high = ((x0, y0), (x1, y1)) if y0 < y1 else ((x1, y1), (x0, y0))
+                side = (high[0] - low[0]) * (y - low[1]) - (x - low[0]) * (high[1] - low[1])
+                crossings += side > 0
+    return distance if crossings % 2 else -distance
+
+
+def _nearest(difference: int, size: int, near: float) -> int:
+    """Return the number congruent to `difference` modulo `size` that lies nearest to `near`."""
+    return difference + round((near - difference) / size) * size

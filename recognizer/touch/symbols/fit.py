@@ -1,0 +1,213 @@
+"""The joint fit: image -> a few lattices, each with the scores of every cell in view.
+
+Forces (newtons, or counts that rise with force) -> Fit: pose of the sensor on the lattice of
+symbols, gain, and for every cell of the lattice under the sensor the log-likelihood of each
+symbol and of none. Whole and partial symbols count alike: each with what it shows.
+Lattice frame: mm; cell (i, j) is the i-th column and the j-th row upwards, its symbol's
+axes are the frame's. A sensor point s lies at R(theta) s + (x, y). Thesis 6.2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recognizer.touch.symbols.covariance import covariances
+from recognizer.touch.symbols.gain import Image, felt_under, first_gain, tilted_gain
+from recognizer.touch.symbols.noise import Felt, log_likelihoods, spread
+from recognizer.touch.symbols.refine import (
+    NOISE,
+    Lattices,
+    cells_and_offsets,
+    chosen,
+    refined,
+    started,
+    tables_at,
+)
+from recognizer.touch.symbols.search import Bank, search
+from recognizer.touch.symbols.template import Floats, Template, psi
+
+Array = NDArray[np.float64]
+
+SAME_SHIFT = 0.08  #: pitches by which two lattices that are one may differ
+SAME_TURN = 0.02  #: half turns
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How much work the fit spends."""
+
+    candidates: int = 2  #: lattices taken from the coarse search
+    steps: int = 2  #: Gauss-Newton steps of all of them
+    finalists: int = 1  #: lattices that are refined to the end
+    final_steps: int = 2
+    crossed: int = 0  #: gains that are tried on all lattices, and these turned by quarters
+    least_noise: float = 0.05  #: below it a fit is not believed
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """One way to see symbols in an image."""
+
+    x_mm: float
+    y_mm: float
+    theta_rad: float
+    nuisance: Array  #: (4,) width, cross-talk, exponent - 1, scale - 1
+    gain: Array  #: (4,) logarithm of the scale, depth, and its slopes, `pressing`
+    cells: NDArray[np.int64]  #: (m, 2) column and upward row of the cells in view
+    scores: Array  #: (m, q + 1) log-likelihoods, nats, 0 for the best; the last one: no symbol
+    seen: Array  #: (m,) tactels that look at the cell, by how hard they press
+    noise: float  #: standard deviation of psi with which the scores were made
+    value: float  #: log-likelihood of the image with every cell at its best, nats
+    covariance: Array  #: (3, 3) of x, y (mm) and theta (rad)
+
+    @property
+    def pose(self) -> Array:
+        """Return (7,) of `refine.Lattices`."""
+        return np.array([self.x_mm, self.y_mm, self.theta_rad, *self.nuisance])
+
+
+def fits(
+    image: Image,
+    template: Template,
+    bank: Bank,
+    settings: Settings,
+    gains: Sequence[Array] | None = None,
+) -> tuple[Fit, ...]:
+    """Return the likeliest lattices of an image, best first; none if nothing is pressed.
+
+    Gains to begin with, (4,) each, are guessed from the image if they are not given.
+    """
+    if gains is None:
+        guessed = (first_gain(image, template.ink), tilted_gain(image))
+        gains = [gain for gain in guessed if gain is not None]
+    starts = [_searched(image, template, bank, gain, settings.candidates) for gain in gains]
+    if sum(len(start) for start in starts) == 0:
+        return ()
+    each = [len(start) for start in starts]
+    lattices = started(np.concatenate(starts), np.repeat(gains, each, axis=0))
+    lattices = refined(image, template, lattices, steps=settings.steps)
+    if settings.crossed:
+        lattices = _crossed(image, template, lattices, settings.crossed)
+    best = _distinct(lattices, template.pitch_mm)[: settings.finalists]
+    lattices = started(lattices.pose[best], lattices.gain[best])
+    lattices = refined(image, template, lattices, steps=settings.final_steps)
+    found = scored(image, template, lattices, settings)
+    return tuple(found[b] for b in _distinct(lattices, template.pitch_mm))
+
+
+def _distinct(found: Lattices, pitch: float) -> list[int]:
+    """Return the numbers of lattices, best first, each once."""
+    kept: list[int] = []
+    for b in np.argsort(-found.value, kind="stable").tolist():
+        away = found.pose[kept, :3] - found.pose[b, :3]
+        shift = np.abs((away[:, :2] / pitch + 0.5) % 1.0 - 0.5).max(axis=1)
+        turn = np.abs((away[:, 2] / math.pi + 1.0) % 2.0 - 1.0)
+        if not ((shift < SAME_SHIFT) & (turn < SAME_TURN)).any():
+            kept.append(b)
+    return kept
+
+
+def _crossed(image: Image, template: Template, found: Lattices, gains: int) -> Lattices:
+    """Return lattices, and the same turned by quarters, each under the best of several gains.
+
+    A square lattice turned by a quarter is one again, so all four see the image alike but for
+    the symbols; and a lattice may be stuck under a gain from which another one got away.
+    """
+    best = np.argsort(-found.value, kind="stable")
+    tried = []
+    pose = found.pose[best[: 2 * gains]]
+    for _ in range(4):
+        tried.append(pose)
+        pose = pose.copy()
+        pose[:, 0], pose[:, 1] = -pose[:, 1], pose[:, 0].copy()
+        pose[:, 2] += math.pi / 2
+    poses = np.concatenate([*tried, found.pose])
+    each = [
+        refined(image, template, started(poses, np.tile(gain, (len(poses), 1))), steps=1)
+        for gain in found.gain[best[:gains]]
+    ]
+    kept = np.argmax([lattices.value for lattices in each], axis=0)
+    rows = np.arange(len(poses))
+    return Lattices(
+        pose=np.stack([lattices.pose for lattices in each])[kept, rows],
+        gain=np.stack([lattices.gain for lattices in each])[kept, rows],
+        value=np.stack([lattices.value for lattices in each])[kept, rows],
+        normal=np.stack([lattices.normal for lattices in each])[kept, rows],
+    )
+
+
+def _searched(image: Image, template: Template, bank: Bank, gain: Array, keep: int) -> Array:
+    """Return the best lattices (n, 3) of the coarse search under a gain."""
+    felt = felt_under(image, gain[None])
+    response, bare = (np.expm1(felt.psi[0] * math.log(4.0)) / 3.0, felt.bare[0])
+    rest = np.maximum(1.0 - bare, 0.1)
+    seen = psi(np.maximum(response - bare, 0.0) / rest)
+    weights = (felt.press[0] * rest) ** 2 * felt.trust
+    return search(
+        bank,
+        seen.reshape(bank.shape).astype(np.float32),
+        weights.reshape(bank.shape).astype(np.float32),
+        template.order,
+        keep,
+    )
+
+
+def scored(
+    image: Image,
+    template: Template,
+    lattices: Lattices,
+    settings: Settings,
+    noise: float | None = None,
+) -> tuple[Fit, ...]:
+    """Return the fits of lattices with the scores of all their cells, in their order.
+
+    Parameters
+    ----------
+    noise
+        With which scores are made; by default what the likeliest lattice leaves.
+    """
+    felt = felt_under(image, lattices.gain)
+    cells, offsets = cells_and_offsets(image, lattices.pose, template.pitch_mm)
+    tables = tables_at(template, offsets, lattices.pose, felt)
+    away = _away(felt, tables, cells)
+    if noise is None:
+        best = np.minimum(np.abs(away[int(np.argmax(lattices.value))]), 4 * NOISE)
+        left = math.sqrt(float((felt.trust * best**2).sum() / felt.trust.sum()))
+        noise = max(settings.least_noise, left)
+    each = log_likelihoods(felt, tables, np.full(len(cells), noise))
+    level = felt.measure + (felt.trust * np.log(felt.press)).sum(axis=1)
+    covariance = covariances(image, lattices, away * felt.trust, noise)
+    found = []
+    for b in range(len(cells)):
+        names, dense = np.unique(cells[b], axis=0, return_inverse=True)
+        dense = dense.reshape(-1)
+        scores = np.stack([np.bincount(dense, column, len(names)) for column in each[b].T], axis=1)
+        most = scores.max(axis=1)
+        found.append(
+            Fit(
+                x_mm=float(lattices.pose[b, 0]),
+                y_mm=float(lattices.pose[b, 1]),
+                theta_rad=math.remainder(float(lattices.pose[b, 2]), 2 * math.pi),
+                nuisance=lattices.pose[b, 3:],
+                gain=lattices.gain[b],
+                cells=names,
+                scores=scores - most[:, None],
+                seen=np.bincount(dense, felt.press[b] * felt.trust, len(names)).astype(np.float64),
+                noise=noise,
+                value=float(most.sum() + level[b] - felt.trust.sum() * math.log(noise)),
+                covariance=covariance[b],
+            )
+        )
+    return tuple(found)
+
+
+def _away(felt: Felt, tables: Floats, cells: NDArray[np.int64]) -> Array:
+    """Return how far (b, n) readings lie from the likeliest labels, on a covered tactel's scale."""
+    scores = log_likelihoods(felt, tables, np.full(len(cells), NOISE))
+    values = chosen(cells, tables, scores, felt)
+    return (felt.psi - values[..., 0]) * felt.press / spread(values[:, :, None])[..., 0]

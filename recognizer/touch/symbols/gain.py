@@ -1,0 +1,164 @@
+"""The image that is fitted, and its gain: what a plateau would read, all over the sensor.
+
+A gain is a plane of depths under a force scale (`pressing`): (logarithm of the scale, depth at
+the centre, its slopes per half width). It is guessed from the forces alone, as if symbols
+stood all over, or as if a part of the sensor came down on the bare face. A round face falls
+away under the plane by what its bend tells. Sensor frame, mm.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.polyhedron.tangent import Bend
+from probe.sensor import Sensor
+from recognizer.touch.symbols.noise import Felt
+from recognizer.touch.symbols.pressing import Pressing
+from recognizer.touch.symbols.template import psi
+
+Array = NDArray[np.float64]
+
+STEEPEST = 1.7  #: slope of a gain plane; over 1 a part of the sensor hangs in the air
+USUAL = 0.25  #: depth of a usual touch, heights of the overlay, where the scale is not known
+LEAST_PRESS = 0.2  #: of a tactel where the plane presses little or not at all
+LEAST_GAIN = 0.12  #: of the largest over the sensor: below it a tactel tells nothing of symbols
+_AROUND = 5  # tactels, side of a neighbourhood
+_EVEN = 0.3  # share of the highest readings that the lowest reach on the bare face
+_HIGH = 0.06  # and share of the highest of all
+_FEW = 10  # tactels, at least
+
+
+@dataclass(frozen=True, slots=True)
+class Image:
+    """What is fitted: forces of the tactels that tell something."""
+
+    points_mm: Array  #: (n, 2) sensor frame; of a round face, as it is unrolled
+    forces: Array  #: (n,) newtons, or anything proportional
+    trust: Array  #: (n,) 0 ... 1, 0 for bad tactels
+    shape: tuple[int, int]  #: rows and columns
+    pressing: Pressing
+    newtons: bool  #: whether the scale of the pressing is that of the forces
+    plane: Array  #: (n, 3) basis of planes: 1, x and y over the half widths
+    falls: Array | None = None  #: (1 or b, n) of a round face under b planes, overlay heights
+
+
+def image_of(
+    sensor: Sensor, forces: Array, trust: Array, pressing: Pressing, *, newtons: bool
+) -> Image:
+    """Return what is fitted of a frame: forces (rows, columns), trust (rows, columns).
+
+    The face is taken as flat; `bent` gives the same image of a round one.
+    """
+    points = sensor.centres_mm().reshape(-1, 2)
+    return Image(
+        points_mm=points,
+        forces=forces.reshape(-1).astype(np.float64),
+        trust=trust.reshape(-1).astype(np.float64),
+        shape=forces.shape,
+        pressing=pressing,
+        newtons=newtons,
+        plane=np.column_stack([np.ones(len(points)), points / np.array(sensor.half_mm)]),
+    )
+
+
+def bent(image: Image, sensor: Sensor, bend: Bend, shares: tuple[float, ...] = (1.0,)) -> Image:
+    """Return an image of a flat face as one of a face with a bend, in the axes of the sensor.
+
+    Parameters
+    ----------
+    shares
+        By how much less than the bend says the face falls away, of each of the gains under
+        which the image is seen; one for all of them.
+    """
+    height = sensor.overlay.height_mm
+    points = sensor.centres_mm().reshape(-1, 2)
+    symbol = image.pressing.symbol * height
+    return replace(
+        image,
+        points_mm=bend.unrolled_mm(points, symbol),
+        falls=np.multiply.outer(np.array(shares), bend.raised(symbol).falls_mm(points) / height),
+    )
+
+
+def first_gain(image: Image, ink: float) -> Array | None:
+    """Return the gain (4,) of an image with symbols of mean response `ink` all over.
+
+    None where nothing presses.
+    """
+    basis = image.plane
+    root = np.sqrt(image.trust)
+    plane = np.linalg.lstsq(basis * (root * ink)[:, None], image.forces * root, rcond=None)[0]
+    if not (np.isfinite(plane).all() and plane[0] > 0):
+        return None
+    pressing = image.pressing
+    scale = pressing.scale if image.newtons else plane[0] / float(pressing.force(np.array(USUAL)))
+    depth = pressing.depth(np.array(plane[0] / scale))
+    slopes = plane[1:] / (scale * float(pressing.slope(depth)))
+    gain = np.array([math.log(scale), depth, *slopes])
+    return np.asarray(bounded_gain(gain[None], 0.9)[0])
+
+
+def tilted_gain(image: Image) -> Array | None:
+    """Return the gain (4,) of an image in which a part of the bare face is pressed; None if not.
+
+    Where a plate tilts over blank ground it comes down on the face itself, far deeper than on
+    symbols. There even the lowest readings of a neighbourhood as wide as a symbol are high.
+    """
+    from scipy.ndimage import percentile_filter
+
+    forces = image.forces.reshape(image.shape)
+    low, high = (
+        percentile_filter(forces, share, size=_AROUND, mode="nearest").reshape(-1)
+        for share in (20, 80)
+    )
+    known = image.trust > 0
+    flat = known & (low > _EVEN * high) & (low > _HIGH * np.max(high))
+    top = known & (low < _EVEN / 2 * high) & (image.forces > 0.8 * high)
+    if flat.sum() < _FEW or top.sum() < _FEW:
+        return None
+    pressing = image.pressing
+    scale = pressing.scale
+    if not image.newtons:
+        scale = float(np.median(image.forces[top])) / float(pressing.force(np.array(USUAL)))
+    depth = pressing.depth(image.forces / scale) + np.where(flat, pressing.symbol, 0.0)
+    basis, sure = image.plane, np.sqrt(image.trust * (flat | top))
+    plane = np.linalg.lstsq(basis * sure[:, None], depth * sure, rcond=None)[0]
+    if not (np.isfinite(plane).all() and plane[0] > 0):
+        return None
+    return np.asarray(bounded_gain(np.array([[math.log(scale), *plane]]))[0])
+
+
+def bounded_gain(gain: Array, steepest: float = STEEPEST) -> Array:
+    """Return gains (b, 4) whose slopes are at most `steepest` times the depth at the centre."""
+    slope = np.abs(gain[:, 2:]).sum(axis=1)
+    limit = steepest * gain[:, 1]
+    factor = np.where(slope > limit, limit / np.maximum(slope, 1e-300), 1.0)
+    return np.column_stack([gain[:, :2], gain[:, 2:] * factor[:, None]])
+
+
+def felt_under(image: Image, gain: Array) -> Felt:
+    """Return the image as it is under gains (b, 4)."""
+    depth = gain[:, 1:] @ image.plane.T
+    if image.falls is not None:
+        depth = depth - image.falls
+    plain = image.pressing.force(depth)
+    lower = image.pressing.force(depth - image.pressing.symbol)
+    least = LEAST_GAIN * plain.max(axis=1, keepdims=True)
+    share = np.maximum(plain, least)
+    plateau = np.exp(gain[:, :1]) * share
+    return Felt(
+        psi=psi(image.forces / plateau),
+        press=np.clip(depth / (0.5 * gain[:, 1:2]), LEAST_PRESS, 1.0),
+        bare=lower / share,
+        contact=np.clip(plain / least, 0.0, 1.0),
+        trust=image.trust,
+        measure=-(image.trust * np.log(plateau + 3.0 * image.forces)).sum(axis=1),
+        depth=depth,
+        plain=plain,
+        lower=lower,
+        plateau=plateau,
+    )

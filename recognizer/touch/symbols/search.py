@@ -1,0 +1,168 @@
+"""Coarse search: every rotation and shift of the lattice at once.
+
+The score of a symbol k at a place y of the sensor is sum_t w (2 f T_k - T_k^2) over tactels
+t, two correlations of the image with what the symbol looks like there. All symbols, rotations
+and sub-tactel phases together are one matrix product; the score of a lattice is then the
+sum, over its cells, of the best symbol of each (or none), by a table of look-ups.
+Sensor frame, mm; psi values as in `template`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.sensor import Sensor
+from recognizer.touch.symbols.template import Floats, Template
+
+ROTATIONS = 72  #: over the full turn
+PHASES = 2  #: places per tactel along each axis
+SHIFTS = 10  #: of the lattice along each axis
+_RIM = 1.0  #: tactels beyond the matrix at which a symbol's centre may lie
+
+
+@dataclass(frozen=True, slots=True)
+class Bank:
+    """Everything about the search that does not depend on the image."""
+
+    shape: tuple[int, int]  #: rows and columns of the image
+    reach: int  #: kernels are (2 reach + 1) tactels wide
+    rim: int  #: how many tactels around the matrix are places
+    kernels: Floats  #: (2 K K, order * rotations * phases^2): T, then T^2
+    lookups: NDArray[np.int32]  #: (rotations, shifts^2, cells) into places, last one = none
+    rotations_rad: NDArray[np.float64]  #: (rotations,)
+    shifts_mm: NDArray[np.float64]  #: (shifts^2, 2) of the lattice
+
+
+def bank_of(
+    template: Template,
+    sensor: Sensor,
+    *,
+    rotations: int = ROTATIONS,
+    phases: int = PHASES,
+    shifts: int = SHIFTS,
+) -> Bank:
+    """Return the tables of a search.
+
+    Parameters
+    ----------
+    rotations, phases, shifts
+        Finer is slower; work grows with rotations x phases^2 and with rotations x shifts^2.
+    """
+    d = sensor.pitch_mm
+    turns = np.arange(rotations) * 2 * np.pi / rotations
+    reach = math.ceil(template.half_mm * 1.1 / d)
+    rim = math.ceil(_RIM)
+    offset = (np.arange(phases) + 0.5) / phases - 0.5  # of a place from its tactel, tactels
+    k = np.arange(-reach, reach + 1)
+    # tactel minus place, sensor frame: [ky, kx, py, px]
+    dx = (k[None, :, None, None] - offset[None, None, None, :]) * d
+    dy = (-k[:, None, None, None] + offset[None, None, :, None]) * d
+    dx, dy = np.broadcast_arrays(dx, dy)
+    kernels = np.empty((2, len(k) ** 2, template.order, rotations, phases * phases), np.float32)
+    for i, turn in enumerate(turns):
+        c, s = math.cos(turn), math.sin(turn)
+        u = np.stack([c * dx - s * dy, s * dx + c * dy], axis=-1)
+        value = template.at(u)[..., 0].reshape(len(k) ** 2, phases * phases, template.order)
+        kernels[0, :, :, i] = value.swapaxes(1, 2)
+        kernels[1, :, :, i] = kernels[0, :, :, i] ** 2
+    lookups, shifts_mm = _lookups(template, sensor, turns, rim, phases, shifts)
+    return Bank(
+        (sensor.rows, sensor.columns),
+        reach,
+        rim,
+        kernels.reshape(2 * len(k) ** 2, -1),
+        lookups,
+        turns,
+        shifts_mm,
+    )
+
+
+def _lookups(
+    template: Template,
+    sensor: Sensor,
+    turns: NDArray[np.float64],
+    rim: int,
+    phases: int,
+    shifts: int,
+) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Return which place each cell of each lattice falls on."""
+    p, d = template.pitch_mm, sensor.pitch_mm
+    step = (np.arange(shifts) + 0.5) / shifts * p
+    shifts_mm = np.stack(np.meshgrid(step, step), axis=-1).reshape(-1, 2)
+    half_x, half_y = sensor.half_mm
+    most = math.ceil((sensor.reach_mm + 2 * d) / p) + 1
+    cell = (np.arange(-most, most + 1) + 0.5) * p
+    cells = np.stack(np.meshgrid(cell, cell), axis=-1).reshape(-1, 2)
+    width, height = (sensor.columns + 2 * rim) * phases, (sensor.rows + 2 * rim) * phases
+    none = width * height
+    table = np.full((len(turns), len(shifts_mm), len(cells)), none, np.int32)
+    for i, turn in enumerate(turns):
+        c, s = math.cos(turn), math.sin(turn)
+        u = cells[None] - shifts_mm[:, None]
+        x, y = c * u[..., 0] + s * u[..., 1], -s * u[..., 0] + c * u[..., 1]
+        ix = np.floor((x + half_x + rim * d) / d * phases).astype(np.int64)
+        iy = np.floor((half_y + rim * d - y) / d * phases).astype(np.int64)
+        inside = (ix >= 0) & (ix < width) & (iy >= 0) & (iy < height)
+        table[i][inside] = (iy * width + ix)[inside]
+    used = int((table < none).sum(axis=2).max())
+    return np.ascontiguousarray(np.sort(table, axis=2)[:, :, :used]), shifts_mm
+
+
+def search(
+    bank: Bank, values: Floats, weights: Floats, order: int, keep: int
+) -> NDArray[np.float64]:
+    """Return the best lattices.
+
+    Parameters
+    ----------
+    values
+        (rows, columns) psi of the normalised forces.
+    weights
+        (rows, columns) 0 ... 1; 0 where a tactel tells nothing.
+    keep
+        How many to return at most; no two of them are neighbours.
+
+    Returns
+    -------
+    (n, 3) x, y (mm), theta: sensor point s lies at R(theta) s + (x, y) in the lattice frame.
+    """
+    scores = lattice_scores(bank, values, weights, order)
+    return _peaks(bank, scores, keep)
+
+
+def lattice_scores(bank: Bank, values: Floats, weights: Floats, order: int) -> Floats:
+    """Return the score of every rotation and shift, (rotations, shifts^2)."""
+    pad = bank.reach + bank.rim
+    k = 2 * bank.reach + 1
+    stacked = np.stack([2 * weights * values, -weights]).astype(np.float32)
+    padded = np.pad(stacked, ((0, 0), (pad, pad), (pad, pad)))
+    patches = np.lib.stride_tricks.sliding_window_view(padded, (k, k), axis=(1, 2))
+    height, width = patches.shape[1:3]
+    flat = patches.transpose(1, 2, 0, 3, 4).reshape(height * width, -1)
+    turns = len(bank.rotations_rad)
+    best = (flat @ bank.kernels).reshape(height, width, order, turns, -1).max(axis=2)
+    np.maximum(best, 0, out=best)
+    phases = round(math.sqrt(best.shape[-1]))
+    grid = best.reshape(height, width, turns, phases, phases).transpose(2, 0, 3, 1, 4)
+    places = np.zeros((turns, height * width * phases * phases + 1), np.float32)
+    places[:, :-1] = grid.reshape(turns, -1)
+    base = (np.arange(turns) * places.shape[1])[:, None, None]
+    return np.asarray(np.take(places.ravel(), bank.lookups + base).sum(axis=2))
+
+
+def _peaks(bank: Bank, scores: Floats, keep: int) -> NDArray[np.float64]:
+    """Return the best lattices of which no two are neighbours."""
+    turns = len(bank.rotations_rad)
+    n = round(math.sqrt(scores.shape[1]))
+    cube = scores.reshape(turns, n, n)
+    most = cube
+    for axis in range(3):
+        most = np.maximum(most, np.maximum(np.roll(most, 1, axis), np.roll(most, -1, axis)))
+    peaks = np.flatnonzero((cube >= most).ravel())
+    order = peaks[np.argsort(-cube.ravel()[peaks], kind="stable")][:keep]
+    turn, shift = np.divmod(order, n * n)
+    return np.column_stack([bank.shifts_mm[shift], bank.rotations_rad[turn]])
