@@ -31,13 +31,23 @@ class Overlay:
 
 
 @dataclass(frozen=True, slots=True)
-class Sensor:
-    """A matrix of tactels and its overlay."""
+class SensorType:
+    """A matrix of tactels and its overlay; the default is `fsr-16`, the thesis's own.
+
+    Examples
+    --------
+    >>> sensor = SensorType()
+    >>> sensor.name, sensor.rows, sensor.columns, sensor.pitch_mm
+    ('fsr-16', 16, 16, 1.5875)
+    >>> sensor.half_mm
+    (12.7, 12.7)
+    """
 
     rows: int = 16
     columns: int = 16
     pitch_mm: float = 1.5875  #: from tactel to tactel, both ways
     overlay: Overlay = field(default_factory=Overlay)
+    name: str = "fsr-16"
 
     @property
     def half_mm(self) -> tuple[float, float]:

@@ -29,7 +29,7 @@ from probe.contact.press import accuracy_of, level_for, press
 from probe.errors import SurfaceError
 from probe.frame import Frame, frame_from
 from probe.recording.record import Recorder
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from probe.simulate.scene import Scene
 from probe.simulate.touch import Touches, pose_of, random_touches
 
@@ -91,7 +91,7 @@ def simulate_touches(
     for out, suffix in ((png, ".png"), (truth, ".json")):
         if out is not None:
             refuse_taken(out, suffix, replace=replace)
-    sensor = Sensor(overlay=Overlay(kind="pad" if overlay == "pad" else "tab"))
+    sensor = SensorType(overlay=Overlay(kind="pad" if overlay == "pad" else "tab"))
     level = level_for(sensor, accuracy_of(accuracy))
     board = Electronics(noise=QUIET if noise == "quiet" else Noise())
     scene = scene_of(target)
@@ -160,7 +160,7 @@ def scene_of(target: str) -> Scene:
 
 
 def _touched(
-    scene: Scene, sensor: Sensor, board: Electronics, level: str, asked: Asked
+    scene: Scene, sensor: SensorType, board: Electronics, level: str, asked: Asked
 ) -> Iterator[Felt]:
     fsr = fsr_of(sensor.rows, sensor.columns)
     for i in range(asked.touches or 1):
@@ -227,7 +227,7 @@ def _told(felt: Felt) -> dict[str, Any]:
     }
 
 
-def _picture(felt: Felt, sensor: Sensor, png: Path, noise: str) -> None:
+def _picture(felt: Felt, sensor: SensorType, png: Path, noise: str) -> None:
     from probe.plot.touch import touch_picture
 
     what = f"{felt.scene.name}, {felt.touch.force_n:g} N, {sensor.overlay.kind} overlay"

@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike, NDArray
 from probe.contact.layer_influence import influence, nearest_tactel
 from probe.contact.layer_kernel import base_ratio
 from probe.errors import ContactError
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 
 Array = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ class Deblurred:
     arrives: float  #: share of a wave at the tactels' Nyquist frequency that the pad passes
 
 
-def deblurred(forces_n: ArrayLike, sensor: Sensor, *, noise_n: float) -> Deblurred:
+def deblurred(forces_n: ArrayLike, sensor: SensorType, *, noise_n: float) -> Deblurred:
     """Return the forces on top of the pad.
 
     Parameters
@@ -102,13 +102,13 @@ def deblurred(forces_n: ArrayLike, sensor: Sensor, *, noise_n: float) -> Deblurr
     )
 
 
-def arriving(sensor: Sensor) -> float:
+def arriving(sensor: SensorType) -> float:
     """Return the share of a wave two tactels long that arrives at the base of the pad."""
     s = math.pi / sensor.pitch_mm * sensor.overlay.height_mm
     return float(base_ratio(np.array(s), sensor.overlay.poisson))
 
 
-def thickest_mm(sensor: Sensor) -> float:
+def thickest_mm(sensor: SensorType) -> float:
     """Return the height of the highest pad of the sensor's material that can be deblurred."""
     from scipy.optimize import brentq
 
@@ -127,7 +127,7 @@ def _pressing(blur: Array, read: Array, share: float) -> Array:
 
 
 @lru_cache(maxsize=4)
-def blur_of(sensor: Sensor) -> tuple[Array, Array]:
+def blur_of(sensor: SensorType) -> tuple[Array, Array]:
     """Return the blur (n, n) from tactel to tactel, and its singular values (n,).
 
     Column k is what the tactels feel of 1 N that presses evenly on the square of tactel k.

@@ -24,7 +24,7 @@ from probe.contact.elements_pad import CondensedPad, PadLines, condensed
 from probe.contact.elements_seen import heights_at, refuse_unseen
 from probe.contact.elements_unilateral import rest, tips
 from probe.errors import ContactError
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.surface.contract import Surface
 
 STEEPEST_RAD = 0.35  #: tilts beyond are not small
@@ -39,7 +39,7 @@ FINER = 1.6  #: elements get thinner towards the top, by this power
 
 def elements(
     surface: Surface,
-    sensor: Sensor,
+    sensor: SensorType,
     touch: Touch,
     *,
     per_tactel: int = 2,
@@ -114,7 +114,7 @@ def elements(
 
 
 def condensed_pad(
-    sensor: Sensor,
+    sensor: SensorType,
     per_tactel: int = 2,
     layers: int = 3,
     margin_mm: float = 0.0,
@@ -128,7 +128,7 @@ def condensed_pad(
 
 @lru_cache(maxsize=KEPT)
 def _condensed(
-    sensor: Sensor,
+    sensor: SensorType,
     per_tactel: int,
     layers: int,
     margin_mm: float,
@@ -192,7 +192,7 @@ def _along(
     return np.asarray(lines[np.append(True, np.diff(lines) > TINY * size)])
 
 
-def _checked(sensor: Sensor, touch: Touch) -> None:
+def _checked(sensor: SensorType, touch: Touch) -> None:
     overlay = sensor.overlay
     if overlay.kind != "pad":
         raise ContactError(

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from probe.contact.elements_axisymmetric import Kind, Section, section
 from probe.contact.elements_line import Array
 from probe.errors import ContactError
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 
 STEPS = 60
 EVEN = 24  #: Gauss points along a tactel
@@ -55,7 +55,7 @@ class Indented:
         stress[inside] = probes @ field
         return stress
 
-    def tactels_n(self, sensor: Sensor, at_mm: tuple[float, float] = (0.0, 0.0)) -> Array:
+    def tactels_n(self, sensor: SensorType, at_mm: tuple[float, float] = (0.0, 0.0)) -> Array:
         """Return the force on each tactel (rows, columns) with the axis at `at_mm`."""
         points, weights = np.polynomial.legendre.leggauss(EVEN)
         step = points * sensor.pitch_mm / 2

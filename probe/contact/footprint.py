@@ -16,7 +16,7 @@ from probe.contact.plate import Pose, checked_load, load_of
 from probe.contact.tabs import asked
 from probe.contact.tips import Tips, tip_points
 from probe.errors import ContactError
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.surface.contract import Surface
 
 DEPTH = 0.25  #: of the overlay's height, down to which the surface counts as touched
@@ -24,7 +24,7 @@ DEPTH = 0.25  #: of the overlay's height, down to which the surface counts as to
 
 def footprint(
     surface: Surface,
-    sensor: Sensor,
+    sensor: SensorType,
     touch: Touch,
     tips: Tips | None = None,
     *,

@@ -27,7 +27,7 @@ from probe.contact.layer_solve import plate_of
 from probe.contact.neo_hooke import Linear
 from probe.contact.plate import Pose, load_of, rest
 from probe.errors import ContactError
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.surface.contract import Surface
 
 Array = NDArray[np.float64]
@@ -45,7 +45,7 @@ _HELD_RAD = 1e-4  # the same for the last, where the plate was held
 
 def layer(
     surface: Surface,
-    sensor: Sensor,
+    sensor: SensorType,
     touch: Touch,
     *,
     cells_per_tactel: int = 4,
@@ -239,6 +239,6 @@ def _refuse_thin(patch: Patch, pose: Pose, sunk_mm: Array) -> None:
         )
 
 
-def _untouched(sensor: Sensor, touch: Touch) -> Contact:
+def _untouched(sensor: SensorType, touch: Touch) -> Contact:
     zeros = np.zeros((sensor.rows, sensor.columns))
     return Contact(zeros, math.inf, touch.tilt_x_rad, touch.tilt_y_rad, "layer", iterations=0)

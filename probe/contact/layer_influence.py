@@ -1,6 +1,6 @@
 """Influence of a pressed cell on every other: the pad as two spectra.
 
-Sensor + cells per tactel -> Influence, made once for a sensor and kept. The matrix is cut into
+SensorType + cells per tactel -> Influence, made once for a sensor and kept. The matrix is cut into
 square cells of side dx; pressure is band-limited on them, and the surface sinks by a cyclic
 convolution, two Fourier transforms: the compliance between cells is never a matrix.
 
@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from probe.contact.layer_kernel import base_ratio, edge_compliance, layer_compliance
 from probe.errors import ContactError
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ class Influence:
     One more ring of cells stands about the matrix: the bells of `layer_levels` reach there.
     """
 
-    sensor: Sensor
+    sensor: SensorType
     cells_per_tactel: int
     rows: int  #: of cells, ring and all
     columns: int
@@ -83,7 +83,7 @@ class Influence:
 
 
 @lru_cache(maxsize=8)
-def influence(sensor: Sensor, cells_per_tactel: int) -> Influence:
+def influence(sensor: SensorType, cells_per_tactel: int) -> Influence:
     """Return the pad of a sensor on a grid.
 
     Parameters
@@ -146,7 +146,7 @@ def nearest_tactel(
     return order, starts
 
 
-def _check(sensor: Sensor, cells_per_tactel: int) -> None:
+def _check(sensor: SensorType, cells_per_tactel: int) -> None:
     pad = sensor.overlay
     if pad.kind != "pad":
         raise ContactError(

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from probe.contact.contract import Touch
 from probe.errors import ContactError
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.surface.contract import Surface
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ class Patch:
     """What lies under the matrix: cells in flat numbers, row * columns + column, row 0 on top."""
 
     surface: Surface
-    sensor: Sensor
+    sensor: SensorType
     touch: Touch  #: its x, y and theta; force, tilt and wrist have no meaning here
     cells_per_tactel: int
     offsets_mm: Array  #: (samples, 2) points of a cell from its centre, sensor frame
@@ -86,7 +86,7 @@ class Patch:
 
 def patch_under(
     surface: Surface,
-    sensor: Sensor,
+    sensor: SensorType,
     touch: Touch,
     *,
     cells_per_tactel: int = 4,
@@ -174,7 +174,7 @@ def _heights(surface: Surface, touch: Touch, points: Array) -> Array:
 
 
 def _refuse_hidden(
-    surface: Surface, sensor: Sensor, touch: Touch, high: Array, low: Array, finest_mm: float
+    surface: Surface, sensor: SensorType, touch: Touch, high: Array, low: Array, finest_mm: float
 ) -> None:
     """Refuse a surface whose top is under the matrix and was seen by no point.
 

@@ -23,7 +23,7 @@ from importlib import resources
 
 from probe.contact.contract import Contact, Touch
 from probe.errors import ContactError
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.surface.contract import Surface
 
 #: "auto", the name of a level, or the largest error of an image.
@@ -47,7 +47,7 @@ class Measured:
 
 
 def press(
-    surface: Surface, sensor: Sensor, touch: Touch, *, accuracy: Accuracy = "auto"
+    surface: Surface, sensor: SensorType, touch: Touch, *, accuracy: Accuracy = "auto"
 ) -> Contact:
     """Press the sensor on a surface.
 
@@ -81,7 +81,7 @@ def press(
     return _MODELS[level](surface, sensor, touch)
 
 
-def level_for(sensor: Sensor, accuracy: Accuracy = "auto") -> str:
+def level_for(sensor: SensorType, accuracy: Accuracy = "auto") -> str:
     """Return the name of the level that `press` takes.
 
     Raises
@@ -136,32 +136,32 @@ def table() -> dict[str, tuple[Measured, ...]]:
     }
 
 
-def _footprint(surface: Surface, sensor: Sensor, touch: Touch) -> Contact:
+def _footprint(surface: Surface, sensor: SensorType, touch: Touch) -> Contact:
     from probe.contact.footprint import footprint
 
     return footprint(surface, sensor, touch)
 
 
-def _tabs(points: int, surface: Surface, sensor: Sensor, touch: Touch) -> Contact:
+def _tabs(points: int, surface: Surface, sensor: SensorType, touch: Touch) -> Contact:
     from probe.contact.tabs import tabs
     from probe.contact.tips import Tips
 
     return tabs(surface, sensor, touch, Tips(points))
 
 
-def _layer(cells: int, surface: Surface, sensor: Sensor, touch: Touch) -> Contact:
+def _layer(cells: int, surface: Surface, sensor: SensorType, touch: Touch) -> Contact:
     from probe.contact.layer import layer
 
     return layer(surface, sensor, touch, cells_per_tactel=cells)
 
 
-def _elements(surface: Surface, sensor: Sensor, touch: Touch) -> Contact:
+def _elements(surface: Surface, sensor: SensorType, touch: Touch) -> Contact:
     from probe.contact.elements import elements
 
     return elements(surface, sensor, touch)
 
 
-_MODELS: dict[str, Callable[[Surface, Sensor, Touch], Contact]] = {
+_MODELS: dict[str, Callable[[Surface, SensorType, Touch], Contact]] = {
     "footprint": _footprint,
     **{f"tabs-{points}": partial(_tabs, points) for points in (7, 19, 61)},
     **{f"layer-{cells}": partial(_layer, cells) for cells in (2, 4, 8, 16)},

@@ -27,7 +27,7 @@ from probe.contact.tab_law import checked_tabs, tip_laws
 from probe.contact.tabs_foreseen import columns_foreseen, foreseen_pose
 from probe.contact.tips import Tips, tip_points
 from probe.errors import ContactError
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from probe.surface.contract import Surface
 
 Array = NDArray[np.float64]
@@ -36,7 +36,7 @@ TOLERANCE = 1e-6  #: of the force
 STEEPEST_RAD = 0.35  #: tilts beyond are not small
 
 
-def tabs(surface: Surface, sensor: Sensor, touch: Touch, tips: Tips | None = None) -> Contact:
+def tabs(surface: Surface, sensor: SensorType, touch: Touch, tips: Tips | None = None) -> Contact:
     """Press separate tabs on a surface.
 
     Parameters

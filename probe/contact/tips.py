@@ -1,6 +1,6 @@
 """Where the tips of the overlay are asked for contact: a few points on each. Thesis 4.2.
 
-Sensor + `Tips` -> points (rows * columns, q, 2) in the sensor frame and the depth of each
+SensorType + `Tips` -> points (rows * columns, q, 2) in the sensor frame and the depth of each
 below the highest place of its tip. A round tip carries rings of points of equal share (7, 19,
 37, 61 ...), turned from tab to tab by the golden angle, so that what they miss at an edge does
 not add up along a stroke; a pad's tactel carries a square pattern (4, 9, 16 ... points).
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.errors import ContactError
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ class Tips:
     shifts_mm: Array | None = None  #: (rows, columns, 2) how far each stands off its place
 
 
-def tip_points(sensor: Sensor, tips: Tips) -> tuple[Array, Array]:
+def tip_points(sensor: SensorType, tips: Tips) -> tuple[Array, Array]:
     """Return where the tips are asked, and how deep these places lie.
 
     Parameters
@@ -68,7 +68,7 @@ def tip_points(sensor: Sensor, tips: Tips) -> tuple[Array, Array]:
 
 
 @lru_cache(maxsize=16)
-def _drawn(sensor: Sensor, number: int, dome_mm: float) -> tuple[Array, Array]:
+def _drawn(sensor: SensorType, number: int, dome_mm: float) -> tuple[Array, Array]:
     """Return points and drops of tips without defects."""
     tabs = sensor.rows * sensor.columns
     if sensor.overlay.kind == "tab":

@@ -16,7 +16,7 @@ from matplotlib.colors import Normalize
 from numpy.typing import ArrayLike, NDArray
 
 from probe.plot.canvas import HEAT, in_mm, page
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 
 UNITS = {"counts": "reading (ADC counts)", "N": "force (N)", "scaled": "reading (scaled)"}
 WIDTH, HEIGHT = 1000, 440  #: px, of each image
@@ -30,7 +30,7 @@ def frame_picture(
     *,
     unit: str = "counts",
     title: str = "",
-    sensor: Sensor | None = None,
+    sensor: SensorType | None = None,
     azimuth_deg: float = -60.0,
     elevation_deg: float = 40.0,
 ) -> None:
@@ -44,7 +44,7 @@ def frames_picture(
     path: Path,
     *,
     unit: str = "counts",
-    sensor: Sensor | None = None,
+    sensor: SensorType | None = None,
     azimuth_deg: float = -60.0,
     elevation_deg: float = 40.0,
 ) -> None:
@@ -63,7 +63,7 @@ def frames_picture(
     azimuth_deg, elevation_deg
         From where the surfaces are seen.
     """
-    matrix = sensor or Sensor()
+    matrix = sensor or SensorType()
     half_x, half_y = matrix.half_mm
     label = UNITS.get(unit, f"reading ({unit})")
     with page(path, WIDTH, HEIGHT * len(images)) as figure:
@@ -86,7 +86,7 @@ def frames_picture(
 def _surface(
     axes: Any,  # mplot3d has no types
     values: NDArray[np.float64],
-    sensor: Sensor,
+    sensor: SensorType,
     heat: Normalize,
     seen_from_deg: tuple[float, float],
 ) -> None:

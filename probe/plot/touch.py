@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from probe.contact.contract import Touch
 from probe.plot.canvas import HEAT, in_mm, page
 from probe.plot.frame import UNITS
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.surface.contract import Surface
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ _BESIDE = 1.05  # of the sensor's reach is shown
 
 def touch_picture(
     surface: Surface,
-    sensor: Sensor,
+    sensor: SensorType,
     touch: Touch,
     forces_n: ArrayLike,
     counts: ArrayLike,
@@ -81,7 +81,7 @@ def touch_picture(
                              linewidths=0.8, linestyles="solid")  # fmt: skip
 
 
-def _patch(figure: Figure, axes: Axes, surface: Surface, sensor: Sensor, touch: Touch) -> float:
+def _patch(figure: Figure, axes: Axes, surface: Surface, sensor: SensorType, touch: Touch) -> float:
     """Draw the surface about the sensor, and the sensor; returns the surface's top there."""
     reach = _BESIDE * sensor.reach_mm
     x = np.linspace(touch.x_mm - reach, touch.x_mm + reach, ACROSS)
@@ -107,7 +107,7 @@ def _patch(figure: Figure, axes: Axes, surface: Surface, sensor: Sensor, touch: 
     return top
 
 
-def _under(surface: Surface, sensor: Sensor, touch: Touch) -> tuple[tuple[Array, Array], Array]:
+def _under(surface: Surface, sensor: SensorType, touch: Touch) -> tuple[tuple[Array, Array], Array]:
     """Return x and y (n,), sensor frame, and the finite heights (n, n) under the sensor."""
     half_x, half_y = sensor.half_mm
     x, y = np.linspace(-half_x, half_x, ACROSS), np.linspace(-half_y, half_y, ACROSS)
@@ -119,7 +119,7 @@ def _under(surface: Surface, sensor: Sensor, touch: Touch) -> tuple[tuple[Array,
     return (x, y), lowest
 
 
-def _image(figure: Figure, axes: Axes, values: Array, sensor: Sensor, label: str) -> None:
+def _image(figure: Figure, axes: Axes, values: Array, sensor: SensorType, label: str) -> None:
     half_x, half_y = sensor.half_mm
     heat = Normalize(0.0, max(float(values.max()), 1e-9))
     axes.imshow(values, cmap=HEAT, norm=heat, extent=(-half_x, half_x, -half_y, half_y))

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from probe.contact.contract import Touch, WristStiffness
 from probe.errors import SurfaceError
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 
 STEP_TACTELS: Final = 4.25
 
@@ -43,7 +43,7 @@ class Raster:
 
 def raster(
     loops: Sequence[ArrayLike],
-    sensor: Sensor | None = None,
+    sensor: SensorType | None = None,
     *,
     step_tactels: float = STEP_TACTELS,
     theta_rad: float = 0.0,
@@ -69,7 +69,7 @@ def raster(
     SurfaceError
         A loop that is no polygon, or a step that is none.
     """
-    sensor = sensor or Sensor()
+    sensor = sensor or SensorType()
     if not (0 < step_tactels <= min(sensor.rows, sensor.columns)):
         raise SurfaceError(
             f"a step of {step_tactels:g} tactels",

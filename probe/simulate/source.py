@@ -31,7 +31,7 @@ from probe.contact.contract import Touch
 from probe.contact.press import Accuracy, accuracy_of, level_for, press
 from probe.errors import ContactError, SurfaceError
 from probe.frame import Frame, frame_from
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from probe.simulate.scene import Scene
 from probe.simulate.target import surface_of
 
@@ -50,7 +50,7 @@ class Options:
     """How a simulated probe moves and what it is; the table above."""
 
     numbers: dict[str, float]  #: x, y and theta only where given
-    sensor: Sensor
+    sensor: SensorType
     electronics: Electronics
     accuracy: Accuracy
 
@@ -100,7 +100,7 @@ def options_of(values: Mapping[str, str], *, place: str = "") -> Options:
             )
         if name not in _CHOICES and name != "accuracy":
             numbers[name] = _number(name, text, place)
-    sensor = Sensor(overlay=Overlay(kind="pad" if values.get("overlay") == "pad" else "tab"))
+    sensor = SensorType(overlay=Overlay(kind="pad" if values.get("overlay") == "pad" else "tab"))
     noise = QUIET if values.get("noise") == "quiet" else Noise()
     electronics = Electronics(noise=noise, frame_s=1 / numbers["rate"])
     accuracy = accuracy_of(values.get("accuracy", "auto"))

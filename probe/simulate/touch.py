@@ -18,7 +18,7 @@ from probe.contact.contract import Contact, Touch, WristStiffness
 from probe.contact.press import Accuracy, press
 from probe.errors import SurfaceError
 from probe.frame import Frame, frame_from
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.surface.contract import Surface
 from probe.surface.polygon import Polygon
 
@@ -38,7 +38,7 @@ class Touches:
 
 def simulate(
     surface: Surface,
-    sensor: Sensor,
+    sensor: SensorType,
     touch: Touch,
     electronics: Electronics,
     fsr: Fsr,

@@ -19,7 +19,7 @@ from probe.circuit import QUIET, Electronics, Noise, State, fsr_of, read_counts
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.frame import Frame, frame_from
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.simulate.scene import Scene
 from recognizer.bench.errors import BenchError
 
@@ -43,7 +43,7 @@ class Manner:
 class Beats:
     """The probe's state; `touch`, `load` and `lift` may be called from any thread."""
 
-    def __init__(self, sensor: Sensor, manner: Manner) -> None:
+    def __init__(self, sensor: SensorType, manner: Manner) -> None:
         self.sensor, self.manner = sensor, manner
         noise = QUIET if manner.noise == "quiet" else Noise()
         self._board = Electronics(noise=noise, frame_s=1 / manner.rate)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.thesis.filters import median, sobel, touch_image, unbiased
 
 Array = NDArray[np.float64]
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 FILTERS = ("raw", "bias-free", "median", "sobel")
 
 
-def filtered(readings: Array, sensor: Sensor, wish: str, bias: Array | None = None) -> Array:
+def filtered(readings: Array, sensor: SensorType, wish: str, bias: Array | None = None) -> Array:
     """Return an image through a filter.
 
     Parameters

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.bench.images import FILTERS, filtered
 from recognizer.scan.mosaic.image import GlobalImage
 
@@ -32,7 +32,7 @@ class FramePicture:
     """A frame for the pages; each filter is computed when the first page asks for it."""
 
     readings: Array  #: (16, 16) counts or N
-    sensor: Sensor
+    sensor: SensorType
     bias: Array | None
     newtons: bool
     seq: int

@@ -19,7 +19,7 @@ from generator.errors import GeneratorError
 from probe.calibration import Calibration, calibrated
 from probe.errors import ProbeError
 from probe.frame import Frame
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.bench.bulletin import Bulletin
 from recognizer.bench.message import MosaicPicture, mosaic_picture
 from recognizer.bench.telling import told
@@ -51,7 +51,7 @@ class Offered:
 class Reading:
     """The thread. `offer`, `reload` and `clear` may be called from any other."""
 
-    def __init__(self, database: str, sensor: Sensor, bulletin: Bulletin) -> None:
+    def __init__(self, database: str, sensor: SensorType, bulletin: Bulletin) -> None:
         self.database, self.sensor = database, sensor
         self.reader: Reader | None = None
         self._bulletin = bulletin

@@ -17,7 +17,7 @@ import uvicorn
 from generator.database.open import database_exists
 from generator.errors import DatabaseError
 from probe.errors import ProbeError
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from recognizer.bench.app import Bench, app_for
 from recognizer.bench.bulletin import Bulletin
 from recognizer.bench.errors import BenchError
@@ -66,7 +66,7 @@ def serve(asked: Asked) -> int:
     line = _listening(asked.host, asked.web_port)
     before = signal.signal(signal.SIGTERM, _end)
     bulletin = Bulletin()
-    sensor = Sensor(overlay=Overlay(kind="pad" if asked.overlay == "pad" else "tab"))
+    sensor = SensorType(overlay=Overlay(kind="pad" if asked.overlay == "pad" else "tab"))
     session = Session(database, asked.folder, sensor, bulletin)
     try:
         _begin(session, asked.port)

@@ -26,7 +26,7 @@ from probe.frame import Frame
 from probe.port.url import address_of
 from probe.recording.read import read_recording
 from probe.recording.record import Recorder
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.bench.bulletin import Bulletin
 from recognizer.bench.errors import BenchError, BusyError
 from recognizer.bench.feed import Feed, NoFeed, ProbeFeed
@@ -60,7 +60,7 @@ class Session:
         Where everything is told.
     """
 
-    def __init__(self, database: str, folder: Path, sensor: Sensor, bulletin: Bulletin) -> None:
+    def __init__(self, database: str, folder: Path, sensor: SensorType, bulletin: Bulletin) -> None:
         self.database, self.folder, self.sensor = database, folder, sensor
         self.reading = Reading(database, sensor, bulletin)
         self.simulation: TouchProbe | None = None

@@ -20,7 +20,7 @@ from probe.contact.contract import Touch
 from probe.errors import ProbeError
 from probe.port.emulated import emulated_probe
 from probe.port.simulated import FULL_COUNTS, FULL_MV
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.simulate.registered import registered_object, registered_surface
 from probe.simulate.scene import Scene
 from recognizer.bench.beats import Beats, Manner
@@ -52,7 +52,7 @@ class TouchProbe:
         When the emulator cannot be built.
     """
 
-    def __init__(self, url: str, database: str, sensor: Sensor) -> None:
+    def __init__(self, url: str, database: str, sensor: SensorType) -> None:
         firmware, manner = manner_of(url)
         self.database = database
         self.firmware = firmware

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.touch.lab import EncodedFace, Encoding, Lab
 from recognizer.touch.recognition import Recognition
 
@@ -28,7 +28,7 @@ ADVICE = {
 }
 
 
-def told(recognition: Recognition, lab: Lab, sensor: Sensor) -> dict[str, Any]:
+def told(recognition: Recognition, lab: Lab, sensor: SensorType) -> dict[str, Any]:
     """Return an answer for the page."""
     answer = recognition.as_json()
     margin = recognition.margin
@@ -65,7 +65,9 @@ def _face(lab: Lab, recognition: Recognition) -> tuple[int, Encoding, EncodedFac
     return None
 
 
-def _seen(encoding: Encoding, face: EncodedFace, sensor: Sensor, pose: Array) -> list[list[float]]:
+def _seen(
+    encoding: Encoding, face: EncodedFace, sensor: SensorType, pose: Array
+) -> list[list[float]]:
     """Return row, column, label, x and y (sensor frame, mm) of the symbols in view."""
     at = (face.centres_mm - pose[:2, 3]) @ pose[:2, :2]
     half = np.array(sensor.half_mm) + encoding.style.pitch_mm / 2
@@ -78,7 +80,7 @@ def _seen(encoding: Encoding, face: EncodedFace, sensor: Sensor, pose: Array) ->
 
 
 def _corners(
-    encoding: Encoding, face: EncodedFace, sensor: Sensor, pose: Array
+    encoding: Encoding, face: EncodedFace, sensor: SensorType, pose: Array
 ) -> list[list[float]]:
     """Return the sensor's corners on the array, as rows and columns (not wrapped)."""
     w, h = sensor.half_mm

@@ -25,7 +25,7 @@ from probe.frame import Frame
 from probe.port.url import address_of
 from probe.recording.layout import Origin
 from probe.recording.read import read_recording
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from recognizer.touch.contacts import Touch, every_frame, touches
 from recognizer.touch.signal import Signal, signal_of
 
@@ -39,7 +39,7 @@ class Source:
     """What is read."""
 
     place: str  #: file or URL
-    sensor: Sensor
+    sensor: SensorType
     calibration: Calibration | None
     frames: int | None  #: in all; None: nobody knows
     together: int  #: frames of every touch where their writer says so; 0: force tells
@@ -159,9 +159,9 @@ def _overlay_of(origin: Origin) -> str:
     return told if told in ("tab", "pad") else ""
 
 
-def _sensor(asked: str, told: str) -> Sensor:
+def _sensor(asked: str, told: str) -> SensorType:
     kind = cast(Literal["tab", "pad"], asked or told or "tab")
-    return Sensor(overlay=Overlay(kind=kind))
+    return SensorType(overlay=Overlay(kind=kind))
 
 
 def _together(origin: Origin, path: Path) -> int:

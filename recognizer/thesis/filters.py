@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.errors import RecognizerError
 
 Array = NDArray[np.float64]
@@ -93,7 +93,7 @@ def tactile_image(
 
 
 def touch_image(
-    sensor: Sensor, readings: ArrayLike, trust: ArrayLike | None = None
+    sensor: SensorType, readings: ArrayLike, trust: ArrayLike | None = None
 ) -> TactileImage:
     """Return the image of one touch, in the sensor frame; tactels without trust are undefined."""
     defined = None if trust is None else np.asarray(trust) > 0

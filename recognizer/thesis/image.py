@@ -19,7 +19,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.scan.mosaic.planar import between, composed, inverse, moved, planar_pose
 from recognizer.scan.mosaic.raster import MAGNIFIED
 from recognizer.thesis.filters import (
@@ -85,7 +85,7 @@ def relative_poses(poses: ArrayLike) -> Array:
 
 
 def merged(
-    sensor: Sensor,
+    sensor: SensorType,
     readings: Sequence[ArrayLike],
     poses: ArrayLike,
     merging: Merging | None = None,
@@ -132,7 +132,7 @@ def merged(
     return GlobalImage(laid(sensor, images, placed), placed, corrected)
 
 
-def laid(sensor: Sensor, images: Sequence[TactileImage], placed: Array) -> TactileImage:
+def laid(sensor: SensorType, images: Sequence[TactileImage], placed: Array) -> TactileImage:
     """Return the mean of images laid at poses (n, 3), sampled four times as finely."""
     cell = sensor.pitch_mm / MAGNIFIED
     half = np.array(sensor.half_mm) - sensor.pitch_mm / 2
@@ -160,7 +160,7 @@ def laid(sensor: Sensor, images: Sequence[TactileImage], placed: Array) -> Tacti
     )
 
 
-def _nearest(sensor: Sensor, believed: Array, k: int, merging: Merging) -> int | None:
+def _nearest(sensor: SensorType, believed: Array, k: int, merging: Merging) -> int | None:
     """Return the earlier touch that overlaps most, of equals the latest; None if none does."""
     steps = between(believed[:k], believed[k])
     width = 2 * np.array(sensor.half_mm)
@@ -173,7 +173,7 @@ def _nearest(sensor: Sensor, believed: Array, k: int, merging: Merging) -> int |
 
 
 def _shift(
-    sensor: Sensor, a: TactileImage, b: TactileImage, step: Array, merging: Merging
+    sensor: SensorType, a: TactileImage, b: TactileImage, step: Array, merging: Merging
 ) -> Array | None:
     """Return where b lies on a, mm; None where what they have in common shows nothing."""
     faint = merging.faint * max(a.values.max(), b.values.max())

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.thesis.image import GlobalImage, Merging, merged
 from recognizer.thesis.read import ClassicalReading, Settings, read_classically
 from recognizer.touch.lab import Lab
@@ -34,7 +34,7 @@ class ScanReading:
 
 def read_scan(
     lab: Lab,
-    sensor: Sensor,
+    sensor: SensorType,
     readings: Sequence[ArrayLike],
     poses: ArrayLike,
     settings: Settings | None = None,
@@ -70,7 +70,7 @@ def read_scan(
 
     Examples
     --------
-    >>> answer = read_scan(lab, Sensor(), images, believed)  # doctest: +SKIP
+    >>> answer = read_scan(lab, SensorType(), images, believed)  # doctest: +SKIP
     >>> answer.recognition.object, answer.recognition.face  # doctest: +SKIP
     ('Cube', 'F1')
     """
@@ -90,7 +90,7 @@ def spatial_pose(pose: Array) -> Array:
 
 def read_while_scanning(
     lab: Lab,
-    sensor: Sensor,
+    sensor: SensorType,
     readings: Sequence[ArrayLike],
     poses: ArrayLike,
     settings: Settings | None = None,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.touch.belief import Thresholds
 from recognizer.touch.lab import Encoding, Lab
 from recognizer.touch.symbols.fit import Settings
@@ -20,7 +20,7 @@ class Reader:
     """Everything that is prepared once for a lab and a sensor."""
 
     lab: Lab
-    sensor: Sensor
+    sensor: SensorType
     settings: Settings = field(default_factory=Settings)
     thorough: Settings = field(default_factory=lambda: THOROUGH)
     thresholds: Thresholds = field(default_factory=Thresholds)
@@ -29,7 +29,7 @@ class Reader:
 
 def reader_for(
     lab: Lab,
-    sensor: Sensor,
+    sensor: SensorType,
     settings: Settings | None = None,
     thresholds: Thresholds | None = None,
 ) -> Reader:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.polyhedron.tangent import Bend
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.touch.belief import Thresholds
 from recognizer.touch.lab import Encoding
 from recognizer.touch.locate import Place, place_scores, places, rivals, shown_at
@@ -57,7 +57,7 @@ class RoundPlace:
 
 def round_places(
     image: Image,
-    sensor: Sensor,
+    sensor: SensorType,
     encoding: Encoding,
     template: Template,
     bank: Bank,
@@ -136,7 +136,7 @@ def _near(a: Bend, b: Bend, turn_rad: float, factor: float) -> bool:
 
 def _verified(
     image: Image,
-    sensor: Sensor,
+    sensor: SensorType,
     encoding: Encoding,
     template: Template,
     place: Place,

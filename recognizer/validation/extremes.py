@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.press import press
 from probe.errors import ProbeError
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from probe.surface.contract import Surface
 from probe.surface.indenters import Cross, Plate, Rough, Strip, TiltedPlane
 from recognizer.touch.reader import Reader
@@ -99,7 +99,7 @@ def pressed() -> Iterator[dict[str, Any]]:
     for kind in ("tab", "pad"):
         plain = Overlay(kind="pad" if kind == "pad" else "tab")
         for scene in SCENES:
-            sensor = Sensor(overlay=scene.overlay(plain))
+            sensor = SensorType(overlay=scene.overlay(plain))
             outcome, told, balance = _press(scene, sensor)
             close = balance is None or balance <= BALANCE
             yield {
@@ -113,7 +113,7 @@ def pressed() -> Iterator[dict[str, Any]]:
             }
 
 
-def _press(scene: Scene, sensor: Sensor) -> tuple[str, str, float | None]:
+def _press(scene: Scene, sensor: SensorType) -> tuple[str, str, float | None]:
     """Return what came of a scene, in words, and how far the forces are out of balance."""
     try:
         contact = press(scene.surface, sensor, scene.touch)

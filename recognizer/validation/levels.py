@@ -19,7 +19,7 @@ from probe.contact.contract import Contact, Touch
 from probe.contact.press import press
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.surface.contract import Surface
 
 Array = NDArray[np.float64]
@@ -84,7 +84,7 @@ class Printed:
 
 
 def read(
-    surface: Surface, sensor: Sensor, touch: Touch, level: Level, rng: np.random.Generator
+    surface: Surface, sensor: SensorType, touch: Touch, level: Level, rng: np.random.Generator
 ) -> tuple[NDArray[np.uint16], Contact]:
     """Return the counts (rows, columns) of a sensor drawn from a level, and the contact.
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.touch.lab import EncodedFace, Lab
 from recognizer.validation.trial import Trial
 
@@ -79,7 +79,7 @@ def row_of(trial: Trial, kind: str, seen: Seen) -> Row:
     return row
 
 
-def seen_of(lab: Lab, sensor: Sensor, trial: Trial) -> Seen:
+def seen_of(lab: Lab, sensor: SensorType, trial: Trial) -> Seen:
     """Return how many symbols a touch had in view, and whether they were enough.
 
     Enough is `ENOUGH` times the cells of the array's window, on a face that is not worn.

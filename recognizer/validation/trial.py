@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from probe.contact.contract import Touch
 from probe.errors import ContactError
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from probe.simulate.scene import Scene
 from probe.simulate.touch import Touches, random_touches
@@ -246,8 +246,8 @@ def _anywhere(rng: np.random.Generator, ranges: Touches) -> Touch:
     )
 
 
-def sensor_of(overlay: str) -> Sensor:
+def sensor_of(overlay: str) -> SensorType:
     """Return the usual sensor with a tab or a pad overlay."""
     from probe.sensor import Overlay
 
-    return Sensor(overlay=Overlay(kind="pad" if overlay == "pad" else "tab"))
+    return SensorType(overlay=Overlay(kind="pad" if overlay == "pad" else "tab"))

@@ -30,11 +30,11 @@ from probe.contact.elements_axisymmetric import section
 from probe.contact.elements_round import indented, washer_pad
 from probe.contact.elements_tab import Tab, compressed, partly_covered
 from probe.contact.layer import layer
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from probe.surface.contract import Surface
 from probe.surface.indenters import Cross, Paraboloid, Plate, Sphere, Strip
 
-PAD = Sensor(overlay=Overlay(kind="pad"))
+PAD = SensorType(overlay=Overlay(kind="pad"))
 INNER, OUTER, FORCE = 3.5, 7.5, 80.0
 TINY = 1e-9  #: mm, so that a node on a wall that was moved stays on it
 COVERED_PARTS = 3  #: elements along the radius of a tab that is covered in part

@@ -36,10 +36,10 @@ from probe.contact.layer_patch import patch_under
 from probe.contact.layer_solve import glued, plate_of, solved
 from probe.contact.plate import Pose
 from probe.errors import ContactError
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import Cross, HalfPlane, Rough, Sphere, Strip, TiltedPlane, Washer
 
-PAD = Sensor(overlay=Overlay("pad"))
+PAD = SensorType(overlay=Overlay("pad"))
 CELLS = (2, 4, 8)
 REFUSALS = (
     "tips",
@@ -149,7 +149,7 @@ def scenes(given):
             10 ** rng.uniform(-2, 3),
         )
         poisson = float(rng.choice([0, 0.3, 0.45, 0.49, 0.4999, 0.5]))
-        sensor = Sensor(overlay=Overlay("pad", height, young_mpa=young, poisson=poisson))
+        sensor = SensorType(overlay=Overlay("pad", height, young_mpa=young, poisson=poisson))
         force = 10 ** rng.uniform(-6, 9) if rng.random() < 0.3 else (
             young * height * 10 ** rng.uniform(-3, 1.2))  # fmt: skip
         stiffness = 3e3 * 10 ** rng.uniform(-6, 6) * (rng.random() < 0.7)

@@ -38,7 +38,7 @@ from probe.contact.press import LEVELS, press
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.errors import ContactError
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from probe.surface.face import endless
 from probe.surface.indenters import Sphere, Strip, TiltedPlane, Washer
 
@@ -200,7 +200,7 @@ def main():
         return
     lines = []
     for kind in (given.overlay,) if given.overlay else ("tab", "pad"):
-        sensor = Sensor(overlay=Overlay(kind=kind))
+        sensor = SensorType(overlay=Overlay(kind=kind))
         for case, (surface, on_tabs, on_pad, wrist) in cases(
             np.random.default_rng(given.seed)
         ).items():

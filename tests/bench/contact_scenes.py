@@ -27,7 +27,7 @@ import numpy as np
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.press import press
 from probe.errors import ContactError
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import HalfPlane, Plate, Sphere, Strip, Washer
 from probe.surface.mesh import mesh
 
@@ -79,7 +79,7 @@ def extreme(only) -> bool:
             for level in levels:
                 if only and level not in only:
                     continue
-                sensor = Sensor(overlay=Overlay(kind=kind, **changed))
+                sensor = SensorType(overlay=Overlay(kind=kind, **changed))
                 start = time.process_time()
                 try:
                     answer, good = described(press(surface, sensor, touch, accuracy=level), touch)
@@ -126,7 +126,7 @@ def scan(side_mm, repeat):
         ]
         for kind, level in (("tab", "tabs-7"), ("tab", "tabs-19"), ("pad", "layer-2"),
                             ("pad", "layer-4")):  # fmt: skip
-            sensor = Sensor(overlay=Overlay(kind=kind))
+            sensor = SensorType(overlay=Overlay(kind=kind))
             runs = [scanned(surface, loops, sensor, level) for _ in range(repeat)]
             count = runs[0][0]
             arm, pressing, board = np.min([run[1] for run in runs], axis=0) / count

@@ -26,11 +26,11 @@ from probe.contact.plate_newton import Columns
 from probe.contact.tab_law import tip_laws
 from probe.contact.tabs import TOLERANCE, asked, settled, tabs
 from probe.contact.tips import Tips, tip_points
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.surface.face import endless
 from probe.surface.indenters import Cross, HalfPlane, Sphere, Strip, Washer
 
-SENSOR = Sensor()
+SENSOR = SensorType()
 POINTS = (7, 19, 37, 61, 127)
 DENSE_4 = (
     (((-1, 1), (-1, -1)), ((-1, -1), (1, -1))),

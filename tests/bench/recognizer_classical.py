@@ -30,7 +30,7 @@ from probe.contact.tips import Tips
 from probe.scan.kinesthetic import JointErrors, kinesthetic
 from probe.scan.places import surface_to_sensor, touch_at
 from probe.scan.raster import raster
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from probe.surface.face import Face
 from probe.surface.polygon import polygon
@@ -44,7 +44,7 @@ from recognizer.thesis.scan import read_while_scanning, spatial_pose
 from recognizer.thesis.skeleton.symbols import symbols
 from recognizer.touch.lab import open_lab
 
-SENSOR = Sensor()
+SENSOR = SensorType()
 LEVELS = ("typical", "mismatch")
 PLACINGS = ("product", "bounded", "believed")
 THESIS_MM = 1.52

@@ -37,7 +37,7 @@ from probe.contact.press import press
 from probe.scan.kinesthetic import JointErrors, Kinesthetic, kinesthetic
 from probe.scan.places import surface_to_sensor
 from probe.scan.raster import raster
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.simulate.registered import registered_object, registered_surface
 from recognizer.scan.mosaic.grow import added, settled
 from recognizer.scan.mosaic.mosaic import Mosaic, MosaicSettings, no_touches, outliers
@@ -59,7 +59,7 @@ from recognizer.touch.recognise import recognise
 from recognizer.touch.signal import Signal, signal_of
 
 SPECS = Path(__file__).parents[2] / "fixtures" / "specs"
-SENSOR = Sensor()
+SENSOR = SensorType()
 P = SENSOR.pitch_mm
 DEG = math.pi / 180
 PITCH_MM = {"thesis": 12.0, "one-touch": 7.0}

@@ -26,7 +26,7 @@ from sqlalchemy import create_engine  # noqa: E402
 from generator.alphabet import SymbolStyle, alphabet_named  # noqa: E402
 from generator.array import enlarged, profile  # noqa: E402
 from probe.contact.contract import Touch  # noqa: E402
-from probe.sensor import Sensor  # noqa: E402
+from probe.sensor import SensorType  # noqa: E402
 from probe.surface.face import Face  # noqa: E402
 from probe.surface.lattice import Lattice, listed  # noqa: E402
 from probe.surface.polygon import polygon  # noqa: E402
@@ -95,7 +95,7 @@ def encoding_of(array, faces: int) -> Encoding:
 
 def measured(faces: int, touches: int) -> str:
     encoding = encoding_of(array_4095(), faces)
-    reader = reader_for(Lab("", (encoding,)), Sensor())
+    reader = reader_for(Lab("", (encoding,)), SensorType())
     start = time.process_time()
     encoding.windows()
     indexed = time.process_time() - start
@@ -110,7 +110,7 @@ def measured(faces: int, touches: int) -> str:
         lattice = Lattice(drawn, listed(R, C, held.labels), 0.0, -2.0, -58.0)
         x, y = rng.uniform(12, 48, 2)
         touch = Touch(x, y, rng.uniform(-math.pi, math.pi), rng.uniform(20, 120))
-        image, _ = read(Face(lattice, polygon([SQUARE])), Sensor(), touch, TYPICAL, rng)
+        image, _ = read(Face(lattice, polygon([SQUARE])), SensorType(), touch, TYPICAL, rng)
         start = time.process_time()
         found = recognise(reader, signal_of(image.astype(float)))
         ms.append(1e3 * (time.process_time() - start))

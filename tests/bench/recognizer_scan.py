@@ -34,7 +34,7 @@ from probe.errors import ContactError
 from probe.scan.kinesthetic import JointErrors, kinesthetic
 from probe.scan.places import surface_to_sensor
 from probe.scan.raster import raster
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from recognizer.scan.grow import begun, extended
 from recognizer.scan.mosaic.planar import inverse, moved, planar_covariance, planar_pose
@@ -51,7 +51,7 @@ from recognizer.validation.surfaces import FOREIGN, worn
 SPECS = Path(__file__).parents[2] / "fixtures" / "specs"
 SHAPES = {"thesis": ("cube", "prism", "tetrahedron", "box"), "product": ("cube",),
           "one-touch": ("cube", "prism", "tetrahedron", "box")}  # fmt: skip
-SENSOR = Sensor()
+SENSOR = SensorType()
 NAMED = 3.0  # nats
 NEAR_MM = 2.0
 INSET_MM = 5.0  # of a scan along edges

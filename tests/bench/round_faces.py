@@ -42,7 +42,7 @@ from generator.pipeline import encode  # noqa: E402
 from generator.spec import read_specs  # noqa: E402
 from probe.contact.contract import Touch  # noqa: E402
 from probe.errors import ContactError  # noqa: E402
-from probe.sensor import Sensor  # noqa: E402
+from probe.sensor import SensorType  # noqa: E402
 from probe.simulate.registered import registered_object  # noqa: E402
 from probe.simulate.round import RoundPart, round_part  # noqa: E402
 from probe.simulate.touch import Touches, random_touches  # noqa: E402
@@ -98,7 +98,7 @@ def part(database: str, name: str) -> RoundPart:
 
 @lru_cache(maxsize=8)
 def reader(database: str) -> Reader:
-    return reader_for(open_lab(database), Sensor())
+    return reader_for(open_lab(database), SensorType())
 
 
 def touches(touched: RoundPart, rng: np.random.Generator) -> Iterator[Touch]:
@@ -150,7 +150,7 @@ def one_touch(job: tuple[str, str, str, int]) -> Outcome:
     for touch in touches(touched, rng):
         surface = touched.under(touch).surface
         try:
-            counts, _ = read(surface, Sensor(), touch, LEVELS[level], rng)
+            counts, _ = read(surface, SensorType(), touch, LEVELS[level], rng)
         except ContactError:
             continue  # the plate slips off: no touch
         start = time.process_time()
@@ -171,7 +171,7 @@ def one_scan(job: tuple[str, str, str, int]) -> Outcome:
         if inside:
             try:
                 surface = touched.under(touch).surface
-                counts, _ = read(surface, Sensor(), touch, LEVELS[level], rng)
+                counts, _ = read(surface, SensorType(), touch, LEVELS[level], rng)
             except ContactError:
                 inside = False
         if inside:
@@ -225,7 +225,7 @@ def table(options: argparse.Namespace, databases: dict[str, str]) -> None:
 
 
 def strips(options: argparse.Namespace, databases: dict[str, str]) -> None:
-    sensor = Sensor()
+    sensor = SensorType()
     points = sensor.centres_mm().reshape(-1, 2)
     print("object  force N  strip mm  depth mm  tactels")
     for name in options.objects.split(","):
@@ -252,8 +252,10 @@ def picture(options: argparse.Namespace, databases: dict[str, str]) -> None:
 
     touched, touch = part(databases["R40"], "R40"), Touch(100.0, 31.0, math.radians(25), 80.0)
     surface = touched.under(touch).surface
-    counts, contact = read(surface, Sensor(), touch, LEVELS["typical"], np.random.default_rng(1))
-    touch_picture(surface, Sensor(), touch, contact.forces_n, counts, Path(options.output),
+    counts, contact = read(
+        surface, SensorType(), touch, LEVELS["typical"], np.random.default_rng(1)
+    )
+    touch_picture(surface, SensorType(), touch, contact.forces_n, counts, Path(options.output),
                   title="a cylinder of 80 mm, 80 N")  # fmt: skip
 
 

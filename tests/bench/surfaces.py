@@ -25,7 +25,7 @@ from probe.circuit import Electronics, fsr_of, read_counts
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.contact.tips import Tips, tip_points
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from probe.simulate.part import part_surface
 from probe.simulate.registered import registered_surface
 from probe.simulate.source import frames_of
@@ -105,7 +105,7 @@ def report(folder, given):
     rng = np.random.default_rng(given.seed)
     inside = Touches(margin_mm=18.0)
     places = list(itertools.islice(random_touches(scene.region, rng, inside), given.touches))
-    points = tip_points(Sensor(), Tips())[0].reshape(-1, 2)
+    points = tip_points(SensorType(), Tips())[0].reshape(-1, 2)
     grid = np.random.default_rng(0).integers(0, 2, (63, 65))
 
     print(f"{'surface':<34}{'made ms':>10}{'first ms':>12}{'then ms':>10}{'ns/point':>10}")
@@ -134,10 +134,10 @@ def report(folder, given):
     print(f"\n{'a touch, median of CPU ms':<34}{'all':>12}{'press':>12}{'counts':>12}")
     some = places[: max(10, given.touches // 4)]
     for level in ("footprint", "tabs-7", "tabs-19", "tabs-61"):
-        touched(f"{level} on the registered face", face, Sensor(), places, level)
-    touched("tabs-19 on the panel's STL", mesh, Sensor(), places, "tabs-19")
-    touched("tabs-19 on its raster", raster, Sensor(), places, "tabs-19")
-    pad = Sensor(overlay=Overlay(kind="pad"))
+        touched(f"{level} on the registered face", face, SensorType(), places, level)
+    touched("tabs-19 on the panel's STL", mesh, SensorType(), places, "tabs-19")
+    touched("tabs-19 on its raster", raster, SensorType(), places, "tabs-19")
+    pad = SensorType(overlay=Overlay(kind="pad"))
     for level in ("layer-2", "layer-4"):
         touched(f"{level} on the registered face", face, pad, some, level)
 

@@ -27,7 +27,7 @@ from probe.command.exported import median_filtered
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.plot.frame import frames_picture
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import Washer
 
 FORCE_N = 80.0
@@ -41,13 +41,13 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--png", type=Path)
     options = parser.parse_args()
-    step_mm = Sensor().pitch_mm / FINE
+    step_mm = SensorType().pitch_mm / FINE
     blurred = {round(sigma, 2): tactels(gaussian_filter(ring(), sigma / step_mm))
                for sigma in np.arange(0, 3, 0.05)}  # fmt: skip
     print(f"{'overlay':<9}{'image':<11}{'beside %':>9}{'hole %':>8}{'blur mm':>9}{'match':>8}")
     pictures = {}
     for kind in ("tab", "pad"):
-        sensor = Sensor(overlay=Overlay(kind=kind))
+        sensor = SensorType(overlay=Overlay(kind=kind))
         forces = press(Washer(), sensor, Touch(0, 0, 0, FORCE_N), accuracy=FINEST[kind]).forces_n
         board, rng = Electronics(), np.random.default_rng(options.seed)
         sequence = np.repeat(forces[None], options.frames, axis=0)
@@ -68,7 +68,7 @@ def main() -> None:
 
 def ring() -> np.ndarray:
     """Matter over the sensor, finely sampled, (16 FINE, 16 FINE)."""
-    sensor = Sensor(rows=16 * FINE, columns=16 * FINE, pitch_mm=Sensor().pitch_mm / FINE)
+    sensor = SensorType(rows=16 * FINE, columns=16 * FINE, pitch_mm=SensorType().pitch_mm / FINE)
     on = np.isfinite(Washer().heights_mm(sensor.centres_mm().reshape(-1, 2)))
     return on.reshape(16 * FINE, 16 * FINE).astype(float)
 
@@ -80,7 +80,7 @@ def tactels(fine: np.ndarray) -> np.ndarray:
 def blur(image: np.ndarray, blurred: dict[float, np.ndarray]) -> list[float]:
     """The figures of the table; `blurred` is the ring's cover by the deviation of its blur."""
     cover = blurred[0.0]
-    radius = np.hypot(*np.moveaxis(Sensor().centres_mm(), -1, 0))
+    radius = np.hypot(*np.moveaxis(SensorType().centres_mm(), -1, 0))
     hole = (cover == 0) & (radius < Washer().inner_mm / 2)
     match = {sigma: np.corrcoef(image.ravel(), c.ravel())[0, 1] for sigma, c in blurred.items()}
     return [image[cover == 0].sum() / image.sum(), image[hole].mean() / image[cover == 1].mean(),

@@ -22,7 +22,7 @@ from probe.contact.contract import Touch, WristStiffness
 from probe.contact.press import LEVELS, press
 from probe.contact.tabs import tabs
 from probe.errors import ContactError
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from probe.surface.face import endless
 from probe.surface.indenters import HalfPlane, Plate, Strip
 from probe.surface.polygon import polygon
@@ -31,7 +31,7 @@ from recognizer.scan.mosaic.patch import patch_of
 from recognizer.scan.mosaic.planar import composed
 from recognizer.touch.signal import signal_of
 
-SENSORS = {kind: Sensor(overlay=Overlay(kind=kind)) for kind in ("tab", "pad")}
+SENSORS = {kind: SensorType(overlay=Overlay(kind=kind)) for kind in ("tab", "pad")}
 TAB = SENSORS["tab"]
 P = TAB.pitch_mm
 GLYPHS = (

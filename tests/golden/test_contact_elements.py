@@ -8,7 +8,7 @@ from probe.contact.elements import elements
 from probe.contact.elements_axisymmetric import DEGREES, apparent_modulus, section
 from probe.contact.elements_round import indented, washer_pad
 from probe.contact.elements_tab import Tab, compressed, partly_covered
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import Sphere
 
 NEAR_HALF = (0.499, 0.4999, 0.49999, 0.5)
@@ -96,7 +96,7 @@ def washer(parts, **options):
 
 
 def test_washer_of_figure_4_10():
-    sensor = Sensor(overlay=Overlay(kind="pad"))
+    sensor = SensorType(overlay=Overlay(kind="pad"))
     fine = washer(24)
     truth = fine.tactels_n(sensor)
     assert fine.depth_mm == pytest.approx(0.26528, rel=3e-4)
@@ -134,7 +134,7 @@ def test_partly_covered_tab_bears_less_than_all_and_more_than_its_share():
 
 @pytest.mark.parametrize("wrist", [WristStiffness(), WristStiffness(1e9, 1e9)])
 def test_elements_in_space_agree_with_the_section(wrist):
-    sensor = Sensor(overlay=Overlay(kind="pad"))
+    sensor = SensorType(overlay=Overlay(kind="pad"))
     ball = Sphere(20.0)
     at = (0.3, -0.4)
     touch = Touch(-at[0], -at[1], 0.0, 20.0, wrist=wrist)

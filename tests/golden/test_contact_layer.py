@@ -17,7 +17,7 @@ from probe.contact.layer_kernel import (
     edge_compliance,
     layer_compliance,
 )
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import Paraboloid, Strip, Washer
 
 POISSON = (0.0, 0.3, 0.45, 0.49, 0.499, 0.4999, 0.49999, 0.5 - 2**-40, 0.5)
@@ -26,7 +26,7 @@ HELD = WristStiffness(math.inf, math.inf)
 
 
 def pad(**given):
-    return Sensor(overlay=Overlay("pad", **given))
+    return SensorType(overlay=Overlay("pad", **given))
 
 
 def exact(s, poisson):
@@ -117,7 +117,7 @@ def test_stress_of_a_line_at_the_base_by_quadrature():
 
 
 def test_nyquist_of_the_tactels_tells_where_deblurring_ends():
-    nyquist = math.pi / Sensor().pitch_mm
+    nyquist = math.pi / SensorType().pitch_mm
     for height, share in ((1, 0.61), (2, 0.185), (4, 0.0065)):
         assert base_ratio(np.array(nyquist * height), 0.4999) == pytest.approx(share, rel=0.03)
 

@@ -14,7 +14,7 @@ from probe.circuit import QUIET, Electronics, fsr_of
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.errors import SurfaceError
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.simulate.part import part_surface
 from probe.simulate.registered import DatabaseUnreadableError, registered_surface
 from probe.simulate.source import frames_of, options_of
@@ -152,7 +152,7 @@ def test_a_touch_of_the_file_is_a_touch_of_the_registered_face(lab):
     board, film, quiet = Electronics(noise=QUIET), fsr_of(), np.random.default_rng(0)
     for touch in touches:
         one, other = (
-            simulate(surface, Sensor(), touch, board, film, quiet, "tabs")
+            simulate(surface, SensorType(), touch, board, film, quiet, "tabs")
             for surface in (scene.surface, part.surface)
         )
         assert one.counts.max() > 50
@@ -165,7 +165,7 @@ def test_same_generator_gives_the_same_frame_and_the_truth_stays_outside(lab):
     scene = surface_of(f"{lab / 'lab.db'}#Cube")
     touch = Touch(20.0, 20.0, 0.3, 60.0)
     frames = [
-        simulate(scene.surface, Sensor(), touch, Electronics(), fsr_of(),
+        simulate(scene.surface, SensorType(), touch, Electronics(), fsr_of(),
                  np.random.default_rng(seed), "tabs")
         for seed in (1, 1, 2)
     ]  # fmt: skip
@@ -195,7 +195,7 @@ def test_random_touches_fill_their_region_and_ranges(lab):
 def test_pose_of_a_touch_carries_sensor_points_onto_the_tips_plane(lab):
     scene = surface_of(f"{lab / 'lab.db'}#Cube")
     touch = Touch(20.0, 19.0, 0.8, 60.0, 0.02, -0.01)
-    contact = press(scene.surface, Sensor(), touch, accuracy="tabs")
+    contact = press(scene.surface, SensorType(), touch, accuracy="tabs")
     T = pose_of(touch, contact)
     points = np.array([[5.0, -3.0], [0.0, 0.0], [-7.0, 8.0]])
     here = np.c_[points, np.zeros(3), np.ones(3)] @ T.T
@@ -225,7 +225,7 @@ def test_stream_stays_where_it_is_told(lab):
     frames = list(itertools.islice(frames_of(f"{lab / 'lab.db'}#Cube", options), 20))
     scene = surface_of(f"{lab / 'lab.db'}#Cube")
     touch = Touch(20.0, 18.0, math.radians(30), 50.0)
-    still = simulate(scene.surface, Sensor(), touch, Electronics(noise=QUIET), fsr_of(),
+    still = simulate(scene.surface, SensorType(), touch, Electronics(noise=QUIET), fsr_of(),
                      np.random.default_rng(0), "tabs")  # fmt: skip
     assert np.abs(frames[4].counts.astype(int) - still.counts).max() < 30  # it has crept a little
     shape = np.corrcoef(frames[4].counts.ravel(), still.counts.ravel())[0, 1]

@@ -9,9 +9,9 @@ import pytest
 from probe.contact.contract import WristStiffness
 from probe.contact.neo_hooke import Linear, NeoHooke
 from probe.contact.plate import Load, rest
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 
-POINTS = Sensor().centres_mm().reshape(-1, 2)
+POINTS = SensorType().centres_mm().reshape(-1, 2)
 HALF = 12.7  # mm
 SCENES = ("flat", "cross", "razor", "one", "two", "sphere", "random")
 EPS = np.finfo(float).eps

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.scan.mosaic.canvas import Laid, empty_canvas, laid
 from recognizer.scan.mosaic.correlation import correlated
 from recognizer.scan.mosaic.graph import PLANE, Tie, covariances, solved
@@ -19,7 +19,7 @@ from recognizer.scan.mosaic.planar import between, composed, inverse, moved
 from recognizer.scan.mosaic.raster import Raster
 from recognizer.touch.signal import signal_of
 
-SENSOR = Sensor()
+SENSOR = SensorType()
 lengths = st.floats(-500, 500)
 poses = st.tuples(lengths, lengths, st.floats(-math.pi, math.pi)).map(np.array)
 seeds = st.integers(0, 2**32 - 1)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from generator.alphabet import Alphabet
 from probe.plot.canvas import HEAT, in_mm
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.command.plot.winning import Winning
 from recognizer.touch.signal import Signal
 
@@ -21,7 +21,7 @@ OTHER = "#ff5a5a"  #: symbols that it holds and that look otherwise, or are worn
 ACROSS = 240  #: points of the outlines, each way
 
 
-def draw_touch(axes: Axes, sensor: Sensor, signal: Signal, won: Winning | None) -> None:
+def draw_touch(axes: Axes, sensor: SensorType, signal: Signal, won: Winning | None) -> None:
     """Draw readings, lattice, and outlines of the symbols; untrusted tactels are crossed."""
     half_x, half_y = sensor.half_mm
     box = (-half_x, half_x, -half_y, half_y)
@@ -55,7 +55,7 @@ def _cells(won: Winning, pitch: float) -> list[Array]:
 
 
 def _outlines(
-    axes: Axes, sensor: Sensor, won: Winning, which: NDArray[np.bool_], colour: str
+    axes: Axes, sensor: SensorType, won: Winning, which: NDArray[np.bool_], colour: str
 ) -> None:
     """Draw how far the strokes reach of those symbols that the face holds."""
     half_x, half_y = sensor.half_mm

@@ -16,7 +16,7 @@ from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
 
 from probe.plot.touch import MARK
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.command.plot.symbols import strokes_mm
 from recognizer.command.plot.winning import Winning
 
@@ -26,7 +26,7 @@ AROUND = 8  #: cells beside the one under the sensor's centre
 FREE, OTHERS, OBJECT, FACE = "#ffffff", "#e4e4e4", "#cfe3f7", "#f7d9a8"
 
 
-def draw_window(axes: Axes, sensor: Sensor, won: Winning) -> None:
+def draw_window(axes: Axes, sensor: SensorType, won: Winning) -> None:
     """Draw the cells around the sensor with their symbols."""
     encoding, place = won.encoding, won.place
     array, pitch = encoding.array, encoding.style.pitch_mm

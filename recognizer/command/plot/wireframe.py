@@ -12,7 +12,7 @@ from generator.database.read import read_object
 from generator.database.transaction import reading
 from generator.polyhedron.winged import Polyhedron
 from probe.plot.touch import MARK
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.surface.solids import filled
 from recognizer.command.plot.window import FACE
 from recognizer.touch.lab import Encoding
@@ -27,7 +27,7 @@ MANY = 40  #: vertices beyond which they are not numbered
 def draw_object(
     axes: Any,  # mplot3d has no types
     encoding: Encoding,
-    sensor: Sensor,
+    sensor: SensorType,
     name: str,
     face: str,
     T_object_probe: Array,
@@ -52,7 +52,7 @@ def draw_object(
     _look(axes, solid, T_object_probe)
 
 
-def _draw_probe(axes: Any, sensor: Sensor, T: Array) -> None:
+def _draw_probe(axes: Any, sensor: SensorType, T: Array) -> None:
     """Draw the sensor's outline, its axes, and a dot at tactel (0, 0)."""
     x, y = sensor.half_mm
     corners = np.array([(-x, -y, 0), (x, -y, 0), (x, y, 0), (-x, y, 0)]) @ T[:3, :3].T + T[:3, 3]

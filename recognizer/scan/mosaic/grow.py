@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.scan.mosaic.canvas import Canvas, Laid, empty_canvas, laid
 from recognizer.scan.mosaic.errors import MosaicError
 from recognizer.scan.mosaic.graph import ARM, OUTLIER, Solved, Tie, covariances, solved
@@ -35,7 +35,7 @@ _AGREE = 16.0  # chi^2 of two decoded places about the arm
 
 
 def mosaic_of(
-    sensor: Sensor, touches: Iterable[PlacedTouch], settings: MosaicSettings | None = None
+    sensor: SensorType, touches: Iterable[PlacedTouch], settings: MosaicSettings | None = None
 ) -> Mosaic:
     """Return the mosaic of touches, in the order of the scan.
 

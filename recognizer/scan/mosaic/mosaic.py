@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.scan.mosaic.canvas import Canvas, Laid, empty_canvas
 from recognizer.scan.mosaic.graph import OUTLIER, Tie
 from recognizer.scan.mosaic.image import GlobalImage, image_of
@@ -42,7 +42,7 @@ class MosaicSettings:
 class Mosaic:
     """A value; `grow.added` returns the next one."""
 
-    sensor: Sensor
+    sensor: SensorType
     settings: MosaicSettings
     touches: tuple[PlacedTouch, ...]
     patches: tuple[Patch, ...]
@@ -80,7 +80,7 @@ class Outlier:
     chi2: float  #: of three numbers; 0.1 % of good ones pass 16
 
 
-def no_touches(sensor: Sensor, settings: MosaicSettings | None = None) -> Mosaic:
+def no_touches(sensor: SensorType, settings: MosaicSettings | None = None) -> Mosaic:
     """Return the mosaic of nothing, to grow from."""
     return Mosaic(
         sensor=sensor,

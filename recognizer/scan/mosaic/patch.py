@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.touch.signal import Signal
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ RIM = 2  #: coefficients beyond the matrix, mirrored
 class Patch:
     """One image."""
 
-    sensor: Sensor
+    sensor: SensorType
     scale: float  #: reading that counts as 1; 0 where nothing was felt
     raw: Array  #: (rows, columns) readings over the scale, bad ones filled
     values: Array  #: (rows, columns) the same, smoothed
@@ -39,7 +39,7 @@ class Patch:
     slopes: Array  #: (2, rows * columns) of them by x and y, 1/tactel
 
 
-def patch_of(sensor: Sensor, signal: Signal) -> Patch:
+def patch_of(sensor: SensorType, signal: Signal) -> Patch:
     """Return the patch of a signal.
 
     Examples
@@ -47,7 +47,7 @@ def patch_of(sensor: Sensor, signal: Signal) -> Patch:
     >>> from recognizer.touch.signal import signal_of
     >>> readings = np.zeros((16, 16))
     >>> readings[:, 8:] = 100.0
-    >>> patch = patch_of(Sensor(), signal_of(readings))
+    >>> patch = patch_of(SensorType(), signal_of(readings))
     >>> value, slope_x, _ = asked(patch, np.array([[0.0, 0.0]]))
     >>> bool(0.4 < value[0] < 0.6 and slope_x[0] > 0)
     True
@@ -89,13 +89,13 @@ def asked(patch: Patch, points_mm: Array) -> tuple[Array, Array, Array]:
     return value, slope_x, slope_y
 
 
-def covered(sensor: Sensor, points_mm: Array, beyond: float = 0.0) -> NDArray[np.bool_]:
+def covered(sensor: SensorType, points_mm: Array, beyond: float = 0.0) -> NDArray[np.bool_]:
     """Whether points lie between tactels' centres, or up to `beyond` tactels outside."""
     half = (np.array([sensor.columns, sensor.rows]) - 1) / 2 + beyond
     return np.asarray((np.abs(points_mm) <= half * sensor.pitch_mm + 1e-9).all(axis=-1))
 
 
-def nearest(sensor: Sensor, points_mm: Array) -> NDArray[np.intp]:
+def nearest(sensor: SensorType, points_mm: Array) -> NDArray[np.intp]:
     """Return the number of the tactel whose centre is nearest to each point inside the matrix."""
     column = np.rint(points_mm[..., 0] / sensor.pitch_mm + (sensor.columns - 1) / 2)
     row = np.rint((sensor.rows - 1) / 2 - points_mm[..., 1] / sensor.pitch_mm)

@@ -17,7 +17,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.scan.mosaic.patch import Patch
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ STIFF = 1e6  #: 1/tactel^2
 LEAST_CHANGE = 1e-9  # of a patch's unit
 
 
-def scales(sensor: Sensor) -> Array:
+def scales(sensor: SensorType) -> Array:
     """Return (3,) what one tactel is in x, y (mm) and theta (rad)."""
     return np.array([1.0, 1.0, 1 / min(sensor.half_mm)]) * sensor.pitch_mm
 
@@ -55,7 +55,7 @@ def seen_motions(a: Patch, over: NDArray[np.bool_], pose: Array) -> Array:
     return np.asarray(motions[:, values > LEAST], np.float64)
 
 
-def kept(information: Array, motions: Array, sensor: Sensor, believed: Array) -> Array:
+def kept(information: Array, motions: Array, sensor: SensorType, believed: Array) -> Array:
     """Return what an information says of some motions, all others being unknown.
 
     Parameters
@@ -81,13 +81,13 @@ def kept(information: Array, motions: Array, sensor: Sensor, believed: Array) ->
     return np.asarray((found + found.T) / 2)
 
 
-def held(motions: Array, sensor: Sensor) -> Array:
+def held(motions: Array, sensor: SensorType) -> Array:
     """Return an information (3, 3) that holds a pose in all motions but these."""
     unit = np.outer(scales(sensor), scales(sensor))
     return np.asarray(STIFF * (np.eye(3) - motions @ motions.T) / unit)
 
 
-def far_apart(a: Array, b: Array, sensor: Sensor) -> float:
+def far_apart(a: Array, b: Array, sensor: SensorType) -> float:
     """Return how far two poses (3,) are from each other, tactels, turns among it."""
     away = (a - b) / scales(sensor)
     away[2] = ((a[2] - b[2] + math.pi) % (2 * math.pi) - math.pi) / scales(sensor)[2]

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.thesis.edges.fit import Fitted, Fitting, fitted
 from recognizer.thesis.edges.hough import Settings as Hough
 from recognizer.thesis.edges.hough import segments
@@ -71,7 +71,7 @@ def classical_edges(image: TactileImage, finding: Finding | None = None) -> tupl
 
 
 def face_edges(
-    image: TactileImage, sensor: Sensor, finding: Finding | None = None
+    image: TactileImage, sensor: SensorType, finding: Finding | None = None
 ) -> tuple[Edge, ...]:
     """Return the edges of a blank face that one touch feels, in the sensor frame.
 
@@ -91,14 +91,14 @@ def face_edges(
     >>> from recognizer.thesis.filters import touch_image
     >>> readings = np.zeros((16, 16))
     >>> readings[:, 7:] = 0.5
-    >>> edge, = face_edges(touch_image(Sensor(), readings), Sensor())
+    >>> edge, = face_edges(touch_image(SensorType(), readings), SensorType())
     >>> bool(abs(edge.angle_rad) < 0.02 and abs(edge.offset_mm + 1.5875) < 0.2)
     True
     """
     return outline(image, sensor, finding).edges
 
 
-def outline(image: TactileImage, sensor: Sensor, finding: Finding | None = None) -> Outline:
+def outline(image: TactileImage, sensor: SensorType, finding: Finding | None = None) -> Outline:
     """Return edges and corners that one touch feels, in the sensor frame; see `face_edges`."""
     chosen = finding or Finding()
     over = unbiased(image)
@@ -122,7 +122,7 @@ def outline(image: TactileImage, sensor: Sensor, finding: Finding | None = None)
 
 
 def _best(
-    image: TactileImage, sensor: Sensor, edges: tuple[Edge, ...], finding: Finding
+    image: TactileImage, sensor: SensorType, edges: tuple[Edge, ...], finding: Finding
 ) -> Fitted | None:
     """Return the fit of a face inside of all edges, or of any, whichever explains more."""
     reflex = False

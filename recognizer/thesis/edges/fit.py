@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.thesis.edges.line import Edge
 from recognizer.thesis.edges.response import BLURS_MM, felt_at, responses
 from recognizer.thesis.filters import TactileImage
@@ -56,7 +56,7 @@ class Fitted:
 
 def fitted(
     image: TactileImage,
-    sensor: Sensor,
+    sensor: SensorType,
     edges: tuple[Edge, ...],
     *,
     reflex: bool = False,

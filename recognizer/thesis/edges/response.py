@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ _PAD = 0.5  # of its thickness: what a pad smears, standard deviation
 
 
 @lru_cache(maxsize=8)
-def responses(sensor: Sensor) -> Array:
+def responses(sensor: SensorType) -> Array:
     """Return responses (blurs, n) at -REACH_MM ... REACH_MM inside, every STEP_MM."""
     from scipy.ndimage import gaussian_filter1d
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.polyhedron.tangent import Bend
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.touch.symbols.gain import Image, bounded_gain
 
 Array = NDArray[np.float64]
@@ -40,7 +40,7 @@ class Bent:
 
 
 def bends_of(
-    image: Image, sensor: Sensor, radii_mm: tuple[float, ...], ink: float, keep: int
+    image: Image, sensor: SensorType, radii_mm: tuple[float, ...], ink: float, keep: int
 ) -> list[Bent]:
     """Return the bends that explain an image best, at most `keep`, no two of them alike.
 

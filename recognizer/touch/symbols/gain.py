@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.polyhedron.tangent import Bend
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.touch.symbols.noise import Felt
 from recognizer.touch.symbols.pressing import Pressing
 from recognizer.touch.symbols.template import psi
@@ -47,7 +47,7 @@ class Image:
 
 
 def image_of(
-    sensor: Sensor, forces: Array, trust: Array, pressing: Pressing, *, newtons: bool
+    sensor: SensorType, forces: Array, trust: Array, pressing: Pressing, *, newtons: bool
 ) -> Image:
     """Return what is fitted of a frame: forces (rows, columns), trust (rows, columns).
 
@@ -65,7 +65,7 @@ def image_of(
     )
 
 
-def bent(image: Image, sensor: Sensor, bend: Bend, shares: tuple[float, ...] = (1.0,)) -> Image:
+def bent(image: Image, sensor: SensorType, bend: Bend, shares: tuple[float, ...] = (1.0,)) -> Image:
     """Return an image of a flat face as one of a face with a bend, in the axes of the sensor.
 
     Parameters

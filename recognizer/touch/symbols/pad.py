@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from generator.alphabet import Alphabet, SymbolStyle
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.layer import layer
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.surface.face import endless
 from probe.surface.symbols import Relief
 
@@ -28,7 +28,12 @@ _STIFF = 1e9  # N mm / rad: the plate stays level
 
 
 def pad_responses(
-    alphabet: Alphabet, style: SymbolStyle, sensor: Sensor, axis_mm: Array, *, among: int = AMONG
+    alphabet: Alphabet,
+    style: SymbolStyle,
+    sensor: SensorType,
+    axis_mm: Array,
+    *,
+    among: int = AMONG,
 ) -> Array:
     """Return the pressure at the base (order, n, n), 1 where it is highest, over a cell.
 
@@ -40,7 +45,7 @@ def pad_responses(
     from scipy.ndimage import map_coordinates
 
     pitch, fine = style.pitch_mm, style.pitch_mm / FINE
-    probe = Sensor(CELLS * FINE, CELLS * FINE, fine, sensor.overlay)
+    probe = SensorType(CELLS * FINE, CELLS * FINE, fine, sensor.overlay)
     side = CELLS * pitch
     force = LIGHT_MPA * sensor.overlay.young_mpa * side * side
     rng = np.random.default_rng(1)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 
 Array = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ class Pressing:
         return np.asarray(np.interp(force, self.force(table), table))
 
 
-def pressing_of(sensor: Sensor, height_mm: float) -> Pressing:
+def pressing_of(sensor: SensorType, height_mm: float) -> Pressing:
     """Return how a sensor's overlay presses symbols of a height."""
     overlay = sensor.overlay
     if overlay.kind == "tab":

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.touch.symbols.template import Floats, Template
 
 ROTATIONS = 72  #: over the full turn
@@ -39,7 +39,7 @@ class Bank:
 
 def bank_of(
     template: Template,
-    sensor: Sensor,
+    sensor: SensorType,
     *,
     rotations: int = ROTATIONS,
     phases: int = PHASES,
@@ -83,7 +83,7 @@ def bank_of(
 
 def _lookups(
     template: Template,
-    sensor: Sensor,
+    sensor: SensorType,
     turns: NDArray[np.float64],
     rim: int,
     phases: int,

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.alphabet import Alphabet, SymbolStyle
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -74,7 +74,7 @@ class Template:
 
 
 @lru_cache(maxsize=16)
-def template_of(alphabet: Alphabet, style: SymbolStyle, sensor: Sensor) -> Template:
+def template_of(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType) -> Template:
     """Return the template of an alphabet, as embossed and as felt by a sensor."""
     pad = sensor.overlay.kind == "pad"
     felt = _pad_felt if pad else _tab_felt
@@ -102,7 +102,7 @@ def template_of(alphabet: Alphabet, style: SymbolStyle, sensor: Sensor) -> Templ
     return Template(style.pitch_mm, alphabet.order, steps * STEP_MM, rimmed, ink)
 
 
-def _tab_felt(alphabet: Alphabet, style: SymbolStyle, sensor: Sensor, axis: Array) -> Array:
+def _tab_felt(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType, axis: Array) -> Array:
     """Return the responses (order, n, n) of tabs."""
     x, y = np.meshgrid(axis, axis)
     reach = alphabet.reach * style.pitch_mm
@@ -114,7 +114,7 @@ def _tab_felt(alphabet: Alphabet, style: SymbolStyle, sensor: Sensor, axis: Arra
     )
 
 
-def _pad_felt(alphabet: Alphabet, style: SymbolStyle, sensor: Sensor, axis: Array) -> Array:
+def _pad_felt(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType, axis: Array) -> Array:
     """Return the responses (order, n, n) of a pad, 1 where they are highest."""
     from scipy.ndimage import uniform_filter
 
@@ -130,7 +130,7 @@ def _pad_felt(alphabet: Alphabet, style: SymbolStyle, sensor: Sensor, axis: Arra
     return np.asarray(tactels / np.percentile(tactels, PEAK))
 
 
-def _heard(felt: NDArray[np.float64], share: float, sensor: Sensor) -> NDArray[np.float64]:
+def _heard(felt: NDArray[np.float64], share: float, sensor: SensorType) -> NDArray[np.float64]:
     """Return responses of tactels that hear a share of what stands one tactel away, all around."""
     from scipy.signal import fftconvolve
 
@@ -159,13 +159,13 @@ def _presence(distance: NDArray[np.float64], style: SymbolStyle) -> NDArray[np.f
     return np.clip(1 - (distance - top) / max(wall, STEP_MM), 0, 1)
 
 
-def _reach_mm(alphabet: Alphabet, style: SymbolStyle, sensor: Sensor) -> float:
+def _reach_mm(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType) -> float:
     """Return how far from its centre a symbol is felt."""
     strokes = alphabet.reach * style.pitch_mm + style.stroke_mm / 2 + style.draft_mm
     return strokes + sensor.overlay.tab_diameter_mm / 2 + sensor.pitch_mm
 
 
-def _felt(presence: NDArray[np.float64], sensor: Sensor) -> NDArray[np.float64]:
+def _felt(presence: NDArray[np.float64], sensor: SensorType) -> NDArray[np.float64]:
     from scipy.signal import fftconvolve
 
     cover = fftconvolve(presence, _disc(sensor.overlay.tab_diameter_mm / 2), mode="same")

@@ -10,14 +10,14 @@ from probe.contact.deblur import LEAST, arriving, blur_of, deblurred, thickest_m
 from probe.contact.layer import layer
 from probe.contact.layer_influence import influence
 from probe.errors import ContactError
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import Washer
 
 HELD = WristStiffness(math.inf, math.inf)
 
 
 def pad(height, **more):
-    return Sensor(overlay=Overlay("pad", height, **more))
+    return SensorType(overlay=Overlay("pad", height, **more))
 
 
 def blurred(sensor, forces):
@@ -122,7 +122,7 @@ def test_nothing_felt_is_nothing():
 @pytest.mark.parametrize(
     ("read", "sensor", "noise", "match"),
     [
-        (np.ones((16, 16)), Sensor(), 0.01, "kind 'tab'"),
+        (np.ones((16, 16)), SensorType(), 0.01, "kind 'tab'"),
         (np.ones((16, 15)), pad(2.0), 0.01, "shape"),
         (np.full((16, 16), np.nan), pad(2.0), 0.01, "finite"),
         (np.ones((16, 16)), pad(2.0), -1.0, "noise"),

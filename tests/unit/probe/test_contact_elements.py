@@ -7,11 +7,11 @@ from probe.contact.contract import Touch, WristStiffness
 from probe.contact.elements import condensed_pad, elements
 from probe.contact.press import press
 from probe.errors import ContactError
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import Cross, Paraboloid, Plate, Sphere, Strip, TiltedPlane
 
 SMALL = {"rows": 8, "columns": 8}
-PAD = Sensor(**SMALL, overlay=Overlay(kind="pad"))
+PAD = SensorType(**SMALL, overlay=Overlay(kind="pad"))
 BALL = Sphere(20.0)
 FREE = WristStiffness(0.0, 0.0)
 
@@ -51,7 +51,7 @@ def test_no_force_is_an_exactly_zero_image():
     ],
 )
 def test_extreme_scenes_have_a_finite_answer_that_bears_the_force(surface, at, overlay):
-    found = pressed(surface, at, Sensor(**SMALL, overlay=Overlay(kind="pad", **overlay)))
+    found = pressed(surface, at, SensorType(**SMALL, overlay=Overlay(kind="pad", **overlay)))
     assert found.forces_n.min() >= 0
     assert found.forces_n.sum() == pytest.approx(at.force_n, rel=1e-5)
     assert np.isfinite([found.z_mm, found.tilt_x_rad, found.tilt_y_rad]).all()
@@ -153,6 +153,6 @@ def test_ladder_reaches_elements_by_name_for_a_pad_alone():
     assert found.level == "elements"
     assert found.forces_n == pytest.approx(elements(BALL, PAD, touch()).forces_n)
     with pytest.raises(ContactError, match="no level 'elements'"):
-        press(BALL, Sensor(**SMALL), touch(), accuracy="elements")
+        press(BALL, SensorType(**SMALL), touch(), accuracy="elements")
     with pytest.raises(ContactError, match="kind 'tab'"):
-        pressed(BALL, touch(), Sensor(**SMALL))
+        pressed(BALL, touch(), SensorType(**SMALL))

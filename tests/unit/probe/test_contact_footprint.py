@@ -9,11 +9,11 @@ from probe.contact.contract import Touch
 from probe.contact.footprint import footprint
 from probe.contact.tips import Tips
 from probe.errors import ContactError
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import HalfPlane, Plate, Sphere, Strip, TiltedPlane
 
-SENSOR = Sensor()
-PAD = Sensor(overlay=Overlay(kind="pad"))
+SENSOR = SensorType()
+PAD = SensorType(overlay=Overlay(kind="pad"))
 
 
 def test_half_a_face_bears_on_half_the_tactels():

@@ -16,7 +16,7 @@ from probe.contact.layer_solve import plate_of
 from probe.contact.plate import Pose
 from probe.contact.press import press
 from probe.errors import ContactError
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import (
     Cross,
     HalfPlane,
@@ -33,7 +33,7 @@ FREE, HELD = WristStiffness(0.0, 0.0), WristStiffness(math.inf, math.inf)
 
 
 def pad(rows=16, **given):
-    return Sensor(rows=rows, columns=rows, overlay=Overlay("pad", **given))
+    return SensorType(rows=rows, columns=rows, overlay=Overlay("pad", **given))
 
 
 def attempt(*scene, **options):
@@ -240,7 +240,7 @@ def test_thin_strokes_are_felt_or_refused_never_lost(width):
 def test_what_is_refused():
     sensor, touch = pad(), Touch(0, 0, 0, 10.0)
     for other, text in (
-        (Sensor(), "is of kind 'tab'"),
+        (SensorType(), "is of kind 'tab'"),
         (pad(height_mm=0.0), "height is 0"),
         (pad(young_mpa=math.nan), "modulus"),
         (pad(poisson=0.51), "ratio"),

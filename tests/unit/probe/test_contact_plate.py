@@ -11,9 +11,9 @@ from probe.contact.contract import Touch, WristStiffness
 from probe.contact.neo_hooke import Linear, NeoHooke
 from probe.contact.plate import Load, load_of, rest
 from probe.errors import ContactError
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 
-POINTS = Sensor().centres_mm().reshape(-1, 2)
+POINTS = SensorType().centres_mm().reshape(-1, 2)
 FREE = WristStiffness(0.0, 0.0)
 RIGID = WristStiffness(math.inf, math.inf)
 

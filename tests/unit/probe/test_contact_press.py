@@ -10,10 +10,10 @@ from probe.contact.press import AUTO, LEVELS, accuracy_of, level_for, press, tab
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.errors import ContactError
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import Rough, Washer
 
-TAB, PAD = (Sensor(overlay=Overlay(kind=kind)) for kind in ("tab", "pad"))
+TAB, PAD = (SensorType(overlay=Overlay(kind=kind)) for kind in ("tab", "pad"))
 
 
 @pytest.mark.parametrize("sensor", [TAB, PAD])

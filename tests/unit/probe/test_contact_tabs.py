@@ -14,7 +14,7 @@ from probe.contact.tab_law import BETA, tip_laws
 from probe.contact.tabs import asked, settled, tabs
 from probe.contact.tips import NUMBERS, Tips, rings, square, tip_points
 from probe.errors import ContactError
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import (
     Cross,
     HalfPlane,
@@ -26,9 +26,9 @@ from probe.surface.indenters import (
     Washer,
 )
 
-SENSOR = Sensor()
+SENSOR = SensorType()
 RIGID = WristStiffness(math.inf, math.inf)
-ONE_TAB = Sensor(rows=1, columns=1)
+ONE_TAB = SensorType(rows=1, columns=1)
 AREA = math.pi * 1.2666**2 / 4
 
 
@@ -289,8 +289,11 @@ def test_tabs_that_all_stand_off_by_the_same_are_a_sensor_moved():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: pressed(Plate(), sensor=Sensor(overlay=Overlay(kind="pad"))), "overlay is a pad"),
-        (lambda: pressed(Plate(), sensor=Sensor(overlay=Overlay(young_mpa=0.0))), "modulus 0"),
+        (
+            lambda: pressed(Plate(), sensor=SensorType(overlay=Overlay(kind="pad"))),
+            "overlay is a pad",
+        ),
+        (lambda: pressed(Plate(), sensor=SensorType(overlay=Overlay(young_mpa=0.0))), "modulus 0"),
         (lambda: pressed(Plate(-math.inf)), "nothing under the sensor to bear 80 N"),
         (lambda: pressed(Plate(math.nan)), "no numbers"),
         (lambda: pressed(Plate(math.inf)), "no numbers"),
@@ -330,7 +333,7 @@ def test_the_share_under_an_edge_comes_near_the_disc_s():
 
 
 def test_the_points_of_a_pad_tile_its_squares():
-    points, drop = tip_points(Sensor(overlay=Overlay(kind="pad")), Tips(16))
+    points, drop = tip_points(SensorType(overlay=Overlay(kind="pad")), Tips(16))
     assert points.shape == (256, 16, 2)
     assert not drop.any()
     assert len(np.unique(np.round(points.reshape(-1, 2), 9), axis=0)) == 4096

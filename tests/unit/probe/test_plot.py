@@ -10,10 +10,10 @@ from probe.contact.press import press
 from probe.plot.canvas import HEAT
 from probe.plot.frame import HEIGHT, WIDTH, frame_picture, frames_picture
 from probe.plot.touch import MARK, OUTLINE, touch_picture
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.surface.indenters import Plate, Washer
 
-SENSOR = Sensor()
+SENSOR = SensorType()
 
 
 def rgb(colour):

@@ -15,7 +15,7 @@ from probe.scan.approach import Guard, guarded_approach
 from probe.scan.kinesthetic import JointErrors, joint_path, kinesthetic, played
 from probe.scan.places import surface_to_sensor, touch_at
 from probe.scan.raster import raster
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 
 DEG = math.pi / 180
 SQUARE = [(0, 0), (60, 0), (60, 60), (0, 60)]
@@ -172,7 +172,7 @@ def test_a_face_that_is_not_convex_and_one_with_a_hole():
 def test_cover_is_the_area_under_the_sensor(theta):
     ell = np.array([(0, 0), (50, 0), (50, 20), (20, 20), (20, 50), (0, 50)], float)
     plan = raster([ell], theta_rad=theta, least_cover=0)
-    grid = Sensor(rows=160, columns=160, pitch_mm=0.15875).centres_mm().reshape(-1, 2)
+    grid = SensorType(rows=160, columns=160, pitch_mm=0.15875).centres_mm().reshape(-1, 2)
     for place, cover in zip(plan.places_mm, plan.cover, strict=True):
         x, y = Touch(*place, theta, 1.0).on_surface(grid).T
         inside = (x >= 0) & (y >= 0) & (x <= 50) & (y <= 50) & ((x <= 20) | (y <= 20))

@@ -16,7 +16,7 @@ from probe.errors import CalibrationError, RecordingError
 from probe.frame import frame_from
 from probe.recording.read import read_recording
 from probe.recording.record import Recorder
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.bench.bulletin import Bulletin, Reader
 from recognizer.bench.errors import BenchError, BusyError, UnknownError
 from recognizer.bench.files import checked_name, kept, listed, named, part_to_send
@@ -137,7 +137,7 @@ def test_filters_build_on_each_other():
     image = np.full((16, 16), 7.0)
     image[4:10, 4:10] = 107.0
     image[2, 12] = 300.0
-    made = {wish: filtered(image, Sensor(), wish) for wish in FILTERS}
+    made = {wish: filtered(image, SensorType(), wish) for wish in FILTERS}
     assert made["raw"][0, 0] == 7
     assert made["bias-free"][0, 0] == 0
     assert made["bias-free"][6, 6] == 100
@@ -145,12 +145,12 @@ def test_filters_build_on_each_other():
     assert made["median"][6, 6] == 100
     assert made["sobel"][6, 6] == 0
     assert made["sobel"][6, 3] > 0
-    assert filtered(image, Sensor(), "bias-free", image).max() == 0
+    assert filtered(image, SensorType(), "bias-free", image).max() == 0
 
 
 def test_a_frame_is_packed_as_its_module_says():
     image = np.arange(256.0).reshape(16, 16)
-    picture = FramePicture(image, Sensor(), None, True, 2**32 + 5, 1.5, 1e12)
+    picture = FramePicture(image, SensorType(), None, True, 2**32 + 5, 1.5, 1e12)
     data = picture.as_bytes("raw")
     assert len(data) == 32 + 1024
     kind, newtons, wish, _, seq, t_s, received, largest, _ = struct.unpack("<cBBBIddff", data[:32])

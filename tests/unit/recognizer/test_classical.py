@@ -14,7 +14,7 @@ from probe.contact.tips import Tips
 from probe.scan.kinesthetic import JointErrors, kinesthetic
 from probe.scan.places import surface_to_sensor, touch_at
 from probe.scan.raster import raster
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from recognizer.scan.mosaic.planar import between, moved
 from recognizer.thesis.filters import ImageError, tactile_image, touch_image
@@ -25,7 +25,7 @@ from recognizer.thesis.skeleton.symbols import symbols
 from recognizer.touch.lab import open_lab
 from recognizer.touch.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, TOO_FEW
 
-SENSOR = Sensor()
+SENSOR = SensorType()
 SET = """
 objects:
 - {name: Cube, shape: {cube: 80 mm}, profile: thesis}

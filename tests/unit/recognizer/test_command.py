@@ -18,7 +18,7 @@ from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.frame import frame_from
 from probe.recording.record import Recorder
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from probe.simulate.registered import registered_surface
 from probe.wrist.distances import counts_of, distances_at
 from probe.wrist.geometry import Wrist
@@ -47,7 +47,7 @@ def lab(tmp_path_factory):
 
 def forces_of(lab, touch, overlay="tab", face="F1"):
     scene = registered_surface(str(lab / "lab.db"), "Cube", face)
-    sensor = Sensor(overlay=Overlay(kind=overlay))
+    sensor = SensorType(overlay=Overlay(kind=overlay))
     return press(scene.surface, sensor, touch).forces_n
 
 
@@ -324,7 +324,7 @@ def test_the_symbols_of_the_picture_are_those_of_the_touch(lab, images):
     from recognizer.touch.recognise import recognise
     from recognizer.touch.signal import signal_of
 
-    reader = reader_for(open_lab(str(lab / "lab.db")), Sensor())
+    reader = reader_for(open_lab(str(lab / "lab.db")), SensorType())
     signal = signal_of(images[0].astype(np.float64))
     won, found = winning(reader, signal), recognise(reader, signal)
     assert won.face.face == found.face

@@ -9,7 +9,7 @@ import pytest
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
-from probe.sensor import Overlay, Sensor
+from probe.sensor import Overlay, SensorType
 from probe.surface.face import Face
 from probe.surface.polygon import polygon
 from recognizer.thesis.edges.find import Finding, classical_edges, face_edges, outline
@@ -21,7 +21,7 @@ from recognizer.thesis.edges.response import BLURS_MM, REACH_MM, felt_at, respon
 from recognizer.thesis.edges.syntax import fused, vertices
 from recognizer.thesis.filters import tactile_image, touch_image
 
-SENSOR = Sensor()
+SENSOR = SensorType()
 SQUARE = np.array([[0.0, 0], [80, 0], [80, 80], [0, 80]])
 THESIS_MM = 1.52  # the thesis's largest error of an edge
 
@@ -156,7 +156,7 @@ def test_corner_of_a_known_face_gives_the_pose():
 
 @pytest.mark.parametrize("kind", ["tab", "pad"])
 def test_response_rises_from_nothing_to_all(kind):
-    table = responses(Sensor(overlay=Overlay(kind=kind)))
+    table = responses(SensorType(overlay=Overlay(kind=kind)))
     assert len(table) == len(BLURS_MM)
     assert (np.diff(table, axis=1) > -1e-12).all()
     for row in table:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.thesis.filters import (
     ImageError,
     magnified,
@@ -22,7 +22,7 @@ def noise(seed=0, shape=(16, 16)):
 
 
 def test_frame_has_x_along_columns_and_y_against_rows():
-    sensor = Sensor()
+    sensor = SensorType()
     image = touch_image(sensor, noise())
     assert image.xy_mm(*np.indices((16, 16))) == pytest.approx(sensor.centres_mm(), abs=1e-12)
     fine = magnified(image)

@@ -10,7 +10,7 @@ import pytest
 
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.surface.face import endless
 from recognizer.scan.mosaic.errors import MosaicError
 from recognizer.scan.mosaic.grow import added, mosaic_of, settled
@@ -20,7 +20,7 @@ from recognizer.scan.mosaic.planar import between, composed
 from recognizer.scan.mosaic.touch import PlacedTouch, placed
 from recognizer.touch.signal import signal_of
 
-SENSOR = Sensor()
+SENSOR = SensorType()
 P = SENSOR.pitch_mm
 DEG = math.pi / 180
 GLYPHS = (

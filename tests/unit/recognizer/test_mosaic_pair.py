@@ -9,14 +9,14 @@ import pytest
 
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.surface.face import endless
 from recognizer.scan.mosaic.pair import AMBIGUOUS, APART, CONSTANT, NOISE, registered
 from recognizer.scan.mosaic.patch import patch_of
 from recognizer.scan.mosaic.planar import composed, inverse
 from recognizer.touch.signal import signal_of
 
-SENSOR = Sensor()
+SENSOR = SensorType()
 P = SENSOR.pitch_mm
 DEG = math.pi / 180
 GLYPHS = (

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from probe.scan.places import surface_to_sensor
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from recognizer.scan.mosaic.canvas import Laid, empty_canvas, laid, reference
 from recognizer.scan.mosaic.correlation import correlated, peaks
 from recognizer.scan.mosaic.errors import MosaicError
@@ -31,7 +31,7 @@ from recognizer.thesis.product import product_shift
 from recognizer.touch.recognition import Recognition, refused
 from recognizer.touch.signal import Signal, signal_of
 
-SENSOR = Sensor()
+SENSOR = SensorType()
 P = SENSOR.pitch_mm
 LEVEL = (0.0, 0.0, 0.0)
 

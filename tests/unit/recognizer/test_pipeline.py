@@ -13,7 +13,7 @@ from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from recognizer.touch.belief import Support, Thresholds, naming, weighed
 from recognizer.touch.lab import open_lab
@@ -44,7 +44,7 @@ def url(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def reader(url):
-    return reader_for(open_lab(url), Sensor())
+    return reader_for(open_lab(url), SensorType())
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def pad_reader(url):
 
 
 def felt(url, name, face, touch):
-    return tabs(registered_surface(url, name, face).surface, Sensor(), touch).forces_n
+    return tabs(registered_surface(url, name, face).surface, SensorType(), touch).forces_n
 
 
 @pytest.mark.parametrize(("name", "face"), [("Cube", "F1"), ("Cube", "F6"), ("Tetra", "F2")])

@@ -12,14 +12,14 @@ from generator.polyhedron.developable import Developable
 from generator.polyhedron.tangent import Bend
 from probe.contact.contract import Touch
 from probe.contact.press import press
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.surface.face import endless
 from recognizer.touch.lab import FINER, LEAST_MM, MOST_MM, radii_of
 from recognizer.touch.symbols.bent import bends_of
 from recognizer.touch.symbols.gain import Image, bent, felt_under, image_of
 from recognizer.touch.symbols.pressing import pressing_of
 
-SENSOR = Sensor()
+SENSOR = SensorType()
 INK = 0.35  # about the mean response of the symbols of the default alphabet
 BARS = ((((-0.9, 0.9), (0.9, 0.9)), ((-0.9, -0.9), (0.9, -0.9))),)  # fmt: skip
 

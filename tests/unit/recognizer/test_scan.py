@@ -8,7 +8,7 @@ import pytest
 from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.contact.contract import Touch
-from probe.sensor import Sensor
+from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from recognizer.scan.grow import begun, extended, read_scan
 from recognizer.scan.mosaic.touch import PlacedTouch, placed
@@ -19,7 +19,7 @@ from recognizer.touch.signal import signal_of
 from recognizer.validation.levels import MISMATCH, TYPICAL, read
 from recognizer.validation.surfaces import FOREIGN
 
-SENSOR = Sensor()
+SENSOR = SensorType()
 SPREAD = (0.4, 0.4, 0.004)
 
 
