@@ -179,7 +179,7 @@ def _described(
     import numpy as np
 
     from decoder.view import strength
-    from generator.errors import ArrayError
+    from generator.array import ArrayError
 
     cells = np.nonzero(window >= 0)
     seen: dict[str, Any] = {

@@ -19,10 +19,12 @@ from generator.array.fold import FoldedArray
 from generator.array.product import ProductArray
 from generator.array.profiles import DEFAULT_PROFILE, PROFILES, Profile, enlarged, profile
 from generator.array.sequence import Sequence
+from generator.errors import ArrayError
 
 __all__ = [
     "DEFAULT_PROFILE",
     "PROFILES",
+    "ArrayError",
     "FoldedArray",
     "Labels",
     "ProductArray",

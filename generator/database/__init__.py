@@ -17,4 +17,12 @@
     carry.py        objects of one database -> another one (carry_check.py: whether they may)
     exchange.py     export to a file, import from one
     part_state.py   whether registered files are there and unchanged
+    round_face.py   where a plane stands that touches a registered round face
+
+Reading sees of `generator` this package, the array and the alphabet alone: what it needs to
+know of a shape it has from `registered`.
 """
+
+from generator.errors import DatabaseError
+
+__all__ = ["DatabaseError"]

@@ -14,9 +14,23 @@ from numpy.typing import NDArray
 
 from generator.alphabet.outline import SymbolStyle
 from generator.database.canonical import spec_hash
+from generator.database.round_face import Bend, RoundFace
 from generator.layout.placement import Layout, Placement
-from generator.polyhedron.tangent import RoundFace
+from generator.polyhedron.developable import Developable
 from generator.polyhedron.winged import Polyhedron
+
+__all__ = [
+    "Bend",
+    "Developable",
+    "ObjectEntry",
+    "Polyhedron",
+    "RegisteredArray",
+    "RegisteredFace",
+    "RegisteredObject",
+    "RegisteredPart",
+    "RegisteredStyle",
+    "RoundFace",
+]
 
 
 @dataclass(frozen=True, slots=True)

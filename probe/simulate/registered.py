@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Connection
 
+from generator.database import DatabaseError
 from generator.database.open import open_database
 from generator.database.read import find_object, object_names, read_object
 from generator.database.registered import RegisteredFace, RegisteredObject
 from generator.database.transaction import reading
-from generator.errors import DatabaseError
 from probe.errors import SurfaceError
 from probe.simulate.round import round_scene
 from probe.simulate.scene import Scene

@@ -28,14 +28,12 @@ from fastapi.responses import FileResponse, JSONResponse
 from fastapi.staticfiles import StaticFiles
 from starlette.middleware.gzip import GZipMiddleware
 
-from generator.errors import GeneratorError
-from probe.errors import ProbeError
+from encoded_objects.errors import EncodedObjectsError
 from recognizer.bench.bulletin import Bulletin, Reader
 from recognizer.bench.holdings import holdings_routes
 from recognizer.bench.images import FILTERS
 from recognizer.bench.session import Session
 from recognizer.bench.work import work_routes
-from recognizer.errors import RecognizerError
 
 PAGES = 64  #: open at once
 WISH = 1024  #: bytes of a message from a page
@@ -63,8 +61,7 @@ def app_for(bench: Bench) -> FastAPI:
 
     app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None, lifespan=lifespan)
     app.add_middleware(GZipMiddleware, minimum_size=4096)
-    for kind in (GeneratorError, ProbeError, RecognizerError):
-        app.add_exception_handler(kind, _refused)
+    app.add_exception_handler(EncodedObjectsError, _refused)
     app.add_exception_handler(RequestValidationError, _malformed)
     app.include_router(work_routes(bench.session, bench.ports))
     app.include_router(holdings_routes(bench.session, bench.parts))

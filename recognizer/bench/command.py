@@ -33,9 +33,7 @@ app = typer.Typer(
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run `open-bench` and leave with its exit code."""
     one_thread()
-    from generator.errors import GeneratorError
-    from probe.errors import ProbeError
-    from recognizer.errors import RecognizerError
+    from encoded_objects.errors import EncodedObjectsError
 
     usage_error: type[Exception] = typer.BadParameter.__mro__[1]
     try:
@@ -43,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
                    prog_name="open-bench", standalone_mode=False)  # fmt: skip
     except typer.Exit as leaving:
         code = leaving.exit_code
-    except (GeneratorError, ProbeError, RecognizerError) as error:
+    except EncodedObjectsError as error:
         place = f"{error.place}: " if error.place else ""
         sys.stderr.write(f"open-bench: {place}error: {error.cause}\n")
         if error.fix:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.errors import GeneratorError
+from encoded_objects.errors import EncodedObjectsError
 from probe.calibration import Calibration, calibrated
 from probe.errors import ProbeError
 from probe.frame import Frame
@@ -24,7 +24,6 @@ from recognizer.bench.bulletin import Bulletin
 from recognizer.bench.message import MosaicPicture, mosaic_picture
 from recognizer.bench.telling import told
 from recognizer.bench.watch import Watch
-from recognizer.errors import RecognizerError
 from recognizer.scan.mosaic.grow import added
 from recognizer.scan.mosaic.mosaic import Mosaic, no_touches
 from recognizer.scan.mosaic.touch import PlacedTouch, decoded_place
@@ -114,7 +113,7 @@ class Reading:
         self._tell("preparing")
         try:
             self.reader = reader_for(open_lab(self.database), self.sensor)
-        except (GeneratorError, RecognizerError) as error:
+        except EncodedObjectsError as error:
             self.reader = None
             self._tell("off", cause=error.cause, fix=error.fix)
             return

@@ -14,8 +14,8 @@ from types import FrameType
 
 import uvicorn
 
+from generator.database import DatabaseError
 from generator.database.open import database_exists
-from generator.errors import DatabaseError
 from probe.errors import ProbeError
 from probe.sensor import Overlay, SensorType
 from recognizer.bench.app import Bench, app_for

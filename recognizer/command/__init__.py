@@ -33,8 +33,7 @@ def run(arguments: list[str]) -> int:
     """Run the command; returns its exit code. Errors are reported, not raised."""
     from typer import BadParameter, Exit
 
-    from generator.errors import GeneratorError
-    from probe.errors import ProbeError
+    from encoded_objects.errors import EncodedObjectsError
     from recognizer.command import report
     from recognizer.command.app import app
     from recognizer.errors import RecognizerError
@@ -47,7 +46,7 @@ def run(arguments: list[str]) -> int:
         return code if arguments else BAD_INPUT
     except Exit as leaving:
         return leaving.exit_code
-    except (ProbeError, RecognizerError, GeneratorError) as error:
+    except EncodedObjectsError as error:
         report.error(error, as_json=as_json)
         return error.exit_code
     except usage_error as error:

@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING, Any
 from probe.command.report import message, number, write_json
 
 if TYPE_CHECKING:
-    from generator.errors import GeneratorError
-    from probe.errors import ProbeError
-    from recognizer.errors import RecognizerError
+    from encoded_objects.errors import EncodedObjectsError
     from recognizer.touch.contacts import Touch
     from recognizer.touch.recognition import Recognition
     from recognizer.touch.robot import ObjectPose
@@ -38,7 +36,7 @@ def version(*, as_json: bool) -> None:
         sys.stdout.write(f"recognize-object {found}\n")
 
 
-def error(problem: ProbeError | RecognizerError | GeneratorError, *, as_json: bool) -> None:
+def error(problem: EncodedObjectsError, *, as_json: bool) -> None:
     """Say what is wrong: to stderr, or as JSON to stdout."""
     if as_json:
         told = {

@@ -21,10 +21,8 @@ from generator.array import FoldedArray, ProductArray, array_from
 from generator.database.cells import held_cells
 from generator.database.open import open_database
 from generator.database.read import read_array, read_object, read_styles, read_surfaces
-from generator.database.registered import RegisteredObject, RegisteredStyle
+from generator.database.registered import Developable, RegisteredObject, RegisteredStyle, RoundFace
 from generator.database.transaction import reading
-from generator.polyhedron.developable import Developable
-from generator.polyhedron.tangent import RoundFace
 from recognizer.errors import LabError
 from recognizer.touch.windows import Windows, windows_of
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.polyhedron.tangent import Bend
+from generator.database.registered import Bend
 from probe.sensor import SensorType
 from recognizer.touch.belief import Thresholds
 from recognizer.touch.lab import Encoding

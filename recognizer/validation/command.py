@@ -68,9 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 
 def run(arguments: list[str]) -> int:
     """Run one command; returns its exit code. Errors are reported, not raised."""
-    from generator.errors import GeneratorError
-    from probe.errors import ProbeError
-    from recognizer.errors import RecognizerError
+    from encoded_objects.errors import EncodedObjectsError
     from recognizer.validation import told
 
     usage_error: type[Exception] = typer.BadParameter.__mro__[1]  # of every misused option
@@ -83,7 +81,7 @@ def run(arguments: list[str]) -> int:
         return code if arguments else BAD_INPUT
     except typer.Exit as leaving:
         return leaving.exit_code
-    except (RecognizerError, ProbeError, GeneratorError) as error:
+    except EncodedObjectsError as error:
         told.error(type(error).__name__, error.cause, error.fix, error.place, error.exit_code,
                    as_json=as_json)  # fmt: skip
         return error.exit_code

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from generator.database import DatabaseError
 from generator.database.open import open_database
 from generator.database.read import list_objects, read_parts
 from generator.database.transaction import reading
-from generator.errors import DatabaseError
 from recognizer.validation.errors import SetError
 
 PARTS, LAB = "parts", "lab.db"

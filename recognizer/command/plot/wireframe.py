@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.database.read import read_object
+from generator.database.registered import Polyhedron
 from generator.database.transaction import reading
-from generator.polyhedron.winged import Polyhedron
 from probe.plot.touch import MARK
 from probe.sensor import SensorType
 from probe.surface.solids import filled

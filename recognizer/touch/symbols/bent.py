@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.polyhedron.tangent import Bend
+from generator.database.registered import Bend
 from probe.sensor import SensorType
 from recognizer.touch.symbols.gain import Image, bounded_gain
 

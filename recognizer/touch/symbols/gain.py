@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.polyhedron.tangent import Bend
+from generator.database.registered import Bend
 from probe.sensor import SensorType
 from recognizer.touch.symbols.noise import Felt
 from recognizer.touch.symbols.pressing import Pressing

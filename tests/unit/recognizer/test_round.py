@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from generator.polyhedron.developable import Developable
-from generator.polyhedron.tangent import Bend
+from generator.database.registered import Bend, Developable
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.sensor import SensorType
