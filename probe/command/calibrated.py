@@ -27,7 +27,7 @@ from probe.command.laws import condition_map, described, places
 from probe.command.listen import Counts, frames_of
 from probe.command.loads import Given
 from probe.errors import CalibrationError, CircuitError
-from probe.recording.read import read_recording
+from probe.recording.read import Recording
 
 _FULL = 1023
 
@@ -149,7 +149,7 @@ def board_from(text: str) -> Electronics | None:
 
 
 def _one_sensor(given: list[Given]) -> str:
-    names = {read_recording(load.recording).origin.sensor for load in given}
+    names = {Recording(load.recording).origin.sensor for load in given}
     if len(names) != 1 or "" in names:
         shown = ", ".join(sorted(name or "not named" for name in names))
         raise CalibrationError(
@@ -160,4 +160,4 @@ def _one_sensor(given: list[Given]) -> str:
 
 
 def _counts(load: Given) -> Counts:
-    return read_recording(load.recording).block().counts
+    return Recording(load.recording).block().counts

@@ -86,9 +86,9 @@ def recording(name: str) -> Described:
     RecordingError
         When it is none, damaged, or not closed.
     """
-    from probe.recording.read import read_recording
+    from probe.recording.read import Recording
 
-    held = read_recording(name)
+    held = Recording(name)
     seq: list[NDArray[np.int64]] = [np.empty(0, np.int64)]
     t_ns: list[NDArray[np.int64]] = [np.empty(0, np.int64)]
     peak = poses = 0

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from probe.calibration import Calibration, calibrated, read_calibration
 from probe.command import report
 from probe.errors import CalibrationError, ProbeError, RecordingError
-from probe.recording.read import Recording, read_recording
+from probe.recording.read import Recording
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ def export_files(
         if out is not None:
             refuse_taken(out, suffix, replace=replace)
             outputs.append(out)
-    recording = read_recording(path, live=live)
+    recording = Recording(path, live=live)
     known = None if calibration is None else calibration_for(calibration, recording)
     if png is not None:
         _picture(recording, png, view, known)

@@ -9,7 +9,7 @@ from probe.command import report
 from probe.command.stream import Stream, interruption, name_of
 from probe.errors import PortError
 from probe.frame import COLUMNS, ROWS
-from probe.recording.read import read_recording
+from probe.recording.read import Recording
 
 Counts = NDArray[np.uint16]
 
@@ -23,7 +23,7 @@ def frames_of(source: str, sensor: int | None, seconds: float) -> tuple[Counts, 
         When it is not there, or gives no frame.
     """
     if not source.startswith(("serial:", "sim:", "file:")):
-        recording = read_recording(source)
+        recording = Recording(source)
         return recording.block().counts, recording.origin.sensor
 
     with interruption() as interrupted, Stream(source, sensor=sensor) as stream:

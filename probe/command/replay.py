@@ -30,9 +30,9 @@ def replay(
     def action() -> int:
         import sys
 
-        from probe.recording.read import read_recording
+        from probe.recording.read import Recording
 
-        read_recording(recording)  # a wrong file is told as such
+        Recording(recording)  # a wrong file is told as such
         url = f"file:{recording}?speed={speed:g}" + ("&loop=1" if loop else "")
         if sys.stdout.isatty() and not as_json:
             from probe.command.live_loop import watch

@@ -148,7 +148,7 @@ def name_of(ident: IdentPacket | None, url: str) -> str:
     """
     address = address_of(url)
     if address.scheme == "file":
-        from probe.recording.read import read_recording
+        from probe.recording.read import Recording
 
-        return read_recording(address.target).origin.sensor
+        return Recording(address.target).origin.sensor
     return "" if ident is None else f"{ident.name}/{ident.sensor}"

@@ -22,7 +22,7 @@ from probe.frame import WRIST
 from probe.recording.arrays import Found, arrays_of
 from probe.recording.layout import NOMINAL_HZ, Block, Origin
 from probe.recording.names import check_name, final_name, part_of, unless_it_fails
-from probe.recording.read import Recording, read_recording
+from probe.recording.read import Recording
 from probe.recording.write import FileWriter
 
 _AT_ONCE: Final = 1024  #: images read at a time
@@ -87,7 +87,7 @@ def import_array(
             for first, images in _images(found):
                 writer.write(_block(images, first, scale, 1e9 / rate_hz))
     final_name(part, out, [], last=True, replace=replace)
-    return read_recording(out)
+    return Recording(out)
 
 
 def _chosen(path: Path, arrays: list[Found], name: str | None) -> Found:

@@ -7,7 +7,7 @@ of an hour is read in the memory of a second.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
@@ -33,12 +33,57 @@ class File:
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """A recording that is read when asked; what is said about it is from its first file."""
+    """A recording that is read when asked; opening it reads none of its frames.
 
-    files: tuple[File, ...]
-    origin: Origin
-    tool_version: str  #: of the programme that wrote it; empty: not this one
-    live: bool  #: read although it may not be closed
+    Parameters
+    ----------
+    path
+        A file; or the name that was given to the recorder, when the recording rolled over.
+    live
+        Also what was flushed of a recording that is still being written, or was left open.
+
+    Raises
+    ------
+    RecordingError
+        No such file, no HDF5 file, no /frames of the right shape, a newer format, truncated,
+        damaged, or not closed (and not `live`).
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from probe.frame import frame_from
+    >>> from probe.recording.record import Recorder
+    >>> path = Path(tempfile.mkdtemp()) / "touch.h5"
+    >>> with Recorder(path) as recorder:
+    ...     recorder.append(frame_from(np.full((16, 16), 7), t_ns=5, seq=0))
+    >>> recording = Recording(path)
+    >>> print(recording)
+    touch.h5: 1 frame
+    >>> [int(frame.counts[0, 0]) for frame in recording.frames()]
+    [7]
+    """
+
+    path: Path | str
+    live: bool = field(default=False, kw_only=True)
+    files: tuple[File, ...] = field(init=False, repr=False)
+    origin: Origin = field(init=False, repr=False)  #: of the first file
+    tool_version: str = field(init=False, repr=False)  #: that wrote it; empty: not this programme
+
+    def __post_init__(self) -> None:
+        looks = [
+            (name, look(name, live=self.live)) for name in _files_of(Path(self.path), self.live)
+        ]
+        _, first = looks[0]
+        files = tuple(File(name, seen.frames, seen.poses) for name, seen in looks)
+        object.__setattr__(self, "files", files)
+        object.__setattr__(self, "origin", first.origin)
+        object.__setattr__(self, "tool_version", first.tool_version)
+
+    def __str__(self) -> str:
+        frames = f"{len(self):,} frame" + ("" if len(self) == 1 else "s")
+        more = f" in {len(self.files)} files" if len(self.files) > 1 else ""
+        by = f", by {self.origin.sensor}" if self.origin.sensor else ""
+        return f"{Path(self.path).name}: {frames}{more}{by}"
 
     def __len__(self) -> int:
         """Return the number of frames."""
@@ -74,43 +119,9 @@ class Recording:
                 yield block.frame(i)
 
 
-def read_recording(path: Path | str, *, live: bool = False) -> Recording:
-    """Look at a recording without reading its frames.
-
-    Parameters
-    ----------
-    path
-        A file; or the name that was given to the recorder, when the recording rolled over.
-    live
-        Also what was flushed of a recording that is still being written, or was left open.
-
-    Raises
-    ------
-    RecordingError
-        No such file, no HDF5 file, no /frames of the right shape, a newer format, truncated,
-        damaged, or not closed (and not `live`).
-    """
-    looks = [(name, look(name, live=live)) for name in _files_of(Path(path), live)]
-    _, first = looks[0]
-    files = tuple(File(name, seen.frames, seen.poses) for name, seen in looks)
-    return Recording(files, first.origin, first.tool_version, live)
-
-
 def read_frames(path: Path | str, *, live: bool = False) -> Iterator[Frame]:
-    """Return an iterator over the frames of a recording; see `read_recording`.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from probe.frame import frame_from
-    >>> from probe.recording.record import Recorder
-    >>> path = Path(tempfile.mkdtemp()) / "touch.h5"
-    >>> with Recorder(path) as recorder:
-    ...     recorder.append(frame_from(np.full((16, 16), 7), t_ns=5, seq=0))
-    >>> [int(frame.counts[0, 0]) for frame in read_frames(path)]
-    [7]
-    """
-    return read_recording(path, live=live).frames()
+    """Return an iterator over the frames of a recording; see `Recording`."""
+    return Recording(path, live=live).frames()
 
 
 def _files_of(path: Path, live: bool) -> list[Path]:

@@ -15,7 +15,7 @@ import numpy as np
 from probe.frame import COLUMNS, ROWS, WRIST
 from probe.recording.layout import Block
 from probe.recording.opened import explained
-from probe.recording.read import Recording, read_recording
+from probe.recording.read import Recording
 
 
 def export_csv(path: Path | str, out: Path | str, *, live: bool = False) -> int:
@@ -35,7 +35,7 @@ def export_csv(path: Path | str, out: Path | str, *, live: bool = False) -> int:
     RecordingError
         The recording cannot be read, or the table not be written.
     """
-    recording, out = read_recording(path, live=live), Path(out)
+    recording, out = Recording(path, live=live), Path(out)
     draft = out.with_name(f".{out.name}.{os.getpid()}")
     try:
         with explained(out, "write"):

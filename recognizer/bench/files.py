@@ -13,7 +13,7 @@ from pathlib import Path
 from generator.database.registered import RegisteredPart
 from generator.database.url import normal_url, part_path
 from probe.errors import RecordingError
-from probe.recording.read import read_recording
+from probe.recording.read import Recording
 from recognizer.bench.errors import BenchError, UnknownError
 
 LISTED = 200  #: files of a kind that are offered
@@ -82,7 +82,7 @@ def kept(folder: Path, name: str, content: bytes) -> int:
         draft = Path(place) / path.name
         draft.write_bytes(content)
         try:
-            recording = read_recording(draft)
+            recording = Recording(draft)
             for _ in recording.blocks():  # every value is looked at
                 pass
         except RecordingError as error:

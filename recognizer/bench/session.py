@@ -24,7 +24,7 @@ from probe.command.live_state import next_free
 from probe.errors import ProbeError
 from probe.frame import Frame
 from probe.port.url import address_of
-from probe.recording.read import read_recording
+from probe.recording.read import Recording
 from probe.recording.record import Recorder
 from probe.sensor import SensorType
 from recognizer.bench.bulletin import Bulletin
@@ -103,7 +103,7 @@ class Session:
                 self._feed = ProbeFeed(self.simulation.url, sensor)
             elif url.startswith("file:"):
                 target = address_of(url).target
-                self._feed = ReplayFeed(url, read_recording(target))
+                self._feed = ReplayFeed(url, Recording(target))
             elif url:
                 address_of(url)
                 self._feed = ProbeFeed(url, sensor)

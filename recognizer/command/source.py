@@ -24,7 +24,7 @@ from probe.errors import CalibrationError, RecordingError
 from probe.frame import Frame
 from probe.port.url import address_of
 from probe.recording.layout import Origin
-from probe.recording.read import read_recording
+from probe.recording.read import Recording
 from probe.sensor import Overlay, SensorType
 from recognizer.touch.contacts import Touch, every_frame, touches
 from recognizer.touch.signal import Signal, signal_of
@@ -75,7 +75,7 @@ def recorded(
     CalibrationError
         The calibration is none, or another one than the recording names.
     """
-    recording = read_recording(path, live=live)
+    recording = Recording(path, live=live)
     origin = recording.origin
     together = 1 if every else _together(origin, path)
     source = Source(
@@ -113,7 +113,7 @@ def at_port(url: str, *, overlay: str, calibration: Path | None, every: bool) ->
     known = None if calibration is None else read_calibration(calibration)
     if address.scheme == "file":
         path = Path(address.target)
-        origin = read_recording(path).origin
+        origin = Recording(path).origin
         told, together = _overlay_of(origin), _together(origin, path)
         known = _calibration_for(origin, calibration, path.parent)
     return Source(

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect, sync_playwright
 
-from probe.recording.read import read_recording
+from probe.recording.read import Recording
 
 CHROMIUM = "/usr/bin/chromium"
 FLAGS = (
@@ -171,7 +171,7 @@ def test_record_and_replay(page, lab):
     record.click()
     expect(record).to_have_attribute("aria-pressed", "false")
     name = page.get_by_test_id("recordings").input_value()
-    frames = len(read_recording(lab / "recordings" / name))
+    frames = len(Recording(lab / "recordings" / name))
     assert frames > 50
     answers = page.evaluate("bench.answers")
     page.get_by_test_id("replay").click()

@@ -26,7 +26,7 @@ from probe.command import run
 from probe.errors import RecordingError
 from probe.frame import frame_from
 from probe.port.emulated import emulated_probe
-from probe.recording.read import read_frames, read_recording
+from probe.recording.read import Recording, read_frames
 from probe.recording.record import Recorder
 
 COMMAND = (sys.executable, "-c", "from probe.command import main; main()")
@@ -70,7 +70,7 @@ def wait_for(what, timeout_s=SHORT_S):
 def held_in(path):
     """Return how many frames of a recording that is being written are on the disk."""
     try:
-        return len(read_recording(path, live=True))
+        return len(Recording(path, live=True))
     except RecordingError:
         return 0
 
@@ -135,7 +135,7 @@ def test_simulate_that_is_interrupted_leaves_what_it_has(lab, tmp_path):
     assert process.returncode == 130
     assert "interrupted after" in err
     touches = json.loads(truth.read_text())["touches"]
-    assert len(read_recording(out)) == len(touches) > 10
+    assert len(Recording(out)) == len(touches) > 10
     assert f"{len(touches):,} touches" in text
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.h5", "a.json"]
 
@@ -247,8 +247,8 @@ def test_live_on_a_terminal_obeys_its_keys(tmp_path):
         terminal.press("q")
         assert terminal.ended() == 0
         assert "\x1b[?1049l" in terminal.text, "the screen is given back"
-    assert len(read_recording(tmp_path / "live-001.h5")) > 5
-    assert read_recording(tmp_path / "live-001.h5").origin.sensor == "sim/3"
+    assert len(Recording(tmp_path / "live-001.h5")) > 5
+    assert Recording(tmp_path / "live-001.h5").origin.sensor == "sim/3"
     names = sorted(path.name for path in tmp_path.iterdir())
     assert names == ["image-001.npy", "image-001.png", "live-001.h5"]
 
@@ -328,7 +328,7 @@ def test_record_shows_what_happens_to_the_probe_and_goes_on(asked, emulated, tmp
     assert "the device went away; it is tried again for 30 s" in err
     assert "the port is open again after" in err
     assert "reopenings 1" in text
-    held = read_recording(out)
+    held = Recording(out)
     assert held.origin.sensor == "FSR-uno/2"
     expected = np.rint(np.linspace(0, 1023, 256).reshape(16, 16))
     assert np.abs(held.block().counts[5:].mean(axis=0) - expected).max() < 2

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from probe.errors import RecordingError
-from probe.recording.read import read_frames, read_recording
+from probe.recording.read import Recording, read_frames
 from probe.recording.record import Recorder
 from probe.recording.repair import repair
 
@@ -95,7 +95,7 @@ def test_a_full_disk_ends_the_recording_with_all_its_frames(tmp_path):
     assert (process.returncode, errors) == (0, b"")
     said = output.decode().split("\n")
     handed = len(said[0])
-    recording = read_recording(path)
+    recording = Recording(path)
     assert f"File too large; the recording ends after {len(recording)} frames" in said[1]
     assert len(recording) == handed + 1  # the last one is on the disk, and then it was refused
     check(recording.frames(), handed + 1)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from probe.errors import RecordingError
 from probe.frame import Frame, frame_from
-from probe.recording.read import read_frames, read_recording
+from probe.recording.read import Recording, read_frames
 from probe.recording.record import Recorder
 from probe.recording.repair import repair
 
@@ -64,7 +64,7 @@ def test_any_stream_is_read_as_it_was(seed, count, poses, flush_s, roll_over_s, 
         with Recorder(path, flush_s=flush_s, roll_over_s=roll_over_s) as recorder:
             for frame in frames:
                 recorder.append(frame)
-        recording = read_recording(path)
+        recording = Recording(path)
         assert len(recording) == count
         assert all(map(same, recording.frames(), frames))
         part = list(recording.frames(start, start + length))

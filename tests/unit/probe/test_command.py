@@ -20,7 +20,7 @@ from probe.command.exported import median_filtered
 from probe.command.loads import loads_given
 from probe.errors import CalibrationError, CircuitError
 from probe.frame import frame_from
-from probe.recording.read import read_frames, read_recording
+from probe.recording.read import Recording, read_frames
 from probe.recording.record import Recorder
 
 FORCES = (0, 40, 100, 200, 400)
@@ -238,7 +238,7 @@ def test_record_ends_by_frames_and_by_seconds(asked, tmp_path):
     assert (told["frames"], told["ended"], told["lost"]) == (40, "frames", 0)
     frames = list(read_frames(out))
     assert [f.seq - frames[0].seq for f in frames] == list(range(40))
-    assert read_recording(out).origin.sensor == "sim/0"
+    assert Recording(out).origin.sensor == "sim/0"
     code, text, _ = asked("record", "sim:?rate=500", "-o", out, "--seconds", "0.2", "--replace")
     assert code == 0
     assert "100 frames in 0.20 s (500.0 a second), lost 0" in text
@@ -248,9 +248,9 @@ def test_a_played_recording_keeps_its_sensor_and_its_calibration(asked, bench, t
     out, calibration = tmp_path / "a.h5", bench / "bench.json"
     url = f"file:{bench / 'load40.h5'}?speed=0"
     assert asked("record", url, "-o", out, "--calibration", calibration)[0] == 0
-    made = read_recording(out)
+    made = Recording(out)
     assert made.origin.sensor == "bench/0"
-    assert (made.block().counts == read_recording(bench / "load40.h5").block().counts).all()
+    assert (made.block().counts == Recording(bench / "load40.h5").block().counts).all()
     digest = json.loads(asked("info", calibration, "--json")[1])["hash"]
     assert made.origin.calibration == digest
 
@@ -306,7 +306,7 @@ def test_export_and_import_give_the_same_images(asked, bench, tmp_path):
         code, out, _ = asked("import", source, "-o", made, "--json")
         told = json.loads(out)
         assert (code, told["frames"]) == (0, 30)
-        counts = read_recording(made).block().counts * told.get("scale", 1)
+        counts = Recording(made).block().counts * told.get("scale", 1)
         assert counts == pytest.approx(images * scale, abs=2e-5)
     words = ["import", bench / "load0.h5", "-o", tmp_path / "c.h5", "--dataset", "nothing"]
     assert error_of(asked(*words))[0] == 2
@@ -405,7 +405,7 @@ def test_simulate_gives_recording_picture_and_truth(asked, tmp_path):
     assert (code, err) == (0, "")
     assert (told["touches"], told["frames"], told["overlay"]) == (2, 6, "tab")
     assert told["first"]["felt_n"] == pytest.approx(80, abs=1e-3)
-    held = read_recording(out)
+    held = Recording(out)
     assert (len(held), held.origin.sensor) == (6, "simulated/tab")
     assert held.block().counts.max() >= told["first"]["peak_counts"]
     assert not any("mm" in name for name in held.origin.more), "the truth is not in the recording"
@@ -417,7 +417,7 @@ def test_simulate_gives_recording_picture_and_truth(asked, tmp_path):
     assert png.read_bytes().startswith(b"\x89PNG")
 
     asked(*words, "-o", tmp_path / "b.h5")
-    again = read_recording(tmp_path / "b.h5").block().counts
+    again = Recording(tmp_path / "b.h5").block().counts
     assert (again == held.block().counts).all()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.h5", "a.json", "a.png", "b.h5"]
 
@@ -429,7 +429,7 @@ def test_touch_i_is_the_same_among_any_number_of_touches(asked, tmp_path):
             asked("simulate", "washer", "--overlay", "pad", "--accuracy", "footprint", *words)[0]
             == 0
         )
-    few, many = (read_recording(tmp_path / f"{n}.h5").block().counts for n in (1, 3))
+    few, many = (Recording(tmp_path / f"{n}.h5").block().counts for n in (1, 3))
     assert (few[0] == many[0]).all()
     assert not (many[0] == many[1]).all()
 

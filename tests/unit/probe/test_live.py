@@ -13,7 +13,7 @@ from probe.command.live_state import BIAS_FRAMES, LiveState, next_free
 from probe.command.live_view import KEYS, SHADES, heat_map, line_of, rendered
 from probe.frame import frame_from
 from probe.protocol import IdentPacket
-from probe.recording.read import read_frames, read_recording
+from probe.recording.read import Recording, read_frames
 
 COUNTS = ClientStatistics(frames=120, rate=99.9, lost=3, failed=1, reopenings=1)
 IDENT = IdentPacket(seq=0, t_us=0, settling_us=10.0, baud=1_000_000, sensor=2, name="FSR-uno")
@@ -112,7 +112,7 @@ def test_recordings_and_images_get_the_next_free_name(state, tmp_path):
         assert f"REC live-00{number}.h5, 2 frames" in shown(state)
         state.toggle_recording("sim/0")
         assert state.notice == f"live-00{number}.h5: 2 frames"
-    assert read_recording(tmp_path / "live-002.h5").origin.sensor == "sim/0"
+    assert Recording(tmp_path / "live-002.h5").origin.sensor == "sim/0"
     assert [int(f.counts[0, 0]) for f in read_frames(tmp_path / "live-001.h5")] == [5, 6]
     state.save()
     assert (np.load(tmp_path / "image-001.npy") == 6).all()

@@ -12,7 +12,7 @@ import pytest
 
 from probe.errors import RecordingError
 from probe.frame import Frame, frame_from
-from probe.recording.read import read_frames, read_recording
+from probe.recording.read import Recording, read_frames
 from probe.recording.record import Recorder
 
 HZ = 220
@@ -87,7 +87,7 @@ def test_the_file_is_plain_hdf5_with_its_origin(tmp_path):
         "piece": 1,
         "force_n": 80.0,
     }
-    recording = read_recording(path)
+    recording = Recording(path)
     assert len(recording) == 70
     assert (recording.origin.sensor, recording.origin.calibration) == ("bench 1", "ab12")
     assert dict(recording.origin.more) == {"force_n": 80.0}
@@ -102,7 +102,7 @@ def test_the_same_frames_give_the_same_bytes(tmp_path):
 def test_a_recording_without_frames_is_one(tmp_path):
     record(tmp_path / "touch.h5", [])
     assert list(read_frames(tmp_path / "touch.h5")) == []
-    assert len(read_recording(tmp_path / "touch.h5").block()) == 0
+    assert len(Recording(tmp_path / "touch.h5").block()) == 0
 
 
 def test_any_slice_of_a_series(tmp_path):
@@ -110,7 +110,7 @@ def test_any_slice_of_a_series(tmp_path):
     recorder = record(tmp_path / "touch.h5", given, roll_over_s=1.0)
     expected = [f"touch-{number:04d}.h5" for number in range(1, 6)]
     assert [file.name for file in recorder.files] == names(tmp_path) == expected
-    recording = read_recording(tmp_path / "touch.h5")
+    recording = Recording(tmp_path / "touch.h5")
     assert [file.frames for file in recording.files] == [220, 220, 220, 220, 120]
     for start, stop in ((0, 1000), (219, 221), (100, 100), (430, 900), (999, 2000), (1200, 1300)):
         assert all(map(same, recording.frames(start, stop), given[start:stop]))
@@ -127,7 +127,7 @@ def test_poses_may_come_and_go(tmp_path):
     late = frames(300) + frames(300, first=300, pose=pose_at(3))
     recorder = record(tmp_path / "b.h5", late)
     assert len(recorder.files) == 2  # the first has no place for poses
-    recording = read_recording(tmp_path / "b.h5")
+    recording = Recording(tmp_path / "b.h5")
     assert all(map(same, recording.frames(), late))
     assert [file.poses for file in recording.files] == [False, True]
     joined = recording.block()
@@ -140,7 +140,7 @@ def test_a_probe_whose_clock_begins_anew_neither_rolls_over_nor_stalls(tmp_path)
         Frame(f.counts, f.t_ns, f.seq + 500, f.wrist) for f in frames(100)
     ]  # restarted
     recorder = record(tmp_path / "touch.h5", given, roll_over_s=2.0)
-    assert [len(read_recording(file)) for file in recorder.files] == [440, 160]
+    assert [len(Recording(file)) for file in recorder.files] == [440, 160]
     assert all(map(same, read_frames(tmp_path / "touch.h5"), given))
 
 
@@ -152,13 +152,13 @@ def test_what_was_flushed_is_read_while_it_is_written(tmp_path):
         assert names(tmp_path) == ["touch.part.h5"]
         for name in (path, tmp_path / "touch.part.h5"):
             with pytest.raises(RecordingError, match=r"still being written; .*live"):
-                read_recording(name)
-            assert len(read_recording(name, live=True)) == 64
+                Recording(name)
+            assert len(Recording(name, live=True)) == 64
         recorder.flush()
         read = list(read_frames(path, live=True))
         assert all(map(same, read, frames(100)))
         assert len(read) == 100
-    assert len(read_recording(path, live=True)) == 100
+    assert len(Recording(path, live=True)) == 100
 
 
 def test_a_series_is_read_while_its_next_file_is_blank(tmp_path):
@@ -168,11 +168,11 @@ def test_a_series_is_read_while_its_next_file_is_blank(tmp_path):
         for frame in given:
             recorder.append(frame)
         assert names(tmp_path) == ["touch-0001.h5", "touch.part.h5"]
-        assert len(read_recording(path, live=True)) == 220
+        assert len(Recording(path, live=True)) == 220
         with pytest.raises(RecordingError, match="nothing in it has reached the disk yet; wait"):
-            read_recording(path)
+            Recording(path)
         with pytest.raises(RecordingError, match="nothing in it has reached the disk yet; wait"):
-            read_recording(tmp_path / "touch.part.h5", live=True)
+            Recording(tmp_path / "touch.part.h5", live=True)
         recorder.flush()
         assert all(map(same, read_frames(path, live=True), given))
     assert all(map(same, read_frames(path), given))
@@ -182,7 +182,7 @@ def test_a_slow_stream_is_flushed_by_time(tmp_path):
     with Recorder(tmp_path / "touch.h5", flush_s=0.05) as recorder:
         for frame in frames(12):
             recorder.append(frame)
-        recording = read_recording(tmp_path / "touch.h5", live=True)
+        recording = Recording(tmp_path / "touch.h5", live=True)
         assert len(recording) == 12  # 11 periods of 1/220 s are 0.05 s
 
 
@@ -199,7 +199,7 @@ def test_a_recording_is_replaced_only_when_asked(tmp_path):
     assert names(tmp_path) == ["touch-0001.h5", "touch-0002.h5"]
     record(path, frames(7), replace=True)
     assert names(tmp_path) == ["touch.h5"]
-    assert len(read_recording(path)) == 7
+    assert len(Recording(path)) == 7
 
 
 def test_a_name_that_was_taken_meanwhile_loses_nothing(tmp_path):
@@ -210,7 +210,7 @@ def test_a_name_that_was_taken_meanwhile_loses_nothing(tmp_path):
     with pytest.raises(RecordingError, match=r"took the name.*repair"):
         recorder.close()
     assert path.read_text() == "mine"
-    assert len(read_recording(tmp_path / "touch.part.h5")) == 1
+    assert len(Recording(tmp_path / "touch.part.h5")) == 1
 
 
 @pytest.mark.parametrize("name", ["touch", "touch.csv", "touch.part.h5"])
@@ -230,7 +230,7 @@ def test_two_recorders_cannot_write_one_file(tmp_path):
         with pytest.raises(RecordingError, match="another process is writing it"):
             Recorder(tmp_path / "touch.h5")
         recorder.append(frames(1)[0])
-    assert len(read_recording(tmp_path / "touch.h5")) == 1
+    assert len(Recording(tmp_path / "touch.h5")) == 1
 
 
 def test_a_closed_recorder_takes_no_frames(tmp_path):
@@ -248,7 +248,7 @@ def test_an_error_of_the_caller_keeps_the_frames(tmp_path):
 
     with pytest.raises(KeyError):
         careless()
-    assert len(read_recording(tmp_path / "touch.h5")) == 1
+    assert len(Recording(tmp_path / "touch.h5")) == 1
 
 
 def test_hdf5_is_not_loaded_before_a_file_is_opened():

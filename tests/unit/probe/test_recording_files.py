@@ -13,7 +13,7 @@ import pytest
 from probe.errors import RecordingError
 from probe.frame import frame_from
 from probe.recording.lock import is_locked
-from probe.recording.read import read_frames, read_recording
+from probe.recording.read import Recording, read_frames
 from probe.recording.record import Recorder
 from probe.recording.repair import repair
 from probe.recording.superblock import superblock_of
@@ -66,7 +66,7 @@ def test_values_that_are_no_counts_are_refused_and_where(tmp_path):
         values[300, 2, 3] = bad
         path = foreign(tmp_path / f"{number}.h5", frames=values)
         refused(path, "other things than counts 0 ... 65535 in frames 256 ... 511; import")
-        assert len(list(read_recording(path).frames(0, 256))) == 256
+        assert len(list(Recording(path).frames(0, 256))) == 256
     poses = np.tile(2.0 * np.eye(4), (600, 1, 1))
     refused(
         foreign(tmp_path / "p.h5", frames=COUNTS, pose=poses), "other things than rigid transforms"
@@ -76,13 +76,13 @@ def test_values_that_are_no_counts_are_refused_and_where(tmp_path):
 def test_any_file_with_frames_is_a_recording(tmp_path):
     for number, dtype in enumerate((np.uint8, np.int32, np.float32, ">u2", np.int64)):
         path = foreign(tmp_path / f"{number}.h5", frames=(COUNTS % 250).astype(dtype))
-        block = read_recording(path).block()
+        block = Recording(path).block()
         assert block.counts.dtype == np.uint16
         assert (block.counts == COUNTS % 250).all()
         assert block.seq.tolist() == list(range(600))
         assert block.t_ns[220] == 1_000_000_000
         assert not block.wrist.any()
-    recording = read_recording(path)
+    recording = Recording(path)
     assert recording.tool_version == ""
     assert recording.origin.units == "counts"
 
@@ -91,7 +91,7 @@ def test_attributes_of_others_are_kept(tmp_path):
     path = foreign(tmp_path / "a.h5", frames=COUNTS)
     with h5py.File(path, "a") as file:
         file.attrs.update({"sensor": np.bytes_(b"mat 3"), "piece": np.array([4]), "format": "own"})
-    origin = read_recording(path).origin
+    origin = Recording(path).origin
     assert origin.sensor == "mat 3"
     assert dict(origin.more) == {"piece": 4, "format": "own"}
 
@@ -107,7 +107,7 @@ def test_a_user_block_does_not_matter(tmp_path):
     path = tmp_path / "touch.h5"
     with h5py.File(path, "w", userblock_size=1024) as file:
         file["frames"] = COUNTS
-    assert len(read_recording(path)) == 600
+    assert len(Recording(path)) == 600
     assert superblock_of(path).whole
 
 
@@ -115,7 +115,7 @@ def test_a_file_that_may_not_be_read(tmp_path):
     path = recorded(tmp_path / "touch.h5", 3)
     path.chmod(0)
     if os.access(path, os.R_OK):  # root may read all
-        assert len(read_recording(path)) == 3
+        assert len(Recording(path)) == 3
     else:
         refused(path, "Permission denied; choose a folder that you may read and write")
 
@@ -133,10 +133,10 @@ def test_a_truncated_recording_gives_the_frames_that_are_there(tmp_path, share):
     assert result.path == path
     assert result.frames + result.lost == 600
     assert result.frames >= share * 600 - 2 * 64
-    block = read_recording(path).block()
+    block = Recording(path).block()
     assert len(block) == result.frames
     assert (block.counts == COUNTS[block.seq]).all()
-    assert read_recording(path).origin.more["frames_lost"] == result.lost
+    assert Recording(path).origin.more["frames_lost"] == result.lost
     kept = tmp_path / "touch.damaged.h5"
     assert kept.read_bytes() == whole[: int(share * len(whole))]
     assert sorted(p.name for p in tmp_path.iterdir()) == ["touch.damaged.h5", "touch.h5"]
@@ -163,7 +163,7 @@ def test_a_damaged_block_costs_that_block(tmp_path):
     refused(path, "damaged: cannot read it")
     result = repair(path)
     assert (result.frames, result.lost) == (536, 64)
-    block = read_recording(path).block()
+    block = Recording(path).block()
     assert (block.counts == COUNTS[block.seq]).all()
     assert repair(path) == type(result)(path, 536, 0, changed=False)
 
@@ -175,7 +175,7 @@ def test_datasets_of_different_lengths_are_cut(tmp_path):
     refused(path, "different lengths; run `repair`")
     result = repair(path)
     assert (result.frames, result.lost, result.changed) == (90, 0, True)
-    assert len(read_recording(path)) == 90
+    assert len(Recording(path)) == 90
 
 
 def test_a_whole_recording_is_left_alone(tmp_path):

@@ -9,7 +9,7 @@ from scipy.io import savemat
 
 from probe.errors import RecordingError
 from probe.recording.imported import import_array
-from probe.recording.read import read_recording
+from probe.recording.read import Recording
 
 COUNTS = np.random.default_rng(5).integers(0, 1024, (70, 16, 16)).astype(np.uint16)
 
@@ -159,4 +159,4 @@ def test_rates_and_names_are_checked(tmp_path):
         import_array(tmp_path / "a.npy", tmp_path / "b.h5")
     np.save(tmp_path / "a.npy", COUNTS[:5])
     assert len(import_array(tmp_path / "a.npy", tmp_path / "b.h5", replace=True)) == 5
-    assert len(read_recording(tmp_path / "b.h5")) == 5
+    assert len(Recording(tmp_path / "b.h5")) == 5

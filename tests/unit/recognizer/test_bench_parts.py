@@ -14,7 +14,7 @@ from generator.database.registered import RegisteredPart
 from probe.circuit import Electronics, fsr_of, read_counts
 from probe.errors import CalibrationError, RecordingError
 from probe.frame import frame_from
-from probe.recording.read import read_recording
+from probe.recording.read import Recording
 from probe.recording.record import Recorder
 from probe.sensor import SensorType
 from recognizer.bench.bulletin import Bulletin, Reader
@@ -212,7 +212,7 @@ def taken(feed, seconds):
 
 def test_a_recording_plays_in_order_goes_where_it_is_told_and_pauses_at_its_end(tmp_path):
     values = [0] * 20 + [200] * 20 + [0] * 20
-    feed = ReplayFeed("file:x", read_recording(recorded(tmp_path / "x.h5", values)))
+    feed = ReplayFeed("file:x", Recording(recorded(tmp_path / "x.h5", values)))
     assert feed.seconds == pytest.approx(0.59)
     assert taken(feed, 5.0) == list(range(60))
     assert feed.told()["at"] == pytest.approx(feed.seconds, abs=1e-3)
@@ -232,13 +232,13 @@ def test_a_recording_plays_in_order_goes_where_it_is_told_and_pauses_at_its_end(
 
 
 def test_an_empty_recording_and_one_whose_clock_jumps(tmp_path):
-    feed = ReplayFeed("file:x", read_recording(recorded(tmp_path / "empty.h5", [])))
+    feed = ReplayFeed("file:x", Recording(recorded(tmp_path / "empty.h5", [])))
     assert (feed.take(0.0), feed.overview(), feed.told()["playing"]) == ([], [], False)
     path = tmp_path / "jump.h5"
     with Recorder(path) as recorder:
         for i, t_ns in enumerate((0, 10**7, 10**13, 10**13 + 10**7, 5, 10**7)):
             recorder.append(frame_from(np.zeros((16, 16)), t_ns=t_ns, seq=i))
-    feed = ReplayFeed("file:x", read_recording(path))
+    feed = ReplayFeed("file:x", Recording(path))
     assert 0 < feed.seconds < 2
 
 
