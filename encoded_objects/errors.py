@@ -3,6 +3,7 @@
 ::
 
     EncodedObjectsError       exit code 2
+    ├── MissingExtraError     here
     ├── GeneratorError        generator.errors
     ├── DecoderError          decoder.errors
     ├── ProbeError            probe.errors
@@ -13,6 +14,7 @@ Imports nothing of ours, so that every package may stand on it.
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Any
 
 
@@ -57,6 +59,53 @@ class EncodedObjectsError(Exception):
             "cause": self.cause,
             "fix": self.fix,
         }
+
+
+class MissingExtraError(EncodedObjectsError):
+    """A library that a plain install leaves out; the fix is the line that installs it."""
+
+
+def require(*modules: str, extra: str, purpose: str) -> None:
+    """Load modules of an extra, or say in one line how they are installed.
+
+    Call it before the imports of such modules, where they are used and never at start.
+
+    Parameters
+    ----------
+    modules
+        As they are imported (`pyarrow.parquet`).
+    extra
+        Of this distribution, which brings them.
+    purpose
+        What needs them, as a person calls it ("validate-set").
+
+    Raises
+    ------
+    MissingExtraError
+        One of them is not installed, or a library of the system that it needs is not.
+
+    Examples
+    --------
+    >>> require("no_such_module", extra="report", purpose="validate-set")
+    Traceback (most recent call last):
+    encoded_objects.errors.MissingExtraError: validate-set needs no_such_module, which is not \
+installed; pip install 'encoded-objects[report]'
+    """
+    for module in modules:
+        try:
+            import_module(module)
+        except ImportError as error:
+            absent = isinstance(error, ModuleNotFoundError)
+            why = "is not installed" if absent else f"cannot be loaded ({error})"
+            raise MissingExtraError(
+                f"{purpose} needs {module.partition('.')[0]}, which {why}",
+                fix=install_line(extra),
+            ) from error
+
+
+def install_line(extra: str) -> str:
+    """Return the line that installs an extra."""
+    return f"pip install 'encoded-objects[{extra}]'"
 
 
 def printable(text: str) -> str:

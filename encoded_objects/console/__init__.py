@@ -40,6 +40,7 @@ def main(
     arguments: Sequence[str] | None = None,
     *,
     groups: Sequence[str] = (),
+    bare: bool = False,
     advice: str = "",
 ) -> NoReturn:
     """Run a command and leave with its exit code.
@@ -54,6 +55,8 @@ def main(
         In place of the process's own.
     groups
         Subcommands that have subcommands: given alone they show their help.
+    bare
+        Whether the command does something without any argument; otherwise it shows its help.
     advice
         Follows "interrupted" ("; go on with --resume").
     """
@@ -62,7 +65,7 @@ def main(
         sys.stdout.reconfigure(errors="backslashreplace")  # a name the terminal cannot show
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        code = run(name, chosen, given, groups=groups)
+        code = run(name, chosen, given, groups=groups, bare=bare)
         sys.stdout.flush()
     except KeyboardInterrupt:
         sys.stderr.write(f"\n{name}: interrupted{advice}\n")
@@ -73,7 +76,14 @@ def main(
     sys.exit(code)
 
 
-def run(name: str, chosen: Chosen, arguments: list[str], *, groups: Sequence[str] = ()) -> int:
+def run(
+    name: str,
+    chosen: Chosen,
+    arguments: list[str],
+    *,
+    groups: Sequence[str] = (),
+    bare: bool = False,
+) -> int:
     """Run one command; returns its exit code. Errors are reported, not raised."""
     from typer import BadParameter, Exit
 
@@ -82,7 +92,7 @@ def run(name: str, chosen: Chosen, arguments: list[str], *, groups: Sequence[str
 
     usage_error: type[Exception] = BadParameter.__mro__[1]  # of every misused option
     as_json = "--json" in arguments
-    unsaid = not arguments or arguments in [[group] for group in groups]  # which command is not
+    unsaid = not (arguments or bare) or arguments in [[group] for group in groups]
     try:
         asked = [*arguments, "--help"] if unsaid else arguments
         action = chosen(arguments)(asked, prog_name=name, standalone_mode=False)

@@ -11,8 +11,9 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from encoded_objects.errors import require
 from generator.cad.encode import EncodedSolid
-from generator.errors import GeneratorError, SolidError
+from generator.errors import SolidError
 from generator.export.step import step_chunks
 from generator.solid import Part
 
@@ -22,13 +23,12 @@ def to_build123d(result: EncodedSolid) -> Any:
 
     Raises
     ------
-    GeneratorError
+    MissingExtraError
         build123d is not installed.
     """
-    try:
-        from build123d import Compound, Solid
-    except ImportError as error:
-        raise _missing("build123d", error) from error
+    require("build123d", extra="cad", purpose="to_build123d")
+    from build123d import Compound, Solid
+
     solids = []
     for part in result.parts:
         solid = Solid(_kernel_solid(part))
@@ -42,13 +42,12 @@ def to_cadquery(result: EncodedSolid) -> Any:
 
     Raises
     ------
-    GeneratorError
+    MissingExtraError
         cadquery is not installed.
     """
-    try:
-        from cadquery import Assembly, Solid
-    except ImportError as error:
-        raise _missing("cadquery", error) from error
+    require("cadquery", extra="cad", purpose="to_cadquery")
+    from cadquery import Assembly, Solid
+
     assembly = Assembly(name=result.name)
     for part in result.parts:
         assembly.add(Solid(_kernel_solid(part)), name=part.name)
@@ -81,9 +80,3 @@ def _kernel_solid(part: Part) -> Any:
     motion.SetValues(*part.T_object_part[:3].ravel().tolist())
     moved = BRepBuilderAPI_Transform(explorer.Current(), motion, True).Shape()
     return TopoDS.Solid_s(moved)
-
-
-def _missing(library: str, error: ImportError) -> GeneratorError:
-    return GeneratorError(
-        f"{library} is not installed ({error})", fix='run: pip install "encoded-objects[cad]"'
-    )

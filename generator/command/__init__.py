@@ -56,6 +56,7 @@ def run(arguments: list[str]) -> int:
     """Run one command; returns its exit code. Errors are reported, not raised."""
     from typer import BadParameter, Exit
 
+    from encoded_objects.errors import MissingExtraError
     from generator.command import report
     from generator.errors import GeneratorError
 
@@ -66,7 +67,7 @@ def run(arguments: list[str]) -> int:
         return action() if callable(action) else int(action or 0)
     except Exit as leaving:
         return leaving.exit_code
-    except GeneratorError as error:
+    except (GeneratorError, MissingExtraError) as error:
         report.error(error, as_json=as_json)
         return error.exit_code
     except usage_error as error:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from generator.errors import GeneratorError
+from encoded_objects.errors import EncodedObjectsError
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -61,7 +61,7 @@ def version(*, as_json: bool) -> None:
         write(f"encode-object {number}")
 
 
-def error(problem: GeneratorError, *, as_json: bool) -> None:
+def error(problem: EncodedObjectsError, *, as_json: bool) -> None:
     """Say what is wrong: to stderr, or as JSON to stdout."""
     problems = _problems(problem)
     if as_json:
@@ -186,7 +186,7 @@ def _encoded_values(result: Encoded, dry_run: bool) -> dict[str, Any]:
     }
 
 
-def _problems(error: GeneratorError) -> tuple[Problem, ...]:
+def _problems(error: EncodedObjectsError) -> tuple[Problem, ...]:
     from generator.spec.problem import Problem, SpecError
 
     if isinstance(error, SpecError):

@@ -16,6 +16,7 @@ from urllib.parse import quote
 
 from sqlalchemy import URL, Engine, NullPool, create_engine, event
 
+from encoded_objects.errors import install_line
 from generator.database.transaction import begin_sqlite, place_of
 from generator.errors import DatabaseError
 
@@ -94,7 +95,7 @@ def _postgresql_engine(url: URL, writable: bool, wait_s: float) -> Engine:
             execution_options={"wait_s": wait_s},
         )
     except ImportError as error:
-        fix = "install it with: pip install 'encoded-objects[postgres]'"
+        fix = install_line("postgres")
         raise DatabaseError("psycopg is not installed", fix=fix, place=place_of(url)) from error
     if not writable:
         event.listen(engine, "connect", _read_only)

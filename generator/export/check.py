@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from encoded_objects.errors import require
 from generator.errors import GeneratorError, SolidError
 from generator.export.exact_crossing import cut_triangles, perhaps_folded
 
@@ -23,7 +24,7 @@ from generator.export.exact_crossing import cut_triangles, perhaps_folded
 STEP_VOLUME = 1e-9
 #: Greatest relative error of a volume that is read back from STL: 32-bit coordinates.
 STL_VOLUME = 1e-5
-_EXTRAS = 'pip install "encoded-objects[cad,mesh]"'
+_EXTRAS = "cad,mesh"
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,8 +78,10 @@ def verify(
     ------
     SolidError
         A check failed; the error names the file, the part and what is wrong.
-    GeneratorError
+    MissingExtraError
         The CAD kernel or the mesh library is not installed.
+    GeneratorError
+        The mesh library lacks one of the system.
     """
     return PartReport(
         part,
@@ -89,17 +92,16 @@ def verify(
 
 def read_step(path: Path) -> StepReport:
     """Return what the CAD kernel makes of a file; the volume error is not known (NaN)."""
-    try:
-        from OCP.BRepCheck import BRepCheck_Analyzer
-        from OCP.BRepGProp import BRepGProp
-        from OCP.GProp import GProp_GProps
-        from OCP.IFSelect import IFSelect_ReturnStatus
-        from OCP.Message import Message
-        from OCP.STEPControl import STEPControl_Reader
-        from OCP.TopAbs import TopAbs_ShapeEnum
-        from OCP.TopExp import TopExp_Explorer
-    except ImportError as error:
-        raise _missing("the CAD kernel", error) from error
+    require("OCP.BRepCheck", extra=_EXTRAS, purpose="--verify")
+    from OCP.BRepCheck import BRepCheck_Analyzer
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+    from OCP.IFSelect import IFSelect_ReturnStatus
+    from OCP.Message import Message
+    from OCP.STEPControl import STEPControl_Reader
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.TopExp import TopExp_Explorer
+
     # The kernel prints its complaints to stdout, where results belong: take its printers away.
     messenger: Any = Message.DefaultMessenger_s()
     printers = list(messenger.Printers())
@@ -129,10 +131,9 @@ def read_step(path: Path) -> StepReport:
 
 def read_stl(path: Path) -> MeshReport:
     """Return what the mesh library makes of a file; the volume error is not known (NaN)."""
-    try:
-        import pymeshlab
-    except ImportError as error:
-        raise _missing("the mesh library", error) from error
+    require("pymeshlab", extra=_EXTRAS, purpose="--verify")
+    import pymeshlab
+
     meshes: Any = pymeshlab.MeshSet(verbose=False)
     try:
         meshes.load_new_mesh(str(path))
@@ -208,10 +209,4 @@ def _failed(part: str, path: Path, reason: str) -> SolidError:
         f"part '{part}': {path.name} {reason}",
         fix="do not print it; report the spec together with this message",
         place=str(path),
-    )
-
-
-def _missing(what: str, error: ImportError) -> GeneratorError:
-    return GeneratorError(
-        f"--verify needs {what}, which is not installed ({error})", fix=f"run {_EXTRAS}"
     )

@@ -6,14 +6,15 @@ imported before it is needed.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, NoReturn
 
 import typer
 
-from recognizer.threads import one_thread
+from encoded_objects import console
+from encoded_objects.console import Action
+from encoded_objects.errors import require
 
 HELP = """See the part, the touch and the answer in a web page.
 
@@ -22,36 +23,13 @@ Try it without a probe: [bold]open-bench --database lab.db[/], open the page, cl
 EPILOG = "Exit codes: 0 ended, 2 bad input, 3 device, 4 database."
 LAB = "lab.db"
 
-app = typer.Typer(
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
+app = console.application()
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run `open-bench` and leave with its exit code."""
-    one_thread()
-    from encoded_objects.errors import EncodedObjectsError
-
-    usage_error: type[Exception] = typer.BadParameter.__mro__[1]
-    try:
-        code = app(list(sys.argv[1:] if arguments is None else arguments),
-                   prog_name="open-bench", standalone_mode=False)  # fmt: skip
-    except typer.Exit as leaving:
-        code = leaving.exit_code
-    except EncodedObjectsError as error:
-        place = f"{error.place}: " if error.place else ""
-        sys.stderr.write(f"open-bench: {place}error: {error.cause}\n")
-        if error.fix:
-            sys.stderr.write(f"  fix: {error.fix}\n")
-        code = error.exit_code
-    except usage_error as error:
-        told = getattr(error, "format_message", error.__str__)()
-        sys.stderr.write(f"open-bench: error: {told}\n  fix: see open-bench --help\n")
-        code = 2
-    sys.exit(int(code or 0))
+    console.one_thread()
+    console.main("open-bench", lambda _arguments: app, arguments, bare=True)
 
 
 @app.command(help=HELP, epilog=EPILOG)
@@ -84,11 +62,16 @@ def bench(
                           "default."),
     ] = None,
     overlay: Annotated[str, typer.Option(help="Of the sensor: tab or pad.")] = "tab",
-) -> int:  # fmt: skip
+) -> Action:  # fmt: skip
     """Serve the bench."""
-    from recognizer.bench.serve import Asked, serve
 
-    return serve(Asked(port, database, web_port, host, token, folder, parts, overlay))
+    def action() -> int:
+        require("fastapi", "uvicorn", "websockets", extra="bench", purpose="open-bench")
+        from recognizer.bench.serve import Asked, serve
+
+        return serve(Asked(port, database, web_port, host, token, folder, parts, overlay))
+
+    return action
 
 
 if __name__ == "__main__":

@@ -14,15 +14,16 @@ heavy is imported before it is needed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, NoReturn
 
 import typer
 
-from probe.command.ending import BAD_INPUT, FAILED, leave, misuse, unwritten
-from recognizer.threads import one_thread
+from encoded_objects import console
+from encoded_objects.console import Action, output
 
+NAME = "validate-set"
 TOOLS = ("compare", "repeat", "report")
 HELP = """Touch a set of objects in simulation, read every touch, and report how far the answers \
 can be trusted.
@@ -42,66 +43,25 @@ More commands, each with --help:
 [bold]validate-set report[/] DIR            the report anew from the touches that are there
 """
 
-Action = Callable[[], int]
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, also for errors.")]
-_SETTINGS = {"help_option_names": ["-h", "--help"]}
 
-app = typer.Typer(
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
-    context_settings=_SETTINGS,
-)
-tools = typer.Typer(
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
-    context_settings=_SETTINGS,
-)
+app = console.application()
+tools = console.application()
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run `validate-set` and leave with its exit code."""
-    one_thread()
-    leave("validate-set", run, arguments, advice="; go on with --resume")
+    console.one_thread()
+    console.main(NAME, _application, arguments, advice="; go on with --resume")
 
 
 def run(arguments: list[str]) -> int:
     """Run one command; returns its exit code. Errors are reported, not raised."""
-    from encoded_objects.errors import EncodedObjectsError
-    from recognizer.validation import told
+    return console.run(NAME, _application, arguments)
 
-    usage_error: type[Exception] = typer.BadParameter.__mro__[1]  # of every misused option
-    as_json = "--json" in arguments
-    chosen = tools if arguments[:1] and arguments[0] in TOOLS else app
-    try:
-        asked = arguments or ["--help"]
-        action = chosen(asked, prog_name="validate-set", standalone_mode=False)
-        code = action() if callable(action) else int(action or 0)
-        return code if arguments else BAD_INPUT
-    except typer.Exit as leaving:
-        return leaving.exit_code
-    except EncodedObjectsError as error:
-        told.error(type(error).__name__, error.cause, error.fix, error.place, error.exit_code,
-                   as_json=as_json)  # fmt: skip
-        return error.exit_code
-    except usage_error as error:
-        told.error(
-            "UsageError", misuse(error), "see validate-set --help", "", BAD_INPUT, as_json=as_json
-        )
-        return BAD_INPUT
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        told.error(
-            "OSError",
-            unwritten(error),
-            "check folder, space and rights",
-            "",
-            FAILED,
-            as_json=as_json,
-        )
-        return FAILED
+
+def _application(arguments: list[str]) -> typer.Typer:
+    return tools if arguments[:1] and arguments[0] in TOOLS else app
 
 
 @app.command(help=HELP, epilog=EPILOG)
@@ -175,7 +135,7 @@ def validate(
         from recognizer.validation import told
 
         if version:
-            told.version(as_json=as_json)
+            output.version(NAME, as_json=as_json)
             return 0
         from recognizer.validation.complete import Wishes, validate_set
 

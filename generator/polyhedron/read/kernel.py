@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from encoded_objects.errors import install_line
 from generator.errors import ShapeError
 
 PLANAR_MM = 1e-5  #: a spline surface this flat is a plane; kernel tolerances are smaller
@@ -40,7 +41,7 @@ def _read(model: str, scale: float) -> dict[str, Any]:
     except ImportError:  # a library of the system may be missing
         raise ShapeError(
             "reading STEP needs the CAD kernel, which cannot be loaded",
-            fix='run: pip install "encoded-objects[cad]", or save the model as STL',
+            fix=f"{install_line('cad')}, or save the model as STL",
         ) from None
     try:
         return described(_scaled(_model(model), scale))

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from encoded_objects.errors import install_line
 from generator.errors import ShapeError
 from generator.polyhedron.read.facets import polyhedron_of_facets
 from generator.polyhedron.read.merge import merged
@@ -41,7 +42,7 @@ def read_step(content: bytes, place: str, scale: float = 1.0) -> Polyhedron:
     if importlib.util.find_spec("OCP") is None:
         raise ShapeError(
             "reading STEP needs the CAD kernel, which is not installed",
-            fix='run: pip install "encoded-objects[cad]", or save the model as STL',
+            fix=f"{install_line('cad')}, or save the model as STL",
             place=place,
         )
     found = _ask_kernel(content, place, scale)

@@ -225,7 +225,7 @@ def test_step_with_a_bore_has_a_round_face():
 def test_step_without_the_kernel_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "OCP", None)  # as if it were not installed
     error = refused(SHAPES_FOLDER / "cube_with_hole.step")
-    assert 'pip install "encoded-objects[cad]"' in error.fix
+    assert "pip install 'encoded-objects[cad]'" in error.fix
 
 
 def test_step_that_crashes_the_kernel_is_refused(tmp_path):
