@@ -60,6 +60,13 @@ def frame_from(
     return Frame(image, int(t_ns), int(seq), given, None if pose is None else _pose(pose))
 
 
+def median_filter(image: NDArray[Any]) -> NDArray[Any]:
+    """Return the median of the 3x3 neighbourhood of each reading; edges are repeated."""
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(image, 1, mode="edge"), (3, 3))
+    filtered: NDArray[Any] = np.median(around, axis=(2, 3))
+    return filtered
+
+
 def _counts(values: ArrayLike, shape: tuple[int, ...], name: str) -> NDArray[np.uint16]:
     array = np.asarray(values)
     if array.shape != shape:

@@ -2,9 +2,11 @@
 
 ::
 
-    __init__.py   which exit code an error, a signal or a closed pipe means
-    output.py     results to stdout, messages to stderr, as text and as JSON
-    progress.py   a bar on a terminal, notices beside it
+    __init__.py       which exit code an error, a signal or a closed pipe means
+    output.py         results to stdout, messages to stderr, as text and as JSON
+    progress.py       a bar on a terminal, notices beside it
+    interruption.py   Ctrl-C as an event
+    files.py          files that are whole or not there
 
 A command is a typer application whose functions read options and return an `Action`; the
 action does the work and returns the exit code, or raises an `EncodedObjectsError`.
@@ -93,9 +95,11 @@ def run(
     usage_error: type[Exception] = BadParameter.__mro__[1]  # of every misused option
     as_json = "--json" in arguments
     unsaid = not (arguments or bare) or arguments in [[group] for group in groups]
+    app = None
     try:
         asked = [*arguments, "--help"] if unsaid else arguments
-        action = chosen(arguments)(asked, prog_name=name, standalone_mode=False)
+        app = chosen(arguments)
+        action = app(asked, prog_name=name, standalone_mode=False)
         code = action() if callable(action) else int(action or 0)
         return BAD_INPUT if unsaid else code
     except Exit as leaving:
@@ -104,7 +108,8 @@ def run(
         output.error(error, as_json=as_json)
         return error.exit_code
     except usage_error as error:
-        called = getattr(getattr(error, "ctx", None), "command_path", name)
+        called = getattr(getattr(error, "ctx", None), "command_path", "")
+        called = called or _called(name, app, arguments)
         problem = EncodedObjectsError(_misuse(error), fix=f"see {called} --help")
         output.error(problem, as_json=as_json)
         return BAD_INPUT
@@ -139,6 +144,19 @@ def one_thread() -> None:
     """
     for library in MATRIX_LIBRARIES:
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
+
+def _called(name: str, app: Typer | None, arguments: list[str]) -> str:
+    """Return how the command that was meant is called, with the groups it stands in."""
+    from typer.main import get_command
+
+    words, command = [name], None if app is None else get_command(app)
+    for word in arguments:
+        command = getattr(command, "commands", {}).get(word)
+        if command is None:
+            break
+        words.append(word)
+    return " ".join(words)
 
 
 def _misuse(error: Exception) -> str:

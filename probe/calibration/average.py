@@ -15,6 +15,7 @@ from probe.errors import CalibrationError
 
 Image = NDArray[np.float64]
 
+BIAS_FRAMES = 32  #: averaged for the bias of a live view
 FRAMES = 20  #: least number of frames of a load
 _SPIKE = 8.0  # robust deviations from the median, beyond it a sample is a spike
 _SPIKE_COUNTS = 5.0  # and at least so many counts

@@ -7,14 +7,13 @@ from typing import Annotated
 
 import typer
 
-from probe.command import Action
+from encoded_objects.console import Action, application
 from probe.command.options import URLS, Calibrated, Json, Output, Replace, SelectedSensor, Url
 
 BOARD = "none"
 
-app = typer.Typer(
-    help="Find out what a sensor's counts mean: bias, unsound tactels, force law of each.",
-    context_settings={"help_option_names": ["-h", "--help"]},
+app = application(
+    help="Find out what a sensor's counts mean: bias, unsound tactels, force law of each."
 )
 
 Board = Annotated[

@@ -9,6 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from encoded_objects.console import FAILED
+from encoded_objects.console.files import refuse_taken
+from encoded_objects.console.output import pairs, warning, write, write_json
 from probe.calibration import (
     calibration_from,
     calibration_hash,
@@ -20,9 +23,6 @@ from probe.calibration import (
 from probe.calibration.average import averaged
 from probe.calibration.condition import Thresholds, common_bias, raised
 from probe.circuit import Electronics
-from probe.command import report
-from probe.command.ending import FAILED
-from probe.command.exported import refuse_taken
 from probe.command.laws import condition_map, described, places
 from probe.command.listen import Counts, frames_of
 from probe.command.loads import Given
@@ -58,22 +58,22 @@ def report_bias(
         "noise": f"{values['noise_counts']:.2f} counts a frame",
         "raised": places(high) or "none",
     }
-    warning = ""
+    trouble = ""
     if calibration is not None:
         known = read_calibration(calibration, sensor=name or None)
         drift = drift_of(known, counts)
         shift = float(np.abs(drift.bias_counts[~known.bad]).max(initial=0.0))
-        warning = drift.warning
+        trouble = drift.warning
         values |= {"calibration": calibration_hash(known), "shift_counts": shift,
-                   "warning": warning}  # fmt: skip
+                   "warning": trouble}  # fmt: skip
         lines["shift"] = f"{shift:.2f} counts at most since {known.made or 'the calibration'}"
     if as_json:
-        report.write_json(values)
+        write_json(values)
     else:
-        report.pairs(lines)
-        if warning:
-            report.warning(warning)
-    return FAILED if warning else 0
+        pairs(lines)
+        if trouble:
+            warning(trouble)
+    return FAILED if trouble else 0
 
 
 def calibrate_loads(
@@ -112,11 +112,11 @@ def calibrate_loads(
     digest = write_calibration(found, output)
     values, lines = described(found, digest, str(output))
     if as_json:
-        report.write_json(values)
+        write_json(values)
     else:
-        report.pairs(lines)
+        pairs(lines)
         if found.bad.any():
-            report.write("\n" + condition_map(found))
+            write("\n" + condition_map(found))
     return 0
 
 

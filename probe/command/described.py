@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.command.report import number
-from probe.command.stream import Stream, name_of
+from encoded_objects.console.output import number
+from probe.client.stream import Stream, name_of
 
 Described = tuple[dict[str, Any], dict[str, str]]
 """What `--json` prints, and what people read."""

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from probe.command import Action
+from encoded_objects.console import Action
 from probe.command.options import URLS, Json, SelectedSensor
 
 ALWAYS = {
@@ -21,7 +21,7 @@ def list_(as_json: Json = False) -> Action:
     """Print the ports that are there, which of them may be a probe, and URLs that always work."""
 
     def action() -> int:
-        from probe.command import report
+        from encoded_objects.console import output
         from probe.port.listing import list_ports
 
         ports = list_ports()
@@ -29,20 +29,20 @@ def list_(as_json: Json = False) -> Action:
             from dataclasses import asdict
 
             always = [{"url": url, "description": text} for url, text in ALWAYS.items()]
-            report.write_json({"ports": [asdict(port) for port in ports], "always": always})
+            output.write_json({"ports": [asdict(port) for port in ports], "always": always})
             return 0
         if ports:
-            table = report.table("port", "may be a probe", "board or adapter", "serial number")
+            table = output.table("port", "may be a probe", "board or adapter", "serial number")
             for port in ports:
                 name = " ".join(part for part in (port.vendor, port.product) if part)
                 likely = "yes" if port.likely else "no"
                 table.add_row(port.url, likely, name or port.description, port.serial_number)
-            report.show(table)
-            report.write("what answers at a port:  probe-sensor info URL\n")
+            output.show(table)
+            output.write("what answers at a port:  probe-sensor info URL\n")
         else:
-            report.write("no port on USB is there; plug the probe in\n")
-        report.write("without a probe:")
-        report.pairs({f"  {url}": text for url, text in ALWAYS.items()})
+            output.write("no port on USB is there; plug the probe in\n")
+        output.write("without a probe:")
+        output.pairs({f"  {url}": text for url, text in ALWAYS.items()})
         return 0
 
     return action
@@ -60,7 +60,8 @@ def info(
     """Say what a probe is and how well it comes through, or what a file holds."""
 
     def action() -> int:
-        from probe.command import described, report
+        from encoded_objects.console import output
+        from probe.command import described
 
         values: dict[str, Any]
         if what.startswith(("serial:", "sim:", "file:", "/dev/")):
@@ -70,9 +71,9 @@ def info(
         else:
             values, lines = described.recording(what)
         if as_json:
-            report.write_json(values)
+            output.write_json(values)
         else:
-            report.pairs(lines)
+            output.pairs(lines)
         return 0
 
     return action

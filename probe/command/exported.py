@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from encoded_objects.console.files import refuse_taken, staged
+from encoded_objects.console.output import number, write, write_json
 from probe.calibration import Calibration, calibrated, read_calibration
-from probe.command import report
-from probe.errors import CalibrationError, ProbeError, RecordingError
+from probe.errors import CalibrationError, RecordingError
+from probe.frame import median_filter
 from probe.recording.read import Recording
 
 
@@ -48,7 +45,7 @@ def export_files(
         When the recording cannot be read, or has no such frame.
     CalibrationError
         When the calibration is none, or of another sensor.
-    ProbeError
+    EncodedObjectsError
         When a file is there already.
     """
     outputs = []
@@ -68,48 +65,12 @@ def export_files(
         export_csv(path, csv, live=live)
     if as_json:
         names = [str(out) for out in outputs]
-        report.write_json({"file": str(path), "frames": len(recording), "written": names})
+        write_json({"file": str(path), "frames": len(recording), "written": names})
     else:
         for out in outputs:
-            what = "picture" if out is png else report.number(len(recording), "frame")
-            report.write(f"{out}: {what}")
+            what = "picture" if out is png else number(len(recording), "frame")
+            write(f"{out}: {what}")
     return 0
-
-
-def refuse_taken(out: Path, suffix: str, *, replace: bool) -> None:
-    """Refuse a file that is there already, unless it may be replaced, before work is done.
-
-    Parameters
-    ----------
-    out, suffix
-        The file to write, and how its name has to end.
-    replace
-        Whether a file of that name may go.
-
-    Raises
-    ------
-    ProbeError
-        With the way out; also for a folder that is not there, and another ending.
-    """
-    if out.suffix.lower() != suffix:
-        fix = f"write {out.with_suffix(suffix)}" if out.name else "give a name"
-        raise ProbeError(f"the name of this file has to end in {suffix}", fix=fix, place=str(out))
-    if not out.parent.is_dir():
-        raise ProbeError(f"there is no folder {out.parent}", fix="make it first", place=str(out))
-    if out.exists() and not replace:
-        raise ProbeError("the file is there already", place=str(out),
-                         fix="choose another name, or replace it with --replace")  # fmt: skip
-
-
-@contextmanager
-def staged(out: Path) -> Iterator[Path]:
-    """Yield a name beside `out` to write to; it becomes `out` when all went well."""
-    draft = out.with_name(f".{out.stem}.{os.getpid()}{out.suffix}")
-    try:
-        yield draft
-        os.replace(draft, out)
-    finally:
-        draft.unlink(missing_ok=True)
 
 
 def calibration_for(path: Path, recording: Recording) -> Calibration:
@@ -133,13 +94,6 @@ def calibration_for(path: Path, recording: Recording) -> Calibration:
     return known
 
 
-def median_filtered(image: NDArray[Any]) -> NDArray[Any]:
-    """Return the median of the 3x3 neighbourhood of each reading; edges are repeated."""
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(image, 1, mode="edge"), (3, 3))
-    filtered: NDArray[Any] = np.median(around, axis=(2, 3))
-    return filtered
-
-
 def _picture(recording: Recording, out: Path, view: View, known: Calibration | None) -> None:
     from probe.plot.frame import frame_picture
 
@@ -155,7 +109,7 @@ def _picture(recording: Recording, out: Path, view: View, known: Calibration | N
     if known is not None:
         image, unit = calibrated(block.counts[0], known).values, "N"
     if view.median:
-        image = median_filtered(image)
+        image = median_filter(image)
     title = f"frame {view.frame}, {(block.t_ns[0] - first.t_ns[0]) * 1e-9:.3f} s"
     if view.median:
         title += ", median of 3x3"

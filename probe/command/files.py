@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from probe.command import Action
+from encoded_objects.console import Action
 from probe.command.options import Calibrated, Json, Output, Recording, Replace
 
 Target = Path | None
@@ -78,7 +78,7 @@ def import_(
     """Make a recording of others' images; values that are no counts are scaled."""
 
     def action() -> int:
-        from probe.command import report
+        from encoded_objects.console.output import number, write, write_json
         from probe.command.recorded import check_output
         from probe.recording.imported import import_array
 
@@ -88,11 +88,11 @@ def import_(
         more = dict(made.origin.more)
         values = {"file": str(output), "frames": len(made), "units": made.origin.units, **more}
         if as_json:
-            report.write_json(values)
+            write_json(values)
             return 0
         scaled = f"; value = {more['scale_offset']:g} + {more['scale']:g} * count" \
             if "scale" in more else ""  # fmt: skip
-        report.write(f"{output}: {report.number(len(made), 'frame')} of {array}{scaled}")
+        write(f"{output}: {number(len(made), 'frame')} of {array}{scaled}")
         return 0
 
     return action
@@ -104,18 +104,16 @@ def repair(recording: Recording, as_json: Json = False) -> Action:
     def action() -> int:
         from dataclasses import asdict
 
-        from probe.command import report
+        from encoded_objects.console.output import number, write, write_json
         from probe.recording.repair import repair as repaired
 
         done = repaired(recording)
         if as_json:
-            report.write_json(asdict(done))
+            write_json(asdict(done))
         elif not done.changed:
-            report.write(f"{done.path} is whole; {report.number(done.frames, 'frame')}")
+            write(f"{done.path} is whole; {number(done.frames, 'frame')}")
         else:
-            report.write(
-                f"{done.path}: {report.number(done.frames, 'frame')} saved, {done.lost} lost"
-            )
+            write(f"{done.path}: {number(done.frames, 'frame')} saved, {done.lost} lost")
         return 0
 
     return action

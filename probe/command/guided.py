@@ -15,13 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
+from encoded_objects.console.files import refuse_taken
+from encoded_objects.console.output import message
 from probe.circuit import Electronics
-from probe.command import report
+from probe.client.stream import Stream, name_of
 from probe.command.calibrated import calibrate_loads
-from probe.command.exported import refuse_taken
 from probe.command.listen import Counts
 from probe.command.loads import Given, write_list
-from probe.command.stream import Stream, name_of
 from probe.errors import CalibrationError, PortError
 from probe.frame import Frame
 from probe.recording.record import Recorder
@@ -69,7 +69,7 @@ def guide(
     refuse_taken(folder / LIST, ".csv", replace=replace)
     with Stream(url, sensor=sensor) as stream:
         bench = Bench(url, stream, folder, seconds, name_of(stream.ident(), url))
-        report.message(f"{bench.sensor or url}; recordings go to {folder}")
+        message(f"{bench.sensor or url}; recordings go to {folder}")
         given: list[Given] = []
         rest: Counts | None = None
         for force in [0.0, *forces_n]:
@@ -82,7 +82,7 @@ def guide(
                 return calibrate_loads(given, output, board, sensor=bench.sensor, made=made,
                                        replace=replace, as_json=as_json)  # fmt: skip
             except CalibrationError as error:
-                report.message(f"not yet: {error.cause}\n  {error.fix}")
+                message(f"not yet: {error.cause}\n  {error.fix}")
                 more_n = _another_load()
                 if more_n is None:
                     raise
@@ -99,7 +99,7 @@ def _step(
     while True:
         _asked(f"{done + 1}/{steps}  {what}, then press Enter: ")
         counts = _recorded(bench, path)
-        report.message(f"     {_felt(counts, rest)}")
+        message(f"     {_felt(counts, rest)}")
         if _asked("     Enter goes on, r reads it again: ") != "r":
             return Given(path, force), counts
 
@@ -113,7 +113,7 @@ def _recorded(bench: Bench, path: Path) -> Counts:
     while time.monotonic() < until_s and not stream.ended:
         frames += stream.take(0.1)
         for notice in stream.client.notices():
-            report.message(f"     {notice}")
+            message(f"     {notice}")
     if not frames:
         raise PortError("no frame came", fix="see probe-sensor info", place=bench.url)
     with Recorder(path, sensor=bench.sensor, replace=True) as recorder:
@@ -162,5 +162,5 @@ def _another_load() -> float | None:
         with suppress(ValueError):
             if 0 < float(text) < math.inf:
                 return float(text)
-        report.message(f"{text!r} is no force above 0")
+        message(f"{text!r} is no force above 0")
     return None

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.command import report
-from probe.command.stream import Stream, interruption, name_of
+from encoded_objects.console.interruption import interruption
+from encoded_objects.console.output import message
+from probe.client.stream import Stream, name_of
 from probe.errors import PortError
 from probe.frame import COLUMNS, ROWS
 from probe.recording.read import Recording
@@ -42,7 +43,7 @@ def _listen(stream: Stream, seconds: float) -> Counts:
     while not stream.ended:
         frames = stream.take(1.0)
         for notice in stream.client.notices():
-            report.message(notice)
+            message(notice)
         for frame in frames:
             began_ns = frame.t_ns if began_ns is None else began_ns
             if frame.t_ns - began_ns > seconds * 1e9:

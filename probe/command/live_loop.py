@@ -12,13 +12,14 @@ from threading import Event
 from rich.console import Console
 from rich.live import Live
 
+from encoded_objects.console import INTERRUPTED
+from encoded_objects.console.interruption import interruption
+from encoded_objects.console.output import message, write, write_json
 from probe.calibration import read_calibration
-from probe.command import report
-from probe.command.ending import INTERRUPTED
+from probe.client.stream import Stream, name_of
 from probe.command.keys import Pressed, keys
 from probe.command.live_state import LiveState
 from probe.command.live_view import line_of, rendered
-from probe.command.stream import Stream, interruption, name_of
 
 PER_SECOND = 15  #: pictures
 
@@ -105,7 +106,7 @@ def _in_lines(
     while True:
         state.take(stream.take(0.1))
         for notice in stream.client.notices():
-            report.message(notice)
+            message(notice)
         now_s = time.monotonic()
         over = interrupted.is_set() or stream.ended or now_s >= until_s
         if over or now_s >= due_s:
@@ -124,7 +125,7 @@ def _report(state: LiveState, stream: Stream, *, as_json: bool) -> None:
             "unit": state.unit,
             **asdict(counts),
         }
-        report.write_json(values, line=True)
+        write_json(values, line=True)
     else:
-        report.write(line_of(state, counts))
+        write(line_of(state, counts))
     sys.stdout.flush()

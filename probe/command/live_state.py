@@ -8,21 +8,20 @@ from __future__ import annotations
 
 import datetime
 from dataclasses import dataclass, field
-from itertools import count
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.console.files import staged
 from probe.calibration import Calibration, calibrated, calibration_hash, drift_of
-from probe.command.exported import median_filtered, staged
-from probe.frame import Frame
-from probe.recording.names import part_of
+from probe.calibration.average import BIAS_FRAMES
+from probe.frame import Frame, median_filter
+from probe.recording.names import next_free
 from probe.recording.record import Recorder
 
 Image = NDArray[np.float64]
 
-BIAS_FRAMES = 32  #: averaged for the bias
 _HOLD = 0.98  # of the scale is left after each frame shown
 _LEAST = {"counts": 32.0, "N": 0.2}  # scale of a sensor at rest
 
@@ -82,7 +81,7 @@ class LiveState:
             if self.bias is not None:
                 image = np.maximum(image - self.bias, 0.0)
         if self.median:
-            image = median_filtered(image)
+            image = median_filter(image)
         if not self.paused:
             self.scale = max(float(image.max()), self.scale * _HOLD, _LEAST[self.unit])
         return image
@@ -159,13 +158,3 @@ class LiveState:
             self.bias = None  # a calibration has its own
             drift = drift_of(self.calibration, frames)
             self.notice = drift.warning or "the bias is that of the calibration"
-
-
-def next_free(folder: Path, stem: str, suffix: str) -> Path:
-    """Return the first name STEM-001, STEM-002, ... that is free."""
-    for number in count(1):
-        path = folder / f"{stem}-{number:03d}{suffix}"
-        beside = (path, part_of(path), path.with_suffix(".npy"))
-        if not any(other.exists() for other in beside):
-            return path
-    raise AssertionError

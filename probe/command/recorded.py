@@ -8,11 +8,12 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
+from encoded_objects.console import INTERRUPTED
+from encoded_objects.console.interruption import interruption
+from encoded_objects.console.output import message, number, write, write_json
+from encoded_objects.console.progress import ProgressBar, progress_bar
 from probe.calibration import Calibration, calibration_hash, read_calibration
-from probe.command import report
-from probe.command.ending import INTERRUPTED
-from probe.command.progress import Told, progress_bar
-from probe.command.stream import Stream, interruption, name_of
+from probe.client.stream import Stream, name_of
 from probe.errors import PortError, ProbeError, RecordingError
 from probe.frame import Frame
 from probe.recording.names import check_name
@@ -67,7 +68,7 @@ def record_port(
         first = _first(stream, interrupted)
         if not first:
             if interrupted.is_set():
-                report.message("\nprobe-sensor: interrupted; nothing was recorded")
+                message("\nprobe-sensor: interrupted; nothing was recorded")
                 return INTERRUPTED
             raise PortError("it ended before a frame came", fix="see whether it holds frames",
                             place=url)  # fmt: skip
@@ -81,8 +82,8 @@ def record_port(
                 ended, seconds = _run(stream, recorder, first, limits, interrupted, told)
         except ProbeError:
             files = ", ".join(map(str, recorder.files))
-            kept = report.number(recorder.frames, "frame")
-            report.message(f"{files} is complete and holds {kept}")
+            kept = number(recorder.frames, "frame")
+            message(f"{files} is complete and holds {kept}")
             raise
         result = _result(stream, recorder, name, ended, seconds)
     _say(result, as_json)
@@ -128,7 +129,7 @@ def _run(
     frames: list[Frame],
     limits: Limits,
     interrupted: Event,
-    told: Told,
+    told: ProgressBar,
 ) -> tuple[str, float]:
     """Record until something ends it; returns what did, and the seconds recorded."""
     began_s = heard_s = time.monotonic()
@@ -161,7 +162,7 @@ def _run(
     return ended, seconds
 
 
-def _tell(stream: Stream, told: Told, frames: int, seconds: float | None) -> None:
+def _tell(stream: Stream, told: ProgressBar, frames: int, seconds: float | None) -> None:
     """Show counts and notices; the bar runs by seconds, or by frames if None."""
     for notice in stream.client.notices():
         told.say(notice)
@@ -188,7 +189,7 @@ def _result(
 
 def _say(result: dict[str, Any], as_json: bool) -> None:
     if as_json:
-        report.write_json(result)
+        write_json(result)
         return
     files = ", ".join(result["files"])
     trouble = ", ".join(
@@ -196,8 +197,8 @@ def _say(result: dict[str, Any], as_json: bool) -> None:
         for name in ("failed", "doubtful", "reboots", "reopenings", "overruns")
         if result[name]
     )
-    report.write(
-        f"{files}: {report.number(result['frames'], 'frame')} in {result['seconds']:.2f} s "
+    write(
+        f"{files}: {number(result['frames'], 'frame')} in {result['seconds']:.2f} s "
         f"({result['rate']:.1f} a second), lost {result['lost']}"
         + (f", {trouble}" if trouble else "")
     )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from probe.command import Action
+from encoded_objects.console import Action
 from probe.command.options import Calibrated, Recording
 
 if TYPE_CHECKING:
@@ -50,8 +50,9 @@ def _pipe(url: str, *, as_json: bool) -> int:
     """Write every frame when its time has come."""
     import sys
 
-    from probe.command.ending import INTERRUPTED
-    from probe.command.stream import Stream, interruption
+    from encoded_objects.console import INTERRUPTED
+    from encoded_objects.console.interruption import interruption
+    from probe.client.stream import Stream
 
     with interruption() as interrupted, Stream(url) as stream:
         first = True

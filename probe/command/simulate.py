@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from probe.command import Action
+from encoded_objects.console import Action
 from probe.command.options import Json, Replace
 
 EPILOG = """TARGET is a written part, [bold]out/cube/Cube-F1.stl[/] (with [bold]@lab.db[/]: in the \

@@ -17,13 +17,13 @@ from typing import Any
 
 import numpy as np
 
+from encoded_objects.console import INTERRUPTED
+from encoded_objects.console.files import refuse_taken, staged
+from encoded_objects.console.interruption import interruption
+from encoded_objects.console.output import message, write, write_json
+from encoded_objects.console.progress import progress_bar
 from probe.circuit import QUIET, Electronics, Noise, fsr_of, read_counts
-from probe.command import report
-from probe.command.ending import INTERRUPTED
-from probe.command.exported import refuse_taken, staged
-from probe.command.progress import progress_bar
 from probe.command.recorded import check_output
-from probe.command.stream import interruption
 from probe.contact.contract import Contact, Touch
 from probe.contact.press import accuracy_of, level_for, press
 from probe.errors import SurfaceError
@@ -135,7 +135,7 @@ def simulate_touches(
     _say(result, first, written, as_json=as_json)
     if len(kept) == number:
         return 0
-    report.message(f"probe-sensor: interrupted after {len(kept):,} of {number:,} touches")
+    message(f"probe-sensor: interrupted after {len(kept):,} of {number:,} touches")
     return INTERRUPTED
 
 
@@ -242,7 +242,7 @@ def _say(result: dict[str, Any], first: Felt, written: list[str], *, as_json: bo
     kept = result["touches"]
     if as_json:
         summary = {name: value for name, value in result.items() if name != "touches"}
-        report.write_json(summary | {
+        write_json(summary | {
             "touches": len(kept), "frames": len(kept) * result["frames_per_touch"],
             "first": kept[0] | {"peak_counts": first.frames[0].counts.max()},
             "written": written,
@@ -250,13 +250,13 @@ def _say(result: dict[str, Any], first: Felt, written: list[str], *, as_json: bo
         return
     what = "/".join(part for part in (result["object"], result["face"]) if part)
     number = "1 touch" if len(kept) == 1 else f"{len(kept):,} touches"
-    report.write(f"{what or result['target']}: {number}, {result['overlay']} overlay, level "
+    write(f"{what or result['target']}: {number}, {result['overlay']} overlay, level "
                  f"{result['level']}")  # fmt: skip
     if len(kept) == 1:
         one, counts = kept[0], first.frames[0].counts
-        report.write(
+        write(
             f"  at ({one['x_mm']:.2f}, {one['y_mm']:.2f}) mm turned {one['theta_deg']:.1f} "
             f"degrees, {one['force_n']:g} N: {one['tactels']} tactels, peak {counts.max()} counts"
         )
     for name in written:
-        report.write(f"  wrote {name}")
+        write(f"  wrote {name}")

@@ -10,6 +10,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 
 from probe.errors import RecordingError
@@ -102,6 +103,16 @@ def final_name(part: Path, path: Path, files: list[Path], *, last: bool, replace
         for file in old:
             file.unlink(missing_ok=True)
     return final
+
+
+def next_free(folder: Path, stem: str, suffix: str) -> Path:
+    """Return the first name STEM-001, STEM-002, ... that is free."""
+    for number in count(1):
+        path = folder / f"{stem}-{number:03d}{suffix}"
+        beside = (path, part_of(path), path.with_suffix(".npy"))
+        if not any(other.exists() for other in beside):
+            return path
+    raise AssertionError
 
 
 @contextmanager

@@ -9,7 +9,7 @@ import time
 from typing import Any, Protocol
 
 from probe.client.statistics import ClientStatistics
-from probe.command.stream import Stream
+from probe.client.stream import Stream
 from probe.errors import ProbeError
 from probe.frame import Frame
 from probe.protocol import IdentPacket

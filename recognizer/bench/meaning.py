@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.calibration import Calibration, calibrated, drift_of
-from probe.command.live_state import BIAS_FRAMES
+from probe.calibration.average import BIAS_FRAMES
 from probe.errors import ProbeError
 from probe.frame import Frame
 

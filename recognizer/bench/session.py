@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 
 from probe.calibration import calibration_hash, read_calibration, write_calibration
 from probe.circuit import Electronics
-from probe.command.live_state import next_free
 from probe.errors import ProbeError
 from probe.frame import Frame
 from probe.port.url import address_of
+from probe.recording.names import next_free
 from probe.recording.read import Recording
 from probe.recording.record import Recorder
 from probe.sensor import SensorType

@@ -2,7 +2,6 @@
 
 ::
 
-    __init__.py   what an error or an interruption means for the exit code
     app           options
     source        recording or port -> touches, the sensor, its calibration
     answers       touches -> answers, printed as they come
@@ -17,46 +16,29 @@ imported before it is needed: `recognize-object --help` loads no numpy, database
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
-from probe.command.ending import BAD_INPUT, FAILED, leave, misuse, unwritten
-from recognizer.threads import one_thread
+from encoded_objects import console
+
+if TYPE_CHECKING:
+    from typer import Typer
+
+NAME = "recognize-object"
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run `recognize-object` and leave with its exit code."""
-    one_thread()
-    leave("recognize-object", run, arguments)
+    console.one_thread()
+    console.main(NAME, application, arguments)
 
 
 def run(arguments: list[str]) -> int:
     """Run the command; returns its exit code. Errors are reported, not raised."""
-    from typer import BadParameter, Exit
+    return console.run(NAME, application, arguments)
 
-    from encoded_objects.errors import EncodedObjectsError
-    from recognizer.command import report
+
+def application(_arguments: list[str]) -> Typer:
+    """Return the application that reads the arguments."""
     from recognizer.command.app import app
-    from recognizer.errors import RecognizerError
 
-    usage_error: type[Exception] = BadParameter.__mro__[1]  # of every misused option
-    as_json = "--json" in arguments
-    try:
-        action = app(arguments or ["--help"], prog_name="recognize-object", standalone_mode=False)
-        code = action() if callable(action) else int(action or 0)
-        return code if arguments else BAD_INPUT
-    except Exit as leaving:
-        return leaving.exit_code
-    except EncodedObjectsError as error:
-        report.error(error, as_json=as_json)
-        return error.exit_code
-    except usage_error as error:
-        told = misuse(error)
-        fix = "see recognize-object --help"
-        report.error(RecognizerError(told, fix=fix), as_json=as_json)
-        return BAD_INPUT
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        fix = "check folder, space and rights"
-        report.error(RecognizerError(unwritten(error), fix=fix), as_json=as_json)
-        return FAILED
+    return app

@@ -10,12 +10,11 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from probe.command.ending import FAILED, INTERRUPTED
-from probe.command.exported import refuse_taken, staged
-from probe.command.progress import Told, progress_bar
-from probe.command.report import message, warning, write_json
-from probe.command.stream import interruption
-from probe.errors import ProbeError
+from encoded_objects.console import FAILED, INTERRUPTED
+from encoded_objects.console.files import refuse_taken, staged, taken
+from encoded_objects.console.interruption import interruption
+from encoded_objects.console.output import message, warning, write_json
+from encoded_objects.console.progress import ProgressBar, progress_bar
 from probe.frame import Frame
 from recognizer.command import report
 from recognizer.command.placed import object_in_base
@@ -148,7 +147,7 @@ def _answers(
             return
 
 
-def _counted(frames: Iterator[Frame], told: Told) -> Iterator[Frame]:
+def _counted(frames: Iterator[Frame], told: ProgressBar) -> Iterator[Frame]:
     for number, frame in enumerate(frames, start=1):
         told.show(number, f"{number:,} frames")
         yield frame
@@ -157,14 +156,13 @@ def _counted(frames: Iterator[Frame], told: Told) -> Iterator[Frame]:
 def _refuse_pictures(plot: Path, *, replace: bool) -> None:
     """Refuse a picture's name that is taken, also by that of one of several touches."""
     refuse_taken(plot, ".png", replace=replace)
-    taken = [
+    there = [
         path
         for path in plot.parent.glob(f"{plot.stem}-*.png")
         if path.stem.removeprefix(f"{plot.stem}-").isdecimal()
     ]
-    if taken and not replace:
-        raise ProbeError("the file is there already", place=str(taken[0]),
-                         fix="choose another name, or replace it with --replace")  # fmt: skip
+    if there and not replace:
+        raise taken(there[0])
 
 
 def _draw_all(

@@ -94,9 +94,10 @@ def recognize(
 ) -> Callable[[], int]:  # fmt: skip
     """Read touches; `HELP` is what people see."""
     if version:
-        from recognizer.command import report
+        from encoded_objects.console import output
+        from recognizer.command import NAME
 
-        report.version(as_json=as_json)
+        output.version(NAME, as_json=as_json)
         raise typer.Exit
     if (recording is None) == (not port):
         both = "both RECORDING and --port were given" if port else "nothing to read"

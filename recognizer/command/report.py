@@ -1,14 +1,13 @@
-"""Answers and errors as text and as JSON."""
+"""Answers as text and as JSON."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING, Any
 
-from probe.command.report import message, number, write_json
+from encoded_objects.console.output import number
 
 if TYPE_CHECKING:
-    from encoded_objects.errors import EncodedObjectsError
     from recognizer.touch.contacts import Touch
     from recognizer.touch.recognition import Recognition
     from recognizer.touch.robot import ObjectPose
@@ -22,36 +21,6 @@ WAYS_OUT = {
     "database, and the overlay the right one (--overlay)?",
     "outside every face": "move the probe onto the face",
 }
-
-
-def version(*, as_json: bool) -> None:
-    """Say which version this is."""
-    import sys
-    from importlib.metadata import version as installed
-
-    found = installed("encoded-objects")
-    if as_json:
-        write_json({"version": found})
-    else:
-        sys.stdout.write(f"recognize-object {found}\n")
-
-
-def error(problem: EncodedObjectsError, *, as_json: bool) -> None:
-    """Say what is wrong: to stderr, or as JSON to stdout."""
-    if as_json:
-        told = {
-            "kind": type(problem).__name__,
-            "exit_code": problem.exit_code,
-            "place": problem.place,
-            "cause": problem.cause,
-            "fix": problem.fix,
-        }
-        write_json({"error": told})
-        return
-    place = f"{problem.place}: " if problem.place else ""
-    message(f"{place}error: {problem.cause}", "error:", "red")
-    if problem.fix:
-        message(f"  fix: {problem.fix}")
 
 
 def entry(touch: Touch, found: Recognition, placed: ObjectPose | None) -> dict[str, Any]:

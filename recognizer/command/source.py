@@ -17,9 +17,9 @@ from typing import Any, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.console.output import message, warning
 from probe.calibration import Calibration, calibrated, calibration_hash, read_calibration
-from probe.command.report import message, warning
-from probe.command.stream import Stream, name_of
+from probe.client.stream import Stream, name_of
 from probe.errors import CalibrationError, RecordingError
 from probe.frame import Frame
 from probe.port.url import address_of

@@ -23,9 +23,9 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from probe.circuit import Electronics, fsr_of, read_sequence
-from probe.command.exported import median_filtered
 from probe.contact.contract import Touch
 from probe.contact.press import press
+from probe.frame import median_filter
 from probe.plot.frame import frames_picture
 from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import Washer
@@ -53,14 +53,14 @@ def main() -> None:
         sequence = np.repeat(forces[None], options.frames, axis=0)
         counts, _ = read_sequence(sequence, board, fsr_of(16, 16), None, rng)
         reading = np.maximum(counts.mean(axis=0) - board.bias_lsb, 0.0)
-        filtered = median_filtered(reading)
+        filtered = median_filter(reading)
         for name, image in (("force", forces), ("reading", reading), ("filtered", filtered)):
             figures = blur(image, blurred)
             print(f"{kind:<9}{name:<11}{100 * figures[0]:>9.1f}{100 * figures[1]:>8.1f}"
                   f"{figures[2]:>9.2f}{figures[3]:>8.3f}")  # fmt: skip
         figure = {"tab": "4.9", "pad": "4.10"}[kind]
         title = f"{kind} overlay (thesis figure {figure}), {FORCE_N:g} N, median of 3x3"
-        pictures[title] = median_filtered(counts[0].astype(float))
+        pictures[title] = median_filter(counts[0].astype(float))
     if options.png:
         frames_picture(pictures, options.png)
         print(f"wrote {options.png}")

@@ -11,15 +11,14 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from encoded_objects.console.output import write_json
 from probe.calibration import calibration_from, even_load, write_calibration
 from probe.circuit import QUIET, Electronics, fsr_of, read_sequence
-from probe.command import report, run
-from probe.command.app import command_of
+from probe.command import run
 from probe.command.calibrated import board_from
-from probe.command.exported import median_filtered
 from probe.command.loads import loads_given
 from probe.errors import CalibrationError, CircuitError
-from probe.frame import frame_from
+from probe.frame import frame_from, median_filter
 from probe.recording.read import Recording, read_frames
 from probe.recording.record import Recorder
 
@@ -125,7 +124,8 @@ def test_a_misused_option_is_named(asked, words, said):
     code, err = error_of(asked(*words))
     assert code == 2
     assert f"error: {said}" in err
-    assert f"fix: see {command_of(words)} --help" in err
+    called = {"fly": [], "calibrate": words[:2]}.get(words[0], words[:1])
+    assert f"fix: see {' '.join(['probe-sensor', *called])} --help" in err
     code, out, err = asked(*words, "--json")
     if words[0] == "fly":
         return
@@ -465,13 +465,13 @@ def test_lists_of_loads(tmp_path):
 def test_the_median_filter_takes_single_tactels_away():
     image = np.zeros((16, 16))
     image[5, 5] = 900
-    assert not median_filtered(image).any()
+    assert not median_filter(image).any()
     image[:, 8:] = 100
-    assert (median_filtered(image)[:, 8:] == 100).all()
-    assert (median_filtered(image)[:, :8] == 0).all()
+    assert (median_filter(image)[:, 8:] == 100).all()
+    assert (median_filter(image)[:, :8] == 0).all()
 
 
 def test_json_is_json_whatever_the_values(capsys):
-    report.write_json({"nan": float("nan"), "numpy": np.array([1.5, np.inf]), "path": QUIET})
+    write_json({"nan": float("nan"), "numpy": np.array([1.5, np.inf]), "path": QUIET})
     told = json.loads(capsys.readouterr().out)
     assert (told["nan"], told["numpy"]) == (None, [1.5, None])

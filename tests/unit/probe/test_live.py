@@ -7,12 +7,14 @@ import pytest
 from rich.console import Console
 
 from probe.calibration import calibration_from, even_load, expected_counts
+from probe.calibration.average import BIAS_FRAMES
 from probe.circuit import Electronics, fsr_of, read_sequence
 from probe.client import ClientStatistics
-from probe.command.live_state import BIAS_FRAMES, LiveState, next_free
+from probe.command.live_state import LiveState
 from probe.command.live_view import KEYS, SHADES, heat_map, line_of, rendered
 from probe.frame import frame_from
 from probe.protocol import IdentPacket
+from probe.recording.names import next_free
 from probe.recording.read import Recording, read_frames
 
 COUNTS = ClientStatistics(frames=120, rate=99.9, lost=3, failed=1, reopenings=1)

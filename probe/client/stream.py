@@ -1,4 +1,4 @@
-"""Frames of a client while something else is done: a terminal served, an interruption seen.
+"""Frames of a client while something else is done, as a terminal served.
 
 A thread takes the frames from the client; `Stream.take` returns those that wait, or none
 after a while, so that its caller is never held up.
@@ -7,15 +7,12 @@ after a while, so that its caller is never held up.
 from __future__ import annotations
 
 import queue
-import signal
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from types import FrameType, TracebackType
+from types import TracebackType
 from typing import Self
 
-from probe.client import Client
+from probe.client.client import Client
 from probe.errors import ProbeError
 from probe.frame import Frame
 from probe.port.url import address_of
@@ -114,26 +111,6 @@ class Stream:
             except queue.Full:
                 continue
             return
-
-
-@contextmanager
-def interruption() -> Iterator[threading.Event]:
-    """Yield an event that Ctrl-C sets, so that what is being written can be ended in order.
-
-    A second Ctrl-C interrupts at once.
-    """
-    interrupted = threading.Event()
-
-    def note(_number: int, _frame: FrameType | None) -> None:
-        if interrupted.is_set():
-            raise KeyboardInterrupt
-        interrupted.set()
-
-    before = signal.signal(signal.SIGINT, note)
-    try:
-        yield interrupted
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def name_of(ident: IdentPacket | None, url: str) -> str:

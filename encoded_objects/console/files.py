@@ -1,0 +1,56 @@
+"""Files that a command writes: refused before work is done, and whole or not there."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from encoded_objects.errors import EncodedObjectsError
+
+
+def refuse_taken(out: Path, suffix: str, *, replace: bool) -> None:
+    """Refuse a file that is there already, unless it may be replaced, before work is done.
+
+    Parameters
+    ----------
+    out, suffix
+        The file to write, and how its name has to end.
+    replace
+        Whether a file of that name may go.
+
+    Raises
+    ------
+    EncodedObjectsError
+        With the way out; also for a folder that is not there, and another ending.
+    """
+    place = str(out)
+    if out.suffix.lower() != suffix:
+        fix = f"write {out.with_suffix(suffix)}" if out.name else "give a name"
+        raise EncodedObjectsError(
+            f"the name of this file has to end in {suffix}", fix=fix, place=place
+        )
+    if not out.parent.is_dir():
+        raise EncodedObjectsError(
+            f"there is no folder {out.parent}", fix="make it first", place=place
+        )
+    if out.exists() and not replace:
+        raise taken(out)
+
+
+def taken(out: Path) -> EncodedObjectsError:
+    """Return the refusal of a file that is there already."""
+    fix = "choose another name, or replace it with --replace"
+    return EncodedObjectsError("the file is there already", fix=fix, place=str(out))
+
+
+@contextmanager
+def staged(out: Path) -> Iterator[Path]:
+    """Yield a name beside `out` to write to; it becomes `out` when all went well."""
+    draft = out.with_name(f".{out.stem}.{os.getpid()}{out.suffix}")
+    try:
+        yield draft
+        os.replace(draft, out)
+    finally:
+        draft.unlink(missing_ok=True)
