@@ -9,15 +9,14 @@ where windows can lie and which object and face an answer belongs to.
 from __future__ import annotations
 
 import json
-import os
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from encoded_objects.errors import EncodedObjectsError
+from encoded_objects import console
+from encoded_objects.console import output
 
 if TYPE_CHECKING:
     from decoder.decoded import Candidate, Decoded
@@ -32,54 +31,19 @@ ROWS are the symbols, rows apart by spaces, ? where none is seen: [bold]decode-w
 """
 EPILOG = "Exit codes: 0 decoded, 1 not decoded, 2 bad input, 4 database, 130 interrupted."
 METHODS = ("table", "serial", "milestones", "logarithm", "likelihood")
-NOT_DECODED, BAD_INPUT, INTERRUPTED = 1, 2, 130
+NAME = "decode-window"
 
-app = typer.Typer(
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
+app = console.application()
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run `decode-window` and leave with its exit code."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    try:
-        code = run(given)
-        sys.stdout.flush()
-    except KeyboardInterrupt:
-        sys.stderr.write("\ndecode-window: interrupted\n")
-        code = INTERRUPTED
-    except BrokenPipeError:  # the reader of our output has gone, as in `| head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = NOT_DECODED
-    sys.exit(code)
+    console.main(NAME, lambda _: app, arguments)
 
 
 def run(arguments: list[str]) -> int:
     """Run the command; returns its exit code. Errors are reported, not raised."""
-    usage_error: type[Exception] = typer.BadParameter.__mro__[1]  # of every misused option
-    as_json = "--json" in arguments
-    try:
-        code = app(arguments or ["--help"], prog_name="decode-window", standalone_mode=False)
-        return int(code or 0) if arguments else BAD_INPUT
-    except typer.Exit as leaving:
-        return leaving.exit_code
-    except EncodedObjectsError as error:
-        cause = f"{error.place}: {error.cause}" if error.place else error.cause
-        _report(cause, error.fix, as_json=as_json)
-        return error.exit_code
-    except usage_error as error:
-        message = str(getattr(error, "message", error))
-        _report(message, "see decode-window --help", as_json=as_json)
-        return BAD_INPUT
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        what = f"cannot write '{error.filename}': {error.strerror}"
-        _report(what, "check folder, space and rights", as_json=as_json)
-        return NOT_DECODED
+    return console.run(NAME, lambda _: app, arguments)
 
 
 @app.command(help=HELP, epilog=EPILOG)
@@ -145,7 +109,7 @@ def decode(
         draw(chosen, window, found, plot)
         known["plot"] = str(plot)
     _print(known, as_json=as_json)
-    return 0 if found else NOT_DECODED
+    return console.DONE if found else console.FAILED
 
 
 def _array(profile_name: str, definition: str) -> FoldedArray | ProductArray:
@@ -232,39 +196,27 @@ def _place(candidate: Candidate) -> dict[str, Any]:
 
 def _print(known: dict[str, Any], *, as_json: bool) -> None:
     if as_json:
-        sys.stdout.write(json.dumps(known) + "\n")
+        output.write_json(known, line=True)
         return
     if known["row"] is None:
-        sys.stdout.write(f"not decoded: {known['reason']}\n")
+        output.write(f"not decoded: {known['reason']}")
     else:
         turned = f", turned by {90 * known['rotation']} degrees" if known["rotation"] else ""
-        sys.stdout.write(
-            f"row {known['row']}, column {known['column']} (t = {known['t']}){turned}\n"
-        )
+        output.write(f"row {known['row']}, column {known['column']} (t = {known['t']}){turned}")
         if known.get("object"):
-            sys.stdout.write(f"{known['object']}, face {known['face']}\n")
+            output.write(f"{known['object']}, face {known['face']}")
         elif "object" in known:
-            sys.stdout.write("no object is registered there\n")
+            output.write("no object is registered there")
     if known["doubt"] is not None:
         margin = "none" if known["margin"] is None else f"{known['margin']:.1f} nats"
-        sys.stdout.write(f"margin {margin}, doubt {known['doubt']:.2g}\n")
+        output.write(f"margin {margin}, doubt {known['doubt']:.2g}")
     seen = known["seen"]
-    sys.stdout.write(f"{seen['cells']} symbols seen, rank {seen['rank']} of {seen['full_rank']}")
+    line = f"{seen['cells']} symbols seen, rank {seen['rank']} of {seen['full_rank']}"
     if seen["errors_corrected"] is not None:
-        sys.stdout.write(
-            f"; always corrects {seen['errors_corrected']} wrong or "
-            f"{seen['erasures_corrected']} missing"
-        )
-    sys.stdout.write("\n")
+        wrong, missing = seen["errors_corrected"], seen["erasures_corrected"]
+        line += f"; always corrects {wrong} wrong or {missing} missing"
+    output.write(line)
     for place in known["candidates"]:
         score = "" if place["score"] is None else f"  {place['score']:9.3f} nats"
         turn = f"  turned {90 * place['rotation']}" if place["rotation"] else ""
-        sys.stdout.write(f"  row {place['row']}, column {place['column']}{score}{turn}\n")
-
-
-def _report(cause: str, fix: str, *, as_json: bool) -> None:
-    if as_json:
-        sys.stdout.write(json.dumps({"error": {"message": cause, "fix": fix}}) + "\n")
-    sys.stderr.write(f"error: {cause}\n")
-    if fix:
-        sys.stderr.write(f"  fix: {fix}\n")
+        output.write(f"  row {place['row']}, column {place['column']}{score}{turn}")

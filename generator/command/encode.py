@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from generator.command import Action
+from encoded_objects import console
+from encoded_objects.console import Action
 
 if TYPE_CHECKING:
     from generator.spec import Located
@@ -36,12 +37,7 @@ More commands, each with --help:
 [bold]encode-object export[/] FILE     objects for another lab; [bold]import[/] FILE takes them over
 """
 
-app = typer.Typer(
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
+app = console.application()
 
 
 @app.command(help=HELP, epilog=EPILOG)
@@ -88,10 +84,11 @@ def encode(
     """Read the options of `encode-object SPEC.yaml...`; `HELP` is what people see."""
 
     def action() -> int:
-        from generator.command import report
+        from encoded_objects.console import output
+        from generator.command import NAME
 
         if version:
-            report.version(as_json=as_json)
+            output.version(NAME, as_json=as_json)
             return 0
         if not specs:
             raise typer.BadParameter("no spec is named")
@@ -115,8 +112,8 @@ def _make(
     as_json: bool,
 ) -> None:
     """Make the objects and report them."""
-    from generator.command import report
-    from generator.command.progress import progress_bar
+    from encoded_objects.console.progress import progress_bar
+    from generator.command.made_report import print_made
     from generator.spec.option import database_option, format_option
     from generator.spec.read import read_specs
 
@@ -126,7 +123,7 @@ def _make(
 
     from generator.pipeline import encode as make
 
-    with progress_bar() as progress:
+    with progress_bar("reading", 1) as bar:
         encoded = make(
             located,
             folder=folder,
@@ -135,7 +132,7 @@ def _make(
             dry_run=dry_run,
             verify=verify,
             replace=replace,
-            progress=progress,
+            progress=lambda what, share: bar.show(share, label=what),
             jobs=jobs,
         )
-    report.encoded(encoded, dry_run=dry_run, as_json=as_json)
+    print_made(encoded, dry_run=dry_run, as_json=as_json)

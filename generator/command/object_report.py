@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
 
-from generator.command import report
+from encoded_objects.console import output
 from generator.database.read import surfaces_of
 from generator.database.url import without_password
 
@@ -21,33 +21,35 @@ if TYPE_CHECKING:
     from generator.layout.placement import FaceLayout, Placement
 
 
-def listed(entries: Sequence[ObjectEntry], url: str, *, as_json: bool) -> None:
+def print_list(entries: Sequence[ObjectEntry], url: str, *, as_json: bool) -> None:
     """Say which objects a database holds."""
     if as_json:
-        report.write_json(
+        output.write_json(
             {"objects": [_entry_values(e) for e in entries], "database": without_password(url)}
         )
         return
     if not entries:
-        report.write(
+        output.write(
             f"no objects in {without_password(url)}; make one with: encode-object SPEC.yaml"
         )
         return
     titles = ["object", "shape", "faces", "symbols", "array", "pitch", "registered (UTC)"]
     some_retired = any(entry.retired_utc for entry in entries)
-    table = report.table(*titles, *(["retired (UTC)"] if some_retired else []))
+    table = output.table(*titles, *(["retired (UTC)"] if some_retired else []), broken=())
     for e in entries:
         array = f"{e.profile} {e.rows}x{e.columns}"
         counts = str(e.faces), str(e.symbols)
         row = [e.name, e.object_type, *counts, array, f"{e.pitch_mm:g} mm", _minute(e.utc)]
         table.add_row(*map(escape, row + ([_minute(e.retired_utc)] if some_retired else [])))
-    report.show(table)
+    output.show(table)
 
 
-def shown(held: RegisteredObject, files: Sequence[PartState], url: str, *, as_json: bool) -> None:
+def print_object(
+    held: RegisteredObject, files: Sequence[PartState], url: str, *, as_json: bool
+) -> None:
     """Say all about one object."""
     if as_json:
-        report.write_json(_object_values(held, files) | {"database": without_password(url)})
+        output.write_json(_object_values(held, files) | {"database": without_password(url)})
         return
     e, style, alphabet = held.entry, held.style, held.alphabet.get("name", "")
     lengths = f"height {style.height_mm:g}, stroke {style.stroke_mm:g}"
@@ -62,30 +64,30 @@ def shown(held: RegisteredObject, files: Sequence[PartState], url: str, *, as_js
     if e.retired_utc:
         lines.append(f"  retired      {_minute(e.retired_utc)} UTC; its cells stay taken")
     lines += [f"  warning      {warning}" for warning in held.layout.warnings]
-    report.write("\n".join(lines))
-    table = report.table("face", "kind", "area", "symbols", "places", "first cell")
+    output.write("\n".join(lines))
+    table = output.table("face", "kind", "area", "symbols", "places", "first cell", broken=())
     for face in _faces(held):
         on = face.layout
         first = f"({on.rows[0]}, {on.columns[0]})" if len(on.rows) else "blank"
         counts = str(len(on.rows)), str(on.places)
         row = face.name, face.kind, f"{face.area_mm2:.0f} mm2", *counts, first
         table.add_row(*map(escape, row))
-    report.show(table)
+    output.show(table)
     if not files:
-        report.write("no files are registered")
+        output.write("no files are registered")
         return
-    table = report.table("part", "format", "state", "file")
+    table = output.table("part", "format", "state", "file", broken=("file",))
     for each in files:
         table.add_row(*map(escape, (each.part.name, each.part.format, each.state, str(each.path))))
-    report.show(table)
+    output.show(table)
     if any(each.state != "ok" for each in files):
-        report.write("files that are not ok: make them again from the same spec, on the same cells")
+        output.write("files that are not ok: make them again from the same spec, on the same cells")
 
 
-def retired(entries: Sequence[ObjectEntry], done: str, url: str, *, as_json: bool) -> None:
+def print_retired(entries: Sequence[ObjectEntry], done: str, url: str, *, as_json: bool) -> None:
     """Say that objects were `removed`, `restored` or `retired`."""
     if as_json:
-        report.write_json(
+        output.write_json(
             {done: [_entry_values(e) for e in entries], "database": without_password(url)}
         )
         return
@@ -95,7 +97,7 @@ def retired(entries: Sequence[ObjectEntry], done: str, url: str, *, as_json: boo
         "retired": "stay taken",
     }
     for entry in entries:
-        report.write(f"{entry.name}: {done}; its {entry.symbols} cells {cells[done]}")
+        output.write(f"{entry.name}: {done}; its {entry.symbols} cells {cells[done]}")
 
 
 def warning_before(entries: Sequence[ObjectEntry]) -> str:
@@ -108,18 +110,20 @@ def warning_before(entries: Sequence[ObjectEntry]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def exported(done: Carried, file: Path, url: str, *, as_json: bool) -> None:
+def print_export(done: Carried, file: Path, url: str, *, as_json: bool) -> None:
     """Say what was exported, and what the other lab does with it."""
     if as_json:
-        report.write_json(
+        output.write_json(
             {"exported": list(done.copied), "file": str(file), "database": without_password(url)}
         )
         return
     there = f"in the other lab, before it makes its next object: encode-object import {file.name}"
-    report.write(f"{_counted(done.copied)} of {without_password(url)} exported to {file}; {there}")
+    output.write(
+        f"{_object_count(done.copied)} of {without_password(url)} exported to {file}; {there}"
+    )
 
 
-def imported(done: Carried, url: str, *, dry_run: bool, as_json: bool) -> None:
+def print_import(done: Carried, url: str, *, dry_run: bool, as_json: bool) -> None:
     """Say what was imported, what was there already, and what was refused."""
     if as_json:
         values = {
@@ -127,19 +131,21 @@ def imported(done: Carried, url: str, *, dry_run: bool, as_json: bool) -> None:
             "known": list(done.known),
             "refused": [{"name": r.name, "cause": r.cause, "fix": r.fix} for r in done.refused],
         }
-        report.write_json(values | {"dry_run": dry_run, "database": without_password(url)})
+        output.write_json(values | {"dry_run": dry_run, "database": without_password(url)})
         return
     verb = "would be imported" if dry_run else "imported"
-    report.write(
-        "\n  ".join([f"{_counted(done.copied)} {verb} into {without_password(url)}", *done.copied])
+    output.write(
+        "\n  ".join(
+            [f"{_object_count(done.copied)} {verb} into {without_password(url)}", *done.copied]
+        )
     )
     if done.known:
-        report.write(f"{_counted(done.known)} known already, left as they are")
+        output.write(f"{_object_count(done.known)} known already, left as they are")
     for each in done.refused:
-        report.message(f"refused: '{each.name}' {each.cause}\n  fix: {each.fix}", "refused:")
+        output.message(f"refused: '{each.name}' {each.cause}\n  fix: {each.fix}", "refused:")
 
 
-def _counted(names: Sequence[str]) -> str:
+def _object_count(names: Sequence[str]) -> str:
     return "1 object" if len(names) == 1 else f"{len(names)} objects"
 
 

@@ -8,14 +8,10 @@ from typing import Annotated
 
 import typer
 
-from generator.command import Action
+from encoded_objects import console
+from encoded_objects.console import Action
 
-app = typer.Typer(
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
+app = console.application()
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, also for errors.")]
 Database = Annotated[
     str, typer.Option(metavar="URL", help="lab.db, sqlite:///lab.db, postgresql://host/name.")
@@ -42,7 +38,7 @@ def list_(database: Database = LAB, as_json: Json = False) -> Action:
         url = database_option(database)
         with reading(open_database(url, writable=False)) as connection:
             entries = list_objects(connection)
-        object_report.listed(entries, url, as_json=as_json)
+        object_report.print_list(entries, url, as_json=as_json)
         return 0
 
     return action
@@ -69,7 +65,7 @@ def show(
         with reading(engine) as connection:
             held = read_object(connection, name)
         files = [part_state(engine.url, part) for part in held.parts]
-        object_report.shown(held, files, url, as_json=as_json)
+        object_report.print_object(held, files, url, as_json=as_json)
         return 0
 
     return action
@@ -109,7 +105,7 @@ def retire(
         unique = tuple(dict.fromkeys(names))
         entries = in_turn(engine, lambda connection: [do(connection, name) for name in unique])
         done = "removed" if free else "restored" if undo else "retired"
-        object_report.retired(entries, done, url, as_json=as_json)
+        object_report.print_retired(entries, done, url, as_json=as_json)
         return 0
 
     return action
@@ -132,7 +128,7 @@ def export(
 
         url = database_option(database)
         done = export_objects(url, file, names=objects or (), force=force)
-        object_report.exported(done, file, url, as_json=as_json)
+        object_report.print_export(done, file, url, as_json=as_json)
         return 0
 
     return action
@@ -172,11 +168,11 @@ def import_(
             url,
             file,
             names=objects or (),
-            renamed=dict(_renaming(given) for given in rename or ()),
+            renamed=dict(_new_name(given) for given in rename or ()),
             skip_refused=skip_refused,
             dry_run=dry_run,
         )
-        object_report.imported(done, url, dry_run=dry_run, as_json=as_json)
+        object_report.print_import(done, url, dry_run=dry_run, as_json=as_json)
         return 0
 
     return action
@@ -198,7 +194,7 @@ def _confirm(url: str, names: list[str], *, as_json: bool) -> None:
         raise typer.Exit(1)
 
 
-def _renaming(given: str) -> tuple[str, str]:
+def _new_name(given: str) -> tuple[str, str]:
     old, _, new = given.rpartition("=")
     if not old or not new.strip():
         raise typer.BadParameter(f"--rename takes OLD=NEW, not '{given}'")

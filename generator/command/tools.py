@@ -9,14 +9,10 @@ from typing import Annotated, Any
 
 import typer
 
-from generator.command import Action
+from encoded_objects import console
+from encoded_objects.console import Action
 
-app = typer.Typer(
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
+app = console.application()
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, also for errors.")]
 
 
@@ -26,7 +22,7 @@ def init(
         str, typer.Argument(help="cube, box, triangular_prism, tetrahedron, octahedron, "
                                  "dodecahedron, prism, pyramid, polyhedron or file."),
     ] = "cube",
-    output: Annotated[
+    file: Annotated[
         Path | None,
         typer.Option("-o", "--output", metavar="FILE", show_default=False,
                      help="File to write; stdout if left out."),
@@ -37,20 +33,18 @@ def init(
     """Write a commented spec to begin with; it can be made as it is."""
 
     def action() -> int:
-        from generator.command import report
+        from encoded_objects.console import output
         from generator.spec.starter import starter_named
 
         kind, text = starter_named(shape)
-        if output is not None:
-            _write_new(output, text, force)
+        if file is not None:
+            _write_new(file, text, force)
         if as_json:
-            report.write_json(
-                {"shape": kind, "file": str(output) if output else None, "spec": text}
-            )
-        elif output is None:
-            report.write(text)
+            output.write_json({"shape": kind, "file": str(file) if file else None, "spec": text})
+        elif file is None:
+            output.write(text)
         else:
-            report.write(f"wrote {output}; make it with: encode-object {output}")
+            output.write(f"wrote {file}; make it with: encode-object {file}")
         return 0
 
     return action
@@ -65,10 +59,10 @@ def schema(
     """Print the JSON schema of specs, so that an editor completes and checks them."""
 
     def action() -> int:
-        from generator.command import report
+        from encoded_objects.console import output
         from generator.spec.schema import spec_schema
 
-        report.write_json(spec_schema())
+        output.write_json(spec_schema())
         return 0
 
     return action
@@ -79,24 +73,25 @@ def printers(as_json: Json = False) -> Action:
     """Print the printers that specs can name, with their limits."""
 
     def action() -> int:
-        from generator.command import report
+        from encoded_objects.console import output
         from generator.printers import PRINTERS
 
         if as_json:
-            report.write_json({"printers": [_printer_values(name) for name in PRINTERS]})
+            output.write_json({"printers": [_printer_values(name) for name in PRINTERS]})
             return 0
         rows = [_printer_values(name) for name in PRINTERS]
-        table = report.table(
-            "printer", "bed", "layer", "stroke >=", "gap >=", "height >=", "made for"
-        )
+        table = output.table(
+            "printer", "bed", "layer", "stroke >=", "gap >=", "height >=", "made for",
+            broken=("made for",),
+        )  # fmt: skip
         for row in rows:
             bed = " x ".join(f"{side:g}" for side in row["bed_mm"])
             limits = ("layer_mm", "stroke_min_mm", "gap_min_mm", "height_min_mm")
             table.add_row(
                 row["name"], bed, *(f"{row[key]:g}" for key in limits), row["description"]
             )
-        report.show(table)
-        report.write("lengths in mm; choose one with  print: {printer: NAME}")
+        output.show(table)
+        output.write("lengths in mm; choose one with  print: {printer: NAME}")
         return 0
 
     return action

@@ -11,7 +11,9 @@ import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from typing import Any
 
+from encoded_objects.errors import printable
 from generator.errors import GeneratorError
 
 _LINE_END = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
@@ -63,6 +65,17 @@ class Problem:
         """`file:line:column`, or the file alone."""
         return str(self.mark) if self.mark else self.file
 
+    def as_json(self) -> dict[str, Any]:
+        """Return the problem as plain values."""
+        return {
+            "place": self.place,
+            "file": self.mark.source.name if self.mark else None,
+            "line": self.mark.line if self.mark else None,
+            "column": self.mark.column if self.mark else None,
+            "cause": self.cause,
+            "fix": self.fix,
+        }
+
     def __str__(self) -> str:
         """Return the problem as it is printed."""
         place = printable(self.place)
@@ -99,17 +112,20 @@ class SpecError(GeneratorError):
         """Return all problems as they are printed."""
         return "\n\n".join(str(problem) for problem in self.problems)
 
+    def as_text(self) -> str:
+        """Return all problems as they are printed."""
+        return str(self)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the first problem as every error, and all of them under `problems`."""
+        return super().as_json() | {"problems": [problem.as_json() for problem in self.problems]}
+
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """Return the known word nearest to `word`, or an empty string where none is near."""
     lowered = {name.lower(): name for name in known}
     near = get_close_matches(word.lower()[:80], lowered, n=1, cutoff=0.6)
     return lowered[near[0]] if near else ""
-
-
-def printable(text: str) -> str:
-    """Return `text` without characters that would disturb a terminal."""
-    return "".join(c if c == " " or c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
 
 
 def _excerpt(mark: Mark) -> list[str]:

@@ -114,7 +114,7 @@ def set_digest(database: str) -> str:
 def _told(stdout: str, stderr: str) -> tuple[str, str, str]:
     """Return cause, fix and place of the first problem that `encode-object` reports."""
     try:
-        first = json.loads(stdout)["error"]["problems"][0]
+        first = json.loads(stdout)["error"]
     except (ValueError, KeyError, IndexError):
         lines = (stderr or stdout).strip().splitlines()
         return (lines[-1] if lines else "it failed"), "", ""

@@ -76,7 +76,7 @@ def encoded(model: Path) -> dict[str, object]:
             counts = {"symbols": made["symbols"], "places": made["places"]}
             name = f"{made['parts']} panels" if parts == "panels" else "whole"
             return row | {"result": "encoded", "parts": name, **counts}
-        problems = answer["error"]["problems"]
+        problems = answer["error"].get("problems", [answer["error"]])
         row["reason"], row["fix"] = (problems[0][key] for key in ("cause", "fix"))
         row["complete"] = all(all((p["place"], p["cause"], p["fix"])) for p in problems)
         if UNVERIFIED in problems[0]["fix"] or code != 2:

@@ -75,7 +75,7 @@ def test_bad_input(capsys, arguments, message):
     if arguments:
         code, out, _ = outcome(capsys, *arguments, "--json")
         assert code == 2
-        assert message in json.loads(out)["error"]["message"]
+        assert message in json.loads(out)["error"]["cause"]
 
 
 def test_picture(capsys, tmp_path):

@@ -152,6 +152,9 @@ def test_problems_as_json(capsys):
         "error": {
             "kind": "SpecError",
             "exit_code": 2,
+            "place": "c.yaml:2:15",
+            "cause": "unknown unit 'mn' for a length (and 1 more)",
+            "fix": "use one of mm, cm, m, um, in",
             "problems": [
                 {
                     "place": "c.yaml:2:15",
@@ -207,7 +210,7 @@ def test_misused_options_are_bad_input(arguments, start, fix, capsys):
     assert run([*arguments, "--json"]) == 2
     text, messages = capsys.readouterr()
     assert messages == ""
-    assert json.loads(text)["error"]["problems"][0]["fix"] == fix
+    assert json.loads(text)["error"]["fix"] == fix
 
 
 def test_missing_database_has_exit_code_4(capsys):

@@ -181,8 +181,8 @@ def test_labs_exchange_objects(capsys):
     assert run(["export", "for-b.db", "--database", "a.db"]) == 4
     assert "--force" in capsys.readouterr().err
     error = said(capsys, "import", "for-b.db", "--database", "b.db", code=4)["error"]
-    assert "'Cube' needs" in error["problems"][0]["cause"]
-    assert "'Other' holds here" in error["problems"][0]["cause"]
+    assert "'Cube' needs" in error["cause"]
+    assert "'Other' holds here" in error["cause"]
     value = said(capsys, "import", "for-b.db", "--database", "b.db", "--skip-refused")
     assert [refused["name"] for refused in value["refused"]] == ["Cube"]
     assert run(["import", "for-b.db", "--database", "b.db", "--skip-refused"]) == 0

@@ -1,0 +1,121 @@
+"""What `encode-object` says of the objects that it made, as text and as JSON."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from encoded_objects.console import output
+from generator.database.url import without_password
+from generator.pipeline import Encoded, Made
+
+
+def print_made(result: Encoded, *, dry_run: bool, as_json: bool) -> None:
+    """Say what was made."""
+    if as_json:
+        output.write_json(_encoded_values(result, dry_run))
+        return
+    for made in result.objects:
+        output.write(_object_text(made, dry_run))
+        for warning in made.warnings:
+            output.warning(f"{made.name}: {warning}")
+    share = result.used_cells / max(1, result.rows * result.columns)
+    array = f"array {result.rows} x {result.columns}, {share:.0%} of its cells in use"
+    if dry_run:
+        output.write(f"\n{array} then; nothing was written ({result.seconds:.1f} s)")
+        return
+    if result.set_files:
+        folder = result.set_files[0].parent
+        output.write(
+            f"set:\n  {folder}{os.sep}  {', '.join(file.name for file in result.set_files)}"
+        )
+    output.write(
+        f"\n{array}; registered in {without_password(result.database)} ({result.seconds:.1f} s)"
+    )
+    if following := _next_step(result.objects):
+        output.write(following)
+
+
+def _object_text(made: Made, dry_run: bool) -> str:
+    """Return a few lines on one object."""
+    verb = "made"
+    if dry_run:
+        verb = "would be made"
+    elif made.skipped:
+        verb = "registered before, its files are unchanged: nothing to do"
+    elif made.reused:
+        verb = "registered before, same cells"
+    counts = f"{_count(made.faces, 'face')}, {_count(made.symbols, 'symbol')}"
+    parts, places = _count(made.parts, "part"), _count(made.places, "place")
+    lines = [f"{made.name}: {verb}; {counts}, {parts}, {places} told apart by touch"]
+    for face in made.face_reports:
+        size, least = (
+            " x ".join(f"{v:.3g}" for v in each) for each in (face.size_mm, face.smallest_mm)
+        )
+        lines.append(
+            f"  {face.name:6} {size} mm, {_count(face.symbols, 'symbol')}, "
+            f"{_count(face.places, 'place')}; it could be as small as {least} mm"
+        )
+    for folder in dict.fromkeys(file.parent for file in made.files):
+        lines.append(f"  {folder}{os.sep}  {_file_list(folder, made.files)}")
+    return "\n".join(lines)
+
+
+def _file_list(folder: Path, files: tuple[Path, ...]) -> str:
+    """Return the files of a folder: by name, or how many where there are several of a kind."""
+    kinds: dict[str, list[str]] = {}
+    for file in files:
+        if file.parent == folder:
+            kinds.setdefault(file.suffix, []).append(file.name)
+    return ", ".join(
+        names[0] if len(names) == 1 else f"{len(names)} {kind.lstrip('.')} ({names[0]}, ...)"
+        for kind, names in kinds.items()
+    )
+
+
+def _next_step(objects: tuple[Made, ...]) -> str:
+    """Return what a person does next: look, and print."""
+    files = [file for made in objects for file in made.files]
+    picture = next((file for file in files if file.suffix == ".png"), None)
+    printable = next((f for suffix in (".3mf", ".stl") for f in files if f.suffix == suffix), None)
+    steps = [f"open {picture}"] if picture else []
+    if printable:
+        twin = printable.with_name(f"{printable.stem}-prusaslicer.3mf")
+        name = f"{printable} (in PrusaSlicer {twin.name})" if twin in files else str(printable)
+        steps.append(f"print {name} as it lies, symbols up, 100 % scale")
+    return "next: " + ", then ".join(steps) if steps else ""
+
+
+def _count(count: int, thing: str) -> str:
+    return f"{count} {thing}" if count == 1 else f"{count} {thing}s"
+
+
+def _encoded_values(result: Encoded, dry_run: bool) -> dict[str, Any]:
+    return {
+        "objects": [
+            {
+                "name": made.name,
+                "faces": made.faces,
+                "symbols": made.symbols,
+                "files": [str(file) for file in made.files],
+                "places": made.places,
+                "parts": made.parts,
+                "reused": made.reused,
+                "skipped": made.skipped,
+                "face_reports": [asdict(face) for face in made.face_reports],
+                "warnings": list(made.warnings),
+            }
+            for made in result.objects
+        ],
+        "set_files": [str(file) for file in result.set_files],
+        "database": without_password(result.database),
+        "array": {
+            "rows": result.rows,
+            "columns": result.columns,
+            "used_cells": result.used_cells,
+        },
+        "dry_run": dry_run,
+        "seconds": round(result.seconds, 3),
+    }
