@@ -1,26 +1,38 @@
-"""Encode a solid from a script, as `encode-object` encodes a spec."""
+"""Encode a spec or a solid from a script, as `encode-object` encodes a spec.
+
+::
+
+    a spec: a path, text, a dict      -> Encoded
+    a model: a path to STEP, STL, OBJ -> Encoded
+    a solid of build123d, cadquery or trimesh -> EncodedSolid
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 from generator.cad.read import polyhedron_from
 from generator.layout.placement import Layout
 from generator.pipeline.choose import chosen
+from generator.pipeline.encode import encode as encode_specs
 from generator.pipeline.encode import encode_planned
 from generator.pipeline.files import parts_of
-from generator.pipeline.plan import Plan, planned
+from generator.pipeline.made import Encoded, Made
+from generator.pipeline.plan import planned
 from generator.polyhedron import Polyhedron
+from generator.polyhedron.read import READERS
 from generator.solid import Part
+from generator.spec import Problem, SpecError, read_specs
+from generator.spec.document import Tree, tree_of
 from generator.spec.option import database_option
 from generator.spec.resolved import ShapeSpec
-from generator.spec.script import spec_of
+from generator.spec.script import SOURCE, spec_of, tree_from
 
 DIGITS = 6  #: of a coordinate (mm) by which two solids are told apart
 
@@ -29,44 +41,110 @@ DIGITS = 6  #: of a coordinate (mm) by which two solids are told apart
 class EncodedSolid:
     """A solid that was encoded and registered."""
 
-    name: str
+    made: Made
     database: str  #: URL
-    files: tuple[Path, ...]
-    symbols: int
-    places: int  #: how many places of it can be told apart by touch
-    reused: bool  #: registered before, so the same cells again
-    warnings: tuple[str, ...]
     polyhedron: Polyhedron  #: mm, frame of the solid that was given
     layout: Layout  #: which cell stands where on which face
     parts: tuple[Part, ...]  #: the printable parts, each with its `T_object_part`
 
+    @property
+    def name(self) -> str:
+        """As it is registered."""
+        return self.made.name
 
+    @property
+    def faces(self) -> int:
+        """How many faces it has; a round face counts as one."""
+        return self.made.faces
+
+    @property
+    def symbols(self) -> int:
+        """How many symbols it bears."""
+        return self.made.symbols
+
+    @property
+    def places(self) -> int:
+        """How many places of it can be told apart by touch."""
+        return self.made.places
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All that was written."""
+        return self.made.files
+
+    @property
+    def folder(self) -> Path | None:
+        """Where the files stand."""
+        return self.made.folder
+
+    @property
+    def reused(self) -> bool:
+        """Registered before, so the same cells again."""
+        return self.made.reused
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is worth knowing before it is printed."""
+        return self.made.warnings
+
+    def __str__(self) -> str:
+        return str(self.made)
+
+
+@overload
 def encode(
-    solid: Any,
+    given: str | Path | Mapping[str, Any],
+    *,
+    name: str | None = ...,
+    database: str | None = ...,
+    profile: str | None = ...,
+    folder: Path | str | None = ...,
+    formats: Sequence[str] | None = ...,
+    verify: bool = ...,
+    replace: bool = ...,
+    **settings: Any,
+) -> Encoded: ...
+@overload
+def encode(
+    given: Any,
     *,
     name: str,
-    database: str = "lab.db",
+    database: str | None = ...,
+    profile: str | None = ...,
+    folder: Path | str | None = ...,
+    formats: Sequence[str] | None = ...,
+    verify: bool = ...,
+    replace: bool = ...,
+    **settings: Any,
+) -> EncodedSolid: ...
+def encode(
+    given: Any,
+    *,
+    name: str | None = None,
+    database: str | None = None,
     profile: str | None = None,
     folder: Path | str | None = None,
     formats: Sequence[str] | None = None,
     verify: bool = False,
     replace: bool = False,
     **settings: Any,
-) -> EncodedSolid:
-    """Emboss a solid, write its files and register it.
+) -> Encoded | EncodedSolid:
+    """Emboss what a spec says, or a solid; write its files and register it.
 
     Parameters
     ----------
-    solid
-        One solid of build123d or cadquery, mm.
+    given
+        A spec: the path of a YAML file, its text, or its settings as a dict. Or a model: the
+        path of a STEP, STL or OBJ file. Or one solid of build123d, cadquery or trimesh, mm.
     name
-        In the database and of the files.
+        In the database and of the files; a spec has its own.
     database
-        `lab.db`, `sqlite:///lab.db` or `postgresql://host/name`.
+        `lab.db`, `sqlite:///lab.db` or `postgresql://host/name`, in place of the spec's own;
+        `lab.db` if neither says one.
     profile
         As in a spec: one-touch, thesis, product, large, fine, auto.
     folder
-        For the files; `out/NAME` if left out.
+        For the files; the spec's own or `out/NAME` if left out.
     formats
         Of step, stl, 3mf, glb; the first three if left out, `()` for pictures alone.
     verify
@@ -79,46 +157,60 @@ def encode(
 
     Returns
     -------
+    Encoded
+        Of a spec or a model's file: the objects that were made.
     EncodedSolid
-        For `to_build123d` and `to_cadquery`.
+        Of a solid, for `to_build123d` and `to_cadquery`.
 
     Raises
     ------
     GeneratorError
         See `generator.errors`; nothing is written or registered then.
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> folder = mkdtemp()
+    >>> spec = {"name": "Cube", "shape": {"cube": "30 mm"}}
+    >>> result = encode(spec, database=f"{folder}/lab.db", folder=folder, formats=["stl"])
+    >>> print(result)  # doctest: +ELLIPSIS
+    Cube: 6 faces, 96 symbols, 8 files in ...
+    >>> result.symbols, result.files[0].name
+    (96, 'Cube-F1.stl')
     """
-    polyhedron = polyhedron_from(solid)
-    url = database_option(database)
-    given = {"name": name, "profile": profile, **settings}
-    located = spec_of(given, ShapeSpec("solid", {"sha256": _digest(polyhedron)}))
+    named = {"name": name, "profile": profile, **settings}
+    url = None if database is None else database_option(database)
+    where = None if folder is None else Path(folder)
+    if isinstance(given, str | Path | Mapping):
+        specs = read_specs([_spec_source(given, named)], database=url)
+        return encode_specs(
+            specs, folder=where, formats=formats, database=url, verify=verify, replace=replace
+        )
+    polyhedron = polyhedron_from(given)
+    url = url or database_option("lab.db")
+    located = spec_of(named, ShapeSpec("solid", {"sha256": _digest(polyhedron)}))
     choice = chosen([located], url, polyhedron)
     plan = planned(choice.specs[0], polyhedron)
     plan = dataclasses.replace(plan, notes=(*plan.notes, *choice.notes))
     product = encode_planned(
-        plan,
-        folder=Path(folder) if folder is not None else None,
-        formats=formats,
-        database=url,
-        verify=verify,
-        replace=replace,
+        plan, folder=where, formats=formats, database=url, verify=verify, replace=replace
     )
-    made, layout = product.made, product.placed.layout
-    return EncodedSolid(
-        name=made.name,
-        database=url,
-        files=made.files,
-        symbols=made.symbols,
-        places=made.places,
-        reused=made.reused,
-        warnings=made.warnings,
-        polyhedron=polyhedron,
-        layout=layout,
-        parts=_parts(plan, layout),
-    )
+    layout = product.placed.layout
+    return EncodedSolid(product.made, url, polyhedron, layout, parts_of(plan, layout)[0])
 
 
-def _parts(plan: Plan, layout: Layout) -> tuple[Part, ...]:
-    return parts_of(plan, layout)[0]
+def _spec_source(given: str | Path | Mapping[str, Any], named: Mapping[str, Any]) -> Path | Tree:
+    """Return where the spec is read from; settings beside a YAML file are refused."""
+    if isinstance(given, Mapping):
+        return tree_from({**given, **{key: one for key, one in named.items() if one is not None}})
+    if Path(given).suffix.lower() in READERS:
+        return tree_from({**named, "shape": {"file": given}})
+    if more := [key for key, one in named.items() if one is not None]:
+        cause = f"'{more[0]}' stands beside a spec, which says it itself"
+        raise SpecError([Problem(cause, "write it in the spec, or give a dict", file=SOURCE)])
+    if isinstance(given, str) and "\n" in given:
+        return tree_of(given, SOURCE, Path())
+    return Path(given)
 
 
 def _digest(polyhedron: Polyhedron) -> str:

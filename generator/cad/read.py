@@ -1,13 +1,22 @@
-"""A solid of build123d or cadquery -> polyhedron, through the kernel that holds it. mm."""
+"""A solid of build123d, cadquery or trimesh -> polyhedron. mm.
+
+The first two go through the kernel that holds them; of a mesh, coplanar triangles that hang
+together become one face, as in an STL file.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from generator.errors import ShapeError
 from generator.polyhedron import Polyhedron
 from generator.polyhedron.read.kernel import described
+from generator.polyhedron.read.merge import merged
+from generator.polyhedron.read.soup import soup_of_triangles
 from generator.polyhedron.read.step import polyhedron_of
+from generator.polyhedron.winged import polyhedron
 
 PLACE = "the solid"
 
@@ -18,14 +27,17 @@ def polyhedron_from(solid: Any) -> Polyhedron:
     Parameters
     ----------
     solid
-        A `build123d` part or solid, a `cadquery` workplane, shape or assembly's shape, or a
-        kernel shape; it must hold one solid.
+        A `build123d` part or solid, a `cadquery` workplane, shape or assembly's shape, a
+        kernel shape, or a `trimesh.Trimesh`; it must hold one solid.
 
     Raises
     ------
     ShapeError
         It holds no solid or several, or the solid has faces that cannot be read.
     """
+    triangles = getattr(solid, "triangles", None)  # of trimesh.Trimesh, (n, 3, 3)
+    if isinstance(triangles, np.ndarray):
+        return polyhedron("solid", *merged(soup_of_triangles(np.array(triangles, float), PLACE)))
     return polyhedron_of(described(_kernel_shape(solid)), PLACE, "solid")
 
 
@@ -40,8 +52,8 @@ def _kernel_shape(solid: Any) -> Any:
     found = getattr(found, "wrapped", found)
     if not type(found).__module__.startswith("OCP"):
         raise ShapeError(
-            f"{type(solid).__name__} is no solid of build123d or cadquery",
-            fix="give a part, a solid or a workplane",
+            f"{type(solid).__name__} is no solid of build123d, cadquery or trimesh",
+            fix="give a part, a solid, a workplane or a trimesh.Trimesh",
             place=PLACE,
         )
     return found

@@ -27,6 +27,15 @@ class Made:
         FaceReport, ...
     ] = ()  #: of a dry run: face by face, and how small it may be
 
+    @property
+    def folder(self) -> Path | None:
+        """Where the files stand; None where none were written."""
+        return self.files[0].parent if self.files else None
+
+    def __str__(self) -> str:
+        where = f", {len(self.files)} files in {self.folder}" if self.files else ""
+        return f"{self.name}: {self.faces} faces, {self.symbols:,} symbols{where}"
+
 
 @dataclass(frozen=True, slots=True)
 class Encoded:
@@ -39,6 +48,36 @@ class Encoded:
     used_cells: int  #: of the array, by all objects in the database
     seconds: float
     set_files: tuple[Path, ...] = ()  #: of a set: its plates, overview and packing list
+
+    @property
+    def name(self) -> str:
+        """Names of the objects, commas between."""
+        return ", ".join(one.name for one in self.objects)
+
+    @property
+    def faces(self) -> int:
+        """How many faces all objects have."""
+        return sum(one.faces for one in self.objects)
+
+    @property
+    def symbols(self) -> int:
+        """How many symbols all objects bear."""
+        return sum(one.symbols for one in self.objects)
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All that was written, object by object, and of the set."""
+        return (*(file for one in self.objects for file in one.files), *self.set_files)
+
+    @property
+    def folder(self) -> Path | None:
+        """Where the files stand: of a set the folder that holds its objects' own."""
+        if len(self.objects) == 1:
+            return self.objects[0].folder
+        return self.set_files[0].parent if self.set_files else None
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.objects))
 
 
 def made_of(

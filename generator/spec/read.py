@@ -22,13 +22,15 @@ PROBLEMS_SHOWN = 25
 SHARED_BLOCKS = ("symbols", "print", "output")  # merged setting by setting
 
 
-def read_specs(paths: Sequence[Path | str], *, database: str | None = None) -> tuple[Located, ...]:
+def read_specs(
+    paths: Sequence[Path | str | Tree], *, database: str | None = None
+) -> tuple[Located, ...]:
     """Read all objects of one run.
 
     Parameters
     ----------
     paths
-        Spec files; each holds one object or a set.
+        Spec files, or what was read of them; each holds one object or a set.
     database
         URL that takes the place of the one in the files; they may then name different ones.
 
@@ -50,11 +52,11 @@ def read_specs(paths: Sequence[Path | str], *, database: str | None = None) -> t
     problems: list[Problem] = []
     found: list[Located] = []
     for path in paths:
-        for tree in _collected(_objects(Path(path), problems), problems):
+        for tree in _collected(_objects(path, problems), problems):
             try:
                 settings = ObjectSettings.model_validate(tree.value)
                 if len(found) + settings.copies <= OBJECTS_MAX:
-                    origin = Path(path).stem
+                    origin = "" if isinstance(path, Tree) else Path(path).stem
                     found += [Located(spec, tree, origin) for spec in resolved(settings, tree)]
                 else:
                     problems.append(_too_many(tree))
@@ -78,9 +80,9 @@ def _collected(trees: Iterable[Tree], problems: list[Problem]) -> list[Tree]:
         return []
 
 
-def _objects(path: Path, problems: list[Problem]) -> Iterable[Tree]:
+def _objects(source: Path | str | Tree, problems: list[Problem]) -> Iterable[Tree]:
     """Yield the objects of a file; those of a set with the set's defaults merged in."""
-    tree = read_tree(path)
+    tree = source if isinstance(source, Tree) else read_tree(Path(source))
     problems += tree.problems
     if not isinstance(tree.value, dict) or "objects" not in tree.value:
         yield tree
@@ -100,7 +102,7 @@ def _objects(path: Path, problems: list[Problem]) -> Iterable[Tree]:
     for own in tree.parts()["objects"].parts().values():
         entry = own.value
         if isinstance(entry, str):
-            if file := _object_file(path.parent / entry, own, problems):
+            if file := _object_file(tree.folder / entry, own, problems):
                 yield _merged(shared, file)
         elif isinstance(entry, dict):
             if "objects" in entry:

@@ -14,7 +14,7 @@ from typing import Any
 import yaml
 from pydantic import ValidationError
 
-from generator.spec.document import tree_of
+from generator.spec.document import Tree, tree_of
 from generator.spec.explain import explained
 from generator.spec.located import Located
 from generator.spec.problem import Problem, SpecError
@@ -40,13 +40,7 @@ def spec_of(settings: Mapping[str, Any], shape: ShapeSpec) -> Located:
     SpecError
         Every setting that is unknown, out of range or does not go with the others.
     """
-    try:
-        text = yaml.safe_dump(_plain(settings), sort_keys=False, allow_unicode=True)
-    except yaml.YAMLError as error:
-        fix = "give numbers, texts, lists and dicts of them, as in a spec file"
-        cause = f"a setting is not a plain value: {error}"
-        raise SpecError([Problem(cause, fix, file=SOURCE)]) from None
-    tree = tree_of(text, SOURCE, Path())
+    tree = tree_from(settings)
     if tree.problems:
         raise SpecError(tree.problems)
     try:
@@ -59,6 +53,23 @@ def spec_of(settings: Mapping[str, Any], shape: ShapeSpec) -> Located:
             [Problem("one solid is encoded at a time", fix, tree.key_mark(("copies",)))]
         )
     return Located(resolved(read, tree, shape)[0], tree)
+
+
+def tree_from(settings: Mapping[str, Any]) -> Tree:
+    """Return settings as the tree of a file that says them; None means not given.
+
+    Raises
+    ------
+    SpecError
+        A setting that no file can say.
+    """
+    try:
+        text = yaml.safe_dump(_plain(settings), sort_keys=False, allow_unicode=True)
+    except yaml.YAMLError as error:
+        fix = "give numbers, texts, lists and dicts of them, as in a spec file"
+        cause = f"a setting is not a plain value: {error}"
+        raise SpecError([Problem(cause, fix, file=SOURCE)]) from None
+    return tree_of(text, SOURCE, Path())
 
 
 def with_profile(

@@ -75,7 +75,7 @@ def test_what_is_no_single_solid_is_refused_and_leaves_nothing(tmp_path):
     for solid, cause in (
         (two, "2 solids"),
         (BRepPrimAPI_MakeSphere(20.0).Shell(), "no solid, but 1 loose face;"),
-        ("block.step", "no solid of build123d or cadquery"),
+        (3.0, "float is no solid of build123d, cadquery or trimesh"),
     ):
         with pytest.raises(ShapeError, match=cause):
             encoded(tmp_path, solid)
@@ -108,3 +108,38 @@ def face_of(result, z):
         if (abs(polyhedron.vertices[list(face.loops[0])][:, 2] - z) < 1e-9).all()
     )
     return face
+
+
+def test_a_spec_is_a_file_its_text_or_its_settings(tmp_path):
+    text = "name: Cube\nshape: {cube: 30 mm}\n"
+    (tmp_path / "cube.yaml").write_text(text)
+    settings = {"name": "Cube", "shape": {"cube": "30 mm"}}
+    given = {"database": str(tmp_path / "lab.db"), "formats": (), "folder": tmp_path / "out"}
+    first = encode(settings, **given)
+    assert (first.name, first.faces, first.symbols) == ("Cube", 6, 96)
+    assert first.folder == tmp_path / "out"
+    assert str(first) == f"Cube: 6 faces, 96 symbols, {len(first.files)} files in {first.folder}"
+    for again in (text, tmp_path / "cube.yaml", str(tmp_path / "cube.yaml")):
+        assert encode(again, **given).objects[0].reused  # the same spec: the same cells
+    two = encode({"objects": [settings, settings | {"name": "Second"}]}, **given)
+    assert (two.name, two.symbols) == ("Cube, Second", 192)
+    assert str(two).count("\n") == 1
+    with pytest.raises(SpecError, match="'layout' stands beside a spec"):
+        encode(text, layout="net", **given)
+    with pytest.raises(SpecError, match=r"encode\(\):1:1: error: unknown setting 'nam'"):
+        encode({"nam": "Cube", "shape": {"cube": "30 mm"}}, **given)
+
+
+def test_a_mesh_is_encoded_as_its_file_is_and_loads_no_kernel(tmp_path):
+    script = """
+import sys, trimesh
+from generator import encode
+mesh = trimesh.creation.box((30, 35, 40))
+mesh.export("box.stl")
+solid = encode(mesh, name="Mesh", database="lab.db", folder="mesh", formats=["stl"])
+model = encode("box.stl", name="File", database="lab.db", folder="file", formats=["stl"])
+assert solid.faces == model.faces == 6 and solid.symbols == model.symbols > 50, model
+assert solid.folder.name == "mesh", solid.folder
+assert not [name for name in sys.modules if name.startswith(("OCP", "build123d", "cadquery"))]
+"""
+    subprocess.run([sys.executable, "-c", script], cwd=tmp_path, check=True)
