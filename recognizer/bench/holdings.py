@@ -65,7 +65,7 @@ def holdings_routes(session: Session, parts: Path | None) -> APIRouter:
     @routes.get("/map/{number}")
     def array(number: int) -> dict[str, Any]:
         reader = session.reading.reader
-        known = () if reader is None else reader.lab.encodings
+        known = () if reader is None else reader.lab.arrays
         if not 0 <= number < len(known):
             raise UnknownError(f"there is no array {number}", fix=f"there are {len(known)}")
         with reading(engine()) as connection:

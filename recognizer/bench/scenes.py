@@ -19,7 +19,7 @@ from generator.database.read import list_objects, read_object
 from generator.database.registered import RegisteredObject
 from probe.surface.solids import filled, symbol_triangles
 from probe.surface.symbols import Relief, embossed
-from recognizer.touch.lab import Encoding, Lab
+from recognizer.touch.lab import EmbossedArray, Lab
 
 DIGITS = 4  #: after the point, of mm: a tenth of a micrometre
 
@@ -111,12 +111,12 @@ def encodings_told(lab: Lab) -> list[dict[str, Any]]:
                 for glyph in encoding.alphabet.glyphs
             ],
         }
-        for encoding in lab.encodings
+        for encoding in lab.arrays
         for unit in (encoding.alphabet.reach * encoding.style.pitch_mm,)
     ]
 
 
-def map_told(connection: Connection, encoding: Encoding) -> dict[str, Any]:
+def map_told(connection: Connection, encoding: EmbossedArray) -> dict[str, Any]:
     """Return the cells of an array that objects hold, face by face."""
     columns = np.uint64(encoding.array.columns)
     owners, labels = encoding.owners[:-1], encoding.labels[:-1]

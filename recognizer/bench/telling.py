@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import SensorType
-from recognizer.touch.lab import EncodedFace, Encoding, Lab
+from recognizer.touch.lab import EmbossedArray, EncodedFace, Lab
 from recognizer.touch.recognition import Recognition
 
 Array = NDArray[np.float64]
@@ -57,8 +57,8 @@ def told(recognition: Recognition, lab: Lab, sensor: SensorType) -> dict[str, An
     }
 
 
-def _face(lab: Lab, recognition: Recognition) -> tuple[int, Encoding, EncodedFace] | None:
-    for number, encoding in enumerate(lab.encodings):
+def _face(lab: Lab, recognition: Recognition) -> tuple[int, EmbossedArray, EncodedFace] | None:
+    for number, encoding in enumerate(lab.arrays):
         for face in encoding.known.values():
             if (face.object, face.face) == (recognition.object, recognition.face):
                 return number, encoding, face
@@ -66,7 +66,7 @@ def _face(lab: Lab, recognition: Recognition) -> tuple[int, Encoding, EncodedFac
 
 
 def _seen(
-    encoding: Encoding, face: EncodedFace, sensor: SensorType, pose: Array
+    encoding: EmbossedArray, face: EncodedFace, sensor: SensorType, pose: Array
 ) -> list[list[float]]:
     """Return row, column, label, x and y (sensor frame, mm) of the symbols in view."""
     at = (face.centres_mm - pose[:2, 3]) @ pose[:2, :2]
@@ -80,7 +80,7 @@ def _seen(
 
 
 def _corners(
-    encoding: Encoding, face: EncodedFace, sensor: SensorType, pose: Array
+    encoding: EmbossedArray, face: EncodedFace, sensor: SensorType, pose: Array
 ) -> list[list[float]]:
     """Return the sensor's corners on the array, as rows and columns (not wrapped)."""
     w, h = sensor.half_mm

@@ -19,7 +19,7 @@ from probe.frame import Frame
 from recognizer.command import report
 from recognizer.command.placed import object_in_base
 from recognizer.command.source import Source, at_port, listened, recorded
-from recognizer.touch.contacts import Touch
+from recognizer.touch.contacts import TouchImage
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader, reader_for
 from recognizer.touch.recognise import recognise
@@ -52,7 +52,7 @@ class Asked:
 class Answer:
     """A touch and what it says."""
 
-    touch: Touch
+    touch: TouchImage
     found: Recognition
     placed: ObjectPose | None
 

@@ -10,13 +10,13 @@ from probe.arm.carried import SensorPose
 from probe.arm.links import Arm
 from probe.errors import PoseError
 from probe.wrist.geometry import Wrist
-from recognizer.touch.contacts import Touch
+from recognizer.touch.contacts import TouchImage
 from recognizer.touch.recognition import Recognition
 from recognizer.touch.robot import ObjectPose, carried_pose, object_pose
 
 
 def object_in_base(
-    touch: Touch,
+    touch: TouchImage,
     recognition: Recognition,
     joints_deg: tuple[float, ...] | None,
     joint_error_deg: float,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from encoded_objects.console.output import number
 
 if TYPE_CHECKING:
-    from recognizer.touch.contacts import Touch
+    from recognizer.touch.contacts import TouchImage
     from recognizer.touch.recognition import Recognition
     from recognizer.touch.robot import ObjectPose
 
@@ -23,7 +23,7 @@ WAYS_OUT = {
 }
 
 
-def entry(touch: Touch, found: Recognition, placed: ObjectPose | None) -> dict[str, Any]:
+def entry(touch: TouchImage, found: Recognition, placed: ObjectPose | None) -> dict[str, Any]:
     """Return what `--json` gives for a touch."""
     values = found.as_json()
     x, y, theta = (None, None, None) if found.T_face_probe is None else on_face(found)
@@ -41,7 +41,7 @@ def on_face(found: Recognition) -> tuple[float, float, float]:
     return float(T[0, 3]), float(T[1, 3]), math.degrees(math.atan2(T[1, 0], T[0, 0]))
 
 
-def sentence(touch: Touch, found: Recognition, placed: ObjectPose | None) -> str:
+def sentence(touch: TouchImage, found: Recognition, placed: ObjectPose | None) -> str:
     """Return an answer in a line: what and where, or why not and what to do."""
     head = f"{touch.seq}: "
     if not found:

@@ -26,7 +26,7 @@ from probe.port.url import address_of
 from probe.recording.layout import Origin
 from probe.recording.read import Recording
 from probe.sensor import Overlay, SensorType
-from recognizer.touch.contacts import Touch, every_frame, touches
+from recognizer.touch.contacts import TouchImage, cut_touches, every_frame
 from recognizer.touch.signal import Signal, signal_of
 
 LEAST_N = 0.05  #: N over the lowest reading by which the strongest tactels must rise
@@ -45,13 +45,13 @@ class Source:
     together: int  #: frames of every touch where their writer says so; 0: force tells
     newest: bool  #: whether frames may be left out
 
-    def touches(self, frames: Iterator[Frame]) -> Iterator[Touch]:
+    def touches(self, frames: Iterator[Frame]) -> Iterator[TouchImage]:
         """Yield the touches among frames."""
         if self.together:
             return every_frame(frames, self.together)
-        return touches(frames, trust=self._trust())
+        return cut_touches(frames, trust=self._trust())
 
-    def signal(self, touch: Touch) -> Signal:
+    def signal(self, touch: TouchImage) -> Signal:
         """Return what of a touch is worth fitting: newtons where there is a calibration."""
         if self.calibration is None:
             return signal_of(touch.counts)

@@ -18,24 +18,30 @@ from numpy.typing import NDArray
 
 from recognizer.scan.composite import Composite
 from recognizer.scan.settings import ScanSettings
-from recognizer.touch.belief import CLEARLY, left_at, unplaced, weighed
-from recognizer.touch.lab import Encoding
-from recognizer.touch.locate import Place, neighbours, place_scores, places, under_centre
+from recognizer.touch.belief import CLEARLY, null_log_likelihood, unworn_labels_at, weigh_cells
+from recognizer.touch.lab import EmbossedArray
+from recognizer.touch.locate import (
+    Hypothesis,
+    find_hypotheses,
+    log_likelihood,
+    neighbours,
+    under_centre,
+)
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognise import placed
+from recognizer.touch.recognise import answer_at
 from recognizer.touch.recognition import (
     AMBIGUOUS,
     NOT_ENCODED,
     TOO_FEW,
     Recognition,
     RunnerUp,
-    refused,
+    refusal,
 )
 from recognizer.touch.round import SHARES, bend_at
-from recognizer.touch.symbols.fit import Fit, scored
-from recognizer.touch.symbols.gain import Image, bent
-from recognizer.touch.symbols.refine import explained_share, refined, started
-from recognizer.touch.symbols.template import Template
+from recognizer.touch.symbols.fit import Fit, score_cells
+from recognizer.touch.symbols.gain import Image, bend_image
+from recognizer.touch.symbols.refine import explained_share, initial_lattices, refine_lattices
+from recognizer.touch.symbols.template import ResponseTemplate
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -45,9 +51,9 @@ Ints = NDArray[np.int64]
 class Located:
     """A place of a composite."""
 
-    encoding: Encoding
+    encoding: EmbossedArray
     composite: Composite
-    place: Place
+    place: Hypothesis
     fit: Fit  #: of the composite, with the pose of the last touch
     score: float  #: log-likelihood of all touches, nats
     explained: float = math.nan  #: share of the last image's variance; NaN: not asked
@@ -71,7 +77,7 @@ class Located:
 
 
 def located(
-    encoding: Encoding, composites: Sequence[Composite], limits: ScanSettings
+    encoding: EmbossedArray, composites: Sequence[Composite], limits: ScanSettings
 ) -> list[Located]:
     """Return the likeliest places of composites of one encoding."""
     found: list[Located] = []
@@ -82,32 +88,34 @@ def located(
         listed = replace(
             fit, cells=fit.cells[telling], scores=fit.scores[telling], seen=fit.seen[telling]
         )
-        for place in places(encoding, (listed,), limits.places):
-            score = place_scores(encoding, fit, place)
+        for place in find_hypotheses(encoding, (listed,), limits.places):
+            score = log_likelihood(encoding, fit, place)
             found.append(Located(encoding, each, replace(place, score=score), fit, score))
     return found
 
 
 def posed(
-    reader: Reader, image: Image, template: Template, found: Located, limits: ScanSettings
+    reader: Reader, image: Image, template: ResponseTemplate, found: Located, limits: ScanSettings
 ) -> Located:
     """Return a place whose last touch was fitted again with the symbols that belong there."""
     encoding, place, fit = found.encoding, found.place, found.fit
-    worn = fit.cells[weighed(encoding, fit, place).worn]
+    worn = fit.cells[weigh_cells(encoding, fit, place).worn]
 
     def shown(cells: Ints) -> Ints:
-        return left_at(encoding, place, worn, cells)
+        return unworn_labels_at(encoding, place, worn, cells)
 
     bend = bend_at(encoding, place, fit)
     shares = (1.0,) if bend is None else SHARES
     if bend is not None:
-        image = bent(image, reader.sensor, bend, shares)
-    start = started(np.tile(fit.pose, (len(shares), 1)), np.tile(fit.gain, (len(shares), 1)))
-    lattices = refined(image, template, start, steps=limits.verify_steps, shown=shown)
+        image = bend_image(image, reader.sensor, bend, shares)
+    start = initial_lattices(
+        np.tile(fit.pose, (len(shares), 1)), np.tile(fit.gain, (len(shares), 1))
+    )
+    lattices = refine_lattices(image, template, start, steps=limits.verify_steps, shown=shown)
     best = int(np.argmax(lattices.value))
-    again = scored(image, template, lattices, reader.settings)[best]
+    again = score_cells(image, template, lattices, reader.settings)[best]
     if bend is not None:
-        image = bent(image, reader.sensor, bend, shares[best : best + 1])
+        image = bend_image(image, reader.sensor, bend, shares[best : best + 1])
     finer = replace(
         fit,
         x_mm=again.x_mm,
@@ -127,14 +135,14 @@ def answered(
 ) -> Recognition:
     """Return the answer; `found` is sorted, the best place first and posed."""
     if not found:
-        return refused(seq, TOO_FEW)
+        return refusal(seq, TOO_FEW)
     best = found[0]
     other = next((item for item in found[1:] if not best.same(item)), None)
     margin = math.inf if other is None else best.score - other.score
     runner_up = None
     if other is not None:
         runner_up = RunnerUp(*other.face, other.index)
-    return placed(
+    return answer_at(
         best.encoding, best.fit, best.place, reader.thresholds, seq,
         reason=_doubt(reader, best, margin, limits), margin=margin, runner_up=runner_up,
     )  # fmt: skip
@@ -143,15 +151,15 @@ def answered(
 def _doubt(reader: Reader, best: Located, margin: float, limits: ScanSettings) -> str:
     """Return why the best place may not be believed; nothing if it may."""
     encoding, fit, place = best.encoding, best.fit, best.place
-    cells = weighed(encoding, fit, place)
-    told = int(cells.told.sum())
-    chance = unplaced(encoding, fit)
+    cells = weigh_cells(encoding, fit, place)
+    told = int(cells.agree.sum())
+    chance = null_log_likelihood(encoding, fit)
     if fit.value - chance < reader.thresholds.surprise:
         return TOO_FEW  # if every cell agreed fully it would be no surprise either
     if best.score - chance < reader.thresholds.surprise:
         return NOT_ENCODED
     if (cells.against > CLEARLY).sum() > max(reader.thresholds.contradicted, limits.wrong * told):
         return NOT_ENCODED
-    if told < reader.thresholds.cells:
+    if told < reader.thresholds.least_inliers:
         return TOO_FEW
     return AMBIGUOUS if margin < reader.thresholds.margin else ""

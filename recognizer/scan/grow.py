@@ -34,7 +34,7 @@ from recognizer.touch.recognition import (
     NOT_ENCODED,
     TOO_FEW,
     Recognition,
-    refused,
+    refusal,
 )
 from recognizer.touch.symbols.gain import Image, image_of
 from recognizer.touch.symbols.pressing import pressing_of
@@ -62,7 +62,7 @@ def begun(reader: Reader, settings: ScanSettings | None = None) -> Scan:
     """Return a scan without touches."""
     none = tuple(() for _ in reader.prepared)
     limits = settings or ScanSettings()
-    return Scan(reader, limits, (), None, none, none, 0, None, None, refused(0, TOO_FEW))
+    return Scan(reader, limits, (), None, none, none, 0, None, None, refusal(0, TOO_FEW))
 
 
 def read_scan(
@@ -107,9 +107,9 @@ def extended(scan: Scan, touch: PlacedTouch) -> Scan:
     """
     reader, limits = scan.reader, scan.settings
     if not touch.signal.contact:
-        return replace(scan, recognition=refused(touch.seq, NO_CONTACT))
+        return replace(scan, recognition=refusal(touch.seq, NO_CONTACT))
     touches = (*scan.touches, replace(touch, decoded=None))
-    finest = min(encoding.style.pitch_mm for encoding in reader.lab.encodings)
+    finest = min(encoding.style.pitch_mm for encoding in reader.lab.arrays)
     stands = stands_of(reader, touches, scan.stands, limits.loose * finest)
     shown, lattices, found, images = [], [], [], []
     for k, (encoding, template, bank) in enumerate(reader.prepared):
@@ -162,7 +162,7 @@ def _posed(
     if best.composite.agreement.chosen[-1] >= 0:
         k = next(n for n, each in enumerate(reader.prepared) if each[0] is best.encoding)
         finer = posed(reader, images[k], reader.prepared[k][1], best, limits)
-        many = len(best.fit.cells) >= reader.thresholds.many
+        many = len(best.fit.cells) >= reader.thresholds.many_inliers
         least = reader.thresholds.explained_by_many if many else reader.thresholds.explained
         if finer.explained >= least and tells_place(finer.fit.covariance):
             return finer, True
@@ -182,11 +182,11 @@ def _believed(
         return answer, scan.told
     named = answer.object, answer.face
     if scan.told is not None and named != scan.told:
-        return refused(answer.seq, AMBIGUOUS, margin=answer.margin), None
+        return refusal(answer.seq, AMBIGUOUS, margin=answer.margin), None
     if astray > 0 and (scan.told is None or astray > scan.settings.patience):
-        return refused(answer.seq, NOT_ENCODED, margin=answer.margin), scan.told
+        return refusal(answer.seq, NOT_ENCODED, margin=answer.margin), scan.told
     if answer.covariance is not None and widest_mm(answer.covariance) > scan.settings.loose_mm:
-        return refused(answer.seq, TOO_FEW, margin=answer.margin), scan.told or named
+        return refusal(answer.seq, TOO_FEW, margin=answer.margin), scan.told or named
     return answer, named
 
 

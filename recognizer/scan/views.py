@@ -17,15 +17,15 @@ from recognizer.scan.mosaic.grow import added
 from recognizer.scan.mosaic.mosaic import Mosaic, MosaicSettings, no_touches
 from recognizer.scan.mosaic.planar import wrapped
 from recognizer.scan.mosaic.touch import PlacedTouch
-from recognizer.touch.lab import Encoding
+from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.reader import Reader
 from recognizer.touch.round import BENDS
-from recognizer.touch.symbols.bent import bends_of
-from recognizer.touch.symbols.fit import Fit, Settings, fits, scored
-from recognizer.touch.symbols.gain import Image, bent, first_gain
-from recognizer.touch.symbols.refine import refined, started
+from recognizer.touch.symbols.bends import guess_bends
+from recognizer.touch.symbols.fit import Fit, FitSettings, fit_lattices, score_cells
+from recognizer.touch.symbols.gain import Image, bend_image, first_gain
+from recognizer.touch.symbols.refine import initial_lattices, refine_lattices
 from recognizer.touch.symbols.search import Bank
-from recognizer.touch.symbols.template import Template
+from recognizer.touch.symbols.template import ResponseTemplate
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -81,7 +81,7 @@ def stands_of(
         poses = np.concatenate([before.poses, pose])
         return Stands(poses, np.concatenate([before.covariances, covariance]), None)
     if mosaic is None:
-        pitch = min(encoding.style.pitch_mm for encoding in reader.lab.encodings)
+        pitch = min(encoding.style.pitch_mm for encoding in reader.lab.arrays)
         mosaic = no_touches(reader.sensor, MosaicSettings(period_mm=pitch))
         for touch in touches[:-1]:
             mosaic = added(mosaic, touch)
@@ -96,7 +96,7 @@ def widest_mm(covariance: Array) -> float:
 
 def fits_of(
     image: Image,
-    template: Template,
+    template: ResponseTemplate,
     bank: Bank,
     reader: Reader,
     near: Array,
@@ -126,9 +126,9 @@ def fits_of(
         expected = _near(image, template, settings, near[:1], None)
         if expected and expected[0].noise <= clean:
             return (View(expected[0], led=True),)
-    found = fits(image, template, bank, settings)
+    found = fit_lattices(image, template, bank, settings)
     if hard and found and found[0].noise > clean:
-        found = fits(image, template, bank, reader.thorough)
+        found = fit_lattices(image, template, bank, reader.thorough)
     views = tuple(View(fit, led=False) for fit in found)
     rest = [pose for pose in near if not any(_same(pose, f, template.pitch_mm) for f in found)]
     for fit in _near(image, template, settings, np.array(rest).reshape(-1, 3), found):
@@ -140,10 +140,10 @@ def fits_of(
 
 def round_views(
     image: Image,
-    template: Template,
+    template: ResponseTemplate,
     bank: Bank,
     reader: Reader,
-    encoding: Encoding,
+    encoding: EmbossedArray,
     near: Array,
 ) -> tuple[View, ...]:
     """Return the likeliest lattices of an image of a round face, and those near given ones.
@@ -156,9 +156,9 @@ def round_views(
         (k, 3) as for `fits_of`.
     """
     views: list[View] = []
-    for guess in bends_of(image, reader.sensor, encoding.radii_mm, template.ink, BENDS):
-        under = bent(image, reader.sensor, guess.bend)
-        found = fits(under, template, bank, reader.settings, [guess.gain])
+    for guess in guess_bends(image, reader.sensor, encoding.radii_mm, template.ink, BENDS):
+        under = bend_image(image, reader.sensor, guess.bend)
+        found = fit_lattices(under, template, bank, reader.settings, [guess.gain])
         views += [View(fit, led=False) for fit in found]
         rest = [pose for pose in near if not any(_same(pose, f, template.pitch_mm) for f in found)]
         led = _near(under, template, reader.settings, np.array(rest).reshape(-1, 3), found)
@@ -168,8 +168,8 @@ def round_views(
 
 def _near(
     image: Image,
-    template: Template,
-    settings: Settings,
+    template: ResponseTemplate,
+    settings: FitSettings,
     near: Array,
     found: tuple[Fit, ...] | None,
 ) -> tuple[Fit, ...]:
@@ -177,9 +177,9 @@ def _near(
     gain = found[0].gain if found else first_gain(image, template.ink)
     if gain is None or not len(near):
         return ()
-    starts = started(near, np.repeat(gain[None], len(near), axis=0))
-    lattices = refined(image, template, starts, steps=settings.final_steps)
-    return scored(image, template, lattices, settings)
+    starts = initial_lattices(near, np.repeat(gain[None], len(near), axis=0))
+    lattices = refine_lattices(image, template, starts, steps=settings.final_steps)
+    return score_cells(image, template, lattices, settings)
 
 
 def views_of(found: Sequence[tuple[View, ...]]) -> Views:

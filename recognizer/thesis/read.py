@@ -34,8 +34,8 @@ from recognizer.thesis.filters import TactileImage, median, unbiased
 from recognizer.thesis.grid import Acceptance, Grid, grid
 from recognizer.thesis.skeleton import symbols as by_skeleton
 from recognizer.thesis.skeleton.symbols import Symbol, symbols
-from recognizer.touch.lab import Encoding, Lab
-from recognizer.touch.locate import Place
+from recognizer.touch.lab import EmbossedArray, Lab
+from recognizer.touch.locate import Hypothesis
 from recognizer.touch.pose import face_covariance, face_pose, inside_mm, pose_on_object
 from recognizer.touch.recognition import (
     AMBIGUOUS,
@@ -45,7 +45,7 @@ from recognizer.touch.recognition import (
     TOO_FEW,
     Recognition,
     RunnerUp,
-    refused,
+    refusal,
 )
 from recognizer.touch.symbols.fit import Fit
 
@@ -73,7 +73,7 @@ class ClassicalReading:
     """The answer and how it came about."""
 
     recognition: Recognition
-    encoding: Encoding | None  #: the one that was read
+    encoding: EmbossedArray | None  #: the one that was read
     symbols: tuple[Symbol, ...]  #: of that encoding, rejected ones among them
     grid: Grid | None
 
@@ -110,16 +110,16 @@ def read_classically(
     chosen = settings or Settings()
     over = unbiased(image)
     if not over.values.any():
-        return ClassicalReading(refused(seq, NO_CONTACT), None, (), None)
+        return ClassicalReading(refusal(seq, NO_CONTACT), None, (), None)
     T = np.eye(4) if T_image_probe is None else T_image_probe
-    readings = [_read(encoding, over, chosen, T, seq) for encoding in lab.encodings]
+    readings = [_read(encoding, over, chosen, T, seq) for encoding in lab.arrays]
     answers = [reading for reading in readings if reading.recognition]
     if len(answers) > 1:  # two ways of embossing explain the image
         first = answers[0].recognition
         other = answers[1].recognition
         if other.object is not None and other.face is not None and other.index is not None:
             runner_up = RunnerUp(other.object, other.face, other.index)
-            value = refused(seq, AMBIGUOUS, margin=first.margin, runner_up=runner_up)
+            value = refusal(seq, AMBIGUOUS, margin=first.margin, runner_up=runner_up)
             return ClassicalReading(value, answers[0].encoding, answers[0].symbols, answers[0].grid)
     return answers[0] if answers else max(readings, key=_seen)
 
@@ -129,7 +129,7 @@ def _seen(reading: ClassicalReading) -> int:
 
 
 def _read(
-    encoding: Encoding, image: TactileImage, settings: Settings, T_image_probe: Array, seq: int
+    encoding: EmbossedArray, image: TactileImage, settings: Settings, T_image_probe: Array, seq: int
 ) -> ClassicalReading:
     style = encoding.style
     filtered = image
@@ -138,13 +138,13 @@ def _read(
     found = tuple(symbols(filtered, encoding.alphabet, style, settings.symbols))
     laid = grid(found, style.pitch_mm, settings.acceptance)
     if laid is None:
-        return ClassicalReading(refused(seq, TOO_FEW), encoding, found, None)
+        return ClassicalReading(refusal(seq, TOO_FEW), encoding, found, None)
     decoded = _converted(encoding, laid, settings)
     answer = _answered(encoding, laid, decoded, settings, T_image_probe, seq)
     return ClassicalReading(answer, encoding, found, laid)
 
 
-def _converted(encoding: Encoding, laid: Grid, settings: Settings) -> Decoded:
+def _converted(encoding: EmbossedArray, laid: Grid, settings: Settings) -> Decoded:
     """Return the place of a window by the conversion that is asked for."""
     array = encoding.array
     if settings.conversion == "exact":
@@ -157,7 +157,7 @@ def _converted(encoding: Encoding, laid: Grid, settings: Settings) -> Decoded:
     return _likeliest(encoding, laid, settings.error)[0]
 
 
-def _likeliest(encoding: Encoding, laid: Grid, error: float) -> Decodings:
+def _likeliest(encoding: EmbossedArray, laid: Grid, error: float) -> Decodings:
     """Decode with the prior that the first member lies on a registered cell, if it can be held."""
     array = encoding.array
     i, j = laid.cells[0].tolist()
@@ -176,7 +176,7 @@ def _back(places: NDArray[np.uint64], steps: int, cycle: int) -> NDArray[np.uint
 
 
 def _answered(
-    encoding: Encoding,
+    encoding: EmbossedArray,
     laid: Grid,
     decoded: Decoded,
     settings: Settings,
@@ -188,7 +188,7 @@ def _answered(
     at_mm = _moved(fit, T_image_probe)  # the probe's centre on the lattice
     under = (math.floor(at_mm[0] / pitch), math.floor(at_mm[1] / pitch))
 
-    def index(place: Place) -> tuple[int, int]:
+    def index(place: Hypothesis) -> tuple[int, int]:
         return (place.row - under[1]) % array.rows, (place.column + under[0]) % array.columns
 
     runner_up = None
@@ -198,14 +198,14 @@ def _answered(
             other = encoding.face(place.face)
             runner_up = RunnerUp(other.object, other.face, index(place))
     if decoded.row is None or decoded.column is None:
-        return refused(seq, decoded.reason, margin=decoded.margin, runner_up=runner_up)
+        return refusal(seq, decoded.reason, margin=decoded.margin, runner_up=runner_up)
     place, held = _placed(encoding, laid, decoded.row, decoded.column)
     if place.face < 0 or held < 1 - settings.strangers:
-        return refused(seq, NOT_ENCODED, margin=decoded.margin, runner_up=runner_up)
+        return refusal(seq, NOT_ENCODED, margin=decoded.margin, runner_up=runner_up)
     face = encoding.face(place.face)
     pose = face_pose(encoding, face, place, fit) @ T_image_probe
     if inside_mm(face, float(pose[0, 3]), float(pose[1, 3])) < -settings.rim_mm:
-        return refused(seq, OUTSIDE, margin=decoded.margin, runner_up=runner_up)
+        return refusal(seq, OUTSIDE, margin=decoded.margin, runner_up=runner_up)
     lever = np.eye(3)  # the image's turn moves a probe that is away from its origin
     lever[:2, 2] = fit.y_mm - at_mm[1], at_mm[0] - fit.x_mm
     return Recognition(
@@ -222,7 +222,7 @@ def _answered(
     )
 
 
-def _placed(encoding: Encoding, laid: Grid, row: int, column: int) -> tuple[Place, float]:
+def _placed(encoding: EmbossedArray, laid: Grid, row: int, column: int) -> tuple[Hypothesis, float]:
     """Return a window's place and the share of its symbols that one face holds."""
     array = encoding.array
     i, j = laid.first
@@ -233,10 +233,10 @@ def _placed(encoding: Encoding, laid: Grid, row: int, column: int) -> tuple[Plac
     )
     held = owners[owners >= 0]
     if len(held) == 0:
-        return Place(0, start_row, start_column, -1, 0.0), 0.0
+        return Hypothesis(0, start_row, start_column, -1, 0.0), 0.0
     faces, number = np.unique(held, return_counts=True)
     face = int(faces[number.argmax()])
-    return Place(0, start_row, start_column, face, 0.0), float(number.max()) / len(owners)
+    return Hypothesis(0, start_row, start_column, face, 0.0), float(number.max()) / len(owners)
 
 
 def _as_fit(laid: Grid) -> Fit:

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Cutting:
+class ContactSettings:
     """When frames are one touch, and when it is read."""
 
     alike: float = 0.6  #: correlation of images of one touch; of two places it is below 0.3
@@ -35,7 +35,7 @@ class Cutting:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Touch:
+class TouchImage:
     """One image to be read, and where it is from."""
 
     seq: int  #: number of the touch's first frame
@@ -46,21 +46,21 @@ class Touch:
     pose: Array | None  #: (4, 4) T_base_sensor of the frame in the middle, mm; None if not known
 
 
-def every_frame(frames: Iterable[Frame], together: int = 1) -> Iterator[Touch]:
+def every_frame(frames: Iterable[Frame], together: int = 1) -> Iterator[TouchImage]:
     """Yield a touch for every `together` frames, whether anything is touched or not."""
     held: list[Frame] = []
     for frame in frames:
         held.append(frame)
         if len(held) == together:
-            yield _mean(held, held[0].seq)
+            yield _average(held, held[0].seq)
             held = []
     if held:
-        yield _mean(held, held[0].seq)
+        yield _average(held, held[0].seq)
 
 
-def touches(
-    frames: Iterable[Frame], cutting: Cutting | None = None, trust: Array | None = None
-) -> Iterator[Touch]:
+def cut_touches(
+    frames: Iterable[Frame], cutting: ContactSettings | None = None, trust: Array | None = None
+) -> Iterator[TouchImage]:
     """Yield the touches of a film, each as soon as it is told.
 
     Parameters
@@ -72,13 +72,13 @@ def touches(
     trust
         (rows, columns) 0 for bad tactels of a calibration.
     """
-    chosen = cutting or Cutting()
+    chosen = cutting or ContactSettings()
     contact = _Contact(chosen)
     for frame in frames:
         signal = signal_of(frame.counts.astype(np.float64), trust=trust)
         if signal.contact:
             image = signal.forces * signal.trust
-            yield from contact.take(_Felt(frame, image, float(image.sum())))
+            yield from contact.take(_ContactFrame(frame, image, float(image.sum())))
         else:
             yield from contact.end()
             contact = _Contact(chosen)
@@ -86,7 +86,7 @@ def touches(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Felt:
+class _ContactFrame:
     """A frame in contact."""
 
     frame: Frame
@@ -98,16 +98,16 @@ class _Felt:
 class _Contact:
     """What is known of the contact that lasts."""
 
-    cutting: Cutting
+    cutting: ContactSettings
     steady: bool = False  # whether a steady touch was found in it
-    fragments: list[Touch] = field(default_factory=list)
+    fragments: list[TouchImage] = field(default_factory=list)
     first: int = 0  # number of the first frame of what is alike
     last: Array | None = None  # image before
     read: Array | None = None  # image that was read last of what is alike
-    group: list[_Felt] = field(default_factory=list)  # frames that rest at one force
-    best: list[_Felt] = field(default_factory=list)  # longest group of what is alike
+    group: list[_ContactFrame] = field(default_factory=list)  # frames that rest at one force
+    best: list[_ContactFrame] = field(default_factory=list)  # longest group of what is alike
 
-    def take(self, felt: _Felt) -> Iterator[Touch]:
+    def take(self, felt: _ContactFrame) -> Iterator[TouchImage]:
         """Add a frame; yield what is told by it."""
         if self.last is None or _correlation(self.last, felt.image) < self.cutting.alike:
             yield from self._closed()
@@ -121,34 +121,34 @@ class _Contact:
             yield from self._steady(self.group)
             self.group = []
 
-    def end(self) -> Iterator[Touch]:
+    def end(self) -> Iterator[TouchImage]:
         """Yield what is left when the contact ends."""
         yield from self._closed()
         if not self.steady:
             yield from self.fragments
         self.fragments = []
 
-    def _closed(self) -> Iterator[Touch]:
+    def _closed(self) -> Iterator[TouchImage]:
         """End what is alike; where it was not read, read the longest rest in it."""
         self._keep_best()
         if self.read is None and len(self.best) >= self.cutting.few:
             yield from self._steady(self.best)
         elif self.read is None and self.best and not self.steady:
-            self.fragments.append(_mean(_frames(self.best), self.first))
+            self.fragments.append(_average(_frames(self.best), self.first))
             if len(self.fragments) >= self.cutting.fragments:
                 yield from self.fragments
                 self.fragments = []
         self.read, self.group, self.best = None, [], []
 
-    def _steady(self, group: list[_Felt]) -> Iterator[Touch]:
+    def _steady(self, group: list[_ContactFrame]) -> Iterator[TouchImage]:
         """Read frames that rest, unless they show what was read before."""
         image = np.mean([felt.image for felt in group], axis=0)
         if self.read is None or _correlation(self.read, image) < self.cutting.alike:
             seq = self.first if self.read is None else group[0].frame.seq
-            yield _mean(_frames(group), seq)
+            yield _average(_frames(group), seq)
             self.read, self.steady, self.fragments = image, True, []
 
-    def _rests(self, felt: _Felt) -> bool:
+    def _rests(self, felt: _ContactFrame) -> bool:
         """Tell whether a frame has force and image of the group."""
         if not self.group:
             return True
@@ -163,17 +163,17 @@ class _Contact:
             self.best = self.group
 
 
-def _rank(group: list[_Felt]) -> tuple[int, float]:
+def _rank(group: list[_ContactFrame]) -> tuple[int, float]:
     return len(group), sum(felt.total for felt in group)
 
 
-def _frames(group: list[_Felt]) -> list[Frame]:
+def _frames(group: list[_ContactFrame]) -> list[Frame]:
     return [felt.frame for felt in group]
 
 
-def _mean(frames: list[Frame], seq: int) -> Touch:
+def _average(frames: list[Frame], seq: int) -> TouchImage:
     middle = frames[len(frames) // 2]
-    return Touch(
+    return TouchImage(
         seq=seq,
         t_ns=frames[0].t_ns,
         frames=len(frames),

@@ -1,6 +1,6 @@
 """What the lab has registered, as the reader needs it. Thesis 6.3.
 
-Database -> Lab: for every array and way of embossing (an `Encoding`) the cells that objects
+Database -> Lab: for every array and way of embossing (an `EmbossedArray`) the cells that objects
 hold, each with the face that holds it. Cells are looked up by their number row x columns +
 column; faces are read from the database when a touch first meets them.
 """
@@ -24,7 +24,7 @@ from generator.database.read import read_array, read_object, read_styles, read_s
 from generator.database.registered import Developable, RegisteredObject, RegisteredStyle, RoundFace
 from generator.database.transaction import reading
 from recognizer.errors import LabError
-from recognizer.touch.windows import Windows, windows_of
+from recognizer.touch.windows import Windows, index_windows
 
 Ints = NDArray[np.int64]
 
@@ -50,7 +50,7 @@ class EncodedFace:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Encoding:
+class EmbossedArray:
     """One array as embossed in one alphabet and style, and who holds its cells."""
 
     array: FoldedArray | ProductArray
@@ -81,7 +81,12 @@ class Encoding:
     def windows(self) -> list[Windows]:
         """Return the index of all small windows, made when it is first asked for."""
         if not self.indexed:
-            self.indexed.extend(windows_of(self))
+            self.indexed.extend(
+                index_windows(
+                    self.keys, self.owners[:-1], self.array.rows, self.array.columns,
+                    self.array.order, self.at,
+                )
+            )  # fmt: skip
         return self.indexed
 
     def face(self, number: int) -> EncodedFace:
@@ -107,7 +112,7 @@ class Lab:
     """Everything that a touch can be told apart from."""
 
     url: str
-    encodings: tuple[Encoding, ...]
+    arrays: tuple[EmbossedArray, ...]
 
 
 def open_lab(url: str) -> Lab:
@@ -122,17 +127,17 @@ def open_lab(url: str) -> Lab:
     """
     engine = open_database(url, writable=False)
     with reading(engine) as connection:
-        encodings = tuple(_encodings(connection, engine))
-    if not encodings:
+        arrays = tuple(_embossed_arrays(connection, engine))
+    if not arrays:
         raise LabError(
             "the database holds no encoded object",
             fix="register one first: encode-object SPEC.yaml --database " + url,
             place=url,
         )
-    return Lab(url, encodings)
+    return Lab(url, arrays)
 
 
-def _encodings(connection: Connection, engine: Engine) -> Iterable[Encoding]:
+def _embossed_arrays(connection: Connection, engine: Engine) -> Iterable[EmbossedArray]:
     styles: dict[tuple[int, str, SymbolStyle], list[RegisteredStyle]] = {}
     for entry in read_styles(connection):
         styles.setdefault((entry.array_id, entry.alphabet, entry.style), []).append(entry)
@@ -152,7 +157,7 @@ def _encodings(connection: Connection, engine: Engine) -> Iterable[Encoding]:
         if array.rows * array.columns <= DENSE:
             dense = np.full(array.rows * array.columns, len(mine), np.int32)
             dense[keys] = np.arange(len(mine))
-        yield Encoding(
+        yield EmbossedArray(
             array=array,
             alphabet=alphabet_from(json.loads(alphabet)),
             style=style,

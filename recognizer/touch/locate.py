@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.touch.lab import Encoding, cell_keys
+from recognizer.touch.lab import EmbossedArray, cell_keys
 from recognizer.touch.symbols.fit import Fit
 
 Ints = NDArray[np.int64]
@@ -34,25 +34,27 @@ FIRST, FOLLOWED = 6, 512  #: after so many cells only so many candidates go on
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class Hypothesis:
     """One reading of a fit."""
 
     fit: int  #: which of the fits
     row: int  #: array row of lattice cell (0, 0), on the torus
     column: int
-    face: int  #: number in `Encoding.faces`
+    face: int  #: number in `EmbossedArray.faces`
     score: float  #: log-likelihood of the image, nats
 
 
-def places(encoding: Encoding, fits: tuple[Fit, ...], keep: int) -> list[Place]:
+def find_hypotheses(embossed: EmbossedArray, fits: tuple[Fit, ...], keep: int) -> list[Hypothesis]:
     """Return the likeliest places over all fits, best first, at most `keep` of each fit."""
-    found: list[Place] = []
+    found: list[Hypothesis] = []
     for number, fit in enumerate(fits):
-        found += _places_of(encoding, fit, number, keep)
-    return sorted(found, key=lambda place: -place.score)
+        found += _hypotheses_of(embossed, fit, number, keep)
+    return sorted(found, key=lambda hypothesis: -hypothesis.score)
 
 
-def rivals(encoding: Encoding, fit: Fit, place: Place, number: int, keep: int) -> list[Place]:
+def find_rivals(
+    embossed: EmbossedArray, fit: Fit, hypothesis: Hypothesis, number: int, keep: int
+) -> list[Hypothesis]:
     """Return the likeliest other places of the whole database under a fit, best first.
 
     `places` looks where a few windows point to; a place that differs from the best one in a
@@ -67,47 +69,49 @@ def rivals(encoding: Encoding, fit: Fit, place: Place, number: int, keep: int) -
     keep
         How many at most.
     """
-    scores = _worn(fit)
-    held = shown_at(encoding, place, fit.cells)
-    sure = np.where(held < encoding.array.order, scores.max(axis=1) - scores[:, -1], 0.0)
-    found = _candidates(encoding, fit, scores, sure, AGAIN)
+    scores = _bounded_scores(fit)
+    held = labels_at(embossed, hypothesis, fit.cells)
+    sure = np.where(held < embossed.array.order, scores.max(axis=1) - scores[:, -1], 0.0)
+    found = _anchor_candidates(embossed, fit, scores, sure, AGAIN)
     return [
         other
-        for other in _scored(encoding, fit, number, scores, found, keep + 1)
-        if (other.row, other.column, other.face) != (place.row, place.column, place.face)
+        for other in _rank_candidates(embossed, fit, number, scores, found, keep + 1)
+        if (other.row, other.column, other.face)
+        != (hypothesis.row, hypothesis.column, hypothesis.face)
     ]
 
 
-def place_scores(encoding: Encoding, fit: Fit, place: Place) -> float:
+def log_likelihood(embossed: EmbossedArray, fit: Fit, hypothesis: Hypothesis) -> float:
     """Return the log-likelihood of the image if the fit lies at this place, nats."""
-    labels = shown_at(encoding, place, fit.cells)
-    scores = _worn(fit)[np.arange(len(labels)), labels]
+    labels = labels_at(embossed, hypothesis, fit.cells)
+    scores = _bounded_scores(fit)[np.arange(len(labels)), labels]
     return float(scores.sum()) + fit.value
 
 
-def shown_at(encoding: Encoding, place: Place, cells: Ints) -> Ints:
+def labels_at(embossed: EmbossedArray, hypothesis: Hypothesis, cells: Ints) -> Ints:
     """Return the labels (m,) that cells (m, 2) of a lattice show at a place; `order` for none."""
-    array = encoding.array
-    held_by, label = encoding.at(
-        (place.row - cells[:, 1]) % array.rows, (place.column + cells[:, 0]) % array.columns
+    array = embossed.array
+    held_by, label = embossed.at(
+        (hypothesis.row - cells[:, 1]) % array.rows,
+        (hypothesis.column + cells[:, 0]) % array.columns,
     )
-    return np.where(held_by == place.face, label, array.order).astype(np.int64)
+    return np.where(held_by == hypothesis.face, label, array.order).astype(np.int64)
 
 
-def under_centre(encoding: Encoding, fit: Fit, place: Place) -> tuple[int, int]:
+def under_centre(embossed: EmbossedArray, fit: Fit, hypothesis: Hypothesis) -> tuple[int, int]:
     """Return row and column of the array's cell under the sensor's centre."""
-    pitch, array = encoding.style.pitch_mm, encoding.array
+    pitch, array = embossed.style.pitch_mm, embossed.array
     i, j = math.floor(fit.x_mm / pitch), math.floor(fit.y_mm / pitch)
-    return (place.row - j) % array.rows, (place.column + i) % array.columns
+    return (hypothesis.row - j) % array.rows, (hypothesis.column + i) % array.columns
 
 
-def neighbours(encoding: Encoding, a: tuple[int, int], b: tuple[int, int]) -> bool:
+def neighbours(embossed: EmbossedArray, a: tuple[int, int], b: tuple[int, int]) -> bool:
     """Whether two cells are one, up to a cell's rounding."""
-    array = encoding.array
+    array = embossed.array
     return (a[0] - b[0] + 1) % array.rows <= 2 and (a[1] - b[1] + 1) % array.columns <= 2
 
 
-def _worn(fit: Fit) -> Array:
+def _bounded_scores(fit: Fit) -> Array:
     """Return scores (m, q + 1) in which a registered symbol may be worn away, or read wrong.
 
     Of a cell of which the sensor sees only a corner, less is believed.
@@ -117,39 +121,41 @@ def _worn(fit: Fit) -> Array:
     return np.asarray(np.maximum(np.concatenate([symbols, fit.scores[:, -1:]], axis=1), -least))
 
 
-def _places_of(encoding: Encoding, fit: Fit, number: int, keep: int) -> list[Place]:
-    scores = _worn(fit)
-    found = _by_windows(encoding, fit)
+def _hypotheses_of(embossed: EmbossedArray, fit: Fit, number: int, keep: int) -> list[Hypothesis]:
+    scores = _bounded_scores(fit)
+    found = _window_candidates(embossed, fit)
     if found is None:
-        told = scores[:, :-1].max(axis=1) - scores[:, -1]  # a symbol rather than none
-        found = _candidates(encoding, fit, scores, told, ANCHORS)
-    return _scored(encoding, fit, number, scores, found, keep)
+        symbol = scores[:, :-1].max(axis=1) - scores[:, -1]  # a symbol rather than none
+        found = _anchor_candidates(embossed, fit, scores, symbol, ANCHORS)
+    return _rank_candidates(embossed, fit, number, scores, found, keep)
 
 
-def _scored(
-    encoding: Encoding, fit: Fit, number: int, scores: Array, found: _Candidates, keep: int
-) -> list[Place]:
+def _rank_candidates(
+    embossed: EmbossedArray, fit: Fit, number: int, scores: Array, found: _Candidates, keep: int
+) -> list[Hypothesis]:
     """Return the likeliest candidates, best first."""
     rows, columns, owners = found
     if len(rows) == 0:
         return []
-    values = _values(encoding, fit, scores, rows, columns, owners)
+    values = _log_likelihoods(embossed, fit, scores, rows, columns, owners)
     best = np.argsort(-values, kind="stable")[:keep]
     return [
-        Place(number, int(rows[k]), int(columns[k]), int(owners[k]), float(values[k]) + fit.value)
+        Hypothesis(
+            number, int(rows[k]), int(columns[k]), int(owners[k]), float(values[k]) + fit.value
+        )
         for k in best
     ]
 
 
-def _by_windows(encoding: Encoding, fit: Fit) -> _Candidates | None:
+def _window_candidates(embossed: EmbossedArray, fit: Fit) -> _Candidates | None:
     """Return where (0, 0) can lie, from the surest whole windows; None if there is none."""
-    order = encoding.array.order
+    order = embossed.array.order
     symbols = np.sort(fit.scores[:, :order], axis=1)
     sure = np.minimum(symbols[:, -1] - symbols[:, -2], symbols[:, -1] - fit.scores[:, order])
     labels = fit.scores[:, :order].argmax(axis=1)
     named = {cell: n for n, cell in enumerate(map(tuple, fit.cells.tolist()))}
     seen: list[tuple[float, int, list[int]]] = []
-    for k, index in enumerate(encoding.windows()):
+    for k, index in enumerate(embossed.windows()):
         down, right = index.shape
         for i, j in named:
             inside = [named.get((i + c, j - r)) for r in range(down) for c in range(right)]
@@ -169,14 +175,14 @@ def _by_windows(encoding: Encoding, fit: Fit) -> _Candidates | None:
             code = 0
             for n in cells:
                 code = code * order + (other if n == weakest else int(labels[n]))
-            at = encoding.windows()[k].at(code).astype(np.int64)
+            at = embossed.windows()[k].at(code).astype(np.int64)
             found.append(at)
             shifts.append(np.tile(fit.cells[cells[0]], (len(at), 1)))
-    return _zeros(encoding, np.concatenate(found), np.concatenate(shifts))
+    return _origins(embossed, np.concatenate(found), np.concatenate(shifts))
 
 
-def _candidates(
-    encoding: Encoding, fit: Fit, scores: Array, told: Array, anchors: int
+def _anchor_candidates(
+    embossed: EmbossedArray, fit: Fit, scores: Array, symbol: Array, anchors: int
 ) -> _Candidates:
     """Return where (0, 0) can lie if one of a few cells is a registered one.
 
@@ -184,38 +190,38 @@ def _candidates(
 
     Parameters
     ----------
-    told
+    symbol
         (m,) nats by which cells hold a symbol; the first `anchors` of them are tried.
     """
-    order = encoding.array.order
+    order = embossed.array.order
     found: list[Ints] = [np.zeros(0, np.int64)]
     shifts: list[Ints] = [np.zeros((0, 2), np.int64)]
-    tried = np.argsort(-told, kind="stable")[: anchors if len(encoding.keys) <= LARGE else 0]
-    for anchor in tried[told[tried] > 0]:
+    tried = np.argsort(-symbol, kind="stable")[: anchors if len(embossed.keys) <= LARGE else 0]
+    for anchor in tried[symbol[tried] > 0]:
         likely = scores[anchor, :order] > -CAP
-        at = np.flatnonzero(likely[encoding.labels[:-1]])
+        at = np.flatnonzero(likely[embossed.labels[:-1]])
         found.append(at)
         shifts.append(np.tile(fit.cells[anchor], (len(at), 1)))
-    return _zeros(encoding, np.concatenate(found), np.concatenate(shifts))
+    return _origins(embossed, np.concatenate(found), np.concatenate(shifts))
 
 
-def _zeros(encoding: Encoding, at: Ints, cells: Ints) -> _Candidates:
+def _origins(embossed: EmbossedArray, at: Ints, cells: Ints) -> _Candidates:
     """Return where (0, 0) lies, each place once, if cells (n, 2) are the registered ones `at`."""
-    array = encoding.array
-    rows, columns = np.divmod(encoding.keys[at], np.uint64(array.columns))
+    array = embossed.array
+    rows, columns = np.divmod(embossed.keys[at], np.uint64(array.columns))
     row = (rows.astype(np.int64) + cells[:, 1]) % array.rows
     column = (columns.astype(np.int64) - cells[:, 0]) % array.columns
-    owners = encoding.owners[at]
-    _, place = np.unique(cell_keys(array.columns, row, column), return_inverse=True)
-    both = place.reshape(-1).astype(np.int64) * (len(encoding.faces) + 1) + owners
+    owners = embossed.owners[at]
+    _, hypothesis = np.unique(cell_keys(array.columns, row, column), return_inverse=True)
+    both = hypothesis.reshape(-1).astype(np.int64) * (len(embossed.faces) + 1) + owners
     _, once, votes = np.unique(both, return_index=True, return_counts=True)
     if len(once) > MANY and (votes > 1).any():
         once = once[votes > 1]  # several windows say the same
     return row[once], column[once], owners[once]
 
 
-def _values(
-    encoding: Encoding,
+def _log_likelihoods(
+    embossed: EmbossedArray,
     fit: Fit,
     scores: Array,
     rows: Ints,
@@ -226,7 +232,7 @@ def _values(
 
     The surest cells come first; of many candidates only the best are followed to the end.
     """
-    array = encoding.array
+    array = embossed.array
     spread = scores.max(axis=1) - scores.min(axis=1)
     order = np.argsort(-spread * np.minimum(fit.seen, 12.0), kind="stable")
     total = np.zeros(len(rows))
@@ -238,7 +244,7 @@ def _values(
             low[kept] = total[kept]
             total = low
         i, j = fit.cells[n].tolist()
-        held_by, label = encoding.at(
+        held_by, label = embossed.at(
             (rows[kept] - j) % array.rows, (columns[kept] + i) % array.columns
         )
         total[kept] += scores[n][np.where(held_by == owners[kept], label, array.order)]

@@ -11,27 +11,29 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.touch.lab import EncodedFace, Encoding
-from recognizer.touch.locate import Place
+from recognizer.touch.lab import EmbossedArray, EncodedFace
+from recognizer.touch.locate import Hypothesis
 from recognizer.touch.symbols.fit import Fit
 
 Array = NDArray[np.float64]
 
 
-def face_pose(encoding: Encoding, face: EncodedFace, place: Place, fit: Fit) -> Array:
+def face_pose(
+    embossed: EmbossedArray, face: EncodedFace, hypothesis: Hypothesis, fit: Fit
+) -> Array:
     """Return T_face_probe (4, 4), mm: the sensor's tips in the plane of the symbols' tops."""
-    array, pitch = encoding.array, encoding.style.pitch_mm
+    array, pitch = embossed.array, embossed.style.pitch_mm
     # any symbol of the face ties the two frames together; the first one does
     row, column = int(face.rows[0]), int(face.columns[0])
-    i = _nearest(column - place.column, array.columns, fit.x_mm / pitch)
-    j = _nearest(place.row - row, array.rows, fit.y_mm / pitch)
+    i = _nearest(column - hypothesis.column, array.columns, fit.x_mm / pitch)
+    j = _nearest(hypothesis.row - row, array.rows, fit.y_mm / pitch)
     away = np.array([fit.x_mm - (i + 0.5) * pitch, fit.y_mm - (j + 0.5) * pitch])
     c, s = math.cos(face.rotation_rad), math.sin(face.rotation_rad)
     centre = face.centres_mm[0] + np.array([c * away[0] + s * away[1], c * away[1] - s * away[0]])
     turn = fit.theta_rad - face.rotation_rad
     pose = np.eye(4)
     pose[:2, :2] = [[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]]
-    pose[:3, 3] = centre[0], centre[1], encoding.style.height_mm
+    pose[:3, 3] = centre[0], centre[1], embossed.style.height_mm
     return pose
 
 

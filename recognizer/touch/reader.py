@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from probe.sensor import SensorType
-from recognizer.touch.belief import Thresholds
-from recognizer.touch.lab import Encoding, Lab
-from recognizer.touch.symbols.fit import Settings
+from recognizer.touch.belief import BeliefSettings
+from recognizer.touch.lab import EmbossedArray, Lab
+from recognizer.touch.symbols.fit import FitSettings
 from recognizer.touch.symbols.search import Bank, bank_of
-from recognizer.touch.symbols.template import Template, template_of
+from recognizer.touch.symbols.template import ResponseTemplate, template_of
 
 #: For touches that the first try does not answer.
-THOROUGH = Settings(candidates=12, steps=4, finalists=6, final_steps=6, crossed=3)
+THOROUGH = FitSettings(candidates=12, steps=4, finalists=6, final_steps=6, crossed=3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,27 +21,27 @@ class Reader:
 
     lab: Lab
     sensor: SensorType
-    settings: Settings = field(default_factory=Settings)
-    thorough: Settings = field(default_factory=lambda: THOROUGH)
-    thresholds: Thresholds = field(default_factory=Thresholds)
-    prepared: tuple[tuple[Encoding, Template, Bank], ...] = ()
+    settings: FitSettings = field(default_factory=FitSettings)
+    thorough: FitSettings = field(default_factory=lambda: THOROUGH)
+    thresholds: BeliefSettings = field(default_factory=BeliefSettings)
+    prepared: tuple[tuple[EmbossedArray, ResponseTemplate, Bank], ...] = ()
 
 
 def reader_for(
     lab: Lab,
     sensor: SensorType,
-    settings: Settings | None = None,
-    thresholds: Thresholds | None = None,
+    settings: FitSettings | None = None,
+    thresholds: BeliefSettings | None = None,
 ) -> Reader:
     """Return a reader with the templates of all encodings of a lab."""
     prepared = []
-    for encoding in lab.encodings:
-        template = template_of(encoding.alphabet, encoding.style, sensor)
-        prepared.append((encoding, template, bank_of(template, sensor)))
+    for embossed in lab.arrays:
+        template = template_of(embossed.alphabet, embossed.style, sensor)
+        prepared.append((embossed, template, bank_of(template, sensor)))
     return Reader(
         lab=lab,
         sensor=sensor,
-        settings=settings or Settings(),
-        thresholds=thresholds or Thresholds(),
+        settings=settings or FitSettings(),
+        thresholds=thresholds or BeliefSettings(),
         prepared=tuple(prepared),
     )

@@ -15,9 +15,9 @@ from __future__ import annotations
 
 import math
 
-from recognizer.touch.belief import Thresholds, naming
-from recognizer.touch.lab import Encoding
-from recognizer.touch.locate import Place, under_centre
+from recognizer.touch.belief import BeliefSettings, symbols_to_name
+from recognizer.touch.lab import EmbossedArray
+from recognizer.touch.locate import Hypothesis, under_centre
 from recognizer.touch.pose import face_covariance, face_pose, inside_mm, pose_on_object
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import (
@@ -28,79 +28,83 @@ from recognizer.touch.recognition import (
     TOO_FEW,
     Recognition,
     RunnerUp,
-    refused,
+    refusal,
 )
 from recognizer.touch.signal import Signal
 from recognizer.touch.symbols.fit import Fit
-from recognizer.touch.verify import Reading, index_of, readings, same_place
+from recognizer.touch.verify import VerifiedHypothesis, index_of, same_place, verify_hypotheses
 
 
 def recognise(reader: Reader, signal: Signal, seq: int = 0) -> Recognition:
     """Return what one touch says."""
-    return explained(reader, signal, seq)[0]
+    return recognise_with_hypothesis(reader, signal, seq)[0]
 
 
-def explained(reader: Reader, signal: Signal, seq: int = 0) -> tuple[Recognition, Reading | None]:
+def recognise_with_hypothesis(
+    reader: Reader, signal: Signal, seq: int = 0
+) -> tuple[Recognition, VerifiedHypothesis | None]:
     """Return what one touch says, and the reading that was judged; None where there is none."""
     if not signal.contact:
-        return refused(seq, NO_CONTACT), None
-    found = readings(reader, signal, reader.settings)
+        return refusal(seq, NO_CONTACT), None
+    found = verify_hypotheses(reader, signal, reader.settings)
     answer, cells = _answer(reader, found, seq)
-    if answer and cells >= reader.thresholds.many:
+    if answer and cells >= reader.thresholds.many_inliers:
         return answer, found[0]
     # Spend more where it is needed: no answer yet, or one that few cells speak for.
-    again = readings(reader, signal, reader.thorough)
+    again = verify_hypotheses(reader, signal, reader.thorough)
     second, cells = _answer(reader, again, seq)
     if answer and second and not same_place(found[0], again[0]):
-        return refused(seq, AMBIGUOUS, margin=0.0, runner_up=answer.runner_up), again[0]
-    if second and cells < reader.thresholds.many:
-        second = _by_few(reader.thresholds, again[0].encoding, second, cells)
+        return refusal(seq, AMBIGUOUS, margin=0.0, runner_up=answer.runner_up), again[0]
+    if second and cells < reader.thresholds.many_inliers:
+        second = _refuse_few(reader.thresholds, again[0].embossed, second, cells)
     return second, again[0] if again else None
 
 
-def _answer(reader: Reader, found: list[Reading], seq: int) -> tuple[Recognition, int]:
-    """Return what readings, best first, say together, and how many cells speak for it."""
+def _answer(reader: Reader, found: list[VerifiedHypothesis], seq: int) -> tuple[Recognition, int]:
+    """Return what hypotheses, best first, say together, and how many cells speak for it."""
     if not found:
-        return refused(seq, TOO_FEW), 0
+        return refusal(seq, TOO_FEW), 0
     best = found[0]
     other = next((r for r in found[1:] if not same_place(best, r)), None)
     margin = math.inf if other is None else best.score - other.score
     runner_up = None
     if other is not None:
-        face = other.encoding.face(other.place.face)
+        face = other.embossed.face(other.hypothesis.face)
         runner_up = RunnerUp(face.object, face.face, index_of(other))
     limits, speaks = reader.thresholds, best.support()
     reason = ""
     if not speaks.holds(limits):
         reason = NOT_ENCODED
-    elif speaks.cells < limits.cells:
+    elif speaks.inliers < limits.least_inliers:
         reason = TOO_FEW
     elif margin < limits.margin:
         reason = AMBIGUOUS
-    told = placed(
-        best.encoding, best.fit, best.place, limits, seq,
+    answer = answer_at(
+        best.embossed, best.fit, best.hypothesis, limits, seq,
         reason=reason, margin=margin, runner_up=runner_up,
     )  # fmt: skip
-    return told, speaks.cells
+    return answer, speaks.inliers
 
 
-def _by_few(limits: Thresholds, encoding: Encoding, told: Recognition, cells: int) -> Recognition:
+def _refuse_few(
+    limits: BeliefSettings, embossed: EmbossedArray, answer: Recognition, cells: int
+) -> Recognition:
     """Return an answer that few cells speak for, if they can name a place and do so plainly."""
     reason = ""
-    if cells < naming(encoding):
+    if cells < symbols_to_name(embossed):
         reason = TOO_FEW
-    elif told.margin is not None and told.margin < limits.margin_by_few:
+    elif answer.margin is not None and answer.margin < limits.margin_by_few:
         reason = AMBIGUOUS
     if not reason:
-        return told
-    return refused(told.seq, reason, margin=told.margin, runner_up=told.runner_up)
+        return answer
+    return refusal(answer.seq, reason, margin=answer.margin, runner_up=answer.runner_up)
 
 
-def placed(
-    encoding: Encoding,
+def answer_at(
+    embossed: EmbossedArray,
     fit: Fit,
-    place: Place,
-    limits: Thresholds,
+    hypothesis: Hypothesis,
+    limits: BeliefSettings,
     seq: int,
     *,
     reason: str,
@@ -109,16 +113,16 @@ def placed(
 ) -> Recognition:
     """Return the answer at a place, or the refusal where there is a reason or no face."""
     if reason:
-        return refused(seq, reason, margin=margin, runner_up=runner_up)
-    face = encoding.face(place.face)
-    pose = face_pose(encoding, face, place, fit)
+        return refusal(seq, reason, margin=margin, runner_up=runner_up)
+    face = embossed.face(hypothesis.face)
+    pose = face_pose(embossed, face, hypothesis, fit)
     if inside_mm(face, float(pose[0, 3]), float(pose[1, 3])) < -limits.rim_mm:
-        return refused(seq, OUTSIDE, margin=margin, runner_up=runner_up)
+        return refusal(seq, OUTSIDE, margin=margin, runner_up=runner_up)
     return Recognition(
         seq=seq,
         object=face.object,
         face=face.face,
-        index=under_centre(encoding, fit, place),
+        index=under_centre(embossed, fit, hypothesis),
         T_face_probe=pose,
         T_object_probe=pose_on_object(face, pose),
         covariance=face_covariance(face, fit.covariance),

@@ -55,9 +55,9 @@ class Recognition:
             "object": self.object,
             "face": self.face,
             "index": None if self.index is None else list(self.index),
-            "T_face_probe": _listed(self.T_face_probe),
-            "T_object_probe": _listed(self.T_object_probe),
-            "covariance": _listed(self.covariance),
+            "T_face_probe": _nested(self.T_face_probe),
+            "T_object_probe": _nested(self.T_object_probe),
+            "covariance": _nested(self.covariance),
             "margin": None if self.margin is None else round(self.margin, 4),
             "runner_up": None
             if runner_up is None
@@ -70,12 +70,12 @@ class Recognition:
         }
 
 
-def refused(
+def refusal(
     seq: int, reason: str, *, margin: float | None = None, runner_up: RunnerUp | None = None
 ) -> Recognition:
     """Return the value of a touch that is not answered."""
     return Recognition(seq, None, None, None, None, None, None, margin, runner_up, reason)
 
 
-def _listed(matrix: NDArray[np.float64] | None) -> list[list[float]] | None:
+def _nested(matrix: NDArray[np.float64] | None) -> list[list[float]] | None:
     return None if matrix is None else [[float(value) for value in row] for row in matrix]

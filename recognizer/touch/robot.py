@@ -103,8 +103,8 @@ def object_pose(
 def _on_face(covariance: Array, seating: Seating) -> Array:
     """Return (6, 6) of the probe on the face, face axes."""
     whole = np.zeros((6, 6))
-    told = np.ix_([0, 1, 5], [0, 1, 5])
-    whole[told] = covariance
+    known = np.ix_([0, 1, 5], [0, 1, 5])
+    whole[known] = covariance
     whole[2, 2] = seating.z_mm**2
     whole[3, 3] = whole[4, 4] = seating.tilt_rad**2
     return whole

@@ -12,154 +12,168 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.touch.belief import Support, support
-from recognizer.touch.lab import Encoding
+from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.locate import (
-    Place,
+    Hypothesis,
+    find_hypotheses,
+    find_rivals,
+    labels_at,
+    log_likelihood,
     neighbours,
-    place_scores,
-    places,
-    rivals,
-    shown_at,
     under_centre,
 )
 from recognizer.touch.reader import Reader
-from recognizer.touch.round import round_places
+from recognizer.touch.round import verify_on_round_faces
 from recognizer.touch.signal import Signal
-from recognizer.touch.symbols.fit import Fit, Settings, fits, scored
+from recognizer.touch.symbols.fit import Fit, FitSettings, fit_lattices, score_cells
 from recognizer.touch.symbols.gain import Image, image_of
 from recognizer.touch.symbols.pressing import pressing_of
-from recognizer.touch.symbols.refine import refined, started
+from recognizer.touch.symbols.refine import initial_lattices, refine_lattices
 from recognizer.touch.symbols.search import Bank
-from recognizer.touch.symbols.template import Template
+from recognizer.touch.symbols.template import ResponseTemplate
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Reading:
+class VerifiedHypothesis:
     """A place that was verified."""
 
     image: Image
-    template: Template
-    encoding: Encoding
-    place: Place
+    template: ResponseTemplate
+    embossed: EmbossedArray
+    hypothesis: Hypothesis
     fit: Fit
     score: float  #: log-likelihood of the image, nats
 
     def support(self) -> Support:
         """Return what speaks for it."""
-        return support(self.image, self.template, self.encoding, self.fit, self.place, self.score)
+        return support(
+            self.image, self.template, self.embossed, self.fit, self.hypothesis, self.score
+        )
 
 
-def readings(reader: Reader, signal: Signal, settings: Settings) -> list[Reading]:
+def verify_hypotheses(
+    reader: Reader, signal: Signal, settings: FitSettings
+) -> list[VerifiedHypothesis]:
     """Return the verified places over all encodings, best first."""
-    found: list[Reading] = []
-    for encoding, template, bank in reader.prepared:
-        pressing = pressing_of(reader.sensor, encoding.style.height_mm)
+    found: list[VerifiedHypothesis] = []
+    for embossed, template, bank in reader.prepared:
+        pressing = pressing_of(reader.sensor, embossed.style.height_mm)
         image = image_of(
             reader.sensor, signal.forces, signal.trust, pressing, newtons=signal.newtons
         )
-        seen = fits(image, template, bank, settings)
-        found += _verified(reader, image, encoding, template, seen)
-        if encoding.radii_mm:
-            found += _on_round_faces(reader, image, encoding, template, bank, settings)
+        seen = fit_lattices(image, template, bank, settings)
+        found += _verify_on_flat_faces(reader, image, embossed, template, seen)
+        if embossed.radii_mm:
+            found += _verify_on_round_faces(reader, image, embossed, template, bank, settings)
     return sorted(found, key=lambda reading: -reading.score)
 
 
-def _verified(
-    reader: Reader, image: Image, encoding: Encoding, template: Template, found: tuple[Fit, ...]
-) -> list[Reading]:
+def _verify_on_flat_faces(
+    reader: Reader,
+    image: Image,
+    embossed: EmbossedArray,
+    template: ResponseTemplate,
+    found: tuple[Fit, ...],
+) -> list[VerifiedHypothesis]:
     """Return the likeliest places, best first, fitted to what the database holds there."""
     limits = reader.thresholds
-    candidates = _flat(encoding, places(encoding, found, limits.places))[: limits.places]
+    candidates = _on_flat_faces(embossed, find_hypotheses(embossed, found, limits.places))[
+        : limits.places
+    ]
     if not candidates:
         return []
-    near = [place.score > candidates[0].score - limits.near for place in candidates]
+    near = [hypothesis.score > candidates[0].score - limits.near for hypothesis in candidates]
     candidates = candidates[: max(2, sum(near))]
-    verified = _fitted(reader, image, encoding, template, candidates, found)
+    verified = _fit_hypotheses(reader, image, embossed, template, candidates, found)
     best = verified[0]
     others = [
-        place
-        for place in _flat(
-            encoding, rivals(encoding, best.fit, best.place, len(found), limits.places)
+        hypothesis
+        for hypothesis in _on_flat_faces(
+            embossed, find_rivals(embossed, best.fit, best.hypothesis, len(found), limits.places)
         )
-        if place.score > best.score - limits.near
+        if hypothesis.score > best.score - limits.near
     ]
     if others:  # also such as were verified before, under a fit that is not as good
-        everything = [replace(best.place, fit=len(found)), *others]
-        verified += _fitted(reader, image, encoding, template, everything, (*found, best.fit))
+        everything = [replace(best.hypothesis, fit=len(found)), *others]
+        verified += _fit_hypotheses(
+            reader, image, embossed, template, everything, (*found, best.fit)
+        )
     return sorted(verified, key=lambda reading: -reading.score)
 
 
-def _flat(encoding: Encoding, found: list[Place]) -> list[Place]:
+def _on_flat_faces(embossed: EmbossedArray, found: list[Hypothesis]) -> list[Hypothesis]:
     """Return the places on flat faces; those on round ones are read with their bend."""
-    if not encoding.radii_mm:
+    if not embossed.radii_mm:
         return found
-    return [place for place in found if encoding.face(place.face).round is None]
+    return [hypothesis for hypothesis in found if embossed.face(hypothesis.face).round is None]
 
 
-def _on_round_faces(
+def _verify_on_round_faces(
     reader: Reader,
     image: Image,
-    encoding: Encoding,
-    template: Template,
+    embossed: EmbossedArray,
+    template: ResponseTemplate,
     bank: Bank,
-    settings: Settings,
-) -> list[Reading]:
+    settings: FitSettings,
+) -> list[VerifiedHypothesis]:
     limits = reader.thresholds
     return [
-        Reading(read.image, template, encoding, read.place, read.fit, read.score)
-        for read in round_places(
-            image, reader.sensor, encoding, template, bank, settings, reader.settings, limits
+        VerifiedHypothesis(read.image, template, embossed, read.hypothesis, read.fit, read.score)
+        for read in verify_on_round_faces(
+            image, reader.sensor, embossed, template, bank, settings, reader.settings, limits
         )
     ]
 
 
-def _fitted(
+def _fit_hypotheses(
     reader: Reader,
     image: Image,
-    encoding: Encoding,
-    template: Template,
-    candidates: list[Place],
+    embossed: EmbossedArray,
+    template: ResponseTemplate,
+    candidates: list[Hypothesis],
     found: tuple[Fit, ...],
-) -> list[Reading]:
+) -> list[VerifiedHypothesis]:
     """Return places with pose and gain fitted to their symbols, best first."""
-    starts = [found[place.fit] for place in candidates]
-    lattices = started(
+    starts = [found[hypothesis.fit] for hypothesis in candidates]
+    lattices = initial_lattices(
         np.array([fit.pose for fit in starts]),
         np.array([fit.gain for fit in starts]),
     )
 
     def shown(cells: NDArray[np.int64]) -> NDArray[np.int64]:
         labels = np.stack(
-            [shown_at(encoding, place, cells[b]) for b, place in enumerate(candidates)]
+            [labels_at(embossed, hypothesis, cells[b]) for b, hypothesis in enumerate(candidates)]
         )
-        return np.where(labels == encoding.array.order, -1, labels)
+        return np.where(labels == embossed.array.order, -1, labels)
 
-    fitted = refined(
+    fitted = refine_lattices(
         image,
         template,
         lattices,
         steps=reader.thresholds.verify_steps,
         shown=shown,
     )
-    again = scored(image, template, fitted, reader.settings)
+    again = score_cells(image, template, fitted, reader.settings)
     verified = []
-    for place in candidates:
+    for hypothesis in candidates:
         # a place is as likely as under the best of the fits that began where its own did: what
         # one of them missed of gain and sharpness is no word against the symbols
-        fair = [again[b] for b, other in enumerate(candidates) if other.fit == place.fit]
-        scores = [place_scores(encoding, fit, place) for fit in fair]
+        fair = [again[b] for b, other in enumerate(candidates) if other.fit == hypothesis.fit]
+        scores = [log_likelihood(embossed, fit, hypothesis) for fit in fair]
         best = int(np.argmax(scores))
-        verified.append(Reading(image, template, encoding, place, fair[best], scores[best]))
+        verified.append(
+            VerifiedHypothesis(image, template, embossed, hypothesis, fair[best], scores[best])
+        )
     return sorted(verified, key=lambda reading: -reading.score)
 
 
-def index_of(reading: Reading) -> tuple[int, int]:
+def index_of(reading: VerifiedHypothesis) -> tuple[int, int]:
     """Return the cell of the array under the sensor's centre."""
-    return under_centre(reading.encoding, reading.fit, reading.place)
+    return under_centre(reading.embossed, reading.fit, reading.hypothesis)
 
 
-def same_place(a: Reading, b: Reading) -> bool:
+def same_place(a: VerifiedHypothesis, b: VerifiedHypothesis) -> bool:
     """Whether two readings say the same place, up to a cell's rounding."""
-    if a.encoding is not b.encoding or a.place.face != b.place.face:
+    if a.embossed is not b.embossed or a.hypothesis.face != b.hypothesis.face:
         return False
-    return neighbours(a.encoding, index_of(a), index_of(b))
+    return neighbours(a.embossed, index_of(a), index_of(b))

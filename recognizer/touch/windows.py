@@ -1,21 +1,18 @@
 """Index of all small windows that a database holds: six or four labels -> where they stand.
 
-Encoding -> Windows, once per database. A touch that sees six neighbouring symbols surely asks
-for them, or for four; what it pays does not grow with the number of registered faces, but
-with how often the same labels occur (array order to the sixth divides them). Works for every
-kind of array, since only registered cells are listed.
+Registered cells -> Windows, once per database. A touch that sees six neighbouring symbols
+surely asks for them, or for four; what it pays does not grow with the number of registered
+faces, but with how often the same labels occur (array order to the sixth divides them). Works
+for every kind of array, since only registered cells are listed.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from recognizer.touch.lab import Encoding
 
 Ints = NDArray[np.int64]
 
@@ -28,29 +25,42 @@ class Windows:
 
     shape: tuple[int, int]
     codes: Ints  #: (n,) rising; labels of the window as digits, row by row
-    cells: NDArray[np.uint32]  #: (n,) places in `Encoding.keys`
+    cells: NDArray[np.uint32]  #: (n,) places in the keys
 
     def at(self, code: int) -> NDArray[np.uint32]:
-        """Return where a window's labels stand, as places in `Encoding.keys`."""
+        """Return where a window's labels stand, as places in the keys."""
         first, last = np.searchsorted(self.codes, [code, code + 1])
         return self.cells[first:last]
 
 
-def windows_of(encoding: Encoding) -> tuple[Windows, ...]:
-    """Return the index of an encoding, for all shapes."""
-    array, order = encoding.array, encoding.array.order
-    rows, columns = np.divmod(encoding.keys, np.uint64(array.columns))
-    rows, columns = rows.astype(np.int64), columns.astype(np.int64)
+def index_windows(
+    keys: NDArray[np.uint64],
+    owners: NDArray[np.int32],
+    rows: int,
+    columns: int,
+    order: int,
+    at: Callable[[Ints, Ints], tuple[NDArray[np.int32], NDArray[np.int8]]],
+) -> tuple[Windows, ...]:
+    """Return the index of registered cells, for all shapes.
+
+    Parameters
+    ----------
+    keys, owners
+        (n,) of the cells, row * columns + column, rising; and the faces that hold them.
+    rows, columns, order
+        Of the array.
+    at
+        Rows and columns on the torus -> which face holds each cell, and the cell's label.
+    """
+    row, column = (part.astype(np.int64) for part in np.divmod(keys, np.uint64(columns)))
     found = []
     for shape in SHAPES:
-        code = np.zeros(len(rows), np.int64)
-        whole = np.ones(len(rows), np.bool_)
+        code = np.zeros(len(keys), np.int64)
+        whole = np.ones(len(keys), np.bool_)
         for down in range(shape[0]):
             for right in range(shape[1]):
-                held_by, label = encoding.at(
-                    (rows + down) % array.rows, (columns + right) % array.columns
-                )
-                whole &= held_by == encoding.owners[:-1]
+                held_by, label = at((row + down) % rows, (column + right) % columns)
+                whole &= held_by == owners
                 code = code * order + label
         places = np.flatnonzero(whole)
         by_code = places[np.argsort(code[places], kind="stable")]

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from recognizer.touch.reader import THOROUGH, Reader
-from recognizer.touch.symbols.fit import Settings
+from recognizer.touch.symbols.fit import FitSettings
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.levels import LEVELS
 from recognizer.validation.surfaces import FOREIGN
@@ -140,7 +140,7 @@ def reader_with(reader: Reader, name: str) -> Reader:
 
 def settings_of(name: str) -> dict[str, int]:
     """Return what a reader of the study spends, as the report names it."""
-    given = Settings()
+    given = FitSettings()
     if name == AS_IS:
         values = (given.candidates, given.steps, given.finalists, given.final_steps)
     else:

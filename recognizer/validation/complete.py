@@ -215,7 +215,7 @@ def _finished(asked: Asked, folder: Path) -> dict[str, Any]:
     if campaign.study:
         studies = {
             "contact": contact_study(),
-            "decoders": decoder_study(reader.lab.encodings[0], campaign.seed),
+            "decoders": decoder_study(reader.lab.arrays[0], campaign.seed),
             "readers": reader_study(folder, campaign),
         }
         plan = Plan(work.database, campaign.seed, kind="face", files=campaign.files)

@@ -93,7 +93,7 @@ def _levels(study: Study, reader: Reader) -> None:
 
 def _cells(study: Study, reader: Reader) -> None:
     """Cells weighed: those that are registered, not all of the array."""
-    for encoding in reader.lab.encodings:
+    for encoding in reader.lab.arrays:
         cells = encoding.array.rows * encoding.array.columns
         what = (
             f"places weighed: registered cells of {encoding.array.rows} x {encoding.array.columns}"

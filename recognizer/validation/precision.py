@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from decoder import Decodings, Likelihood, decode_exact, decode_good_tuple
 from generator.array import FoldedArray
 from probe.contact.press import table
-from recognizer.touch.lab import Encoding
+from recognizer.touch.lab import EmbossedArray
 from recognizer.validation.campaign import Campaign, series_of, settings_of
 from recognizer.validation.results import line_of
 from recognizer.validation.shards import TIMES, columns_of, read_series
@@ -63,7 +63,7 @@ def reader_study(folder: Path, campaign: Campaign) -> Study:
     return study
 
 
-def decoder_study(encoding: Encoding, seed: int) -> Study:
+def decoder_study(encoding: EmbossedArray, seed: int) -> Study:
     """Return what decoders make of damaged windows at registered places of an array."""
     study, array = Study(), encoding.array
     shape = (array.window[0] + DEPTH, array.window[1] + DEPTH)
@@ -99,7 +99,7 @@ def decoder_study(encoding: Encoding, seed: int) -> Study:
     return study
 
 
-def _decoders(encoding: Encoding) -> Iterator[tuple[str, Callable[[Ints], Decodings]]]:
+def _decoders(encoding: EmbossedArray) -> Iterator[tuple[str, Callable[[Ints], Decodings]]]:
     array = encoding.array
     places = array.rows * array.columns
     methods = ["logarithm"]

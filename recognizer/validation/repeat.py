@@ -18,7 +18,7 @@ from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import Recognition
 from recognizer.touch.signal import signal_of
-from recognizer.touch.symbols.fit import Fit, fits
+from recognizer.touch.symbols.fit import Fit, fit_lattices
 from recognizer.touch.symbols.gain import image_of
 from recognizer.touch.symbols.pressing import pressing_of
 from recognizer.validation.campaign import plan_of, series_of
@@ -130,7 +130,7 @@ def _draw_fit(axis: Axes, found: Drawn, reader: Reader) -> None:
         image = image_of(
             reader.sensor, signal.forces, signal.trust, pressing, newtons=signal.newtons
         )
-        for fit in fits(image, template, bank, reader.settings):
+        for fit in fit_lattices(image, template, bank, reader.settings):
             if best is None or fit.value > best[0]:
                 best = (fit.value, fit, encoding.alphabet, encoding.style.pitch_mm)
     if best is not None:

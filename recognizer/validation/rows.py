@@ -97,7 +97,7 @@ def seen_of(lab: Lab, sensor: SensorType, trial: Trial) -> Seen:
 
 def touched(lab: Lab, object_name: str, face: str) -> tuple[EncodedFace, int] | None:
     """Return a face of the lab, and the cells of its array's window; None if it is foreign."""
-    for encoding in lab.encodings:
+    for encoding in lab.arrays:
         for object_id, name in encoding.names.items():
             if name != object_name:
                 continue

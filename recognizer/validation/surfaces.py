@@ -18,7 +18,7 @@ from probe.surface.contract import Surface
 from probe.surface.face import Face, endless
 from probe.surface.indenters import Plate, Rough
 from probe.surface.symbols import Relief
-from recognizer.touch.lab import Encoding
+from recognizer.touch.lab import EmbossedArray
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -81,12 +81,12 @@ def worn(face: Face, share: float, rng: np.random.Generator) -> Face:
     return replace(face, lattice=replace(lattice, label_at=left))
 
 
-def blank(_encoding: Encoding, _rng: np.random.Generator) -> Surface:
+def blank(_encoding: EmbossedArray, _rng: np.random.Generator) -> Surface:
     """Return a flat face."""
     return Plate()
 
 
-def ridges(encoding: Encoding, rng: np.random.Generator) -> Surface:
+def ridges(encoding: EmbossedArray, rng: np.random.Generator) -> Surface:
     """Return ridges as wide as strokes, or up to twice that, often at the pitch of the symbols."""
     pitch, stroke = encoding.style.pitch_mm, encoding.style.stroke_mm
     period = pitch * rng.choice([0.25, 1 / 3, 0.5, 1.0, rng.uniform(0.3, 1.2)])
@@ -94,23 +94,23 @@ def ridges(encoding: Encoding, rng: np.random.Generator) -> Surface:
     return Ridges(max(period, 1.5 * width), width, rng.uniform(0, math.pi))
 
 
-def dots(encoding: Encoding, rng: np.random.Generator) -> Surface:
+def dots(encoding: EmbossedArray, rng: np.random.Generator) -> Surface:
     """Return dots on a grid, often at a part of the pitch of the symbols."""
     period = encoding.style.pitch_mm * rng.choice([0.5, 1.0, rng.uniform(0.4, 1.2)])
     return Dots(period, period * rng.uniform(0.3, 0.7))
 
 
-def rough(_encoding: Encoding, rng: np.random.Generator) -> Surface:
+def rough(_encoding: EmbossedArray, rng: np.random.Generator) -> Surface:
     """Return a random surface."""
     return Rough(int(rng.integers(1 << 31)), rng.uniform(0.1, 0.5), rng.uniform(2.0, 8.0))
 
 
-def random_symbols(encoding: Encoding, rng: np.random.Generator) -> Surface:
+def random_symbols(encoding: EmbossedArray, rng: np.random.Generator) -> Surface:
     """Return symbols of the same alphabet at the same pitch, drawn at random."""
     return _of(encoding, rng.integers(encoding.array.order, size=(64, 64)))
 
 
-def other_lab(encoding: Encoding, rng: np.random.Generator) -> Surface:
+def other_lab(encoding: EmbossedArray, rng: np.random.Generator) -> Surface:
     """Return another array in the same alphabet, at the same pitch."""
     sizes = (encoding.array.rows, encoding.array.columns)
     names = ("one-touch", "large") if encoding.array.order == 4 else ("thesis",)
@@ -125,7 +125,7 @@ def other_lab(encoding: Encoding, rng: np.random.Generator) -> Surface:
     )
 
 
-def text(encoding: Encoding, rng: np.random.Generator) -> Surface:
+def text(encoding: EmbossedArray, rng: np.random.Generator) -> Surface:
     """Return letters as high and as thick as the symbols."""
     letters = alphabet_named("letters-4")
     style = encoding.style
@@ -143,7 +143,7 @@ def text(encoding: Encoding, rng: np.random.Generator) -> Surface:
 
 
 #: Surfaces of no database.
-FOREIGN: dict[str, Callable[[Encoding, np.random.Generator], Surface]] = {
+FOREIGN: dict[str, Callable[[EmbossedArray, np.random.Generator], Surface]] = {
     "blank": blank,
     "ridges": ridges,
     "dots": dots,
@@ -154,7 +154,7 @@ FOREIGN: dict[str, Callable[[Encoding, np.random.Generator], Surface]] = {
 }
 
 
-def _of(encoding: Encoding, labels: NDArray[np.int64]) -> Surface:
+def _of(encoding: EmbossedArray, labels: NDArray[np.int64]) -> Surface:
     style, alphabet = encoding.style, encoding.alphabet
     return endless(
         labels,

@@ -23,7 +23,7 @@ from probe.simulate.scene import Scene
 from probe.simulate.touch import Touches, random_touches
 from probe.surface.contract import Surface
 from probe.surface.face import Face
-from recognizer.touch.lab import Encoding
+from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import Recognition
@@ -99,7 +99,7 @@ def drawn(plan: Plan, number: int, reader: Reader) -> Drawn:
     rng = np.random.default_rng([plan.seed, number])
     level = LEVELS[plan.level]
     ranges = Touches(force_n=plan.force_n, tilt_rad=plan.tilt_rad)
-    encoding = reader.lab.encodings[int(rng.integers(len(reader.lab.encodings)))]
+    encoding = reader.lab.arrays[int(rng.integers(len(reader.lab.arrays)))]
     while True:
         scene: Scene | None = None
         surface: Surface
@@ -179,7 +179,7 @@ def judged(plan: Plan, number: int, found: Drawn, answer: Recognition, seconds: 
 
 
 @lru_cache(maxsize=8)
-def _by_name(encoding: Encoding) -> list[int]:
+def _by_name(encoding: EmbossedArray) -> list[int]:
     """Return the faces in the order of their objects' names.
 
     Their numbers follow the order of registration, which a set made in parallel leaves to chance.

@@ -242,7 +242,7 @@ def first_answer(lab, readings, believed, merging):
 
 def bench_scans(url, scans, seed, sigmas):
     lab = open_lab(url)
-    encoding = lab.encodings[0]
+    encoding = lab.arrays[0]
     faces = {(f.object, f.face): f for f in map(encoding.face, range(len(encoding.faces)))}
     header = (f"{'noise':9}{'arm':>6}  {'placing':9}{'scans':>6}{'answered':>9}{'wrong':>6}"
               f"{'symbols':>8}{'right':>7}{'wrong':>6}{'reject':>7}{'mosaic':>8}{'pose mm':>8}"
@@ -278,7 +278,7 @@ def bench_scans(url, scans, seed, sigmas):
 
 
 def bench_stages(lab, url, seed):
-    encoding = lab.encodings[0]
+    encoding = lab.arrays[0]
     scene = registered_surface(url, "Cube", "F1")
     believed, readings, _ = scanned(scene, "typical", np.random.default_rng(seed), 0.0, None)
     timed = {}

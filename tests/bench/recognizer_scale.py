@@ -32,7 +32,7 @@ from probe.surface.lattice import Lattice, listed  # noqa: E402
 from probe.surface.polygon import polygon  # noqa: E402
 from probe.surface.symbols import Relief, embossed  # noqa: E402
 from probe.surface.template import template  # noqa: E402
-from recognizer.touch.lab import EncodedFace, Encoding, Lab, cell_keys  # noqa: E402
+from recognizer.touch.lab import EmbossedArray, EncodedFace, Lab, cell_keys  # noqa: E402
 from recognizer.touch.reader import reader_for  # noqa: E402
 from recognizer.touch.recognise import recognise  # noqa: E402
 from recognizer.touch.signal import signal_of  # noqa: E402
@@ -70,7 +70,7 @@ class Faces(dict):
         return EncodedFace(*name, np.eye(4), (SQUARE,), 0.0, rows, columns, labels, CENTRES)
 
 
-def encoding_of(array, faces: int) -> Encoding:
+def encoding_of(array, faces: int) -> EmbossedArray:
     wide = math.ceil(math.sqrt(faces))
     row, column = (SIDE * part for part in np.divmod(np.arange(faces), wide))
     rows, columns = (row[:, None] + R).ravel(), (column[:, None] + C).ravel()
@@ -84,7 +84,7 @@ def encoding_of(array, faces: int) -> Encoding:
     order = np.argsort(keys)
     owners = np.repeat(np.arange(faces), SIDE * SIDE)[order]
     known = Faces(array, row, column)
-    return Encoding(
+    return EmbossedArray(
         array=array, alphabet=ALPHABET, style=STYLE, keys=keys[order],
         owners=np.append(owners, -1).astype(np.int32),
         labels=np.append(labels[order], -1).astype(np.int8), dense=None,

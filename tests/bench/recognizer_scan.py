@@ -305,7 +305,7 @@ def main() -> None:
             lab = open_lab(url)
             reader = reader_for(lab, SENSOR)
             faces = {}
-            for encoding in lab.encodings:
+            for encoding in lab.arrays:
                 for n in range(len(encoding.faces)):
                     face = encoding.face(n)
                     faces[face.object, face.face] = encoding, face

@@ -18,23 +18,23 @@ for library in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 import numpy as np  # noqa: E402
 
 from recognizer.touch.lab import open_lab  # noqa: E402
-from recognizer.touch.locate import places  # noqa: E402
+from recognizer.touch.locate import find_hypotheses  # noqa: E402
 from recognizer.touch.reader import reader_for  # noqa: E402
-from recognizer.touch.recognise import explained  # noqa: E402
+from recognizer.touch.recognise import recognise_with_hypothesis  # noqa: E402
 from recognizer.touch.signal import signal_of  # noqa: E402
-from recognizer.touch.symbols.fit import Settings, fits  # noqa: E402
-from recognizer.touch.symbols.gain import felt_under, first_gain, image_of  # noqa: E402
+from recognizer.touch.symbols.fit import FitSettings, fit_lattices  # noqa: E402
+from recognizer.touch.symbols.gain import first_gain, image_of, normalize_image  # noqa: E402
 from recognizer.touch.symbols.pressing import pressing_of  # noqa: E402
 from recognizer.touch.symbols.search import search  # noqa: E402
-from recognizer.touch.verify import readings  # noqa: E402
+from recognizer.touch.verify import verify_hypotheses  # noqa: E402
 from recognizer.validation.trial import Plan, drawn, judged, sensor_of  # noqa: E402
 
 SETTINGS = {
-    "1 lattice, 1 + 1 steps": Settings(1, 1, 1, 1),
-    "2 lattices, 2 + 2 steps (default)": Settings(),
-    "3 lattices, 3 + 4 steps": Settings(3, 3, 2, 4),
-    "8 lattices, 4 + 10 steps": Settings(8, 4, 4, 10),
-    "24 lattices, 6 + 14 steps": Settings(24, 6, 6, 14),
+    "1 lattice, 1 + 1 steps": FitSettings(1, 1, 1, 1),
+    "2 lattices, 2 + 2 steps (default)": FitSettings(),
+    "3 lattices, 3 + 4 steps": FitSettings(3, 3, 2, 4),
+    "8 lattices, 4 + 10 steps": FitSettings(8, 4, 4, 10),
+    "24 lattices, 6 + 14 steps": FitSettings(24, 6, 6, 14),
 }
 
 
@@ -56,15 +56,15 @@ def stages(reader, signals):
             )
         )
         gain = first_gain(image, template.ink)
-        felt = felt_under(image, gain[None])
+        felt = normalize_image(image, gain[None])
         seen, weights = (
             part.reshape(bank.shape).astype(np.float32) for part in (felt.psi, felt.trust)
         )
         _, coarse = clocked(lambda s=seen, w=weights: search(bank, s, w, template.order, 4))
-        found, fitted = clocked(lambda i=image: fits(i, template, bank, reader.settings))
-        _, placed = clocked(lambda f=found: places(encoding, f, 8))
-        _, read = clocked(lambda s=signal: readings(reader, s, reader.settings))
-        _, whole = clocked(lambda s=signal: explained(reader, s))
+        found, fitted = clocked(lambda i=image: fit_lattices(i, template, bank, reader.settings))
+        _, placed = clocked(lambda f=found: find_hypotheses(encoding, f, 8))
+        _, read = clocked(lambda s=signal: verify_hypotheses(reader, s, reader.settings))
+        _, whole = clocked(lambda s=signal: recognise_with_hypothesis(reader, s))
         rows.append((made, coarse, fitted - coarse, placed, read - fitted - placed, whole))
     names = ("image", "coarse search", "refinement", "places", "verification", "whole touch")
     return dict(zip(names, np.median(rows, axis=0), strict=True))
@@ -90,7 +90,7 @@ def main() -> None:
             one = replace(reader, settings=settings, thorough=settings)
             found = []
             for number, (touch, signal) in enumerate(zip(touches, signals, strict=True)):
-                (answer, _), ms = clocked(lambda s=signal, r=one: explained(r, s))
+                (answer, _), ms = clocked(lambda s=signal, r=one: recognise_with_hypothesis(r, s))
                 found.append((judged(plan, number, touch, answer, ms / 1e3), ms))
             right = [t for t, _ in found if t.verdict == "right"]
             wrong = sum(t.verdict == "wrong" for t, _ in found)

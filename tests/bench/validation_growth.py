@@ -50,7 +50,7 @@ def main() -> None:
                 float(np.median([getattr(t, name) for t in found.times]))
                 for name in ("drawing", "reading")
             )
-            cells = sum(len(encoding.keys) for encoding in reader.lab.encodings)
+            cells = sum(len(encoding.keys) for encoding in reader.lab.arrays)
             right = sum(row["verdict"] == "right" for row in found.rows)
             print(f"{want:8d} {cells:9d} {opened:7.2f} {1e3 * drawing:12.1f} {1e3 * reading:8.1f} "
                   f"{1 / (drawing + reading):10.1f}  {right:5d} {len(found.rows):2d}",

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.touch.lab import EncodedFace, Encoding
-from recognizer.touch.locate import Place, shown_at
+from recognizer.touch.lab import EmbossedArray, EncodedFace
+from recognizer.touch.locate import Hypothesis, labels_at
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognise import explained
+from recognizer.touch.recognise import recognise_with_hypothesis
 from recognizer.touch.signal import Signal
 
 Array = NDArray[np.float64]
@@ -28,8 +28,8 @@ CLEARLY = 3.0  #: nats
 class Winning:
     """The best reading of a touch."""
 
-    encoding: Encoding
-    place: Place
+    encoding: EmbossedArray
+    place: Hypothesis
     face: EncodedFace
     x_mm: float  #: a sensor point s lies at R(theta) s + (x, y) on the lattice
     y_mm: float
@@ -54,11 +54,11 @@ class Winning:
 
 def winning(reader: Reader, signal: Signal) -> Winning | None:
     """Return the best reading of a touch; None where no symbol is seen."""
-    _, best = explained(reader, signal)
+    _, best = recognise_with_hypothesis(reader, signal)
     if best is None:
         return None
-    encoding, place, fit = best.encoding, best.place, best.fit
-    shown = shown_at(encoding, place, fit.cells)
+    encoding, place, fit = best.embossed, best.hypothesis, best.fit
+    shown = labels_at(encoding, place, fit.cells)
     return Winning(
         encoding=encoding,
         place=place,

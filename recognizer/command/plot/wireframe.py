@@ -15,7 +15,7 @@ from probe.plot.touch import MARK
 from probe.sensor import SensorType
 from probe.surface.solids import filled
 from recognizer.command.plot.window import FACE
-from recognizer.touch.lab import Encoding
+from recognizer.touch.lab import EmbossedArray
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ MANY = 40  #: vertices beyond which they are not numbered
 
 def draw_object(
     axes: Any,  # mplot3d has no types
-    encoding: Encoding,
+    encoding: EmbossedArray,
     sensor: SensorType,
     name: str,
     face: str,

@@ -17,19 +17,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.touch.symbols.covariance import covariances
-from recognizer.touch.symbols.gain import Image, felt_under, first_gain, tilted_gain
-from recognizer.touch.symbols.noise import Felt, log_likelihoods, spread
+from recognizer.touch.symbols.gain import Image, first_gain, normalize_image, tilted_gain
+from recognizer.touch.symbols.noise import NormalizedImage, log_likelihoods, psi_deviation
 from recognizer.touch.symbols.refine import (
     NOISE,
     Lattices,
+    best_values,
     cells_and_offsets,
-    chosen,
-    refined,
-    started,
+    initial_lattices,
+    refine_lattices,
     tables_at,
 )
 from recognizer.touch.symbols.search import Bank, search
-from recognizer.touch.symbols.template import Floats, Template, psi
+from recognizer.touch.symbols.template import Floats, ResponseTemplate, psi
 
 Array = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ SAME_TURN = 0.02  #: half turns
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class FitSettings:
     """How much work the fit spends."""
 
     candidates: int = 2  #: lattices taken from the coarse search
@@ -71,11 +71,11 @@ class Fit:
         return np.array([self.x_mm, self.y_mm, self.theta_rad, *self.nuisance])
 
 
-def fits(
+def fit_lattices(
     image: Image,
-    template: Template,
+    template: ResponseTemplate,
     bank: Bank,
-    settings: Settings,
+    settings: FitSettings,
     gains: Sequence[Array] | None = None,
 ) -> tuple[Fit, ...]:
     """Return the likeliest lattices of an image, best first; none if nothing is pressed.
@@ -85,18 +85,18 @@ def fits(
     if gains is None:
         guessed = (first_gain(image, template.ink), tilted_gain(image))
         gains = [gain for gain in guessed if gain is not None]
-    starts = [_searched(image, template, bank, gain, settings.candidates) for gain in gains]
+    starts = [_search_under(image, template, bank, gain, settings.candidates) for gain in gains]
     if sum(len(start) for start in starts) == 0:
         return ()
     each = [len(start) for start in starts]
-    lattices = started(np.concatenate(starts), np.repeat(gains, each, axis=0))
-    lattices = refined(image, template, lattices, steps=settings.steps)
+    lattices = initial_lattices(np.concatenate(starts), np.repeat(gains, each, axis=0))
+    lattices = refine_lattices(image, template, lattices, steps=settings.steps)
     if settings.crossed:
-        lattices = _crossed(image, template, lattices, settings.crossed)
+        lattices = _cross_gains(image, template, lattices, settings.crossed)
     best = _distinct(lattices, template.pitch_mm)[: settings.finalists]
-    lattices = started(lattices.pose[best], lattices.gain[best])
-    lattices = refined(image, template, lattices, steps=settings.final_steps)
-    found = scored(image, template, lattices, settings)
+    lattices = initial_lattices(lattices.pose[best], lattices.gain[best])
+    lattices = refine_lattices(image, template, lattices, steps=settings.final_steps)
+    found = score_cells(image, template, lattices, settings)
     return tuple(found[b] for b in _distinct(lattices, template.pitch_mm))
 
 
@@ -112,7 +112,7 @@ def _distinct(found: Lattices, pitch: float) -> list[int]:
     return kept
 
 
-def _crossed(image: Image, template: Template, found: Lattices, gains: int) -> Lattices:
+def _cross_gains(image: Image, template: ResponseTemplate, found: Lattices, gains: int) -> Lattices:
     """Return lattices, and the same turned by quarters, each under the best of several gains.
 
     A square lattice turned by a quarter is one again, so all four see the image alike but for
@@ -128,7 +128,9 @@ def _crossed(image: Image, template: Template, found: Lattices, gains: int) -> L
         pose[:, 2] += math.pi / 2
     poses = np.concatenate([*tried, found.pose])
     each = [
-        refined(image, template, started(poses, np.tile(gain, (len(poses), 1))), steps=1)
+        refine_lattices(
+            image, template, initial_lattices(poses, np.tile(gain, (len(poses), 1))), steps=1
+        )
         for gain in found.gain[best[:gains]]
     ]
     kept = np.argmax([lattices.value for lattices in each], axis=0)
@@ -141,9 +143,11 @@ def _crossed(image: Image, template: Template, found: Lattices, gains: int) -> L
     )
 
 
-def _searched(image: Image, template: Template, bank: Bank, gain: Array, keep: int) -> Array:
+def _search_under(
+    image: Image, template: ResponseTemplate, bank: Bank, gain: Array, keep: int
+) -> Array:
     """Return the best lattices (n, 3) of the coarse search under a gain."""
-    felt = felt_under(image, gain[None])
+    felt = normalize_image(image, gain[None])
     response, bare = (np.expm1(felt.psi[0] * math.log(4.0)) / 3.0, felt.bare[0])
     rest = np.maximum(1.0 - bare, 0.1)
     seen = psi(np.maximum(response - bare, 0.0) / rest)
@@ -157,11 +161,11 @@ def _searched(image: Image, template: Template, bank: Bank, gain: Array, keep: i
     )
 
 
-def scored(
+def score_cells(
     image: Image,
-    template: Template,
+    template: ResponseTemplate,
     lattices: Lattices,
-    settings: Settings,
+    settings: FitSettings,
     noise: float | None = None,
 ) -> tuple[Fit, ...]:
     """Return the fits of lattices with the scores of all their cells, in their order.
@@ -171,10 +175,10 @@ def scored(
     noise
         With which scores are made; by default what the likeliest lattice leaves.
     """
-    felt = felt_under(image, lattices.gain)
+    felt = normalize_image(image, lattices.gain)
     cells, offsets = cells_and_offsets(image, lattices.pose, template.pitch_mm)
     tables = tables_at(template, offsets, lattices.pose, felt)
-    away = _away(felt, tables, cells)
+    away = _residuals(felt, tables, cells)
     if noise is None:
         best = np.minimum(np.abs(away[int(np.argmax(lattices.value))]), 4 * NOISE)
         left = math.sqrt(float((felt.trust * best**2).sum() / felt.trust.sum()))
@@ -206,8 +210,8 @@ def scored(
     return tuple(found)
 
 
-def _away(felt: Felt, tables: Floats, cells: NDArray[np.int64]) -> Array:
+def _residuals(felt: NormalizedImage, tables: Floats, cells: NDArray[np.int64]) -> Array:
     """Return how far (b, n) readings lie from the likeliest labels, on a covered tactel's scale."""
     scores = log_likelihoods(felt, tables, np.full(len(cells), NOISE))
-    values = chosen(cells, tables, scores, felt)
-    return (felt.psi - values[..., 0]) * felt.press / spread(values[:, :, None])[..., 0]
+    values = best_values(cells, tables, scores, felt)
+    return (felt.psi - values[..., 0]) * felt.press / psi_deviation(values[:, :, None])[..., 0]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from generator.database.registered import Bend
 from probe.sensor import SensorType
-from recognizer.touch.symbols.noise import Felt
+from recognizer.touch.symbols.noise import NormalizedImage
 from recognizer.touch.symbols.pressing import Pressing
 from recognizer.touch.symbols.template import psi
 
@@ -65,7 +65,9 @@ def image_of(
     )
 
 
-def bent(image: Image, sensor: SensorType, bend: Bend, shares: tuple[float, ...] = (1.0,)) -> Image:
+def bend_image(
+    image: Image, sensor: SensorType, bend: Bend, shares: tuple[float, ...] = (1.0,)
+) -> Image:
     """Return an image of a flat face as one of a face with a bend, in the axes of the sensor.
 
     Parameters
@@ -140,7 +142,7 @@ def bounded_gain(gain: Array, steepest: float = STEEPEST) -> Array:
     return np.column_stack([gain[:, :2], gain[:, 2:] * factor[:, None]])
 
 
-def felt_under(image: Image, gain: Array) -> Felt:
+def normalize_image(image: Image, gain: Array) -> NormalizedImage:
     """Return the image as it is under gains (b, 4)."""
     depth = gain[:, 1:] @ image.plane.T
     if image.falls is not None:
@@ -150,7 +152,7 @@ def felt_under(image: Image, gain: Array) -> Felt:
     least = LEAST_GAIN * plain.max(axis=1, keepdims=True)
     share = np.maximum(plain, least)
     plateau = np.exp(gain[:, :1]) * share
-    return Felt(
+    return NormalizedImage(
         psi=psi(image.forces / plateau),
         press=np.clip(depth / (0.5 * gain[:, 1:2]), LEAST_PRESS, 1.0),
         bare=lower / share,

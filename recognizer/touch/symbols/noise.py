@@ -23,7 +23,7 @@ MOST = 8.0  #: nats that one tactel can cost
 
 
 @dataclass(frozen=True, slots=True)
-class Felt:
+class NormalizedImage:
     """An image under gain planes: b planes, n tactels."""
 
     psi: Array  #: (b, n) of the forces over the gain
@@ -38,14 +38,14 @@ class Felt:
     plateau: Array  #: (b, n) force on a plateau, no less than where the sensor hangs in the air
 
 
-def spread(tables: Floats | Array) -> Floats:
+def psi_deviation(tables: Floats | Array) -> Floats:
     """Return the spread (b, n, q) of psi around templates (b, n, q, 6), in units of the noise."""
     value, x, y = tables[..., 0], tables[..., 1], tables[..., 2]
     square = QUIET**2 + value * value + DISPLACED_MM**2 * (x * x + y * y)
     return np.asarray(np.sqrt(square), np.float32)
 
 
-def log_likelihoods(felt: Felt, tables: Floats, noise: Array) -> Array:
+def log_likelihoods(felt: NormalizedImage, tables: Floats, noise: Array) -> Array:
     """Return log-likelihoods (b, n, q + 1) of each symbol at each tactel; the last is no symbol.
 
     Parameters
@@ -56,14 +56,16 @@ def log_likelihoods(felt: Felt, tables: Floats, noise: Array) -> Array:
         (b,) standard deviation of psi on a covered tactel.
     """
     unit = noise[:, None] / np.maximum(felt.press, 1e-3)
-    symbols = _each(felt, tables[..., 0], spread(tables), unit)
+    symbols = _each(felt, tables[..., 0], psi_deviation(tables), unit)
     floor = psi(felt.bare)
     bare = np.stack([np.zeros_like(floor), floor], axis=-1)  # beyond the edge of the face, or not
     nothing = _each(felt, bare, np.hypot(QUIET, bare), unit).max(axis=-1, keepdims=True)
     return np.concatenate([symbols, nothing], axis=-1)
 
 
-def _each(felt: Felt, values: Array | Floats, widths: Array | Floats, unit: Array) -> Array:
+def _each(
+    felt: NormalizedImage, values: Array | Floats, widths: Array | Floats, unit: Array
+) -> Array:
     away = (felt.psi[..., None] - values) / (unit[..., None] * widths)
     each = -np.minimum(0.5 * away * away, MOST) - np.log(widths)
     return np.asarray(felt.trust[:, None] * each, np.float64)

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.touch.symbols.gain import Image, bounded_gain, felt_under
-from recognizer.touch.symbols.noise import Felt, log_likelihoods, spread
-from recognizer.touch.symbols.template import Floats, Template, psi
+from recognizer.touch.symbols.gain import Image, bounded_gain, normalize_image
+from recognizer.touch.symbols.noise import NormalizedImage, log_likelihoods, psi_deviation
+from recognizer.touch.symbols.template import Floats, ResponseTemplate, psi
 
 Array = NDArray[np.float64]
 
@@ -59,9 +59,9 @@ def cells_and_offsets(image: Image, pose: Array, pitch: float) -> tuple[NDArray[
 Shown = Callable[[NDArray[np.int64]], NDArray[np.int64]]
 
 
-def refined(
+def refine_lattices(
     image: Image,
-    template: Template,
+    template: ResponseTemplate,
     start: Lattices,
     *,
     steps: int,
@@ -80,7 +80,7 @@ def refined(
     best = start
     trial, damping = start, np.full(len(start.pose), DAMPING)
     for step in range(steps + 1):
-        seen = _seen(image, template, trial, noise, shown)
+        seen = _evaluate(image, template, trial, noise, shown)
         tried = replace(trial, value=seen.value, normal=seen.normal)
         if step == 0:
             best, at_best = tried, seen
@@ -93,24 +93,24 @@ def refined(
                 break
         if step == steps:
             break
-        trial = _moved(best, at_best, damping)
+        trial = _step_from(best, at_best, damping)
     return best
 
 
-def _seen(
-    image: Image, template: Template, at: Lattices, noise: float, shown: Shown | None
-) -> _Seen:
+def _evaluate(
+    image: Image, template: ResponseTemplate, at: Lattices, noise: float, shown: Shown | None
+) -> _Evaluation:
     """Return how well lattices explain the image, and what a small change would do."""
-    felt = felt_under(image, at.gain)
+    felt = normalize_image(image, at.gain)
     cells, offsets = cells_and_offsets(image, at.pose, template.pitch_mm)
     tables = tables_at(template, offsets, at.pose, felt)
     scores = log_likelihoods(felt, tables, np.full(len(at.pose), noise))
-    number, dense = _numbered(cells)
+    number, dense = _number_cells(cells)
     labels = _best(number, dense, scores) if shown is None else shown(cells)
     value = np.take_along_axis(scores, labels[..., None], axis=2)[..., 0].sum(axis=1)
     value += felt.measure + (felt.trust * np.log(felt.press)).sum(axis=1)
-    value -= 0.5 * (_known(image, at) ** 2 * _precision(image)).sum(axis=1)
-    values = _labelled(tables, labels, felt)
+    value -= 0.5 * (_from_prior(image, at) ** 2 * _precision(image)).sum(axis=1)
+    values = _values_of(tables, labels, felt)
     jacobian, force = _jacobian(image, at, values, felt)
     width = _width(values, felt, noise)
     away = (image.forces - force) / width
@@ -119,10 +119,10 @@ def _seen(
     normal = weighted @ jacobian + np.diag(_precision(image))
     left = image.forces - force
     right = (weighted @ left[..., None])[..., 0]
-    return _Seen(value, normal, right - _known(image, at) * _precision(image))
+    return _Evaluation(value, normal, right - _from_prior(image, at) * _precision(image))
 
 
-def _moved(at: Lattices, seen: _Seen, damping: Array) -> Lattices:
+def _step_from(at: Lattices, seen: _Evaluation, damping: Array) -> Lattices:
     """Return lattices after a Levenberg-Marquardt step."""
     diagonal = np.einsum("bii->bi", seen.normal) * damping[:, None] + _LEAST
     step = np.linalg.solve(
@@ -148,7 +148,7 @@ def _either(better: NDArray[np.bool_], a: Any, b: Any) -> Any:
     return type(a)(**picked)
 
 
-def _known(image: Image, at: Lattices) -> Array:
+def _from_prior(image: Image, at: Lattices) -> Array:
     """Return how far (b, 11) each unknown lies from what is known of it beforehand."""
     away = np.zeros((len(at.pose), 11))
     away[:, 3:POSE] = at.pose[:, 3:]
@@ -159,18 +159,18 @@ def _known(image: Image, at: Lattices) -> Array:
 
 def _precision(image: Image) -> Array:
     """Return what is known of each unknown beforehand, one over its variance (11,)."""
-    spread = np.concatenate([PRIOR, [_SCALE_KNOWN if image.newtons else 0.0, 0.0, 0.0, 0.0]])
-    return np.where(spread > 0, 1 / np.maximum(spread, 1e-9) ** 2, 0.0)
+    psi_deviation = np.concatenate([PRIOR, [_SCALE_KNOWN if image.newtons else 0.0, 0.0, 0.0, 0.0]])
+    return np.where(psi_deviation > 0, 1 / np.maximum(psi_deviation, 1e-9) ** 2, 0.0)
 
 
-def _width(values: Array, felt: Felt, noise: float) -> Array:
+def _width(values: Array, felt: NormalizedImage, noise: float) -> Array:
     """Return the standard deviation (b, n) of forces, from that of psi."""
-    relative = noise * spread(values[:, :, None])[..., 0] / felt.press
+    relative = noise * psi_deviation(values[:, :, None])[..., 0] / felt.press
     return np.asarray(relative * _by_psi(_response(values[..., 0])) * felt.plateau)
 
 
 def explained_share(
-    image: Image, template: Template, pose: Array, gain: Array, shown: Shown
+    image: Image, template: ResponseTemplate, pose: Array, gain: Array, shown: Shown
 ) -> float:
     """Return the share of the variance of psi that given symbols explain where they stand.
 
@@ -181,11 +181,11 @@ def explained_share(
     pose, gain
         (7,) and (4,) of `Lattices`.
     """
-    felt = felt_under(image, gain[None])
+    felt = normalize_image(image, gain[None])
     cells, offsets = cells_and_offsets(image, pose[None], template.pitch_mm)
     tables = tables_at(template, offsets, pose[None], felt)
     labels = shown(cells)
-    values, seen = _labelled(tables, labels, felt)[0, :, 0], felt.psi[0]
+    values, seen = _values_of(tables, labels, felt)[0, :, 0], felt.psi[0]
     trust = image.trust * (labels[0] >= 0)
     if image.falls is not None:  # where the face has fallen away there is nothing to explain
         trust = trust * felt.contact[0]
@@ -194,20 +194,24 @@ def explained_share(
     return 1.0 - float((trust * (seen - values) ** 2).sum()) / max(whole, 1e-12)
 
 
-def started(pose: Array, gain: Array) -> Lattices:
+def initial_lattices(pose: Array, gain: Array) -> Lattices:
     """Return candidates of which nothing is known but pose (b, 3 or 7) and gain (b, 4)."""
     pose = np.pad(pose, ((0, 0), (0, POSE - pose.shape[1])))
     none = np.zeros((len(pose), 11, 11))
     return Lattices(pose, gain, np.zeros(len(pose)), none)
 
 
-def chosen(cells: NDArray[np.int64], tables: Floats, scores: Array, felt: Felt) -> Array:
+def best_values(
+    cells: NDArray[np.int64], tables: Floats, scores: Array, felt: NormalizedImage
+) -> Array:
     """Return psi and slopes (b, n, 6) of the symbol that fits best in each cell, or of none."""
-    number, dense = _numbered(cells)
-    return _labelled(tables, _best(number, dense, scores), felt)
+    number, dense = _number_cells(cells)
+    return _values_of(tables, _best(number, dense, scores), felt)
 
 
-def tables_at(template: Template, offsets: Array, pose: Array, felt: Felt) -> Floats:
+def tables_at(
+    template: ResponseTemplate, offsets: Array, pose: Array, felt: NormalizedImage
+) -> Floats:
     """Return templates (b, n, q, 6) at offsets, for what is fitted of form and gain."""
     tables = template.at(offsets)
     for slope, by in enumerate(pose[:, 3:6, None, None].astype(np.float32).swapaxes(0, 1), 3):
@@ -235,7 +239,7 @@ def _best(number: int, dense: NDArray[np.int64], scores: Array) -> NDArray[np.in
     return np.asarray(best[dense])
 
 
-def _labelled(tables: Floats, labels: NDArray[np.int64], felt: Felt) -> Array:
+def _values_of(tables: Floats, labels: NDArray[np.int64], felt: NormalizedImage) -> Array:
     """Return psi and slopes (b, n, 6) of given symbols, and of the bare face where there is none.
 
     Beyond the edge of a face nothing is felt: a tactel without a symbol shows what is nearer.
@@ -260,7 +264,7 @@ def _by_psi(response: Array) -> Array:
     return (1 + 3 * response) * math.log(4.0) / 3.0
 
 
-def _numbered(cells: NDArray[np.int64]) -> tuple[int, NDArray[np.int64]]:
+def _number_cells(cells: NDArray[np.int64]) -> tuple[int, NDArray[np.int64]]:
     """Return how many cells there can be over all candidates, and each tactel's number."""
     low = cells.min(axis=1, keepdims=True)
     local = cells - low
@@ -270,7 +274,9 @@ def _numbered(cells: NDArray[np.int64]) -> tuple[int, NDArray[np.int64]]:
     return count * len(cells), dense
 
 
-def _jacobian(image: Image, at: Lattices, values: Array, felt: Felt) -> tuple[Array, Array]:
+def _jacobian(
+    image: Image, at: Lattices, values: Array, felt: NormalizedImage
+) -> tuple[Array, Array]:
     """Return the derivatives (b, n, 11) of the forces by pose and gain, and the forces (b, n)."""
     pressing, basis, pose = image.pressing, image.plane, at.pose
     c, s = np.cos(pose[:, 2, None]), np.sin(pose[:, 2, None])
@@ -293,7 +299,7 @@ def _jacobian(image: Image, at: Lattices, values: Array, felt: Felt) -> tuple[Ar
 
 
 @dataclass(frozen=True, slots=True)
-class _Seen:
+class _Evaluation:
     value: Array  # (b,) log-likelihood with what is known beforehand
     normal: Array  # (b, 11, 11)
     right: Array  # (b, 11)

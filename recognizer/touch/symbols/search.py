@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import SensorType
-from recognizer.touch.symbols.template import Floats, Template
+from recognizer.touch.symbols.template import Floats, ResponseTemplate
 
 ROTATIONS = 72  #: over the full turn
 PHASES = 2  #: places per tactel along each axis
@@ -38,7 +38,7 @@ class Bank:
 
 
 def bank_of(
-    template: Template,
+    template: ResponseTemplate,
     sensor: SensorType,
     *,
     rotations: int = ROTATIONS,
@@ -82,7 +82,7 @@ def bank_of(
 
 
 def _lookups(
-    template: Template,
+    template: ResponseTemplate,
     sensor: SensorType,
     turns: NDArray[np.float64],
     rim: int,

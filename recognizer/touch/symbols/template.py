@@ -45,7 +45,7 @@ def psi(response: NDArray[np.float64] | Floats) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True, slots=True)
-class Template:
+class ResponseTemplate:
     """Responses of all symbols of an alphabet on a fine grid of offsets."""
 
     pitch_mm: float
@@ -74,10 +74,10 @@ class Template:
 
 
 @lru_cache(maxsize=16)
-def template_of(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType) -> Template:
+def template_of(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType) -> ResponseTemplate:
     """Return the template of an alphabet, as embossed and as felt by a sensor."""
     pad = sensor.overlay.kind == "pad"
-    felt = _pad_felt if pad else _tab_felt
+    felt = _pad_responses if pad else _tab_responses
     half = style.pitch_mm / 2 if pad else _reach_mm(alphabet, style, sensor)
     steps = math.ceil(half / STEP_MM) + (0 if pad else 1)
     axis = np.asarray((np.arange(2 * steps + 1) - steps) * STEP_MM, np.float64)
@@ -88,33 +88,39 @@ def template_of(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType) -> T
     rimmed = np.zeros((len(axis) + 2, len(axis) + 2, alphabet.order, 6), np.float32)
     values = rimmed[1:-1, 1:-1]
     for label in range(alphabet.order):
-        middle = _heard(usual[label], CROSS_TALK, sensor)
+        middle = _with_cross_talk(usual[label], CROSS_TALK, sensor)
         values[..., label, 0] = psi(middle)
         values[..., label, 1] = np.gradient(values[..., label, 0], STEP_MM, axis=1)
         values[..., label, 2] = np.gradient(values[..., label, 0], STEP_MM, axis=0)
-        values[..., label, 3] = psi(_heard(wide[label], CROSS_TALK, sensor)) - psi(middle)
-        values[..., label, 4] = psi(_heard(usual[label], 2 * CROSS_TALK, sensor)) - psi(
+        values[..., label, 3] = psi(_with_cross_talk(wide[label], CROSS_TALK, sensor)) - psi(middle)
+        values[..., label, 4] = psi(_with_cross_talk(usual[label], 2 * CROSS_TALK, sensor)) - psi(
             usual[label]
         )
         values[..., label, 5] = (psi(middle**HIGH) - psi(middle**LOW)) / (HIGH - LOW)
     ink = float(usual.sum() * STEP_MM**2 / style.pitch_mm**2) / alphabet.order
     rimmed.setflags(write=False)
-    return Template(style.pitch_mm, alphabet.order, steps * STEP_MM, rimmed, ink)
+    return ResponseTemplate(style.pitch_mm, alphabet.order, steps * STEP_MM, rimmed, ink)
 
 
-def _tab_felt(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType, axis: Array) -> Array:
+def _tab_responses(
+    alphabet: Alphabet, style: SymbolStyle, sensor: SensorType, axis: Array
+) -> Array:
     """Return the responses (order, n, n) of tabs."""
     x, y = np.meshgrid(axis, axis)
     reach = alphabet.reach * style.pitch_mm
     return np.stack(
         [
-            _felt(_presence(_distance(np.array(g.strokes, float) * reach, x, y), style), sensor)
+            _tip_response(
+                _presence(_distance(np.array(g.strokes, float) * reach, x, y), style), sensor
+            )
             for g in alphabet.glyphs
         ]
     )
 
 
-def _pad_felt(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType, axis: Array) -> Array:
+def _pad_responses(
+    alphabet: Alphabet, style: SymbolStyle, sensor: SensorType, axis: Array
+) -> Array:
     """Return the responses (order, n, n) of a pad, 1 where they are highest."""
     from scipy.ndimage import uniform_filter
 
@@ -130,11 +136,13 @@ def _pad_felt(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType, axis: 
     return np.asarray(tactels / np.percentile(tactels, PEAK))
 
 
-def _heard(felt: NDArray[np.float64], share: float, sensor: SensorType) -> NDArray[np.float64]:
+def _with_cross_talk(
+    felt: NDArray[np.float64], share: float, sensor: SensorType
+) -> NDArray[np.float64]:
     """Return responses of tactels that hear a share of what stands one tactel away, all around."""
     from scipy.signal import fftconvolve
 
-    around = fftconvolve(felt, _ring(sensor.pitch_mm), mode="same")
+    around = fftconvolve(felt, _annulus(sensor.pitch_mm), mode="same")
     return np.asarray(np.maximum((1 - share) * felt + share * around, 0.0))
 
 
@@ -165,7 +173,7 @@ def _reach_mm(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType) -> flo
     return strokes + sensor.overlay.tab_diameter_mm / 2 + sensor.pitch_mm
 
 
-def _felt(presence: NDArray[np.float64], sensor: SensorType) -> NDArray[np.float64]:
+def _tip_response(presence: NDArray[np.float64], sensor: SensorType) -> NDArray[np.float64]:
     from scipy.signal import fftconvolve
 
     cover = fftconvolve(presence, _disc(sensor.overlay.tab_diameter_mm / 2), mode="same")
@@ -181,7 +189,7 @@ def _disc(radius: float) -> NDArray[np.float64]:
     return np.asarray(disc / disc.sum())
 
 
-def _ring(radius: float) -> NDArray[np.float64]:
+def _annulus(radius: float) -> NDArray[np.float64]:
     steps = math.ceil(radius / STEP_MM) + 1
     axis = np.arange(-steps, steps + 1) * STEP_MM
     x, y = np.meshgrid(axis, axis)

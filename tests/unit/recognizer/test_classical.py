@@ -201,7 +201,7 @@ def test_a_scan_names_object_face_and_place(lab, scan, placing):
     assert answer.margin > 10
     face = next(
         encoded
-        for encoded in map(lab.encodings[0].face, range(len(lab.encodings[0].faces)))
+        for encoded in map(lab.arrays[0].face, range(len(lab.arrays[0].faces)))
         if (encoded.object, encoded.face) == ("Cube", "F2")
     )
     at = moved(scan.true[0], np.array([[s.x_mm, s.y_mm] for s in found.reading.symbols]))
@@ -274,7 +274,7 @@ def test_an_object_of_another_lab_is_not_taken_for_one_of_ours(lab, tmp_path):
 
 def test_symbols_of_a_face_are_read_as_the_database_has_them(lab, scan):
     image = merged(SENSOR, scan.readings, scan.true, Merging(placing="believed")).image
-    encoding = lab.encodings[0]
+    encoding = lab.arrays[0]
     found = symbols(image, encoding.alphabet, encoding.style)
     named = [symbol for symbol in found if symbol.label >= 0]
     assert len(named) >= 30

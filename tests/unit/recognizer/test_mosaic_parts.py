@@ -28,7 +28,7 @@ from recognizer.scan.mosaic.raster import Raster, laid_under, magnified, points_
 from recognizer.scan.mosaic.texture import kept, seen_motions
 from recognizer.scan.mosaic.touch import PlacedTouch, decoded_place, placed
 from recognizer.thesis.product import product_shift
-from recognizer.touch.recognition import Recognition, refused
+from recognizer.touch.recognition import Recognition, refusal
 from recognizer.touch.signal import Signal, signal_of
 
 SENSOR = SensorType()
@@ -111,7 +111,7 @@ def test_the_reader_s_answer_is_a_place():
     assert place is not None
     assert place.pose == pytest.approx([12, 30, -0.4])
     assert (place.covariance == spread).all()
-    assert decoded_place(refused(1, "ambiguous")) is None
+    assert decoded_place(refusal(1, "ambiguous")) is None
 
 
 # --- correlation ------------------------------------------------------------------------

@@ -15,17 +15,24 @@ from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
-from recognizer.touch.belief import Support, Thresholds, naming, weighed
+from recognizer.touch.belief import BeliefSettings, Support, symbols_to_name, weigh_cells
 from recognizer.touch.lab import open_lab
-from recognizer.touch.locate import CAP, Place, place_scores, places, rivals, shown_at
+from recognizer.touch.locate import (
+    CAP,
+    Hypothesis,
+    find_hypotheses,
+    find_rivals,
+    labels_at,
+    log_likelihood,
+)
 from recognizer.touch.pose import inside_mm
 from recognizer.touch.reader import reader_for
-from recognizer.touch.recognise import _by_few, explained, recognise
+from recognizer.touch.recognise import _refuse_few, recognise, recognise_with_hypothesis
 from recognizer.touch.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, OUTSIDE, TOO_FEW
 from recognizer.touch.signal import CONTACT_N, signal_of
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.template import psi, template_of
-from recognizer.touch.verify import readings
+from recognizer.touch.verify import verify_hypotheses
 from recognizer.validation.levels import LEVELS
 from recognizer.validation.surfaces import FOREIGN
 from recognizer.validation.trial import INSIDE_MM, Plan, drawn, sensor_of, trial
@@ -118,7 +125,7 @@ def test_nothing_pressed_is_no_contact(reader):
     found = recognise(reader, signal_of(np.full((16, 16), 9.0)), 2)
     assert not found
     assert found.reason == NO_CONTACT
-    assert explained(reader, signal_of(np.full((16, 16), 9.0)))[1] is None
+    assert recognise_with_hypothesis(reader, signal_of(np.full((16, 16), 9.0)))[1] is None
 
 
 def test_dead_rows_are_told_from_the_image(url, reader):
@@ -140,31 +147,31 @@ def test_contact_is_judged_in_its_own_unit():
 
 def test_the_reading_behind_an_answer(url, reader):
     signal = signal_of(felt(url, "Cube", "F3", Touch(28.0, 33.0, 2.0, 70.0)), newtons=True)
-    answer, reading = explained(reader, signal)
-    assert reading.encoding.face(reading.place.face).face == answer.face == "F3"
-    speaks = reading.support()
+    answer, hypothesis = recognise_with_hypothesis(reader, signal)
+    assert hypothesis.embossed.face(hypothesis.hypothesis.face).face == answer.face == "F3"
+    speaks = hypothesis.support()
     assert speaks.holds(reader.thresholds)
     assert speaks.explained > 0.85
-    assert speaks.cells >= 9
+    assert speaks.inliers >= 9
     assert speaks.clear == speaks.plain == 0
-    scores = [r.score for r in readings(reader, signal, reader.settings)]
+    scores = [r.score for r in verify_hypotheses(reader, signal, reader.settings)]
     assert scores == sorted(scores, reverse=True)
 
 
 @pytest.mark.parametrize(
     "change",
     [{"surprise": 2.0}, {"explained": 0.5}, {"clear": 2}, {"plain": 1},
-     {"explained": 0.65, "cells": 8}, {"surprise": 6.0, "explained": 0.75},
+     {"explained": 0.65, "inliers": 8}, {"surprise": 6.0, "explained": 0.75},
      {"wider": 1.1, "explained": 0.75}],
 )  # fmt: skip
 def test_what_is_not_believed(change):
-    good = Support(surprise=12.0, explained=0.8, cells=12, clear=0, plain=0, wider=0.3)
-    assert good.holds(Thresholds())
-    assert not replace(good, **change).holds(Thresholds())
+    good = Support(surprise=12.0, explained=0.8, inliers=12, clear=0, plain=0, wider=0.3)
+    assert good.holds(BeliefSettings())
+    assert not replace(good, **change).holds(BeliefSettings())
 
 
 def test_the_index_of_windows_lists_every_window(reader):
-    encoding = reader.lab.encodings[0]
+    encoding = reader.lab.arrays[0]
     order = encoding.array.order
     for windows in encoding.windows():
         down, right = windows.shape
@@ -180,7 +187,7 @@ def test_the_index_of_windows_lists_every_window(reader):
 
 
 def test_a_large_array_is_looked_up_like_a_small_one(reader):
-    encoding = reader.lab.encodings[0]
+    encoding = reader.lab.arrays[0]
     sparse = replace(encoding, dense=None, known={}, indexed=[])
     rng = np.random.default_rng(2)
     rows = rng.integers(encoding.array.rows, size=500)
@@ -192,9 +199,9 @@ def test_a_large_array_is_looked_up_like_a_small_one(reader):
 def place_of(encoding, at=40):
     """A lattice that shows the cells about a registered one without doubt."""
     row, column = divmod(int(encoding.keys[at]), encoding.array.columns)
-    place = Place(0, row, column, int(encoding.owners[at]), 0.0)
+    place = Hypothesis(0, row, column, int(encoding.owners[at]), 0.0)
     cells = np.stack(np.meshgrid(np.arange(-2, 3), np.arange(-2, 3)), axis=-1).reshape(-1, 2)
-    shown = shown_at(encoding, place, cells)
+    shown = labels_at(encoding, place, cells)
     scores = np.full((len(cells), encoding.array.order + 1), -30.0)
     scores[np.arange(len(cells)), shown] = 0.0
     fit = Fit(3.5, 3.5, 0.0, np.zeros(4), np.zeros(4), cells, scores, np.full(len(cells), 20.0),
@@ -203,36 +210,36 @@ def place_of(encoding, at=40):
 
 
 def test_a_sure_lattice_is_placed_and_a_wrong_cell_costs_its_cap(reader):
-    encoding = reader.lab.encodings[0]
+    encoding = reader.lab.arrays[0]
     place, fit = place_of(encoding)
-    best = places(encoding, (fit,), 5)[0]
+    best = find_hypotheses(encoding, (fit,), 5)[0]
     assert (best.row, best.column, best.face) == (place.row, place.column, place.face)
     assert best.score == pytest.approx(-5.0)
-    assert place_scores(encoding, fit, place) == pytest.approx(-5.0)
+    assert log_likelihood(encoding, fit, place) == pytest.approx(-5.0)
     scores = fit.scores.copy()
     middle = int(np.flatnonzero((fit.cells == 0).all(axis=1))[0])
     scores[middle] = [*np.roll(scores[middle][:-1], 1).tolist(), -30.0]
     spoiled = replace(fit, scores=scores)
-    assert place_scores(encoding, spoiled, place) == pytest.approx(-5.0 - CAP)
-    best = places(encoding, (spoiled,), 5)[0]
+    assert log_likelihood(encoding, spoiled, place) == pytest.approx(-5.0 - CAP)
+    best = find_hypotheses(encoding, (spoiled,), 5)[0]
     assert (best.row, best.column, best.face) == (place.row, place.column, place.face)
 
 
 @pytest.mark.parametrize("other", [90, 150, 333])
 def test_a_place_that_fits_nearly_as_well_is_found_wherever_it_is(reader, other):
-    encoding = reader.lab.encodings[0]
+    encoding = reader.lab.arrays[0]
     place, fit = place_of(encoding)
     row, column = divmod(int(encoding.keys[other]), encoding.array.columns)
-    second = Place(0, row, column, int(encoding.owners[other]), 0.0)
-    shown = shown_at(encoding, second, fit.cells)
+    second = Hypothesis(0, row, column, int(encoding.owners[other]), 0.0)
+    shown = labels_at(encoding, second, fit.cells)
     rows = np.arange(len(shown))
     scores = fit.scores.copy()
     scores[rows, shown] = np.maximum(scores[rows, shown], -0.25)
     alike = replace(fit, scores=scores)
-    found = rivals(encoding, alike, place, 3, 8)
+    found = find_rivals(encoding, alike, place, 3, 8)
     best = found[0]
     assert (best.row, best.column, best.face, best.fit) == (row, column, second.face, 3)
-    assert best.score == pytest.approx(place_scores(encoding, alike, second))
+    assert best.score == pytest.approx(log_likelihood(encoding, alike, second))
     assert all((p.row, p.column) != (place.row, place.column) for p in found)
 
 
@@ -240,64 +247,64 @@ def at_the_rim(url, reader):
     """Clean touches ever nearer to an edge and a corner: recognition and cells that speak."""
     for x, y in [(6.0, 30.0), (3.0, 30.0), (0.5, 30.0), (6.0, 6.0), (3.0, 5.0), (2.0, 1.0)]:
         forces = felt(url, "Cube", "F1", Touch(x, y, 0.5, 80.0))
-        found, reading = explained(reader, signal_of(forces, newtons=True))
-        yield found, reading.support().cells
+        found, hypothesis = recognise_with_hypothesis(reader, signal_of(forces, newtons=True))
+        yield found, hypothesis.support().inliers
 
 
 def test_few_symbols_answer_only_if_they_can_name_a_place(url, reader):
-    encoding = reader.lab.encodings[0]
-    fewest, order = naming(encoding), encoding.array.order
+    encoding = reader.lab.arrays[0]
+    fewest, order = symbols_to_name(encoding), encoding.array.order
     assert order ** (fewest - 1) < len(encoding.keys) <= order**fewest
     limits = reader.thresholds
     seen = [(bool(found), cells) for found, cells in at_the_rim(url, reader)]
     assert all(cells >= fewest for told, cells in seen if told)
-    assert any(told and cells < limits.many for told, cells in seen)
+    assert any(told and cells < limits.many_inliers for told, cells in seen)
     assert not all(told for told, _ in seen)
 
 
 def test_a_cell_that_says_hardly_anything_does_not_speak_for_a_place(url, reader):
     forces = felt(url, "Cube", "F1", Touch(32.0, 24.0, 0.7, 80.0))
-    _, reading = explained(reader, signal_of(forces, newtons=True))
-    encoding, fit, place = reading.encoding, reading.fit, reading.place
-    told = weighed(encoding, fit, place).told
-    held = shown_at(encoding, place, fit.cells)
-    assert told.sum() >= reader.thresholds.many
+    _, read = recognise_with_hypothesis(reader, signal_of(forces, newtons=True))
+    encoding, fit, place = read.embossed, read.fit, read.hypothesis
+    told = weigh_cells(encoding, fit, place).agree
+    held = labels_at(encoding, place, fit.cells)
+    assert told.sum() >= reader.thresholds.many_inliers
     assert (held[told] < encoding.array.order).all()
     scores = fit.scores.copy()
     mute, torn = np.flatnonzero(told)[:2]
     scores[mute] = [0.0, -0.2, -0.2, -0.7, -0.5]  # looked at, and nearly as likely anything
     scores[torn] = -9.0
     scores[torn, [held[torn], (held[torn] + 1) % encoding.array.order]] = 0.0, -0.1
-    again = weighed(encoding, replace(fit, scores=scores), place)
+    again = weigh_cells(encoding, replace(fit, scores=scores), place)
     assert again.seen[mute]
-    assert np.flatnonzero(told ^ again.told).tolist() == [mute]
+    assert np.flatnonzero(told ^ again.agree).tolist() == [mute]
     scores[torn, (held[torn] + 1) % encoding.array.order] = 0.1
-    again = weighed(encoding, replace(fit, scores=scores), place)
-    assert np.flatnonzero(told ^ again.told).tolist() == sorted([mute, torn])
+    again = weigh_cells(encoding, replace(fit, scores=scores), place)
+    assert np.flatnonzero(told ^ again.agree).tolist() == sorted([mute, torn])
 
 
 def test_few_symbols_must_leave_other_places_far_behind(url, reader):
-    strict = replace(reader, thresholds=Thresholds(margin_by_few=1e6))
+    strict = replace(reader, thresholds=BeliefSettings(margin_by_few=1e6))
     for found, cells in at_the_rim(url, strict):
-        assert not found or cells >= strict.thresholds.many
+        assert not found or cells >= strict.thresholds.many_inliers
         assert found or found.reason in (AMBIGUOUS, NOT_ENCODED)
 
 
 def test_what_few_symbols_say_is_refused_by_their_number_first(url, reader):
-    encoding, limits = reader.lab.encodings[0], reader.thresholds
+    encoding, limits = reader.lab.arrays[0], reader.thresholds
     told = recognise(reader, signal_of(felt(url, "Cube", "F1", Touch(32.0, 24.0, 0.7, 80.0)),
                                        newtons=True))  # fmt: skip
-    near, fewest = replace(told, margin=limits.margin_by_few - 0.1), naming(encoding)
-    assert _by_few(limits, encoding, told, fewest) is told
-    assert _by_few(limits, encoding, told, fewest - 1).reason == TOO_FEW
-    assert _by_few(limits, encoding, near, fewest).reason == AMBIGUOUS
+    near, fewest = replace(told, margin=limits.margin_by_few - 0.1), symbols_to_name(encoding)
+    assert _refuse_few(limits, encoding, told, fewest) is told
+    assert _refuse_few(limits, encoding, told, fewest - 1).reason == TOO_FEW
+    assert _refuse_few(limits, encoding, near, fewest).reason == AMBIGUOUS
 
 
 def test_a_point_in_a_face(reader):
     face = next(
-        reader.lab.encodings[0].face(n)
+        reader.lab.arrays[0].face(n)
         for n in range(10)
-        if reader.lab.encodings[0].face(n).object == "Cube"
+        if reader.lab.arrays[0].face(n).object == "Cube"
     )
     assert inside_mm(face, 30.0, 30.0) == pytest.approx(30.0)
     assert inside_mm(face, 30.0, -2.0) == pytest.approx(-2.0)
@@ -306,7 +313,7 @@ def test_a_point_in_a_face(reader):
 
 @pytest.mark.parametrize("overlay", ["tab", "pad"])
 def test_a_template_is_the_derivative_of_itself(reader, overlay):
-    encoding = reader.lab.encodings[0]
+    encoding = reader.lab.arrays[0]
     template = template_of(encoding.alphabet, encoding.style, sensor_of(overlay))
     at = np.array([[-1.2, 0.4], [0.3, -1.7], [1.6, 1.1]])
     by = 0.1

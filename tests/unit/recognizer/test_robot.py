@@ -11,7 +11,7 @@ from probe.arm.links import Arm, forward
 from probe.errors import PoseError
 from probe.wrist.distances import counts_of, distances_at
 from probe.wrist.geometry import Wrist, gripper_to_plate, plate_to_sensor
-from recognizer.touch.recognition import Recognition, refused
+from recognizer.touch.recognition import Recognition, refusal
 from recognizer.touch.robot import Seating, carried_pose, object_pose
 
 JOINTS = np.radians([20.0, -40.0, 70.0, -25.0, 15.0])
@@ -102,6 +102,6 @@ def test_arm_and_wrist_carry_the_sensor():
 
 def test_what_is_not_known():
     sensor = SensorPose(np.eye(4), np.zeros((6, 6)))
-    assert object_pose(refused(0, "ambiguous"), sensor) is None
+    assert object_pose(refusal(0, "ambiguous"), sensor) is None
     with pytest.raises(PoseError, match="end stops"):
         carried_pose(Arm(), Wrist(), JOINTS, np.zeros(5), [0, 0, 0, 0])

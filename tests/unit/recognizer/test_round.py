@@ -14,8 +14,8 @@ from probe.contact.press import press
 from probe.sensor import SensorType
 from probe.surface.face import endless
 from recognizer.touch.lab import FINER, LEAST_MM, MOST_MM, radii_of
-from recognizer.touch.symbols.bent import bends_of
-from recognizer.touch.symbols.gain import Image, bent, felt_under, image_of
+from recognizer.touch.symbols.bends import guess_bends
+from recognizer.touch.symbols.gain import Image, bend_image, image_of, normalize_image
 from recognizer.touch.symbols.pressing import pressing_of
 
 SENSOR = SensorType()
@@ -44,9 +44,9 @@ class Rolled:
 def test_a_very_wide_bend_is_no_bend():
     flat = image(np.random.default_rng(1).uniform(0, 2, (16, 16)))
     gain = np.array([[0.1, 0.4, 0.1, -0.05], [0.0, 0.6, 0.0, 0.0]])
-    round_one = felt_under(bent(flat, SENSOR, Bend(1e9, 0.4)), gain)
+    round_one = normalize_image(bend_image(flat, SENSOR, Bend(1e9, 0.4)), gain)
     for name in ("psi", "press", "bare", "contact", "measure"):
-        plain = getattr(felt_under(flat, gain), name)
+        plain = getattr(normalize_image(flat, gain), name)
         assert getattr(round_one, name) == pytest.approx(plain, rel=1e-4, abs=1e-5)
 
 
@@ -54,16 +54,20 @@ def test_shares_are_gains_of_one_image():
     flat = image(np.random.default_rng(2).uniform(0, 2, (16, 16)))
     gain = np.array([0.1, 0.5, 0.1, 0.0])
     shares = (0.6, 1.0)
-    several = felt_under(bent(flat, SENSOR, Bend(40, 0.4), shares), np.tile(gain, (2, 1)))
+    several = normalize_image(
+        bend_image(flat, SENSOR, Bend(40, 0.4), shares), np.tile(gain, (2, 1))
+    )
     for k, share in enumerate(shares):
-        alone = felt_under(bent(flat, SENSOR, Bend(40, 0.4), (share,)), gain[None])
+        alone = normalize_image(bend_image(flat, SENSOR, Bend(40, 0.4), (share,)), gain[None])
         assert (several.psi[k] == alone.psi[0]).all()
         assert several.measure[k] == pytest.approx(alone.measure[0], rel=1e-12)
 
 
 def test_beside_the_strip_nothing_is_expected():
     flat = image(np.ones((16, 16)))
-    felt = felt_under(bent(flat, SENSOR, Bend(20.0, math.pi / 2)), np.array([[0.0, 0.4, 0, 0]]))
+    felt = normalize_image(
+        bend_image(flat, SENSOR, Bend(20.0, math.pi / 2)), np.array([[0.0, 0.4, 0, 0]])
+    )
     across = np.abs(SENSOR.centres_mm().reshape(-1, 2)[:, 0])
     assert (felt.contact[0][across > 9] == 0).all()
     assert (felt.contact[0][across < 4] == 1).all()
@@ -74,7 +78,7 @@ def test_beside_the_strip_nothing_is_expected():
 def test_forces_tell_along_which_line_a_cylinder_lies(radius, degrees):
     surface = Rolled(radius, math.radians(degrees))
     forces = press(surface, SENSOR, Touch(0, 0, 0, 60.0)).forces_n
-    found = bends_of(image(forces), SENSOR, (20.0, 40.0, 80.0), INK, 3)
+    found = guess_bends(image(forces), SENSOR, (20.0, 40.0, 80.0), INK, 3)
     assert 1 <= len(found) <= 3
     turns = [math.remainder(b.bend.towards_rad - math.radians(degrees), math.pi) for b in found]
     assert min(map(abs, turns)) < math.radians(12)
@@ -83,7 +87,7 @@ def test_forces_tell_along_which_line_a_cylinder_lies(radius, degrees):
 
 
 def test_no_forces_no_bend():
-    assert bends_of(image(np.zeros((16, 16))), SENSOR, (40.0,), INK, 3) == []
+    assert guess_bends(image(np.zeros((16, 16))), SENSOR, (40.0,), INK, 3) == []
 
 
 def test_radii_are_near_to_those_of_the_faces():

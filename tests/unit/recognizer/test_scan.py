@@ -138,7 +138,7 @@ def test_steps_without_an_arm_are_enough(lab, reader):
 
 @pytest.mark.parametrize("kind", ["random symbols", "ridges"])
 def test_a_surface_that_is_not_registered_is_no_object(reader, kind):
-    surface = FOREIGN[kind](reader.lab.encodings[0], np.random.default_rng(8))
+    surface = FOREIGN[kind](reader.lab.arrays[0], np.random.default_rng(8))
     touches, _ = scanned(surface, PLACES[:8], 0.5, TYPICAL, 3)
     scan = begun(reader)
     for touch in touches:

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from probe.frame import frame_from
-from recognizer.touch.contacts import Cutting, every_frame, touches
+from recognizer.touch.contacts import ContactSettings, cut_touches, every_frame
 
 RNG = np.random.default_rng(8)
 A, B, C = (np.where(RNG.random((16, 16)) < 0.35, RNG.uniform(60, 300, (16, 16)), 0.0)
            for _ in range(3))  # fmt: skip
 REST = np.zeros((16, 16))
-CUT = Cutting()
+CUT = ContactSettings()
 DOWN = np.linspace(0.1, 0.9, 9)
 
 
@@ -31,7 +31,7 @@ def pressed(image, hold=40):
 
 
 def cut(*images, **named):
-    return list(touches(film(*images), **named))
+    return list(cut_touches(film(*images), **named))
 
 
 def test_a_press_is_one_touch_read_where_it_rests():
@@ -51,7 +51,7 @@ def test_every_press_is_a_touch_also_at_the_same_place():
 
 def test_a_touch_is_told_as_soon_as_it_rests():
     frames = film(*pressed(A, hold=500))
-    next(touches(frames))
+    next(cut_touches(frames))
     assert next(frames).seq <= len(DOWN) + CUT.enough + 1
 
 
@@ -93,7 +93,7 @@ def test_images_that_do_not_follow_each_other_are_touches():
 def test_many_unlike_images_do_not_wait_for_the_end():
     images = [A, B, C] * 100
     frames = film(*images)
-    reading = touches(frames)
+    reading = cut_touches(frames)
     next(reading)
     assert next(frames).seq <= CUT.fragments + 2
     assert len(list(reading)) == len(images) - 1 - 1  # one frame was taken out here

@@ -31,7 +31,7 @@ _FAINT = 0.03  # root of a response below which its slope is not trusted
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bent:
+class BendGuess:
     """A bend that a touch may have."""
 
     bend: Bend  #: in the axes of the sensor, of the face without its symbols
@@ -39,9 +39,9 @@ class Bent:
     left: float  #: share of the image that it does not explain
 
 
-def bends_of(
+def guess_bends(
     image: Image, sensor: SensorType, radii_mm: tuple[float, ...], ink: float, keep: int
-) -> list[Bent]:
+) -> list[BendGuess]:
     """Return the bends that explain an image best, at most `keep`, no two of them alike.
 
     Parameters
@@ -64,20 +64,20 @@ def bends_of(
     whole = float(seen @ seen)
     if not whole > 0:
         return []
-    plane, root, left = _fitted(image, falls, ink, smooth, seen)
-    found: list[Bent] = []
+    plane, root, left = _fit_gains(image, falls, ink, smooth, seen)
+    found: list[BendGuess] = []
     for b in np.argsort(left, kind="stable").tolist():
         if len(found) == keep:
             break
-        if any(_alike(bends[b], one.bend) for one in found):
+        if any(_same_bend(bends[b], one.bend) for one in found):
             continue
         scale = 2.0 * math.log(max(float(root[b]), 1e-9))
         gain = bounded_gain(np.array([[scale, *plane[b]]]))[0]
-        found.append(Bent(bends[b], gain, float(left[b]) / whole))
+        found.append(BendGuess(bends[b], gain, float(left[b]) / whole))
     return found
 
 
-def _alike(a: Bend, b: Bend) -> bool:
+def _same_bend(a: Bend, b: Bend) -> bool:
     turn = math.remainder(a.towards_rad - b.towards_rad, math.pi)
     return a.radius_mm == b.radius_mm and abs(turn) < APART
 
@@ -102,7 +102,7 @@ class _Average:
         return np.asarray(sums.reshape(values.shape))
 
 
-def _fitted(
+def _fit_gains(
     image: Image, falls: Array, ink: float, smooth: _Average, seen: Array
 ) -> tuple[Array, Array, Array]:
     """Return planes (b, 3), roots of scales (b,), and what is left (b,)."""
