@@ -16,12 +16,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
 from encoded_objects import console
 from encoded_objects.console import Action, output
+from encoded_objects.console.progress import progress_bar
+
+if TYPE_CHECKING:
+    from recognizer.validation.result import ValidationResult
 
 NAME = "validate-set"
 TOOLS = ("compare", "repeat", "report")
@@ -65,7 +69,7 @@ def _application(arguments: list[str]) -> typer.Typer:
 
 
 @app.command(help=HELP, epilog=EPILOG)
-def validate(
+def touch_set(
     specs: Annotated[
         list[Path] | None,
         typer.Argument(metavar="SPEC.yaml...", show_default=False,
@@ -132,21 +136,21 @@ def validate(
     """Read the options of `validate-set SPEC.yaml...`; `HELP` is what people see."""
 
     def action() -> int:
-        from recognizer.validation import told
-
         if version:
             output.version(NAME, as_json=as_json)
-            return 0
-        from recognizer.validation.complete import Wishes, validate_set
+            return console.DONE
+        from recognizer.validation.pipeline import validate
+        from recognizer.validation.progress import TouchProgress
 
-        wishes = Wishes(touches, seed, kinds, levels, overlay, surfaces, study, shard)
-        with told.progress_bar() as bar:
-            summary = validate_set(
-                folder, wishes, list(specs or ()), database,
-                processes=processes, cluster=cluster, resume=resume, told=bar,
+        with progress_bar("making the set") as bar:
+            result = validate(
+                specs or (), folder=folder, touches=touches, database=database, kinds=kinds,
+                levels=levels, overlay=overlay, surfaces=surfaces, study=study, shard=shard,
+                seed=seed, jobs=processes, cluster=cluster, resume=resume,
+                progress=TouchProgress(bar),
             )  # fmt: skip
-        told.summary(summary, folder, as_json=as_json)
-        return summary.exit_code(fail_under)
+        _say(result, as_json=as_json)
+        return result.exit_code(fail_under)
 
     return action
 
@@ -164,11 +168,11 @@ def compare(
     """Show two runs side by side: what became better, worse, or is the same within chance."""
 
     def action() -> int:
-        from recognizer.validation import told
-        from recognizer.validation.compare import compared
+        from recognizer.validation import text
+        from recognizer.validation.compare import compare_runs
 
-        told.comparison(compared(first, second, output), output, as_json=as_json)
-        return 0
+        text.comparison(compare_runs(first, second, output), output, as_json=as_json)
+        return console.DONE
 
     return action
 
@@ -186,11 +190,11 @@ def repeat(
     """Do one touch again: surface, counts, fitted symbols, answer and truth."""
 
     def action() -> int:
-        from recognizer.validation import told
-        from recognizer.validation.repeat import repeated
+        from recognizer.validation import text
+        from recognizer.validation.repeat import repeat_touch
 
-        told.repetition(repeated(folder, number, plot), plot, as_json=as_json)
-        return 0
+        text.repetition(repeat_touch(folder, number, plot), plot, as_json=as_json)
+        return console.DONE
 
     return action
 
@@ -203,13 +207,20 @@ def report(
     """Write results and report anew from the touches that are there."""
 
     def action() -> int:
-        from recognizer.validation import told
-        from recognizer.validation.complete import report_anew
+        from recognizer.validation.pipeline import report_anew
 
-        told.summary(report_anew(folder), folder, as_json=as_json)
-        return 0
+        _say(report_anew(folder), as_json=as_json)
+        return console.DONE
 
     return action
+
+
+def _say(result: ValidationResult, *, as_json: bool) -> None:
+    """Say how a run ended."""
+    if as_json:
+        output.write_json(result.as_json())
+    else:
+        output.write(f"{result}\nnext: open {result.folder / 'report.html'}")
 
 
 if __name__ == "__main__":

@@ -12,16 +12,16 @@ import math
 from pathlib import Path
 from typing import Any
 
-from recognizer.validation.complete import RESULTS, TIMES_FILE
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.pictures import against
+from recognizer.validation.pipeline import RESULTS, TIMES_FILE
 from recognizer.validation.report import PAIR, environment
 from recognizer.validation.run import write_text
 
 SAME, BETTER, WORSE = "same within chance", "better", "worse"
 
 
-def compared(first: Path, second: Path, output: Path | None) -> dict[str, Any]:
+def compare_runs(first: Path, second: Path, output: Path | None) -> dict[str, Any]:
     """Compare two runs.
 
     Parameters
@@ -40,8 +40,8 @@ def compared(first: Path, second: Path, output: Path | None) -> dict[str, Any]:
     ValidationError
         A folder holds no run that is done.
     """
-    a, b = _read(first, RESULTS), _read(second, RESULTS)
-    times = _read(first, TIMES_FILE), _read(second, TIMES_FILE)
+    a, b = _read_json(first, RESULTS), _read_json(second, RESULTS)
+    times = _read_json(first, TIMES_FILE), _read_json(second, TIMES_FILE)
     found = {"lines": _lines(a, b, times), "differ": _differ(a["provenance"], b["provenance"])}
     if output is not None:
         page = environment().get_template(PAIR)
@@ -50,7 +50,7 @@ def compared(first: Path, second: Path, output: Path | None) -> dict[str, Any]:
     return found
 
 
-def _read(folder: Path, name: str) -> dict[str, Any]:
+def _read_json(folder: Path, name: str) -> dict[str, Any]:
     try:
         values: dict[str, Any] = json.loads((folder / name).read_text("utf-8"))
     except (OSError, ValueError) as error:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+from encoded_objects.console import DATABASE, FAILED
 from recognizer.errors import RecognizerError
-
-FAILED, DATABASE = 1, 4
 
 
 class ValidationError(RecognizerError):

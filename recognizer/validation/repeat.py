@@ -38,7 +38,7 @@ GRID = 240  #: points of the picture of a surface, each way
 FORMATS = (".png", ".svg", ".pdf")
 
 
-def repeated(folder: Path, number: int, plot: Path | None) -> dict[str, Any]:
+def repeat_touch(folder: Path, number: int, plot: Path | None) -> dict[str, Any]:
     """Do a touch again.
 
     Parameters

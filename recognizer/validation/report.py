@@ -11,13 +11,18 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from encoded_objects.errors import require
 from recognizer.validation import pictures
-from recognizer.validation.told import check_text
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
 PAGE, PAIR = "report.html.j2", "compare.html.j2"
+
+
+def require_report(command: str) -> None:
+    """See to it that what writes tables, pictures and pages is installed."""
+    require("pyarrow", "matplotlib", "jinja2", extra="report", purpose=command)
 
 
 def page_of(results: dict[str, Any], times: dict[str, Any], rows: dict[str, Any]) -> str:
@@ -37,11 +42,7 @@ def page_of(results: dict[str, Any], times: dict[str, Any], rows: dict[str, Any]
         "margins": pictures.margins(rows),
         "work": pictures.work_precision(results["study"], times) if results["study"] else "",
     }
-    return (
-        environment()
-        .get_template(PAGE)
-        .render(r=results, times=times, pictures=drawn, check_text=check_text)
-    )
+    return environment().get_template(PAGE).render(r=results, times=times, pictures=drawn)
 
 
 @lru_cache(maxsize=1)

@@ -21,7 +21,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from generator.database.url import normal_url
 from recognizer.validation.campaign import (
@@ -34,24 +34,13 @@ from recognizer.validation.campaign import (
 )
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.made import LAB, PARTS, make_parts, set_digest
+from recognizer.validation.progress import TouchProgress
 from recognizer.validation.rows import Row, Time
 from recognizer.validation.shards import done_shards, write_shard
 from recognizer.validation.work import Touched, Work, Workers, code_digest
 
 ASKED = "asked.json"
 FORMAT = 1
-
-
-class Told(Protocol):
-    """What a run tells about itself."""
-
-    def stage(self, text: str, touches: int, done: int) -> None:
-        """Say what begins, how many touches it has, and how many of them were done before."""
-        ...
-
-    def touched(self, rows: tuple[Row, ...]) -> None:
-        """Say what became of some more touches."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,17 +114,17 @@ def prepare(
     return asked
 
 
-def touch_all(asked: Asked, folder: Path, workers: Workers, told: Told) -> None:
+def touch_all(asked: Asked, folder: Path, workers: Workers, progress: TouchProgress) -> None:
     """Touch what is not touched yet, and write every shard as soon as it is whole."""
     for series in series_of(asked.campaign):
         there = done_shards(folder, series)
         left = [shard for shard in range(shards_of(series)) if shard not in there]
         pieces = {shard: list(pieces_of(series, shard)) for shard in left}
         touches = sum(piece.last - piece.first for each in pieces.values() for piece in each)
-        told.stage(series.name, series.touches, series.touches - touches)
+        progress.begin(series.name, series.touches, series.touches - touches)
         waiting = [piece for each in pieces.values() for piece in each]
         if waiting:
-            _gather(workers, asked.work(folder), folder, series, pieces, waiting, told)
+            _gather(workers, asked.work(folder), folder, series, pieces, waiting, progress)
 
 
 def _gather(
@@ -145,7 +134,7 @@ def _gather(
     series: Series,
     pieces: dict[int, list[Piece]],
     waiting: list[Piece],
-    told: Told,
+    progress: TouchProgress,
 ) -> None:
     shard_at = {piece: shard for shard, each in pieces.items() for piece in each}
     rows: dict[int, list[Row]] = {shard: [] for shard in pieces}
@@ -159,7 +148,7 @@ def _gather(
         open_pieces[shard] -= 1
         if open_pieces[shard] == 0:
             write_shard(folder, series.name, shard, rows.pop(shard), times.pop(shard))
-        told.touched(done.rows)
+        progress.add(done.rows)
 
 
 @contextmanager

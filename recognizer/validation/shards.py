@@ -11,25 +11,15 @@ import os
 from collections.abc import Iterable
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
-
-import pyarrow as pa
-import pyarrow.parquet as pq
+from typing import TYPE_CHECKING, Any
 
 from recognizer.validation.campaign import Series, shards_of
 from recognizer.validation.rows import COLUMNS, Row, Time
 
+if TYPE_CHECKING:
+    import pyarrow as pa
+
 SHARDS, TIMES = "shards", "times"
-_TYPES = {"text": pa.string(), "whole": pa.int64(), "truth": pa.bool_()}
-SCHEMA = pa.schema(
-    [
-        (name, pa.float64() if isinstance(what, int) else _TYPES[what])
-        for name, what in COLUMNS.items()
-    ]
-)
-TIME_SCHEMA = pa.schema(
-    [("number", pa.int64()), ("drawing", pa.float64()), ("reading", pa.float64())]
-)
 GROUP = 100_000  #: rows that a file holds together
 _UNDONE = ".writing"
 
@@ -39,20 +29,34 @@ def shard_file(folder: Path, series: str, shard: int, what: str = SHARDS) -> Pat
     return folder / what / series / f"{shard:05d}.parquet"
 
 
+def row_schema() -> pa.Schema:
+    """Return the types of `rows.COLUMNS` in a file."""
+    import pyarrow as pa
+
+    types = {"text": pa.string(), "whole": pa.int64(), "truth": pa.bool_()}
+    return pa.schema([(name, types.get(str(what), pa.float64())) for name, what in COLUMNS.items()])
+
+
 def write_shard(
     folder: Path, series: str, shard: int, rows: Iterable[Row], times: Iterable[Time]
 ) -> None:
     """Write a shard and its times, in the order of the touches' numbers."""
+    import pyarrow as pa
+
     ordered = sorted(rows, key=lambda row: row["number"])
     spent = sorted(times, key=lambda time: time.number)
-    names = [field.name for field in fields(Time)]
-    columns = {name: [getattr(time, name) for time in spent] for name in names}
-    write_table(pa.table(columns, schema=TIME_SCHEMA), shard_file(folder, series, shard, TIMES))
-    write_table(pa.Table.from_pylist(ordered, schema=SCHEMA), shard_file(folder, series, shard))
+    schema = pa.schema([(f.name, pa.int64() if f.name == "number" else pa.float64())
+                        for f in fields(Time)])  # fmt: skip
+    columns = {name: [getattr(time, name) for time in spent] for name in schema.names}
+    write_table(pa.table(columns, schema=schema), shard_file(folder, series, shard, TIMES))
+    table = pa.Table.from_pylist(ordered, schema=row_schema())
+    write_table(table, shard_file(folder, series, shard))
 
 
 def write_table(table: pa.Table, path: Path) -> None:
     """Write a table under a name that it gets when all of it is on the disk."""
+    import pyarrow.parquet as pq
+
     path.parent.mkdir(parents=True, exist_ok=True)
     undone = path.with_name(path.name + _UNDONE)
     with open(undone, "wb") as file:
@@ -73,6 +77,9 @@ def done_shards(folder: Path, series: Series) -> set[int]:
 
 def read_series(folder: Path, series: Series, what: str = SHARDS) -> pa.Table:
     """Return all rows, or all times, of a series that is done."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     files = [shard_file(folder, series.name, shard, what) for shard in range(shards_of(series))]
     return pa.concat_tables([pq.read_table(file) for file in files]).combine_chunks()
 

@@ -63,10 +63,20 @@ def begun(*arguments: str) -> subprocess.Popen:
 
 
 def wait_for(holds, seconds=60.0):
+    """Return what `holds` returns, as soon as that is true."""
     end = time.monotonic() + seconds
-    while not holds():
+    while not (found := holds()):
         assert time.monotonic() < end, "it takes too long"
         time.sleep(0.02)
+    return found
+
+
+def whole_json(path: Path):
+    """Return what a file holds; None while it is not there, or is being written."""
+    try:
+        return json.loads(path.read_text())
+    except (FileNotFoundError, ValueError):
+        return None
 
 
 def left_of(session: int) -> list[int]:
@@ -139,8 +149,7 @@ def test_a_cluster_of_two_workers_one_of_them_killed(spec, reference, tmp_path):
 
     try:
         start("scheduler", "--port", "0", "--host", "127.0.0.1", "--scheduler-file", str(address))
-        wait_for(address.exists)
-        url = json.loads(address.read_text())["address"]
+        url = wait_for(lambda: whole_json(address))["address"]
         for _ in range(2):
             start("worker", url, "--nthreads", "1", "--no-nanny")
         folder = tmp_path / "run"

@@ -3,25 +3,26 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
 from recognizer.validation.campaign import Campaign, series_of
-from recognizer.validation.complete import Summary
+from recognizer.validation.command import run
 from recognizer.validation.extremes import pressed
+from recognizer.validation.result import ValidationResult, bound_from, result_from
 from recognizer.validation.results import results_of
 from recognizer.validation.rows import Time
 from recognizer.validation.shards import (
-    SCHEMA,
     columns_of,
     done_shards,
     read_series,
+    row_schema,
     shard_file,
     write_shard,
 )
-from recognizer.validation.told import check_text
 
 NAN = float("nan")
 
@@ -88,7 +89,20 @@ def test_counts_confusion_and_worst(tmp_path):
     assert place["value"] == pytest.approx(0.05)
     assert place["holds"]
     assert turn["holds"]
-    assert all(check_text(check) for check in found["verdict"])
+    assert [str(bound_from(line)) for line in found["verdict"]] == [
+        "wrong answers, all touches: 1 of 10, 10.000% (1.788% ... 40.415%), bound = 0.0%",
+        (
+            "answered, of touches that show enough symbols: 8 of 9, 88.889% "
+            "(56.500% ... 98.011%), bound >= 99.5%"
+        ),
+        "pose, rms, under strong mismatch: 0.050 mm, bound <= 0.1 mm",
+        "turn, rms, under strong mismatch: 0.200 degrees, bound <= 0.3 degrees",
+    ]
+    result = result_from(found, 1.25, tmp_path)
+    assert (result.holds, result.fair, result.fair_right) == (False, 9, 7)
+    assert str(result).startswith("10 touches: 7 right, 1 wrong, 2 rejected; pose 0.15")
+    assert str(result).count("\n  FAILS  ") == 2
+    assert result.as_json()["folder"] == str(tmp_path)
     json.dumps(found, allow_nan=False)
 
 
@@ -124,17 +138,32 @@ def test_a_shard_is_there_when_it_is_whole(tmp_path):
     write_shard(tmp_path, series.name, 1, [row(4), row(3)], [Time(4, 1, 1), Time(3, 1, 1)])
     assert done_shards(tmp_path, series) == {1}
     table = pq.read_table(shard_file(tmp_path, series.name, 1))
-    assert table.schema.equals(SCHEMA)
+    assert table.schema.equals(row_schema())
     assert table.column("number").to_pylist() == [3, 4]
     assert not [path for path in tmp_path.rglob("*") if path.suffix == ".writing"]
 
 
 def test_fail_under():
-    summary = Summary(100, 98, 0, 2, 0.1, 0.1, 1.0, 50, 49, [])
-    assert summary.exit_code(None) == 0
-    assert summary.exit_code(98.0) == 0
-    assert summary.exit_code(98.5) == 1
-    assert Summary(100, 97, 1, 2, 0.1, 0.1, 1.0, 50, 50, []).exit_code(10.0) == 1
+    def ended(wrong, fair_right):
+        return ValidationResult(
+            100, 98 - wrong, wrong, 2, 0.1, 0.1, 1.0, 50, fair_right, (), Path("x")
+        )
+
+    assert ended(0, 49).exit_code(None) == 0
+    assert ended(0, 49).exit_code(98.0) == 0
+    assert ended(0, 49).exit_code(98.5) == 1
+    assert ended(1, 50).exit_code(10.0) == 1
+
+
+def test_what_a_plain_install_lacks_is_said_in_one_line(monkeypatch, capsys):
+    for library in ("pyarrow", "matplotlib", "jinja2"):
+        with monkeypatch.context() as without:
+            without.setitem(sys.modules, library, None)
+            assert run(["--touches", "5", "-o", "nowhere"]) == 2
+            said = capsys.readouterr().err
+            assert f"validate-set needs {library}" in said
+            assert "pip install 'encoded-objects[report]'" in said
+    assert not Path("nowhere").exists()
 
 
 def test_stiff_and_extreme_scenes_are_finite_or_refused():

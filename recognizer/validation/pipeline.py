@@ -1,12 +1,13 @@
 """From what a person asks to the finished folder: set, touches, results, report.
 
-`validate_set` is `validate-set SPEC...`; `report_anew` makes the results and the page again
-from the touches that are there.
+`validate` is `validate-set SPEC...`; `report_anew` makes the results and the page again from
+the touches that are there.
 """
 
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -23,17 +24,18 @@ from recognizer.validation.campaign import (
     series_of,
     shards_of,
 )
-from recognizer.validation.errors import FAILED, ValidationError
+from recognizer.validation.errors import ValidationError
 from recognizer.validation.extremes import extremes
 from recognizer.validation.left_out import left_out
 from recognizer.validation.precision import contact_study, decoder_study, reader_study
+from recognizer.validation.progress import TouchProgress
 from recognizer.validation.provenance import circumstances, provenance, rule
-from recognizer.validation.report import page_of
+from recognizer.validation.report import page_of, require_report
+from recognizer.validation.result import ValidationResult, result_from
 from recognizer.validation.results import results_of
 from recognizer.validation.run import (
     ASKED,
     Asked,
-    Told,
     alone,
     prepare,
     read_asked,
@@ -59,8 +61,8 @@ STUDY_SHARE, STUDY = 0.05, (10, 200)  #: touches of a reader of the study: share
 
 
 @dataclass(frozen=True, slots=True)
-class Wishes:
-    """Options as they were given; None or empty: not given."""
+class CampaignOptions:
+    """Options as they were given; None or empty: as in the run that is resumed, or the default."""
 
     touches: int | None = None
     seed: int | None = None
@@ -72,86 +74,89 @@ class Wishes:
     shard: int | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Summary:
-    """How a run ended."""
-
-    touches: int
-    right: int
-    wrong: int
-    rejected: int
-    rms_mm: float | None
-    rms_deg: float | None
-    seconds: float  #: wall time of this run
-    fair: int  #: touches that show enough symbols
-    fair_right: int  #: of these, how many are answered right
-    checks: list[dict[str, Any]]
-
-    @property
-    def holds(self) -> bool:
-        """Whether every bound holds."""
-        return all(check["holds"] for check in self.checks)
-
-    def as_json(self) -> dict[str, Any]:
-        """Return what `--json` prints."""
-        names = ("touches", "right", "wrong", "rejected", "rms_mm", "rms_deg", "seconds")
-        return {name: getattr(self, name) for name in names}
-
-    def exit_code(self, fail_under: float | None) -> int:
-        """Return 1 if a touch was answered wrong or too few were answered right."""
-        if fail_under is None:
-            return 0
-        share = 100 * self.fair_right / self.fair if self.fair else 100.0
-        return FAILED if self.wrong or share < fail_under else 0
-
-
-def validate_set(
-    folder: Path,
-    wishes: Wishes,
-    specs: list[Path],
-    database: str,
+def validate(
+    specs: str | Path | Sequence[str | Path] = (),
     *,
-    processes: int,
-    cluster: str,
-    resume: bool,
-    told: Told,
-) -> Summary:
-    """Make a set, touch it, and write the report.
+    folder: str | Path = "validation",
+    touches: int | None = None,
+    database: str = "",
+    kinds: str = "",
+    levels: str = "",
+    overlay: str = "",
+    surfaces: str = "",
+    study: int | None = None,
+    shard: int | None = None,
+    seed: int | None = None,
+    jobs: int = 1,
+    cluster: str = "",
+    resume: bool = False,
+    progress: TouchProgress | None = None,
+) -> ValidationResult:
+    """Make a set, touch it in simulation, read every touch, and write the report.
 
     Parameters
     ----------
+    specs
+        YAML files of what is made; none: what `database` holds.
     folder
-        Of the run.
-    wishes
-        Options; what is not given is as it was in a run that is resumed, or the default.
-    specs, database
-        What is made, and where it is registered.
-    processes, cluster
-        Who does the work.
+        Of the run; gets report.html, results.json and trials.parquet.
+    touches
+        How many; 1000 if not given.
+    database
+        Where the set is registered; `lab.db` in the folder if empty.
+    kinds, levels
+        Shares of the kinds of touches ("face=3,edge") and of the levels of noise.
+    overlay
+        `tab` or `pad`; tabs if empty.
+    surfaces
+        `files`: the written STL files are touched; `database`: the registered faces.
+    study
+        Touches of each reader in the picture of error against run time; 0: none.
+    shard
+        Touches in a file, and lost at most when interrupted.
+    seed
+        Of all that is drawn.
+    jobs, cluster
+        Processes on this machine, or a dask scheduler (`tcp://host:8786`) whose workers do
+        the work. Who does it changes no result.
     resume
         Go on with the run that the folder holds.
-    told
+    progress
         Hears how far it is.
 
     Raises
     ------
     ValidationError, SetError, WorkersError
         See `run.prepare`, `workers`, `cluster`.
+    MissingExtraError
+        What writes tables and pictures is not installed.
+
+    Examples
+    --------
+    >>> from recognizer.validation import validate
+    >>> result = validate("cube.yaml", touches=100, folder="out")  # doctest: +SKIP
+    >>> print(result)  # doctest: +SKIP
+    100 touches: 83 right, 0 wrong, 17 rejected; pose 0.031 mm, 0.107 degrees rms (3.4 s)
+      holds  wrong answers, all touches: 0 of 100, 0.000% (0.000% ... 3.699%), bound = 0.0%
     """
+    require_report("validate-set")
     begun, start = datetime.now(UTC), time.monotonic()
-    known = resume and (folder / ASKED).exists()
-    campaign = _campaign(wishes, read_asked(folder).campaign if known else None)
-    with alone(folder):
-        asked = prepare(folder, campaign, specs, database, resume=resume)
-        touch_all(asked, folder, workers_of(processes, cluster), told)
-        told.stage("report", 0, 0)
-        results = _finished(asked, folder)
+    named = [specs] if isinstance(specs, str | Path) else specs
+    place, steps = Path(folder), progress or TouchProgress()
+    options = CampaignOptions(touches, seed, kinds, levels, overlay, surfaces, study, shard)
+    known = resume and (place / ASKED).exists()
+    campaign = _campaign(options, read_asked(place).campaign if known else None)
+    with alone(place):
+        asked = prepare(place, campaign, [Path(spec) for spec in named], database, resume=resume)
+        touch_all(asked, place, workers_of(jobs, cluster), steps)
+        steps.begin("report", 0, 0)
+        results = _finish(asked, place)
         seconds = round(time.monotonic() - start, 3)
-        write_json(folder / PROVENANCE, circumstances(begun, seconds, processes, cluster))
-    return _summary(results, seconds)
+        write_json(place / PROVENANCE, circumstances(begun, seconds, jobs, cluster))
+    return result_from(results, seconds, place)
 
 
-def report_anew(folder: Path) -> Summary:
+def report_anew(folder: Path) -> ValidationResult:
     """Write results and report of a run again.
 
     Raises
@@ -159,6 +164,7 @@ def report_anew(folder: Path) -> Summary:
     ValidationError
         The run is not there, or not done.
     """
+    require_report("validate-set report")
     asked, start = read_asked(folder), time.monotonic()
     for series in series_of(asked.campaign):
         if len(done_shards(folder, series)) < shards_of(series):
@@ -166,33 +172,33 @@ def report_anew(folder: Path) -> Summary:
                 "the run is not done", fix="go on with it by --resume", place=str(folder)
             )
     with alone(folder):
-        results = _finished(asked, folder)
-    return _summary(results, round(time.monotonic() - start, 3))
+        results = _finish(asked, folder)
+    return result_from(results, round(time.monotonic() - start, 3), folder)
 
 
-def _campaign(wishes: Wishes, known: Campaign | None) -> Campaign:
+def _campaign(options: CampaignOptions, known: Campaign | None) -> Campaign:
     """Return what is asked for, options over what was asked before over defaults."""
     for given, allowed, option in (
-        (wishes.overlay, ("tab", "pad"), "--overlay"),
-        (wishes.surfaces, ("files", "database"), "--surfaces"),
+        (options.overlay, ("tab", "pad"), "--overlay"),
+        (options.surfaces, ("files", "database"), "--surfaces"),
     ):
         if given and given not in allowed:
             raise ValidationError(
                 f"'{given}' is not known", fix=f"give {' or '.join(allowed)}", place=option
             )
     base = known or Campaign(DEFAULT_TOUCHES, kinds=KINDS, levels=LEVEL_SHARES)
-    touches = base.touches if wishes.touches is None else wishes.touches
+    touches = base.touches if options.touches is None else options.touches
     study = base.study if known else _study(touches)
     return replace(
         base,
         touches=touches,
-        seed=base.seed if wishes.seed is None else wishes.seed,
-        kinds=kinds_of(wishes.kinds) if wishes.kinds else base.kinds,
-        levels=levels_of(wishes.levels) if wishes.levels else base.levels,
-        overlay=wishes.overlay or base.overlay,
-        files=wishes.surfaces == "files" if wishes.surfaces else base.files,
-        study=study if wishes.study is None else wishes.study,
-        shard=base.shard if wishes.shard is None else wishes.shard,
+        seed=base.seed if options.seed is None else options.seed,
+        kinds=kinds_of(options.kinds) if options.kinds else base.kinds,
+        levels=levels_of(options.levels) if options.levels else base.levels,
+        overlay=options.overlay or base.overlay,
+        files=options.surfaces == "files" if options.surfaces else base.files,
+        study=study if options.study is None else options.study,
+        shard=base.shard if options.shard is None else options.shard,
     )
 
 
@@ -200,7 +206,7 @@ def _study(touches: int) -> int:
     return int(min(max(STUDY_SHARE * touches, STUDY[0]), STUDY[1]))
 
 
-def _finished(asked: Asked, folder: Path) -> dict[str, Any]:
+def _finish(asked: Asked, folder: Path) -> dict[str, Any]:
     """Write everything that follows from the touches; returns the results."""
     campaign, work = asked.campaign, asked.work_now(folder)
     series = series_of(campaign)
@@ -209,7 +215,7 @@ def _finished(asked: Asked, folder: Path) -> dict[str, Any]:
     spent = columns_of(read_series(folder, series[0], TIMES))
     reader = prepared(work)
     results = results_of(rows)
-    times: dict[str, Any] = {name: _spent(spent[name]) for name in ("drawing", "reading")}
+    times: dict[str, Any] = {name: _cpu_ms(spent[name]) for name in ("drawing", "reading")}
     results["rule"] = rule()
     results["study"], results["left_out"] = {}, []
     if campaign.study:
@@ -233,25 +239,9 @@ def _finished(asked: Asked, folder: Path) -> dict[str, Any]:
     return results
 
 
-def _spent(seconds: Any) -> dict[str, float]:
+def _cpu_ms(seconds: Any) -> dict[str, float]:
     """Return quantiles of CPU times, ms."""
     at = {"median": 0.5, "p95": 0.95, "p99": 0.99}
     found = {name: float(np.quantile(seconds, q)) for name, q in at.items()}
     found["mean"] = float(np.mean(seconds))
     return {name: round(1e3 * value, 3) for name, value in found.items()}
-
-
-def _summary(results: dict[str, Any], seconds: float) -> Summary:
-    totals, fair = results["totals"], results["enough"]
-    return Summary(
-        touches=totals["touches"],
-        right=totals["right"],
-        wrong=totals["wrong"],
-        rejected=totals["rejected"],
-        rms_mm=totals["rms_mm"],
-        rms_deg=totals["rms_deg"],
-        seconds=seconds,
-        fair=fair["touches"],
-        fair_right=fair["right"],
-        checks=results["verdict"],
-    )
