@@ -74,16 +74,19 @@ def simulate(
     """Touch a part in simulation: a recording as the probe would give it, and a picture."""
 
     def action() -> int:
-        from probe.command.simulated import Asked, simulate_touches
+        from probe.command.simulated import check_outputs, simulate_touches
+        from probe.simulate.simulation import SimulatedProbe, TouchOptions
 
         if overlay not in ("tab", "pad"):
             raise typer.BadParameter(f"--overlay {overlay}: give tab or pad")
         if noise not in ("typical", "quiet"):
             raise typer.BadParameter(f"--noise {noise}: give typical or quiet")
-        asked = Asked(x, y, theta, force, tilt_x, tilt_y, touches, frames, seed)
-        return simulate_touches(
-            target, asked, overlay=overlay, accuracy=accuracy, noise=noise, output=output,
-            png=png, truth=truth, replace=replace, as_json=as_json,
+        check_outputs(output, png, truth, replace=replace)
+        options = TouchOptions(x, y, theta, force, tilt_x, tilt_y, touches, frames, seed)
+        probe = SimulatedProbe(
+            target, options, accuracy=accuracy, overlay="pad" if overlay == "pad" else "tab",
+            noise="quiet" if noise == "quiet" else "typical",
         )  # fmt: skip
+        return simulate_touches(probe, output=output, png=png, truth=truth, as_json=as_json)
 
     return action

@@ -6,6 +6,7 @@
     lab.db#Cube/F1               a face of a registered object
     sqlite:///lab.db#Cube        its first face that bears symbols
     part.stl@lab.db              a written part, in the frame of its face
+    washer                       the washer that the thesis pressed
 
 What follows the last '/' after '#' is a face if the object has one of that name.
 """
@@ -14,8 +15,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from probe.errors import SurfaceError
 from probe.simulate.scene import Scene
+from probe.surface.indenters import Washer
+from probe.surface.polygon import polygon
+
+WASHER = "washer"
 
 
 def surface_of(target: str) -> Scene:
@@ -32,6 +39,8 @@ def surface_of(target: str) -> Scene:
     >>> scene.surface.top_mm, scene.region.convex  # doctest: +SKIP
     (1.0, True)
     """
+    if target == WASHER:
+        return _washer()
     database, mark, rest = target.partition("#")
     if mark:
         from probe.simulate.registered import registered_objects, registered_surface
@@ -54,3 +63,9 @@ def surface_of(target: str) -> Scene:
         fix="write part.stl, or database#object/face such as lab.db#Cube/F1",
         place=target,
     )
+
+
+def _washer() -> Scene:
+    half = Washer().outer_mm / 2
+    square = np.array([(-half, -half), (half, -half), (half, half), (-half, half)])
+    return Scene(Washer(), polygon([square]), WASHER)
