@@ -1,0 +1,375 @@
+"""Every decision of the likelihood decoder against Bayes' rule, place by place."""
+
+import math
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+import decoder.joint
+import decoder.likelihood
+from decoder import Likelihood, WindowError, decode_likelihood
+from decoder.ranked import Ranked, best_of, joined
+from decoder.ranking import ranking_of
+from decoder.score import hard_scores, unrelated
+from generator.array import array_from
+
+BINARY = array_from({"family": "prba", "order": 2, "degree": 8})  # 15 x 17
+QUATERNARY = array_from({"family": "prmva", "order": 4, "degree": 4})  # 15 x 17
+PRODUCT = array_from({"family": "prpa", "factors": {
+    "rows": {"order": 2, "degree": 3}, "columns": {"order": 2, "degree": 4}}})  # fmt: skip
+ARRAYS = {"binary": BINARY, "quaternary": QUATERNARY, "product": PRODUCT}
+ALL_TURNS = (0, 1, 2, 3)
+
+
+@lru_cache
+def hypotheses(array, shape, turns=(0,), cells=None):
+    """All (row, column, turn), and the labels (P, k q) as 0 and 1 that each shows."""
+    if cells is None:
+        cells = [(r, c) for r in range(array.rows) for c in range(array.columns)]
+    found, shown = [], []
+    for turn in turns:
+        height, width = shape if turn % 2 == 0 else shape[::-1]
+        a, b = np.indices((height, width))
+        for r, c in cells:
+            labels = array.symbols((r + a) % array.rows, (c + b) % array.columns)
+            seen = np.rot90(labels, -turn)  # as it lies in the window that was read
+            found.append((r, c, turn))
+            shown.append(np.eye(array.order)[np.asarray(seen, int).ravel()].ravel())
+    return found, np.array(shown)
+
+
+def bayes(array, scores, turns=(0,), cells=None, blank=0.01):
+    """Hypotheses, best first, with nats below the best; and the doubt of the best.
+
+    A surface without code has the probability `blank`, every place and turn the same share of
+    the rest; without code all symbols are equally likely at every cell.
+    """
+    found, shown = hypotheses(array, scores.shape[:2], turns, cells and tuple(cells))
+    flat = (scores - scores.max(axis=-1, keepdims=True)).reshape(-1, array.order).astype(float)
+    each = shown @ flat.ravel()
+    weights = (1 - blank) / len(found) * np.exp(each)
+    nothing = blank * math.prod(float(np.exp(cell).mean()) for cell in flat)
+    order = np.argsort(-each, kind="stable")
+    total = weights.sum() + nothing
+    ranked = [(*found[n], each[n] - each[order[0]]) for n in order]
+    doubt = float((weights.sum() - weights[order[0]] + nothing) / total)
+    return ranked, doubt, nothing > weights.sum()
+
+
+def drawn(array, shape, seed, scale=1.5):
+    return scale * np.random.default_rng(seed).normal(size=(*shape, array.order))
+
+
+@pytest.mark.parametrize("turns", [(0,), (2,), (0, 2), (3, 1), ALL_TURNS])
+@pytest.mark.parametrize("name", ARRAYS)
+def test_doubt_margin_and_place_are_those_of_bayes_rule(name, turns):
+    array = ARRAYS[name]
+    for seed, shape in enumerate([(4, 4), (3, 5), (5, 3), (4, 4), (3, 5)]):
+        scores = drawn(array, shape, seed)
+        ranked, doubt, _ = bayes(array, scores, turns)
+        found = Likelihood(array, rotations=turns, doubt=1.0).decode(scores)
+        one = found[0]
+        assert (one.row, one.column, one.rotation) == ranked[0][:3]
+        assert one.doubt == pytest.approx(doubt, rel=1e-3)
+        assert one.margin == pytest.approx(-ranked[1][3], abs=1e-4)
+        assert one.runner_up.score == pytest.approx(ranked[1][3], abs=1e-4)
+        second = one.runner_up
+        assert (second.row, second.column, second.rotation) == ranked[1][:3]
+        assert one.candidates == ()
+
+
+@pytest.mark.parametrize("blank", [0.0, 0.01, 0.3])
+def test_the_more_turns_and_places_the_more_a_blank_surface_weighs(blank):
+    window = QUATERNARY.symbols(*np.indices((3, 3)))
+    scores = hard_scores(window, 4, 0.2)
+    for turns in ((0,), (0, 2), ALL_TURNS):
+        _, doubt, _ = bayes(QUATERNARY, scores, turns, blank=blank)
+        found = Likelihood(QUATERNARY, rotations=turns, blank=blank, doubt=1.0).decode(scores)
+        assert found.doubts[0] == pytest.approx(doubt, rel=1e-3)
+    cells = [(0, 0), (3, 5), (14, 16), (7, 7)]
+    _, doubt, _ = bayes(QUATERNARY, scores, ALL_TURNS, cells, blank)
+    found = Likelihood(QUATERNARY, prior=cells, rotations=ALL_TURNS, blank=blank, doubt=1.0).decode(
+        scores
+    )
+    assert found.doubts[0] == pytest.approx(doubt, rel=1e-3)
+
+
+def test_a_symbol_is_read_wrong_once_in_twenty_times():
+    window = QUATERNARY.symbols(*np.indices((4, 4)))
+    window[1, 2] = (window[1, 2] + 1) % 4
+    window[0, 0] = -1
+    right, wrong = math.log(0.95), math.log(0.05 / 3)
+    scores = np.full((4, 4, 4), wrong)
+    np.put_along_axis(scores, np.where(window < 0, 0, window)[..., None], right, axis=-1)
+    scores[0, 0] = 0.0
+    ranked, doubt, _ = bayes(QUATERNARY, scores)
+    for found in (
+        Likelihood(QUATERNARY, doubt=1.0).decode(window),
+        decode_likelihood(QUATERNARY, window, doubt=1.0),
+    ):
+        assert found.doubts[0] == pytest.approx(doubt, rel=1e-3)
+        assert found.margins[0] == pytest.approx(-ranked[1][3], abs=1e-4)
+
+
+def test_scores_of_labels_by_hand():
+    # 4 symbols, wrong with 0.4: right 0.6, each other 0.4 / 3
+    found = hard_scores(np.array([[2, -1], [0, 3]]), 4, 0.4)
+    least = math.log(0.4 / 3 / 0.6)
+    truth = np.full((2, 2, 4), least)
+    truth[0, 0, 2] = truth[1, 0, 0] = truth[1, 1, 3] = 0.0
+    truth[0, 1] = 0.0
+    np.testing.assert_allclose(found, truth, rtol=1e-6)
+    assert unrelated(found.reshape(1, 4, 4))[0] == pytest.approx(
+        3 * math.log((1 + 3 * math.exp(least)) / 4)
+    )
+    for order, bound in ((2, 0.5), (4, 0.75)):
+        hard_scores(np.array([0]), order, bound - 1e-6)
+        for error in (bound, 0.0, -0.1):
+            with pytest.raises(WindowError, match="error rate"):
+                hard_scores(np.array([0]), order, error)
+
+
+def clear(array, shape, seed, scale):
+    """Scores of a place's own window, read more or less surely."""
+    a, b = np.indices(shape)
+    own = np.eye(array.order)[np.asarray(array.symbols(a + 3, b + 4), int)]
+    away = np.random.default_rng(seed).uniform(0.5, 1.5, (*shape, array.order))
+    return -scale * away * (1 - own)
+
+
+def with_doubt(target, turns=(0,)):
+    """Scores of a window whose best place is wrong with a probability `target`."""
+    low, high = 0.1, 20.0
+    for _ in range(60):
+        middle = (low + high) / 2
+        doubt = bayes(BINARY, clear(BINARY, (5, 5), 3, middle), turns)[1]
+        low, high = (middle, high) if doubt > target else (low, middle)
+    return clear(BINARY, (5, 5), 3, high)
+
+
+@pytest.mark.parametrize("turns", [(0,), ALL_TURNS])
+def test_by_default_one_wrong_answer_in_two_thousand_is_allowed(turns):
+    assert Likelihood(BINARY, rotations=turns).decode(with_doubt(4.95e-4, turns))[0]
+    assert not Likelihood(BINARY, rotations=turns).decode(with_doubt(5.05e-4, turns))[0]
+    allowed = decode_likelihood(BINARY, with_doubt(4.95e-4, turns), rotations=turns)[0]
+    refused = decode_likelihood(BINARY, with_doubt(5.05e-4, turns), rotations=turns)[0]
+    assert allowed
+    assert refused.reason == "ambiguous"
+    assert not decode_likelihood(BINARY, with_doubt(4.95e-4, turns), rotations=turns, doubt=4e-4)[0]
+
+
+@pytest.mark.parametrize("turns", [(0,), (1,), ALL_TURNS])
+@pytest.mark.parametrize("name", ["binary", "quaternary"])
+def test_why_nothing_is_answered(name, turns):
+    array = ARRAYS[name]
+    reasons = set()
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        shape = ((7, 6), (3, 4), (5, 3))[seed % 3]
+        scores = drawn(array, shape, seed, scale=rng.choice([0.8, 1.5, 3.0]))
+        scores[rng.random(shape) < (0.0, 0.2, 0.6)[seed % 3]] = 0.0
+        _, doubt, blank = bayes(array, scores, turns)
+        if doubt <= 5e-4:
+            continue
+        seen = np.nonzero((scores != 0).any(axis=2))
+        reason = "not an encoded surface" if blank else "ambiguous"
+        if not array.identifies(*seen):
+            reason = "too few symbols"
+        found = Likelihood(array, rotations=turns).decode(scores)[0]
+        assert (found.reason, found.row, found.rotation) == (reason, None, 0)
+        reasons.add(reason)
+        assert bool(found.candidates) is (reason != "not an encoded surface")
+    assert len(reasons) == 3
+
+
+@pytest.mark.parametrize("turns", [(0,), ALL_TURNS])
+def test_candidates_are_listed_down_to_seven_nats_and_sixteen_of_them(turns):
+    lengths = set()
+    for seed, scale in enumerate((0.5, 2.0, 5.0, 8.0, 10.0, 15.0, 20.0, 30.0)):
+        scores = drawn(BINARY, (3, 3), 100 + seed, scale)
+        scores[2, 1:] = 0.0  # so that no window is answered, nor one without code
+        ranked, doubt, _ = bayes(BINARY, scores, turns, blank=0.0)
+        assert doubt > 5e-4
+        found = Likelihood(BINARY, rotations=turns, blank=0.0).decode(scores)[0]
+        truth = [one for one in ranked if one[3] >= -7.0][:16]
+        assert [c.score for c in found.candidates] == pytest.approx(
+            [one[3] for one in truth], abs=1e-4
+        )
+        lengths.add(len(truth))
+    assert 16 in lengths
+    assert min(lengths) < 16
+
+
+def test_candidates_at_the_edge_of_seven_nats():
+    row = np.asarray(BINARY.symbols(np.zeros(17, int), np.arange(17)), int).tolist()
+    zeros = [c for c in range(17) if row[c] == 0]
+    cells = [(0, zeros[0]), (0, zeros[1]), (0, row.index(1))]
+    for gap, listed in ((6.99, 3), (7.01, 2)):
+        scores = np.zeros((1, 1, 2))
+        scores[0, 0, 1] = -gap
+        found = Likelihood(BINARY, prior=cells).decode(scores)[0]
+        assert found.reason == "too few symbols"
+        assert len(found.candidates) == listed
+
+
+def test_as_many_candidates_as_are_asked_for_answered_or_not():
+    scores = np.stack([clear(BINARY, (4, 4), seed, 0.3 + 3 * seed) for seed in range(3)])
+    found = Likelihood(BINARY).decode(scores, top=5)
+    assert found.answered.any()
+    assert not found.answered.all()
+    for i, own in enumerate(scores):
+        ranked = bayes(BINARY, own)[0][:5]
+        assert [(c.row, c.column, c.rotation) for c in found[i].candidates] == [
+            one[:3] for one in ranked
+        ]
+        assert [c.score for c in found[i].candidates] == pytest.approx(
+            [one[3] for one in ranked], abs=1e-4
+        )
+    assert len(Likelihood(BINARY).decode(scores[2], top=1)[0].candidates) == 2
+
+
+@pytest.mark.parametrize("turns", [(0,), ALL_TURNS])
+def test_a_prior_of_one_place_has_no_rival_but_its_turns(turns):
+    scores = drawn(BINARY, (4, 4), 5)
+    found = Likelihood(BINARY, prior=[(3, 4)], rotations=turns, doubt=1.0).decode(scores)
+    ranked, doubt, _ = bayes(BINARY, scores, turns, [(3, 4)])
+    one = found[0]
+    assert (one.row, one.column, one.rotation) == ranked[0][:3]
+    assert found.doubts[0] == pytest.approx(doubt, rel=1e-3)
+    if len(turns) == 1:
+        assert one.margin is None
+        assert one.runner_up is None
+    else:
+        assert one.margin == pytest.approx(-ranked[1][3], abs=1e-4)
+
+
+def test_a_prior_is_taken_round_the_torus_and_each_place_once():
+    cells = [(3, 4), (3, 4), (14, 16), (18, 21)]  # 15 x 17: the last is (3, 4) again
+    scores = drawn(BINARY, (4, 4), 6)
+    _, doubt, _ = bayes(BINARY, scores, cells=[(3, 4), (14, 16)])
+    found = Likelihood(BINARY, prior=cells, doubt=1.0).decode(scores)
+    assert found.doubts[0] == pytest.approx(doubt, rel=1e-3)
+
+
+def test_windows_of_a_large_batch_are_weighed_as_one_by_one(monkeypatch):
+    rng = np.random.default_rng(7)
+    scores = rng.normal(size=(23, 3, 3, 2)).astype(np.float32)
+    whole = Likelihood(BINARY, rotations=(0, 1)).decode(scores)
+    monkeypatch.setattr(decoder.likelihood, "_WINDOWS", 5)
+    for values in (1 << 18, 1):
+        monkeypatch.setattr(decoder.likelihood, "_VALUES", values)
+        parts = Likelihood(BINARY, rotations=(0, 1)).decode(scores)
+        for name in ("rows", "columns", "reasons", "rotations", "indices"):
+            np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
+        np.testing.assert_allclose(parts.margins, whole.margins, atol=1e-5)
+        np.testing.assert_allclose(parts.doubts, whole.doubts, rtol=1e-4)
+        assert parts.candidates.keys() == whole.candidates.keys()
+    for i in (0, 4, 5, 22):
+        one = Likelihood(BINARY, rotations=(0, 1)).decode(scores[i])
+        assert (one.rows[0], one.columns[0]) == (whole.rows[i], whole.columns[i])
+        assert one.doubts[0] == pytest.approx(whole.doubts[i], rel=1e-4)
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_the_index_is_the_one_congruent_to_row_and_column(name):
+    array = ARRAYS[name]
+    for r, c in ((0, 0), (1, 0), (0, 1), (6, 11), (2, 14)):
+        a, b = np.indices((5, 5))
+        window = array.symbols((r + a) % array.rows, (c + b) % array.columns)
+        found = Likelihood(array, error=1e-6).decode(window)[0]
+        truth = r * array.columns + c
+        if name != "product":
+            truth = next(t for t in range(255) if (t % 15, t % 17) == (r, c))
+        assert (found.row, found.column, found.t) == (r, c, truth)
+
+
+def test_the_index_of_an_array_of_2_to_the_64_cells():
+    array = array_from({"family": "prba", "order": 2, "degree": 64})
+    cell = (array.rows - 2, array.columns - 3)
+    a, b = np.indices((9, 9)).astype(np.uint64)
+    rows = (np.uint64(cell[0]) + a) % np.uint64(array.rows)
+    columns = (np.uint64(cell[1]) + b) % np.uint64(array.columns)
+    found = Likelihood(array, prior=[cell, (0, 0)]).decode(array.symbols(rows, columns))[0]
+    assert (found.row, found.column) == cell
+    assert found.t % array.rows == cell[0]
+    assert found.t % array.columns == cell[1]
+    assert found.t < array.rows * array.columns
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"doubt": 0.0}, {"doubt": 1.01}, {"blank": -0.01}, {"blank": 1.0},
+     {"rotations": ()}, {"rotations": (4,)}, {"rotations": (0, -1)}],
+)  # fmt: skip
+def test_what_is_no_probability_and_no_turn_is_refused(options):
+    with pytest.raises(WindowError):
+        Likelihood(BINARY, **options)
+
+
+def test_the_bounds_of_what_is_allowed_are():
+    Likelihood(BINARY, doubt=1.0, blank=0.0, rotations=(0, 1, 2, 3))
+    Likelihood(BINARY, doubt=1e-12, blank=0.999, rotations=(3,))
+
+
+def pooled(parts):
+    """All places of parts whose `rest` is that of all of them, best first."""
+    return np.sort(np.concatenate(parts, axis=1), axis=1)[:, ::-1]
+
+
+@pytest.mark.parametrize("number", [2, 3, 7])
+def test_joined_parts_are_as_if_all_were_ranked_at_once(number):
+    rng = np.random.default_rng(8)
+    values = [rng.normal(size=(4, size)) for size in (9, 5, 12)]
+    parts = []
+    for own in values:
+        places, chosen, rest = best_of(own.astype(np.float32), number)
+        rows = places.astype(np.uint64)
+        parts.append(Ranked(rows, rows + np.uint64(100), chosen, rest))
+    found, source = joined(parts, number)
+    whole = pooled(values)
+    np.testing.assert_allclose(found.values, whole[:, :number], atol=1e-5)
+    np.testing.assert_allclose(found.rest, np.exp(whole - whole[:, :1]).sum(axis=1) - 1, rtol=1e-4)
+    for i in range(4):
+        for k in range(number):
+            own = values[source[i, k]][i]
+            assert own[int(found.rows[i, k])] == pytest.approx(found.values[i, k], abs=1e-5)
+            assert found.columns[i, k] == found.rows[i, k] + 100
+
+
+@pytest.mark.parametrize("places", [3, 40, 1023, 1024, 1500, 4099])
+@pytest.mark.parametrize("number", [1, 2, 3, 16, 20])
+def test_the_best_places_are_where_they_are_said_to_be(places, number):
+    values = np.random.default_rng(9).normal(size=(3, places)).astype(np.float32)
+    values[1] = np.sort(values[1])
+    values[2, -1] = 9.0  # in the last block, which may be short
+    found, chosen, rest = best_of(values.copy(), number)
+    kept = min(max(number, 2), places)
+    assert found.shape == chosen.shape == (3, kept)
+    np.testing.assert_array_equal(np.take_along_axis(values, found, axis=1), chosen)
+    np.testing.assert_array_equal(chosen, -np.sort(-values, axis=1)[:, :kept])
+    np.testing.assert_allclose(
+        rest, np.exp(values - values.max(axis=1, keepdims=True)).sum(axis=1) - 1, rtol=1e-4
+    )
+
+
+def test_a_window_of_a_product_array_is_searched_as_it_is_weighed(monkeypatch):
+    rng = np.random.default_rng(10)
+    scores = rng.normal(size=(6, 4, 5, PRODUCT.order)) * np.arange(1, 7)[:, None, None, None]
+    flat = (scores - scores.max(axis=-1, keepdims=True)).reshape(6, 20, -1).astype(np.float32)
+    exact = ranking_of(PRODUCT, (4, 5)).rank(flat, 5)
+    for pairs in (15, 40, 60):  # one, two and four rows at a time; there are 105 places
+        monkeypatch.setattr(decoder.joint, "_PAIRS", pairs)
+        found = ranking_of(PRODUCT, (4, 5)).rank(flat, 5)
+        np.testing.assert_array_equal(found.rows, exact.rows)
+        np.testing.assert_array_equal(found.columns, exact.columns)
+        np.testing.assert_allclose(found.values, exact.values, atol=1e-5)
+        # rows that cannot hold one of the best are not weighed
+        listed = np.exp(found.values[:, 1:] - found.values[:, :1]).sum(axis=1)
+        assert (found.rest >= listed * (1 - 1e-4)).all()
+        assert (found.rest <= exact.rest * (1 + 1e-4)).all()
+    for i in range(6):
+        ranked, _, _ = bayes(PRODUCT, scores[i])
+        assert [(r, c) for r, c, _, _ in ranked[:2]] == list(
+            zip(exact.rows[i, :2].tolist(), exact.columns[i, :2].tolist(), strict=True)
+        )

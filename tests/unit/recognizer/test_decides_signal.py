@@ -1,0 +1,145 @@
+"""What of a frame is worth fitting: floors, contacts and dead rows worked by hand."""
+
+import numpy as np
+import pytest
+
+from recognizer.touch.signal import signal_of
+
+
+def rows_of(*sums, turned=False):
+    """Readings (rows, 5) whose rows sum to these; transposed, their columns do."""
+    image = np.zeros((len(sums), 5))
+    image[:] = np.array(sums, float)[:, None] / 5
+    return image.T.copy() if turned else image
+
+
+def trusted(*sums, turned=False):
+    """Which rows (or columns) of such readings are trusted."""
+    trust = signal_of(rows_of(*sums, turned=turned), floor=0.0).trust
+    trust = trust.T if turned else trust
+    assert (trust == trust[:, :1]).all()
+    assert set(trust.ravel()) <= {0.0, 1.0}
+    return trust[:, 0].astype(bool).tolist()
+
+
+def test_the_floor_is_what_the_lowest_twentieth_reads():
+    readings = np.arange(100.0, 310.0, 10.0).reshape(3, 7)  # 21 tactels: one of twenty lies lower
+    found = signal_of(readings)
+    assert found.forces[0].tolist() == [0.0, 0.0, 10.0, 20.0, 30.0, 40.0, 50.0]
+    assert found.forces[2, 6] == 190.0
+    assert not found.newtons
+
+
+def test_a_floor_that_is_given_is_taken():
+    found = signal_of(np.array([[5.0, 20.0], [30.0, 7.0]]), floor=7.0)
+    assert found.forces.tolist() == [[0.0, 13.0], [23.0, 0.0]]
+
+
+def six(value, others=0.0, count=6):
+    image = np.full(36, others)
+    image[3 : 3 + count] = value
+    return image.reshape(6, 6)
+
+
+@pytest.mark.parametrize(
+    ("value", "count", "newtons", "contact"),
+    [
+        (8.01, 6, False, True),
+        (8.0, 6, False, False),
+        (4000.0, 5, False, False),
+        (0.0501, 6, True, True),
+        (0.05, 6, True, False),
+        (9.0, 5, True, False),
+    ],
+)
+def test_a_contact_is_six_tactels_over_eight_counts_or_a_twentieth_newton(
+    value, count, newtons, contact
+):
+    found = signal_of(six(value, count=count), floor=0.0, newtons=newtons)
+    assert found.contact is contact
+    assert found.newtons is newtons
+
+
+def test_the_sixth_highest_is_the_one_that_counts():
+    image = np.arange(36.0).reshape(6, 6)  # the six highest: 30 ... 35
+    assert signal_of(image, floor=0.0, least=29.9).contact
+    assert not signal_of(image, floor=0.0, least=30.0).contact
+
+
+@pytest.mark.parametrize("newtons", [False, True])
+def test_a_rise_that_is_given_is_taken(newtons):
+    assert signal_of(six(0.02), floor=0.0, least=0.01, newtons=newtons).contact
+    assert not signal_of(six(50.0), floor=0.0, least=60.0, newtons=newtons).contact
+
+
+def test_bad_tactels_count_neither_for_the_floor_nor_for_a_contact():
+    image = six(4000.0) + 100.0
+    image[0, :3] = 0.0
+    trust = np.full((6, 6), 0.5)
+    trust[image > 1000] = 0.0
+    trust[0, :3] = 0.0
+    found = signal_of(image, trust=trust)
+    assert not found.contact
+    assert found.forces[5].tolist() == [0.0] * 6  # the floor is what the good ones read
+    np.testing.assert_array_equal(found.trust, trust)
+    assert signal_of(image, trust=np.where(trust > 0, 0.0, 0.5)).contact
+
+
+def test_nothing_is_felt_where_every_tactel_is_bad():
+    found = signal_of(six(4000.0), trust=np.zeros((6, 6)), newtons=True)
+    assert not found.forces.any()
+    assert not found.trust.any()
+    assert (found.contact, found.newtons) == (False, True)
+
+
+def test_a_single_good_tactel_is_read():
+    trust = np.zeros((3, 3))
+    trust[1, 1] = 1.0
+    found = signal_of(np.full((3, 3), 5.0), trust=trust, floor=2.0, least=1.0)
+    assert found.forces[1, 1] == 3.0
+    assert found.contact
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("dead", [1, 3, 7])
+def test_a_row_or_column_that_reads_nothing_between_two_that_do_is_dead(dead, turned):
+    sums = [100.0] * 9
+    sums[dead] = 0.0
+    assert trusted(*sums, turned=turned) == [number != dead for number in range(9)]
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("rim", [0, 8])
+def test_at_the_rim_it_is_rather_the_edge_of_a_face(rim, turned):
+    sums = [100.0] * 9
+    sums[rim] = 0.0
+    assert all(trusted(*sums, turned=turned))
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_dead_is_less_than_a_fiftieth_of_the_middle_one(turned):
+    for own, alive in ((1.9, False), (2.0, True), (3.0, True)):
+        sums = [100.0] * 9
+        sums[4] = own
+        assert trusted(*sums, turned=turned)[4] is alive
+        sums[2] = 400.0  # the median stays
+        assert trusted(*sums, turned=turned)[4] is alive
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("side", [-1, 1])
+def test_both_neighbours_of_a_dead_row_read_more_than_three_tenths_of_the_middle(side, turned):
+    for beside, dead in ((31.0, True), (50.0, True), (30.0, False), (20.0, False)):
+        sums = [100.0] * 9
+        sums[4], sums[4 + side] = 0.0, beside
+        assert trusted(*sums, turned=turned)[4] is not dead
+
+
+def test_what_a_bad_tactel_reads_keeps_no_row_alive():
+    image = rows_of(*[100.0] * 4, 0.0, *[100.0] * 4)
+    image[4, 2] = 500.0
+    trust = np.ones((9, 5))
+    trust[4, 2] = 0.0
+    found = signal_of(image, trust=trust, floor=0.0)
+    assert not found.trust[4].any()
+    assert found.trust[[0, 1, 2, 3, 5, 6, 7, 8]].all()
