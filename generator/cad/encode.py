@@ -13,17 +13,21 @@ import dataclasses
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, overload
 
 from generator.cad.read import polyhedron_from
+from generator.database.open import open_if_there
+from generator.database.transaction import reading
 from generator.layout.placement import Layout
-from generator.pipeline.choose import chosen
+from generator.pipeline.choose import choose_array
 from generator.pipeline.encode import encode as encode_specs
-from generator.pipeline.encode import encode_planned
+from generator.pipeline.encode import new_database
 from generator.pipeline.files import parts_of
 from generator.pipeline.made import Encoded, Made
+from generator.pipeline.make import Order, made_under_lock
 from generator.pipeline.plan import planned
 from generator.polyhedron import Polyhedron
 from generator.polyhedron.read import READERS
@@ -189,12 +193,19 @@ def encode(
     polyhedron = polyhedron_from(given)
     url = url or database_option("lab.db")
     located = spec_of(named, ShapeSpec("solid", {"sha256": _digest(polyhedron)}))
-    choice = chosen([located], url, polyhedron)
+    engine = open_if_there(url)
+    with reading(engine) if engine else nullcontext() as connection:
+        choice = choose_array([located], connection, polyhedron)
     plan = planned(choice.specs[0], polyhedron)
     plan = dataclasses.replace(plan, notes=(*plan.notes, *choice.notes))
-    product = encode_planned(
-        plan, folder=where, formats=formats, database=url, verify=verify, replace=replace
+    order = Order(
+        plan,
+        where or plan.spec.folder,
+        plan.spec.formats if formats is None else tuple(formats),
+        verify,
+        replace,
     )
+    product = made_under_lock(engine or new_database(url, plan), order)
     layout = product.placed.layout
     return EncodedSolid(product.made, url, polyhedron, layout, parts_of(plan, layout)[0])
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from encoded_objects import console
 from encoded_objects.console import Action
+
+if TYPE_CHECKING:
+    from sqlalchemy import Engine
 
 app = console.application()
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, also for errors.")]
@@ -100,7 +103,7 @@ def retire(
         url = database_option(database)
         engine = existing_database(url)
         if free and not yes:
-            _confirm(url, names, as_json=as_json)
+            _confirm(engine, names, as_json=as_json)
         do = change.remove if free else change.restore if undo else change.retire
         unique = tuple(dict.fromkeys(names))
         entries = in_turn(engine, lambda connection: [do(connection, name) for name in unique])
@@ -178,14 +181,13 @@ def import_(
     return action
 
 
-def _confirm(url: str, names: list[str], *, as_json: bool) -> None:
+def _confirm(engine: Engine, names: list[str], *, as_json: bool) -> None:
     """Ask before cells are freed; leave when the answer is no."""
     from generator.command import object_report
-    from generator.database.open import open_database
     from generator.database.read import existing
     from generator.database.transaction import reading
 
-    with reading(open_database(url, writable=False)) as connection:
+    with reading(engine) as connection:
         entries = [existing(connection, name) for name in dict.fromkeys(names)]
     if as_json or not sys.stdin.isatty():
         raise typer.BadParameter("--free removes objects for good; confirm it with --yes")

@@ -43,20 +43,65 @@ def open_database(
         A place that does not exist or may not be written, a file that is no database
         or another program's, a newer schema, an older one that may not be written.
     """
+    engine = connectable(normal_url(url), writable, wait_s)
+    if _update_schema(engine, wait_s, keep_older):
+        return engine
+    if not writable:
+        fix = "register an object with encode-object first, or name another database"
+        place = place_of(engine.url)
+        raise DatabaseError("no objects are registered here", fix=fix, place=place)
+    with writing(engine) as connection:
+        if _schema_version(connection) is None:  # nobody else made it meanwhile
+            _create_schema(connection)
+    return engine
+
+
+def open_if_there(url: str, *, writable: bool = True) -> Engine | None:
+    """Return an engine as `open_database`, None where there is no database yet; makes none."""
     normal = normal_url(url)
-    engine = connectable(normal, writable, wait_s)
+    if not _file_is_there(normal):
+        return None
+    engine = connectable(normal, writable, WAIT_S)
+    return engine if _update_schema(engine, WAIT_S, keep_older=True) else None
+
+
+def existing_database(url: str) -> Engine:
+    """Return an engine for writing on a database that is there; raises as `open_database`."""
+    return open_if_there(url) or open_database(url, writable=False)  # which says what is missing
+
+
+def database_exists(url: str) -> bool:
+    """Whether there is a database whose objects can be read; makes and changes nothing.
+
+    Raises
+    ------
+    DatabaseError
+        As `open_database`: what is there is no database, or its folder does not exist.
+    """
+    normal = normal_url(url)
+    if not _file_is_there(normal):
+        return False
+    with reading(connectable(normal, writable=False, wait_s=WAIT_S)) as connection:
+        return _schema_version(connection) is not None
+
+
+def _file_is_there(url: URL) -> bool:
+    """Whether a SQLite database has its file; a server answers for itself."""
+    if url.get_backend_name() != "sqlite":
+        return True
+    path = Path(url.database or "").absolute()
+    check_place(path)
+    return path.exists()
+
+
+def _update_schema(engine: Engine, wait_s: float, keep_older: bool) -> bool:
+    """Bring a database to this version of the schema; False where there is none yet."""
     with reading(engine) as connection:
         version = _schema_version(connection)
-    if version is None:
-        if not writable:
-            fix = "register an object with encode-object first, or name another database"
-            raise DatabaseError("no objects are registered here", fix=fix, place=place_of(normal))
-        with writing(engine) as connection:
-            if _schema_version(connection) is None:  # nobody else made it meanwhile
-                _create_schema(connection)
-    elif version < SCHEMA_VERSION:
-        migrate(_for_migration(normal, version, wait_s), _schema_version, keep=keep_older)
-    return engine
+    if version is not None and version < SCHEMA_VERSION:
+        older = _for_migration(engine.url, version, wait_s)
+        migrate(older, _schema_version, keep=keep_older)
+    return version is not None
 
 
 def _for_migration(url: URL, version: int, wait_s: float) -> Engine:
@@ -69,31 +114,6 @@ def _for_migration(url: URL, version: int, wait_s: float) -> Engine:
             fix="open it once where it may be written: encode-object list --database FILE",
             place=place_of(url),
         ) from error
-
-
-def existing_database(url: str) -> Engine:
-    """Return an engine for writing on a database that is there; raises as `open_database`."""
-    if not database_exists(url):
-        open_database(url, writable=False)  # says what is missing
-    return open_database(url)
-
-
-def database_exists(url: str) -> bool:
-    """Whether there is a database whose objects can be read; makes and changes nothing.
-
-    Raises
-    ------
-    DatabaseError
-        As `open_database`: what is there is no database, or its folder does not exist.
-    """
-    normal = normal_url(url)
-    if normal.get_backend_name() == "sqlite":
-        path = Path(normal.database or "").absolute()
-        check_place(path)
-        if not path.exists():
-            return False
-    with reading(connectable(normal, writable=False, wait_s=WAIT_S)) as connection:
-        return _schema_version(connection) is not None
 
 
 def _schema_version(connection: Connection) -> int | None:

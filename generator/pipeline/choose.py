@@ -17,9 +17,7 @@ from sqlalchemy import Connection
 from generator.array.contract import SymbolArray
 from generator.array.profiles import DEFAULT_PROFILE, PROFILES, Profile, enlarged
 from generator.database.cells import occupancy
-from generator.database.open import database_exists, open_database
 from generator.database.read import find_object
-from generator.database.transaction import reading
 from generator.errors import ArrayError, GeneratorError, LayoutError
 from generator.layout.placement import Layout
 from generator.pipeline.place import NO_CELLS, laid_out
@@ -41,15 +39,17 @@ class Choice:
     notes: tuple[str, ...] = ()
 
 
-def chosen(specs: Sequence[Located], url: str, solid: Polyhedron | None = None) -> Choice:
+def choose_array(
+    specs: Sequence[Located], connection: Connection | None, solid: Polyhedron | None = None
+) -> Choice:
     """Return the specs with a profile in place of `auto`.
 
     Parameters
     ----------
     specs
         Of one run; where one of them names its profile, all others follow it.
-    url
-        Of the database, which need not be there yet.
+    connection
+        Of a `reading` transaction; None where there is no database yet.
     solid
         Shape of the one object, where it does not come from its spec.
 
@@ -65,15 +65,6 @@ def chosen(specs: Sequence[Located], url: str, solid: Polyhedron | None = None) 
         profile, encoding = named[0].profile, named[0].encoding
         defaults = profile if profile in PROFILES else DEFAULT_PROFILE
         return Choice(tuple(_followed(one, profile, defaults, encoding) for one in specs))
-    if not database_exists(url):
-        return _chosen(specs, None, solid)
-    with reading(open_database(url, writable=False)) as connection:
-        return _chosen(specs, connection, solid)
-
-
-def _chosen(
-    specs: Sequence[Located], connection: Connection | None, solid: Polyhedron | None
-) -> Choice:
     if connection is not None:
         for one in specs:
             known = find_object(connection, one.spec.name)

@@ -12,18 +12,19 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 
 from sqlalchemy import Connection, Engine
 
 from generator.database.cells import occupancy
-from generator.database.open import database_exists, open_database
+from generator.database.open import open_database, open_if_there
 from generator.database.transaction import reading
-from generator.pipeline.choose import chosen
+from generator.pipeline.choose import choose_array
 from generator.pipeline.faces import face_reports
 from generator.pipeline.files import parts_of
 from generator.pipeline.made import Encoded, Made, made_of
-from generator.pipeline.make import Order, Product, made_under_lock
+from generator.pipeline.make import Order, made_under_lock
 from generator.pipeline.place import beside, placed, taken_by_all
 from generator.pipeline.plan import Plan, planned
 from generator.pipeline.progress import Progress, silent, within
@@ -80,7 +81,9 @@ def encode(
     began = time.perf_counter()
     url = database or specs[0].spec.database
     plans: list[Plan] = []
-    choice = chosen(specs, url)
+    engine = open_if_there(url, writable=not dry_run)
+    with reading(engine) if engine else nullcontext() as connection:
+        choice = choose_array(specs, connection)
     for number, located in enumerate(choice.specs):
         progress(f"planning {located.spec.name}", 0.1 * number / len(specs))
         plan = planned(located)
@@ -89,9 +92,10 @@ def encode(
     rest = within(progress, 0.1, 1.0)
     files: tuple[Path, ...] = ()
     if dry_run:
-        made, used = _rehearsed(plans, url, replace, rest)
+        with reading(engine) if engine else nullcontext() as connection:
+            made, used = _rehearse(connection, plans, replace, rest)
     else:
-        engine = opened(url, plans[0], replace=replace)
+        engine = engine or new_database(url, plans[0])
         orders = [
             Order(plan, _folder(plan, folder, len(plans)), _formats(plan, formats), verify, replace)
             for plan in plans
@@ -107,46 +111,16 @@ def encode(
     return Encoded(tuple(made), url, array.rows, array.columns, used, seconds, files)
 
 
-def encode_planned(
-    plan: Plan,
-    *,
-    folder: Path | None = None,
-    formats: Sequence[str] | None = None,
-    database: str | None = None,
-    verify: bool = False,
-    replace: bool = False,
-) -> Product:
-    """Make one object that was planned elsewhere; parameters as those of `encode`."""
-    engine = opened(database or plan.spec.database, plan, replace=replace)
-    order = Order(plan, folder or plan.spec.folder, _formats(plan, formats), verify, replace)
-    return made_under_lock(engine, order)
-
-
-def opened(url: str, plan: Plan, *, replace: bool = False) -> Engine:
-    """Open a database; an object that cannot be made leaves no new one behind."""
-    if not database_exists(url):
-        _rehearse(None, [plan], replace, silent)
+def new_database(url: str, plan: Plan) -> Engine:
+    """Make a database; an object that cannot be made leaves none behind."""
+    parts_of(plan, placed(None, plan, replace=False).layout)
     return open_database(url)
 
 
-def _rehearsed(
-    plans: Sequence[Plan], url: str, replace: bool, progress: Progress
-) -> tuple[list[Made], int]:
-    """Return what `encode` would make: each object beside the ones before it."""
-    if not database_exists(url):
-        return _rehearse(None, plans, replace, progress, reports=True)
-    with reading(open_database(url, writable=False)) as connection:
-        return _rehearse(connection, plans, replace, progress, reports=True)
-
-
 def _rehearse(
-    connection: Connection | None,
-    plans: Sequence[Plan],
-    replace: bool,
-    progress: Progress,
-    *,
-    reports: bool = False,
+    connection: Connection | None, plans: Sequence[Plan], replace: bool, progress: Progress
 ) -> tuple[list[Made], int]:
+    """Return what `encode` would make, each object beside the ones before it, and cells used."""
     made: list[Made] = []
     taken = taken_by_all(connection, plans[0])
     used = 0
@@ -157,9 +131,7 @@ def _rehearse(
         step(f"building {plan.spec.name}", 0.5)
         parts, warnings = parts_of(plan, place.layout)
         one = made_of(plan, place.layout, len(parts), warnings, (), reused=place.reused)
-        if reports:
-            one = dataclasses.replace(one, face_reports=face_reports(plan, place.layout))
-        made.append(one)
+        made.append(dataclasses.replace(one, face_reports=face_reports(plan, place.layout)))
         if not place.reused:
             taken = beside(taken, place.layout)
         used = place.taken + made[-1].symbols

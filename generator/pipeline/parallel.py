@@ -45,6 +45,11 @@ class Engines:
     _open: ClassVar[dict[str, Engine]] = {}
 
     @classmethod
+    def keep(cls, url: str, engine: Engine) -> None:
+        """Let this process use a database that is open."""
+        cls._open[url] = engine
+
+    @classmethod
     def open(cls, url: str) -> Engine:
         """Return the open database, opened the first time it is asked for."""
         if url not in cls._open:

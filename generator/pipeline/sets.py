@@ -73,6 +73,7 @@ def made_as_set(
                 taken = beside(taken, place.layout)
             numbers.append(number)
             tasks.append(Task(f"making {name}", _make, (url, order, place)))
+    Engines.keep(url, engine)
     with Workers(jobs) as workers:
         found = workers.done(tasks, within(progress, 0.1, 0.8))
         return _together(orders, products, numbers, found, folder, workers, progress)

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
 
+from generator.database import engine
+from generator.database import open as open_module
+from generator.database.open import open_if_there
+from generator.database.transaction import reading
 from generator.pipeline import encode
-from generator.pipeline.choose import chosen
+from generator.pipeline.choose import choose_array
 from generator.pipeline.plan import planned
 from generator.spec import SpecError, read_specs
 
@@ -23,7 +28,9 @@ def dry(folder: Path, text: str, **options):
 def choice(folder: Path, text: str):
     file = folder / "spec.yaml"
     file.write_text(text)
-    return chosen(read_specs([file]), f"sqlite:///{folder / 'lab.db'}")
+    lab = open_if_there(f"sqlite:///{folder / 'lab.db'}")
+    with reading(lab) if lab else nullcontext() as connection:
+        return choose_array(read_specs([file]), connection)
 
 
 def profiles(found) -> set[str]:
@@ -45,6 +52,25 @@ def test_auto_takes_the_smallest_array_that_holds_the_objects(tmp_path):
     (note,) = larger.notes
     assert "76800 cells are needed, and large 255x257 has room for 52428" in note
     assert larger.specs[199].spec.name == "A-200"
+
+
+@pytest.mark.parametrize("profile", ["auto", "one-touch"])
+@pytest.mark.parametrize("copies", [1, 3])
+def test_a_run_opens_the_database_once(tmp_path, monkeypatch, profile, copies):
+    calls = []
+
+    def connectable(*arguments, **options):
+        calls.append(arguments)
+        return engine.connectable(*arguments, **options)
+
+    monkeypatch.setattr(open_module, "connectable", connectable)
+    text = f"name: A\nprofile: {profile}\nshape: {{cube: 30 mm}}\ncopies: {copies}\n"
+    dry(tmp_path, text)
+    assert (calls, [file.name for file in tmp_path.iterdir()]) == ([], ["spec.yaml"])
+    for options in ({"dry_run": False, "formats": ()}, {"dry_run": False, "formats": ()}, {}):
+        calls.clear()
+        dry(tmp_path, text, **options)
+        assert len(calls) == 1
 
 
 def test_auto_goes_on_where_the_database_is_full(tmp_path):
