@@ -9,5 +9,6 @@ views       touch -> the few lattices that it may show, and where the touch stan
 lattice     views -> the lattice of the plane that most of them agree with
 composite   what they say of each cell, summed into one fit
 answer      composites -> places of the database -> Recognition
-grow        one touch more: `begun`, `extended`, `read_scan`
+grow        one touch more: `begin_scan`, `extend_scan`, `read_scan`
+session     `Scan`: counts and poses in, the belief so far out
 """

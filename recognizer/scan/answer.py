@@ -131,9 +131,18 @@ def posed(
 
 
 def answered(
-    reader: Reader, found: Sequence[Located], limits: ScanSettings, seq: int
+    reader: Reader,
+    found: Sequence[Located],
+    limits: ScanSettings,
+    seq: int,
+    *,
+    by_hand: bool = False,
 ) -> Recognition:
-    """Return the answer; `found` is sorted, the best place first and posed."""
+    """Return the answer; `found` is sorted, the best place first and posed.
+
+    Where nobody measured the steps (`by_hand`), a touch may lie whole pitches from where images
+    lay it, and several touches must agree with the database the better.
+    """
     if not found:
         return refusal(seq, TOO_FEW)
     best = found[0]
@@ -144,22 +153,27 @@ def answered(
         runner_up = RunnerUp(*other.face, other.index)
     return answer_at(
         best.encoding, best.fit, best.place, reader.thresholds, seq,
-        reason=_doubt(reader, best, margin, limits), margin=margin, runner_up=runner_up,
+        reason=_doubt(reader, best, margin, limits, by_hand=by_hand),
+        margin=margin, runner_up=runner_up,
     )  # fmt: skip
 
 
-def _doubt(reader: Reader, best: Located, margin: float, limits: ScanSettings) -> str:
+def _doubt(
+    reader: Reader, best: Located, margin: float, limits: ScanSettings, *, by_hand: bool
+) -> str:
     """Return why the best place may not be believed; nothing if it may."""
     encoding, fit, place = best.encoding, best.fit, best.place
     cells = weigh_cells(encoding, fit, place)
     told = int(cells.agree.sum())
     chance = null_log_likelihood(encoding, fit)
-    if fit.value - chance < reader.thresholds.surprise:
+    joined = int((best.composite.agreement.chosen >= 0).sum()) > 1
+    surprise = limits.surprise_by_hand if by_hand and joined else reader.thresholds.surprise
+    if fit.value - chance < surprise:
         return TOO_FEW  # if every cell agreed fully it would be no surprise either
     if best.score - chance < reader.thresholds.surprise:
         return NOT_ENCODED
     if (cells.against > CLEARLY).sum() > max(reader.thresholds.contradicted, limits.wrong * told):
         return NOT_ENCODED
-    if told < reader.thresholds.least_inliers:
+    if best.score - chance < surprise or told < reader.thresholds.least_inliers:
         return TOO_FEW
     return AMBIGUOUS if margin < reader.thresholds.margin else ""

@@ -19,6 +19,7 @@ from recognizer.scan.views import (
     View,
     Views,
     fits_of,
+    is_unmeasured,
     round_views,
     stands_of,
     tells_place,
@@ -43,8 +44,8 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scan:
-    """The touches of one face so far and what they say together; `extended` returns the next."""
+class ScanBelief:
+    """The touches of one face so far and what they say together; `extend_scan` returns the next."""
 
     reader: Reader
     settings: ScanSettings
@@ -58,11 +59,11 @@ class Scan:
     recognition: Recognition  #: of the probe's pose at the last touch
 
 
-def begun(reader: Reader, settings: ScanSettings | None = None) -> Scan:
+def begin_scan(reader: Reader, settings: ScanSettings | None = None) -> ScanBelief:
     """Return a scan without touches."""
     none = tuple(() for _ in reader.prepared)
     limits = settings or ScanSettings()
-    return Scan(reader, limits, (), None, none, none, 0, None, None, refusal(0, TOO_FEW))
+    return ScanBelief(reader, limits, (), None, none, none, 0, None, None, refusal(0, TOO_FEW))
 
 
 def read_scan(
@@ -89,13 +90,13 @@ def read_scan(
     >>> answer.object, answer.face  # doctest: +SKIP
     ('Cube', 'F1')
     """
-    scan = begun(reader, settings)
+    scan = begin_scan(reader, settings)
     for touch in touches:
-        scan = extended(scan, touch)
+        scan = extend_scan(scan, touch)
     return scan.recognition
 
 
-def extended(scan: Scan, touch: PlacedTouch) -> Scan:
+def extend_scan(scan: ScanBelief, touch: PlacedTouch) -> ScanBelief:
     """Return a scan with one touch more.
 
     A touch that feels nothing is answered by that reason and not kept.
@@ -110,7 +111,8 @@ def extended(scan: Scan, touch: PlacedTouch) -> Scan:
         return replace(scan, recognition=refusal(touch.seq, NO_CONTACT))
     touches = (*scan.touches, replace(touch, decoded=None))
     finest = min(encoding.style.pitch_mm for encoding in reader.lab.arrays)
-    stands = stands_of(reader, touches, scan.stands, limits.loose * finest)
+    by_hand = any(is_unmeasured(each, limits.loose * finest) for each in touches)
+    stands = stands_of(reader, touches, scan.stands, limits)
     shown, lattices, found, images = [], [], [], []
     for k, (encoding, template, bank) in enumerate(reader.prepared):
         image = _image(reader, touch, encoding.style.height_mm)
@@ -130,18 +132,18 @@ def extended(scan: Scan, touch: PlacedTouch) -> Scan:
         found += located(encoding, sums, limits)
         images.append(image)
     found.sort(key=lambda item: -item.score)
-    answer = answered(reader, found, limits, touch.seq)
+    answer = answered(reader, found, limits, touch.seq, by_hand=by_hand)
     agrees = bool(found) and bool(found[0].composite.agreement.chosen[-1] >= 0)
     if answer:
         found[0], agrees = _posed(reader, images, found[0], stands, limits)
-        answer = answered(reader, found, limits, touch.seq)
+        answer = answered(reader, found, limits, touch.seq, by_hand=by_hand)
     elif scan.told is None and _tells_alone(reader, shown):
         alone = recognise(reader, touch.signal, touch.seq)
         if alone and found and found[0].face == (alone.object, alone.face):
             answer, agrees = alone, True
     astray = 0 if agrees else scan.astray + 1
-    answer, told = _believed(scan, answer, astray)
-    return Scan(
+    answer, told = _believed(scan, answer, astray, 0 if by_hand else limits.patience)
+    return ScanBelief(
         reader=reader,
         settings=limits,
         touches=touches,
@@ -170,7 +172,7 @@ def _posed(
 
 
 def _believed(
-    scan: Scan, answer: Recognition, astray: int
+    scan: ScanBelief, answer: Recognition, astray: int, patience: int
 ) -> tuple[Recognition, tuple[str | None, str | None] | None]:
     """Return an answer as far as it may be believed, and what the scan has told by now.
 
@@ -183,7 +185,7 @@ def _believed(
     named = answer.object, answer.face
     if scan.told is not None and named != scan.told:
         return refusal(answer.seq, AMBIGUOUS, margin=answer.margin), None
-    if astray > 0 and (scan.told is None or astray > scan.settings.patience):
+    if astray > 0 and (scan.told is None or astray > patience):
         return refusal(answer.seq, NOT_ENCODED, margin=answer.margin), scan.told
     if answer.covariance is not None and widest_mm(answer.covariance) > scan.settings.loose_mm:
         return refusal(answer.seq, TOO_FEW, margin=answer.margin), scan.told or named

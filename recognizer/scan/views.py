@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 from recognizer.scan.mosaic.grow import added
 from recognizer.scan.mosaic.mosaic import Mosaic, MosaicSettings, no_touches
 from recognizer.scan.mosaic.planar import wrapped
+from recognizer.scan.mosaic.search import ImageSearchSettings
 from recognizer.scan.mosaic.touch import PlacedTouch
+from recognizer.scan.settings import ScanSettings
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.reader import Reader
 from recognizer.touch.round import BENDS
@@ -65,13 +67,16 @@ class Views:
 
 
 def stands_of(
-    reader: Reader, touches: Sequence[PlacedTouch], before: Stands | None, loose_mm: float
+    reader: Reader, touches: Sequence[PlacedTouch], before: Stands | None, limits: ScanSettings
 ) -> Stands:
     """Return where touches stand, the last one being new.
 
-    The mosaic is asked from the first touch on whose place is uncertain by more than `loose_mm`.
+    The mosaic is asked from the first touch on whose place is uncertain by more
+    than `loose` pitches.
     """
     last = touches[-1]
+    pitch = min(encoding.style.pitch_mm for encoding in reader.lab.arrays)
+    loose_mm = limits.loose * pitch
     mosaic = None if before is None else before.mosaic
     sure = last.believed is not None and widest_mm(last.believed.covariance) <= loose_mm
     if mosaic is None and sure and last.believed is not None:
@@ -81,12 +86,20 @@ def stands_of(
         poses = np.concatenate([before.poses, pose])
         return Stands(poses, np.concatenate([before.covariances, covariance]), None)
     if mosaic is None:
-        pitch = min(encoding.style.pitch_mm for encoding in reader.lab.arrays)
-        mosaic = no_touches(reader.sensor, MosaicSettings(period_mm=pitch))
+        search = ImageSearchSettings()
+        if any(is_unmeasured(touch, loose_mm) for touch in touches):
+            search = replace(search, margin_beyond=limits.margin_by_hand)
+        mosaic = no_touches(reader.sensor, MosaicSettings(search=search, period_mm=pitch))
         for touch in touches[:-1]:
             mosaic = added(mosaic, touch)
     mosaic = added(mosaic, last)
     return Stands(mosaic.poses, mosaic.covariances, mosaic)
+
+
+def is_unmeasured(touch: PlacedTouch, loose_mm: float) -> bool:
+    """Whether nobody measured how a touch stands to the one before."""
+    step = touch.stepped
+    return touch.believed is None and step is not None and widest_mm(step.covariance) > loose_mm
 
 
 def widest_mm(covariance: Array) -> float:

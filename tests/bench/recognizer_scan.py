@@ -36,7 +36,7 @@ from probe.scan.places import surface_to_sensor
 from probe.scan.raster import raster
 from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
-from recognizer.scan.grow import begun, extended
+from recognizer.scan.grow import begin_scan, extend_scan
 from recognizer.scan.mosaic.planar import inverse, moved, planar_covariance, planar_pose
 from recognizer.scan.mosaic.touch import PlacedTouch, placed
 from recognizer.thesis.image import Merging
@@ -222,10 +222,10 @@ def named(scan, face_of, felt):
 
 def joint(reader, felt, name, faces, tally):
     """Read a scan touch by touch."""
-    scan, first = begun(reader), None
+    scan, first = begin_scan(reader), None
     for k, touch in enumerate(felt.touches):
         start = time.process_time()
-        scan = extended(scan, touch)
+        scan = extend_scan(scan, touch)
         tally.ms.append(1e3 * (time.process_time() - start))
         if tally.judge(scan.recognition, name, felt.true[k]) and first is None:
             first = k + 1

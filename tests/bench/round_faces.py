@@ -46,7 +46,7 @@ from probe.sensor import SensorType  # noqa: E402
 from probe.simulate.registered import registered_object  # noqa: E402
 from probe.simulate.round import RoundPart, round_part  # noqa: E402
 from probe.simulate.touch import Touches, random_touches  # noqa: E402
-from recognizer.scan.grow import begun, extended  # noqa: E402
+from recognizer.scan.grow import begin_scan, extend_scan  # noqa: E402
 from recognizer.scan.mosaic.touch import PlacedTouch, placed  # noqa: E402
 from recognizer.touch.lab import open_lab  # noqa: E402
 from recognizer.touch.reader import Reader, reader_for  # noqa: E402
@@ -164,7 +164,7 @@ def one_scan(job: tuple[str, str, str, int]) -> Outcome:
     touched, rng = part(database, name), np.random.default_rng([2, number])
     touch = next(touches(touched, rng))
     along = float(rng.choice([-1.0, 1.0])) * STEP_MM
-    scan, outcome, first, start = begun(reader(database)), Outcome("refused"), math.nan, 0.0
+    scan, outcome, first, start = begin_scan(reader(database)), Outcome("refused"), math.nan, 0.0
     for k in range(MOST):
         at = np.array([[touch.x_mm, touch.y_mm]])
         inside = touched.region.contains(at)[0] and touched.region.distance_mm(at)[0] > INSIDE_MM
@@ -179,7 +179,7 @@ def one_scan(job: tuple[str, str, str, int]) -> Outcome:
             believed = placed(pose + rng.standard_normal(3) * ARM, ARM)
             signal = signal_of(counts.astype(np.float64))
             begin = time.process_time()
-            scan = extended(scan, PlacedTouch(signal, believed=believed, seq=k))
+            scan = extend_scan(scan, PlacedTouch(signal, believed=believed, seq=k))
             start += time.process_time() - begin
             outcome = judged(touched, touch, scan.recognition)
             if scan.recognition and math.isnan(first):

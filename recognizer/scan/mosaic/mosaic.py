@@ -16,7 +16,7 @@ from recognizer.scan.mosaic.canvas import Canvas, Laid, empty_canvas
 from recognizer.scan.mosaic.graph import OUTLIER, Tie
 from recognizer.scan.mosaic.image import GlobalImage, image_of
 from recognizer.scan.mosaic.patch import Patch
-from recognizer.scan.mosaic.search import Settings
+from recognizer.scan.mosaic.search import ImageSearchSettings
 from recognizer.scan.mosaic.touch import PlacedTouch
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ PARTLY = "in one direction only"
 class MosaicSettings:
     """How touches are tied to each other."""
 
-    search: Settings = field(default_factory=Settings)
+    search: ImageSearchSettings = field(default_factory=ImageSearchSettings)
     period_mm: float = 7.0  #: pitch of symbols, after which the surface looks alike; inf: none
     partners: int = 4  #: neighbours that a touch is registered with
     partners_decoded: int = 2  #: the same if it was decoded: they only check it

@@ -1,6 +1,6 @@
 """One touch against another: where the second lies on the first, or why it cannot be told.
 
-Two patches + believed T_a_b with its covariance -> Registration. `search` looks through the
+Two patches + believed T_a_b with its covariance -> ImageRegistration. `search` looks through the
 window that the belief leaves, `lucas_kanade` refines its best maxima, and they are compared
 by what they explain. No answer is given where there is nothing to correlate, where the best
 place is no better than noise would give, and where another one is nearly as good: surfaces
@@ -21,7 +21,7 @@ from recognizer.scan.mosaic.lucas_kanade import Aligned, aligned
 from recognizer.scan.mosaic.patch import Patch, covered
 from recognizer.scan.mosaic.planar import inverse, moved, wrapped
 from recognizer.scan.mosaic.raster import magnified
-from recognizer.scan.mosaic.search import Settings, nats, searched, window_mm
+from recognizer.scan.mosaic.search import ImageSearchSettings, nats, searched, window_mm
 from recognizer.scan.mosaic.texture import far_apart, held, kept, scales, seen_motions
 
 Array = NDArray[np.float64]
@@ -33,7 +33,7 @@ AMBIGUOUS = "more than one place"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Registration:
+class ImageRegistration:
     """How the second patch lies on the first."""
 
     pose: Array  #: (3,) T_a_b, mm and rad; the belief where there is a reason
@@ -57,8 +57,8 @@ def registered(
     *,
     starts: Sequence[Array] | None = None,
     period_mm: float = math.inf,
-    settings: Settings | None = None,
-) -> Registration:
+    settings: ImageSearchSettings | None = None,
+) -> ImageRegistration:
     """Register two patches.
 
     Parameters
@@ -76,10 +76,10 @@ def registered(
 
     Returns
     -------
-    Registration
+    ImageRegistration
         With a reason, and the belief as its pose, where the place cannot be told.
     """
-    limits = settings or Settings()
+    limits = settings or ImageSearchSettings()
     reach = window_mm(covariance, limits)
     reason = _hopeless(a, b, believed, limits, math.hypot(*reach))
     if reason:
@@ -119,7 +119,7 @@ def registered(
     margin = score - max(others, default=-math.inf)
     if margin < (limits.margin_beyond if max(reach) > period_mm / 2 else limits.margin):
         return refused(believed, covariance, AMBIGUOUS, margin)
-    return Registration(
+    return ImageRegistration(
         pose=best.pose,
         covariance=np.asarray(np.linalg.inv(information + prior), np.float64),
         information=information,
@@ -130,9 +130,11 @@ def registered(
     )
 
 
-def refused(believed: Array, covariance: Array, reason: str, margin: float = 0.0) -> Registration:
+def refused(
+    believed: Array, covariance: Array, reason: str, margin: float = 0.0
+) -> ImageRegistration:
     """Return a registration that says nothing but why."""
-    return Registration(
+    return ImageRegistration(
         pose=np.array(believed),
         covariance=np.array(covariance),
         information=np.zeros((3, 3)),
@@ -154,7 +156,9 @@ def varies(patch: Patch, over: NDArray[np.bool_], contrast: float) -> bool:
     return bool(rest.std() > contrast)
 
 
-def _hopeless(a: Patch, b: Patch, believed: Array, limits: Settings, reach_mm: float) -> str:
+def _hopeless(
+    a: Patch, b: Patch, believed: Array, limits: ImageSearchSettings, reach_mm: float
+) -> str:
     """Return why two patches cannot be registered, before anything is tried; or nothing."""
     if min(a.scale, b.scale) <= 0:
         return CONSTANT

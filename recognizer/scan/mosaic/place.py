@@ -18,7 +18,14 @@ from recognizer.scan.mosaic.canvas import laid, reference
 from recognizer.scan.mosaic.errors import MosaicError
 from recognizer.scan.mosaic.graph import ARM, FREE, PLANE, Kind, Tie
 from recognizer.scan.mosaic.mosaic import ALONE, PARTLY, Mosaic
-from recognizer.scan.mosaic.pair import AMBIGUOUS, CONSTANT, NOISE, Registration, registered, varies
+from recognizer.scan.mosaic.pair import (
+    AMBIGUOUS,
+    CONSTANT,
+    NOISE,
+    ImageRegistration,
+    registered,
+    varies,
+)
 from recognizer.scan.mosaic.patch import Patch, covered
 from recognizer.scan.mosaic.planar import (
     between,
@@ -56,7 +63,7 @@ def placing(mosaic: Mosaic, touch: PlacedTouch, patch: Patch, number: int) -> Pl
             return replace(other, ties=(given[0], *other.ties))
     near = _near(mosaic, patch, predicted, number)
     reason, start = _found(mosaic, patch, predicted, near, number)
-    pairs: list[tuple[int, Registration]] = []
+    pairs: list[tuple[int, ImageRegistration]] = []
     if not reason:
         pairs = _registered(mosaic, patch, predicted, start, near)
     softer = 1 / mosaic.settings.inflation
@@ -200,7 +207,7 @@ def _registered(
     predicted: Placed,
     start: Array,
     near: Sequence[int],
-) -> list[tuple[int, Registration]]:
+) -> list[tuple[int, ImageRegistration]]:
     settings = mosaic.settings
     loose = (settings.loose_tactels * scales(mosaic.sensor)) ** 2
     limits = replace(settings.search, near_tactels=math.inf)
@@ -246,7 +253,7 @@ def _disagreement(mosaic: Mosaic, ties: Sequence[Tie], pose: Array) -> float:
     return total
 
 
-def _gain(mosaic: Mosaic, pairs: Sequence[tuple[int, Registration]]) -> float:
+def _gain(mosaic: Mosaic, pairs: Sequence[tuple[int, ImageRegistration]]) -> float:
     """Return by what the readings of a touch are to be multiplied to be like its neighbours'."""
     found = [(mosaic.gains[j] * pair.gain, pair.rho) for j, pair in pairs if pair]
     if not found:

@@ -87,7 +87,7 @@ def planar_pose(T_plane_sensor: ArrayLike) -> Array:
         angle = math.degrees(math.acos(max(-1.0, min(1.0, float(T[2, 2])))))
         raise MosaicError(
             f"the sensor is tilted by {angle:.0f} degrees, it must face the plane within 60",
-            fix="give poses in the frame of the face that is touched, z outward",
+            fix="scan one face at a time; poses are in its frame, z outward",
         )
     return np.array([T[0, 3], T[1, 3], math.atan2(-T[0, 1], T[1, 1])])
 
@@ -110,4 +110,5 @@ def planar_covariance(covariance: ArrayLike, turn: ArrayLike | None = None) -> A
         )
     chosen = np.zeros((3, 6))
     chosen[0, :3], chosen[1, :3], chosen[2, 3:] = R[0], R[1], R[2]
-    return np.asarray(chosen @ given @ chosen.T)
+    found = chosen @ given @ chosen.T
+    return np.asarray((found + found.T) / 2)

@@ -30,7 +30,7 @@ BEST = 0.94  #: correlation that true places have; more of it is chance, not evi
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class ImageSearchSettings:
     """When a place is told from the images."""
 
     sigmas: float = 3.0  #: half width of the window, standard deviations of the belief
@@ -62,21 +62,25 @@ class Searched:
     tried: float  #: independent places in the window
 
 
-def nats(rho: Array, tactels: Array, settings: Settings) -> Array:
+def nats(rho: Array, tactels: Array, settings: ImageSearchSettings) -> Array:
     """Return how much likelier images are if they show the same, by their correlation."""
     known = np.clip(np.nan_to_num(rho), 0.0, BEST)
     readings = settings.independent * np.minimum(tactels, settings.enough)
     return np.asarray(-readings / 2 * np.log1p(-(known**2)))
 
 
-def window_mm(covariance: Array, settings: Settings) -> tuple[float, float]:
+def window_mm(covariance: Array, settings: ImageSearchSettings) -> tuple[float, float]:
     """Return how far from a belief the search reaches along x and y, mm."""
     x, y = settings.sigmas * np.sqrt(np.diag(covariance)[:2])
     return float(x), float(y)
 
 
 def searched(
-    reference: Raster, patch: Patch, believed: Array, covariance: Array, settings: Settings
+    reference: Raster,
+    patch: Patch,
+    believed: Array,
+    covariance: Array,
+    settings: ImageSearchSettings,
 ) -> Searched:
     """Return where a patch may lie on a reference.
 
@@ -118,7 +122,7 @@ def searched(
     return Searched(tuple(found[: settings.candidates]), tried)
 
 
-def _turns(sigma_rad: float, patch: Patch, settings: Settings) -> Array:
+def _turns(sigma_rad: float, patch: Patch, settings: ImageSearchSettings) -> Array:
     """Return the turns to try about a belief: each moves the rim by a tactel more."""
     step = patch.sensor.pitch_mm / patch.sensor.reach_mm
     count = math.floor(min(settings.sigmas * sigma_rad, math.pi) / step + 0.5)

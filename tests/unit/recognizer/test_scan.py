@@ -7,11 +7,16 @@ import pytest
 
 from generator.pipeline import encode
 from generator.spec import read_specs
+from probe.arm.carried import SensorPose
 from probe.contact.contract import Touch
+from probe.scan.places import surface_to_sensor
 from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
-from recognizer.scan.grow import begun, extended, read_scan
+from recognizer.scan.grow import begin_scan, extend_scan, read_scan
+from recognizer.scan.mosaic.errors import MosaicError
 from recognizer.scan.mosaic.touch import PlacedTouch, placed
+from recognizer.scan.session import Scan, TouchPlaces
+from recognizer.scan.settings import ScanSettings
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import reader_for
 from recognizer.touch.recognition import NO_CONTACT, TOO_FEW
@@ -66,11 +71,11 @@ PLACES = [(x, y) for n, y in enumerate((26.0, 40.0, 54.0)) for x in (22, 32, 42,
 def test_a_scan_tells_what_one_touch_cannot(lab, reader, level):
     surface = registered_surface(lab.url, "Cube", "F3").surface
     touches, true = scanned(surface, PLACES, 0.8, level, 5)
-    scan, answers = begun(reader), []
+    scan, answers = begin_scan(reader), []
     assert not scan.recognition
     assert scan.recognition.reason == TOO_FEW
     for touch in touches:
-        scan = extended(scan, touch)
+        scan = extend_scan(scan, touch)
         answers.append(scan.recognition)
     assert not answers[0]  # a 25 mm touch of 12 mm symbols
     assert answers[-1]
@@ -88,11 +93,11 @@ def test_a_scan_tells_what_one_touch_cannot(lab, reader, level):
 def test_a_touch_in_the_air_says_so_and_changes_nothing(lab, reader):
     surface = registered_surface(lab.url, "Cube", "F3").surface
     touches, _ = scanned(surface, PLACES[:3], 0.0, TYPICAL, 2)
-    scan = begun(reader)
+    scan = begin_scan(reader)
     for touch in touches:
-        scan = extended(scan, touch)
+        scan = extend_scan(scan, touch)
     air = PlacedTouch(signal_of(np.full((16, 16), 8.0)), touches[0].believed, seq=9)
-    lifted = extended(scan, air)
+    lifted = extend_scan(scan, air)
     assert lifted.recognition.reason == NO_CONTACT
     assert len(lifted.touches) == 3
     assert lifted.leading is scan.leading
@@ -106,9 +111,9 @@ def test_touches_of_another_thing_do_not_make_an_answer(lab, reader):
     mixed = list(touches)
     for k, touch in zip((3, 6), strange, strict=True):
         mixed[k] = PlacedTouch(touch.signal, touches[k].believed, seq=k)
-    scan = begun(reader)
+    scan = begin_scan(reader)
     for touch in mixed:
-        scan = extended(scan, touch)
+        scan = extend_scan(scan, touch)
         assert scan.recognition.object in (None, "Cube")
     assert scan.recognition.face == "F3"
     chosen = scan.leading.composite.agreement.chosen
@@ -126,9 +131,9 @@ def test_steps_without_an_arm_are_enough(lab, reader):
     for k in range(1, len(touches)):
         step = true[k] - true[k - 1] + rng.normal(0, 1, 3) * spread
         counted.append(PlacedTouch(touches[k].signal, stepped=placed(step, spread), seq=k))
-    scan = begun(reader)
+    scan = begin_scan(reader)
     for touch in counted:
-        scan = extended(scan, touch)
+        scan = extend_scan(scan, touch)
         assert scan.recognition.object in (None, "Cube")
         assert scan.recognition.face in (None, "F2")
     assert scan.stands.mosaic is not None
@@ -140,7 +145,89 @@ def test_steps_without_an_arm_are_enough(lab, reader):
 def test_a_surface_that_is_not_registered_is_no_object(reader, kind):
     surface = FOREIGN[kind](reader.lab.arrays[0], np.random.default_rng(8))
     touches, _ = scanned(surface, PLACES[:8], 0.5, TYPICAL, 3)
-    scan = begun(reader)
+    scan = begin_scan(reader)
     for touch in touches:
-        scan = extended(scan, touch)
+        scan = extend_scan(scan, touch)
         assert not scan.recognition
+
+
+def true_pose(x, y, theta, base=(300.0, 20.0, 0.4)):
+    """T_base_sensor of a touch, the face lying somewhere in the base's frame, upside down."""
+    T_face_sensor = surface_to_sensor(x, y, theta)
+    over = np.diag([1.0, -1.0, -1.0, 1.0])
+    return over @ surface_to_sensor(*base, 50.0) @ T_face_sensor
+
+
+@pytest.fixture(scope="module")
+def felt(lab):
+    surface = registered_surface(lab.url, "Cube", "F3").surface
+    return scanned(surface, PLACES, 0.8, TYPICAL, 5)
+
+
+@pytest.fixture(scope="module")
+def felt_near(lab):
+    """As close to each other as a hand steps that feels its way."""
+    surface = registered_surface(lab.url, "Cube", "F3").surface
+    places = [(x, y) for n, y in enumerate((30, 37, 44)) for x in range(20, 56, 7)[:: (-1) ** n]]
+    return scanned(surface, places, 0.8, TYPICAL, 5)
+
+
+@pytest.mark.parametrize("knows", ["pose", "arm", "nothing"])
+def test_a_session_answers_with_and_without_the_motion(lab, reader, felt, felt_near, knows):
+    touches, true = felt_near if knows == "nothing" else felt
+    session = Scan(lab) if knows == "pose" else Scan(reader)
+    assert not session.answer
+    for touch, at in zip(touches, true, strict=True):
+        pose = None if knows == "nothing" else true_pose(*at)
+        if knows == "arm":
+            pose = SensorPose(pose, np.diag([0.2, 0.2, 0.2, 0.01, 0.01, 0.003]) ** 2)
+        found = session.add(touch.signal, pose, seq=touch.seq)
+        assert found.seq == touch.seq
+        if found:
+            assert session.answer is found
+    assert session.touches == len(touches)
+    assert (session.answer.object, session.answer.face) == ("Cube", "F3")
+    x, y, _ = true[session.answer.seq]
+    T = session.answer.T_face_probe
+    assert math.hypot(T[0, 3] - x, T[1, 3] - y) < 0.3
+
+
+def test_a_session_keeps_its_answer_in_the_air(lab, reader, felt):
+    touches, true = felt
+    session = Scan(reader)
+    for touch, at in zip(touches, true, strict=True):
+        session.add(touch.signal, true_pose(*at))
+    known = session.answer
+    assert known
+    assert session.add(np.full((16, 16), 8.0)).reason == NO_CONTACT
+    assert session.answer is known
+    assert session.touches == len(touches)
+
+
+def test_places_follow_from_poses_steps_or_a_hand(felt):
+    signal, settings = felt[0][0].signal, ScanSettings()
+    poses = [true_pose(10, 20, 0.1), true_pose(16, 20, 0.1), true_pose(16, 27, 0.2)]
+    known = TouchPlaces(settings)
+    for pose in poses:
+        touch = known.place(signal, pose, 0)
+        known.keep(pose)
+    c, s = math.cos(0.1), math.sin(0.1)
+    assert touch.believed.pose == pytest.approx([6 * c + 7 * s, 7 * c - 6 * s, 0.1])
+    assert touch.stepped is None
+    loose = known.place(signal, None, 0)
+    assert loose.believed is None
+    assert np.sqrt(np.diag(loose.stepped.covariance)) == pytest.approx(settings.by_hand)
+    late = TouchPlaces(settings)  # the first touch had no pose
+    late.keep(None)
+    assert late.place(signal, poses[0], 0).stepped.pose == pytest.approx([0, 0, 0])
+    late.keep(poses[0])
+    assert late.place(signal, poses[1], 0).stepped.pose == pytest.approx([6 * c, -6 * s, 0])
+
+
+def test_another_face_is_no_touch_of_this_scan(reader, felt):
+    session = Scan(reader)
+    session.add(felt[0][0].signal, true_pose(10, 20, 0.1))
+    beside = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]])
+    with pytest.raises(MosaicError, match="tilted by 90 degrees") as refusal:
+        session.add(felt[0][1].signal, true_pose(16, 20, 0.1) @ beside)
+    assert "one face" in refusal.value.fix
