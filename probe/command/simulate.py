@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
 from encoded_objects.console import Action
 from probe.command.options import Json, Replace
+
+if TYPE_CHECKING:
+    from probe.simulate.scan import ScanKind
 
 EPILOG = """TARGET is a written part, [bold]out/cube/Cube-F1.stl[/] (with [bold]@lab.db[/]: in the \
 frame of its face), a registered face, [bold]lab.db#Cube/F1[/], or [bold]washer[/]. x and y lie \
@@ -52,7 +55,13 @@ def simulate(
     ] = "typical",
     touches: Annotated[
         int | None, typer.Option(min=1, show_default=False,
-                                 help="So many touches at random; what is given is kept."),
+                                 help="So many touches at random; what is given is kept. "
+                                      "With --scan: so many of its way, all by default."),
+    ] = None,
+    scan: Annotated[
+        str | None, typer.Option(metavar="raster|kinesthetic", show_default=False,
+                                 help="Touches side by side on a way over the face, with the pose "
+                                      "of each: as it is, or as an arm with play believes."),
     ] = None,
     frames: Annotated[int, typer.Option(min=1, help="Frames of each touch, 220 a second.")] = 1,
     seed: Annotated[int, typer.Option(min=0, help="Of places and noise.")] = 0,
@@ -81,8 +90,11 @@ def simulate(
             raise typer.BadParameter(f"--overlay {overlay}: give tab or pad")
         if noise not in ("typical", "quiet"):
             raise typer.BadParameter(f"--noise {noise}: give typical or quiet")
+        if scan not in (None, "raster", "kinesthetic"):
+            raise typer.BadParameter(f"--scan {scan}: give raster or kinesthetic")
         check_outputs(output, png, truth, replace=replace)
-        options = TouchOptions(x, y, theta, force, tilt_x, tilt_y, touches, frames, seed)
+        kind = cast("ScanKind | None", scan)
+        options = TouchOptions(x, y, theta, force, tilt_x, tilt_y, touches, frames, seed, kind)
         probe = SimulatedProbe(
             target, options, accuracy=accuracy, overlay="pad" if overlay == "pad" else "tab",
             noise="quiet" if noise == "quiet" else "typical",

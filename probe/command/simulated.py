@@ -34,7 +34,7 @@ def simulate_touches(
     ContactError
         When a touch has no equilibrium.
     """
-    number = probe.options.touches or 1
+    number = len(probe)
     kept: list[dict[str, Any]] = []
     with ExitStack() as stack:
         recorder = None

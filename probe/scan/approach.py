@@ -21,7 +21,7 @@ Reason = Literal["contact", "no contact", "force limit", "travel limit", "too st
 
 
 @dataclass(frozen=True, slots=True)
-class Guard:
+class ApproachLimits:
     """What an approach wants, and what it may do."""
 
     force_n: float = 80.0  #: to be reached
@@ -47,7 +47,9 @@ class Approach:
         return self.reason == "contact"
 
 
-def guarded_approach(feel: Callable[[float], float], guard: Guard | None = None) -> Approach:
+def guarded_approach(
+    feel: Callable[[float], float], limits: ApproachLimits | None = None
+) -> Approach:
     """Move the sensor on until the wanted force is felt.
 
     Parameters
@@ -55,7 +57,7 @@ def guarded_approach(feel: Callable[[float], float], guard: Guard | None = None)
     feel
         Moves the sensor to a travel (mm from the start, towards the object) and returns the
         force (N) that is felt there.
-    guard
+    limits
         Force and limits.
 
     Returns
@@ -73,51 +75,53 @@ def guarded_approach(feel: Callable[[float], float], guard: Guard | None = None)
     >>> end.reason, round(end.travel_mm)
     ('contact', 13)
     """
-    guard = guard or Guard()
-    _check(guard)
+    limits = limits or ApproachLimits()
+    _check(limits)
     before = low = (0.0, 0.0)  # travel and force; low is the furthest with too little force
     high: tuple[float, float] | None = None  # the nearest with too much
     at, felt_at, steps = 0.0, math.inf, 0
     while True:
-        force, steps = _felt(feel, at), steps + 1
-        if force >= guard.felt_n:
+        force, steps = _feel_n(feel, at), steps + 1
+        if force >= limits.felt_n:
             felt_at = min(felt_at, at)
-        if force > guard.most_n:
+        if force > limits.most_n:
             feel(0.0)
             return Approach("force limit", 0.0, force, felt_at, steps)
-        if abs(force - guard.force_n) <= guard.tolerance_n:
+        if abs(force - limits.force_n) <= limits.tolerance_n:
             return Approach("contact", at, force, felt_at, steps)
-        if force > guard.force_n:
+        if force > limits.force_n:
             high = (at, force)
         else:
             before, low = low, (at, force)
-        if high and high[0] - low[0] <= guard.finest_mm:
-            return Approach("too stiff", low[0], _felt(feel, low[0]), felt_at, steps + 1)
-        if not high and low[0] >= guard.travel_mm:
+        if high and high[0] - low[0] <= limits.finest_mm:
+            return Approach("too stiff", low[0], _feel_n(feel, low[0]), felt_at, steps + 1)
+        if not high and low[0] >= limits.travel_mm:
             if math.isfinite(felt_at):
                 return Approach("travel limit", at, force, felt_at, steps)
             feel(0.0)
             return Approach("no contact", 0.0, force, felt_at, steps)
-        at = _between(low, high, guard) if high else _further(before, low, guard)
+        at = _between(low, high, limits) if high else _further(before, low, limits)
 
 
-def _further(before: tuple[float, float], low: tuple[float, float], guard: Guard) -> float:
+def _further(
+    before: tuple[float, float], low: tuple[float, float], limits: ApproachLimits
+) -> float:
     """Return the next travel while the force is still too small."""
-    step = guard.step_mm
-    if low[1] >= guard.felt_n:
-        stiffness = (low[1] - before[1]) / max(low[0] - before[0], guard.finest_mm)
-        wanted = _SHORT * (guard.force_n - low[1])
+    step = limits.step_mm
+    if low[1] >= limits.felt_n:
+        stiffness = (low[1] - before[1]) / max(low[0] - before[0], limits.finest_mm)
+        wanted = _SHORT * (limits.force_n - low[1])
         step = min(step, wanted / stiffness) if stiffness > 0 else step / 4
-    return min(low[0] + max(step, guard.finest_mm), guard.travel_mm)
+    return min(low[0] + max(step, limits.finest_mm), limits.travel_mm)
 
 
-def _between(low: tuple[float, float], high: tuple[float, float], guard: Guard) -> float:
+def _between(low: tuple[float, float], high: tuple[float, float], limits: ApproachLimits) -> float:
     """Return the next travel between too little and too much, by proportion."""
-    share = (guard.force_n - low[1]) / (high[1] - low[1])
+    share = (limits.force_n - low[1]) / (high[1] - low[1])
     return low[0] + min(max(share, 0.1), 0.9) * (high[0] - low[0])
 
 
-def _felt(feel: Callable[[float], float], travel: float) -> float:
+def _feel_n(feel: Callable[[float], float], travel: float) -> float:
     force = float(feel(travel))
     if not math.isfinite(force):
         raise ContactError(
@@ -126,12 +130,12 @@ def _felt(feel: Callable[[float], float], travel: float) -> float:
     return force
 
 
-def _check(guard: Guard) -> None:
-    rising = 0 < guard.felt_n <= guard.force_n - guard.tolerance_n
-    rising = rising and guard.force_n + guard.tolerance_n <= guard.most_n < math.inf
-    steps = 0 < guard.finest_mm <= guard.step_mm <= guard.travel_mm < math.inf
-    if not (rising and steps and guard.tolerance_n > 0):
+def _check(limits: ApproachLimits) -> None:
+    rising = 0 < limits.felt_n <= limits.force_n - limits.tolerance_n
+    rising = rising and limits.force_n + limits.tolerance_n <= limits.most_n < math.inf
+    steps = 0 < limits.finest_mm <= limits.step_mm <= limits.travel_mm < math.inf
+    if not (rising and steps and limits.tolerance_n > 0):
         raise ContactError(
-            f"limits that contradict each other: {guard}",
+            f"limits that contradict each other: {limits}",
             fix="felt_n < force_n < most_n, and finest_mm < step_mm < travel_mm, all above 0",
         )

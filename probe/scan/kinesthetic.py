@@ -36,7 +36,7 @@ class JointErrors:
 
 
 @dataclass(frozen=True, slots=True)
-class Kinesthetic:
+class ArmPath:
     """Poses of a scan, one after the other."""
 
     believed: NDArray[np.float64]  #: (n, 4, 4) T_base_sensor, mm
@@ -46,7 +46,7 @@ class Kinesthetic:
     true_angles_rad: NDArray[np.float64]  #: (n, 5)
 
 
-def kinesthetic(
+def follow_poses(
     arm: Arm,
     commanded: Sequence[ArrayLike],
     errors: JointErrors,
@@ -54,7 +54,7 @@ def kinesthetic(
     *,
     wrist: Wrist | None = None,
     hanging: WristPose | None = None,
-) -> Kinesthetic:
+) -> ArmPath:
     """Follow commanded poses with an arm that is not perfect.
 
     Parameters
@@ -81,11 +81,13 @@ def kinesthetic(
     T_gripper_sensor = gripper_to_plate(wrist, hanging) @ plate_to_sensor(wrist)
     back = np.linalg.inv(T_gripper_sensor)
     angles = joint_path(arm, [np.asarray(T, np.float64) @ back for T in commanded])
-    actual = played(angles, errors, rng) + rng.normal(0, 1, angles.shape) * errors.noise_rad
+    actual = (
+        joints_with_play(angles, errors, rng) + rng.normal(0, 1, angles.shape) * errors.noise_rad
+    )
     spread = errors.covariance()
     believed = [sensor_pose(arm, q, spread, wrist, hanging) for q in angles]
     true = [forward(arm, q) @ T_gripper_sensor for q in actual]
-    return Kinesthetic(
+    return ArmPath(
         np.array([pose.T_base_sensor for pose in believed]).reshape(-1, 4, 4),
         np.array(true).reshape(-1, 4, 4),
         np.array([pose.covariance for pose in believed]).reshape(-1, 6, 6),
@@ -115,7 +117,7 @@ def joint_path(arm: Arm, poses: Sequence[ArrayLike]) -> NDArray[np.float64]:
     return np.array(path).reshape(-1, AXES)
 
 
-def played(
+def joints_with_play(
     angles: NDArray[np.float64], errors: JointErrors, rng: np.random.Generator
 ) -> NDArray[np.float64]:
     """Return where joints with play stand, (n, 5), when their motors go through `angles`.

@@ -24,7 +24,7 @@ STEP_TACTELS: Final = 4.25
 
 
 @dataclass(frozen=True, slots=True)
-class Raster:
+class RasterPlan:
     """Where to press."""
 
     places_mm: NDArray[np.float64]  #: (n, 2) of the sensor's centre, in the order of scanning
@@ -34,6 +34,15 @@ class Raster:
 
     def __len__(self) -> int:
         return len(self.places_mm)
+
+    def there_and_back(self, least_cover: float = 0.0) -> NDArray[np.float64]:
+        """Return the places (n, 2) line by line, every other line back.
+
+        Those that cover less of the face than so much of what the best one covers are left out.
+        """
+        kept = self.cover >= least_cover * self.cover.max(initial=0.0)
+        lines = [self.places_mm[kept & (self.lines == line)] for line in np.unique(self.lines)]
+        return np.concatenate([line[:: (-1) ** n] for n, line in enumerate(lines)])
 
     def touches(self, force_n: float, wrist: WristStiffness | None = None) -> Iterator[Touch]:
         """Yield what the contact models take, for a level sensor."""
@@ -48,7 +57,7 @@ def raster(
     step_tactels: float = STEP_TACTELS,
     theta_rad: float = 0.0,
     least_cover: float = 0.1,
-) -> Raster:
+) -> RasterPlan:
     """Lay a raster of touches over a face.
 
     Parameters
@@ -93,7 +102,12 @@ def raster(
                 places.append((x, y))
                 cover.append(share)
                 lines.append(line)
-    return Raster(
+    if not places:
+        raise SurfaceError(
+            f"no place covers {least_cover:.0%} of the sensor",
+            fix="take a larger face, or a smaller share",
+        )
+    return RasterPlan(
         np.array(places).reshape(-1, 2) @ turn.T, np.array(cover), np.array(lines, int), theta_rad
     )
 

@@ -3,7 +3,8 @@
 Target + options -> SimulatedProbe -> touches, each with its frames. Touch i draws from a
 generator of (seed, i) alone, so that it is the same in any number of touches. Its frames
 follow each other at the board's rate under a steady force; the film was not loaded before.
-Truth stands apart from the frames, whose pose stays unknown. Thesis 4.2.
+Truth stands apart from the frames; those of a scan have the pose that the robot believes.
+Thesis 4.2.
 """
 
 from __future__ import annotations
@@ -27,11 +28,13 @@ from probe.frame import Frame, frame_from
 from probe.recording.names import check_name
 from probe.recording.record import Recorder
 from probe.sensor import Overlay, SensorType
+from probe.simulate.scan import ScanKind, ScanPath, scan_path
 from probe.simulate.scene import Scene
 from probe.simulate.target import surface_of
 from probe.simulate.touch import Touches, pose_of, random_touches
 
 FORCE_N = 80.0  #: as the thesis pressed its washer
+_WAY = 1 << 32  # of the generator that draws a scan's way: no touch has that number
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,9 +47,10 @@ class TouchOptions:
     force_n: float | None = None
     tilt_x_deg: float | None = None
     tilt_y_deg: float | None = None
-    touches: int | None = None  #: at random; None: one, as named
+    touches: int | None = None  #: at random; None: one, as named; of a scan at most
     frames: int = 1  #: of each touch
     seed: int = 0
+    scan: ScanKind | None = None  #: None: touches by themselves
 
     def draw(self, scene: Scene, rng: np.random.Generator) -> Touch:
         """Return a touch; what is not named is drawn, or has a default.
@@ -85,6 +89,7 @@ class SimulatedTouch:
     touch: Touch
     contact: Contact
     frames: tuple[Frame, ...]
+    T_base_sensor: NDArray[np.float64] | None = None  #: (4, 4) mm, of a scan: as it was
 
     def truth(self) -> dict[str, Any]:
         """Return where the probe was and what it felt: mm, degrees, N, as JSON has it."""
@@ -95,6 +100,7 @@ class SimulatedTouch:
         T_object_surface = self.scene.T_object_surface
         if T_face_probe is not None and T_object_surface is not None:
             T_object_probe = T_object_surface @ T_face_probe
+        T_base = self.T_base_sensor
         return {
             "seq": self.frames[0].seq,
             "x_mm": touch.x_mm,
@@ -107,6 +113,7 @@ class SimulatedTouch:
             "tactels": int((contact.forces_n > 0).sum()),
             "T_face_probe": None if T_face_probe is None else T_face_probe.tolist(),
             "T_object_probe": None if T_object_probe is None else T_object_probe.tolist(),
+            **({} if T_base is None else {"T_base_probe": T_base.tolist()}),
         }
 
 
@@ -135,6 +142,8 @@ class SimulatedProbe:
         The target is no surface; exit code 4 if its database cannot be read.
     ContactError
         The accuracy cannot be had.
+    PoseError
+        A scan's arm does not reach.
     """
 
     target: str
@@ -145,6 +154,7 @@ class SimulatedProbe:
     sensor: SensorType = field(init=False)
     level: str = field(init=False)  #: of the contact model
     scene: Scene = field(init=False)
+    path: ScanPath | None = field(init=False)  #: None: no scan
 
     def __post_init__(self) -> None:
         for name, given, known in (
@@ -156,6 +166,11 @@ class SimulatedProbe:
         object.__setattr__(self, "sensor", sensor)
         object.__setattr__(self, "level", level_for(sensor, accuracy_of(self.accuracy)))
         object.__setattr__(self, "scene", surface_of(self.target))
+        object.__setattr__(self, "path", self._scan_path())
+
+    def __len__(self) -> int:
+        """Return the number of touches."""
+        return (self.options.touches or 1) if self.path is None else len(self.path)
 
     def touches(self) -> Iterator[SimulatedTouch]:
         """Yield the touches, one after another.
@@ -168,26 +183,36 @@ class SimulatedProbe:
         options, sensor = self.options, self.sensor
         board = Electronics(noise=QUIET if self.noise == "quiet" else Noise())
         fsr = fsr_of(sensor.rows, sensor.columns)
-        for i in range(options.touches or 1):
+        for i in range(len(self)):
             rng = np.random.default_rng([options.seed, i])
-            touch = options.draw(self.scene, rng)
+            touch = options.draw(self.scene, rng) if self.path is None else self.path.touches[i]
             met = self.scene.under(touch)
             contact = press(met.surface, sensor, touch, accuracy=self.level)
+            true = believed = wrist = None
+            if self.path is not None and math.isfinite(contact.z_mm):
+                true = self.path.true_pose(i, met, contact)
+                believed = self.path.believed_pose(i, true)
+                wrist = self.path.wrist_counts(i, contact)
             state, frames = None, []
             for beat in range(options.frames):
                 counts, state = read_counts(contact.forces_n, board, fsr, state, rng)
                 seq = i * options.frames + beat
-                frames.append(frame_from(counts, t_ns=round(seq * board.frame_s * 1e9), seq=seq))
-            yield SimulatedTouch(met, touch, contact, tuple(frames))
+                t_ns = round(seq * board.frame_s * 1e9)
+                frames.append(frame_from(counts, t_ns=t_ns, seq=seq, wrist=wrist, pose=believed))
+            yield SimulatedTouch(met, touch, contact, tuple(frames), true)
 
     @contextmanager
     def recorder(self, out: Path) -> Iterator[Recorder]:
         """Yield the writer of a recording; where a touch is refused, no file is left."""
-        attributes = {
+        attributes: dict[str, Any] = {
             "simulated": self.target, "overlay": self.overlay, "level": self.level,
             "noise": self.noise, "seed": self.options.seed,
             "frames_per_touch": self.options.frames,
         }  # fmt: skip
+        if self.path is not None:
+            error_mm, error_rad = self.path.error
+            attributes |= {"scan": self.options.scan, "pose_error_mm": error_mm,
+                           "pose_error_deg": math.degrees(error_rad)}  # fmt: skip
         sensor = f"simulated/{self.overlay}"
         with (
             staged(out) as draft,
@@ -197,12 +222,29 @@ class SimulatedProbe:
 
     def truth(self, touches: list[dict[str, Any]]) -> dict[str, Any]:
         """Return the truth of a run whose touches were these, as JSON has it."""
+        scan = {}
+        if self.path is not None:
+            T = self.path.T_base_object
+            scan = {"scan": self.options.scan, "T_base_object": None if T is None else T.tolist()}
         return {
             "target": self.target, "object": self.scene.object_name or None,
             "face": self.scene.face or None, "overlay": self.overlay, "level": self.level,
             "seed": self.options.seed, "frames_per_touch": self.options.frames,
-            "touches": touches,
+            **scan, "touches": touches,
         }  # fmt: skip
+
+    def _scan_path(self) -> ScanPath | None:
+        options = self.options
+        if options.scan is None:
+            return None
+        if {options.x_mm, options.y_mm, options.tilt_x_deg, options.tilt_y_deg} != {None}:
+            raise SurfaceError("a scan chooses places and tilts by itself",
+                               fix="leave x, y and tilts out, or the scan")  # fmt: skip
+        return scan_path(
+            self.scene, self.sensor, options.scan, np.random.default_rng([options.seed, _WAY]),
+            most=options.touches, theta_rad=math.radians(_or(options.theta_deg, 0.0)),
+            force_n=_or(options.force_n, FORCE_N),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -258,6 +300,7 @@ def simulate(
     tilt_x: float | None = None,
     tilt_y: float | None = None,
     touches: int | None = None,
+    scan: ScanKind | None = None,
     frames: int = 1,
     seed: int = 0,
     overlay: Literal["tab", "pad"] = "tab",
@@ -280,7 +323,10 @@ def simulate(
     tilt_x, tilt_y
         Tilts about the sensor's own axes, degrees; 0, or up to 2 with `touches`.
     touches
-        So many at random; what is given is kept.
+        So many at random; what is given is kept. Of a scan so many at most.
+    scan
+        Touches side by side on a way over the face, with the pose of each in the robot's base:
+        raster, as it is; kinesthetic, as an arm with play believes.
     frames
         Of each touch, 220 a second.
     seed
@@ -299,7 +345,7 @@ def simulate(
     >>> touch.counts.shape, touch.truth()["touches"][0]["force_n"]
     ((16, 16), 80.0)
     """
-    options = TouchOptions(x, y, theta, force, tilt_x, tilt_y, touches, frames, seed)
+    options = TouchOptions(x, y, theta, force, tilt_x, tilt_y, touches, frames, seed, scan)
     probe = SimulatedProbe(target, options, overlay=overlay, accuracy=accuracy, noise=noise)
     return Simulation(probe, tuple(probe.touches()))
 

@@ -34,6 +34,12 @@ class Polygon:
         """Lowest and highest x and y."""
         return self.starts.min(axis=0), self.starts.max(axis=0)
 
+    def loops(self) -> list[Array]:
+        """Return the corners (k, 2) of the outline and of every hole."""
+        ends = np.flatnonzero((np.roll(self.starts, -1, axis=0) != self.ends).any(axis=1))
+        rings = ends if len(ends) else np.array([len(self.starts) - 1])
+        return np.split(self.starts, rings[:-1] + 1)
+
     def contains(self, points_mm: Array) -> NDArray[np.bool_]:
         """Whether points (n, 2) lie inside or on an edge."""
         step = max(1, _BLOCK // len(self.starts))

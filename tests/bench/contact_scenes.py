@@ -142,7 +142,7 @@ def scanned(surface, loops, sensor, level):
     from probe.arm.links import Arm
     from probe.circuit import Electronics, fsr_of, read_counts
     from probe.frame import frame_from
-    from probe.scan.kinesthetic import JointErrors, kinesthetic
+    from probe.scan.kinesthetic import JointErrors, follow_poses
     from probe.scan.places import surface_to_sensor
     from probe.scan.raster import raster
 
@@ -150,7 +150,7 @@ def scanned(surface, loops, sensor, level):
     start = time.process_time()
     plan = raster(loops, sensor)
     stands = [surface_to_sensor(260 + x, y - 40, 0.0, 100.0) for x, y in plan.places_mm.tolist()]
-    kinesthetic(Arm(), stands, JointErrors((3e-4,) * 5, (1e-3,) * 5), rng)
+    follow_poses(Arm(), stands, JointErrors((3e-4,) * 5, (1e-3,) * 5), rng)
     times = [time.process_time() - start, 0.0, 0.0]
     fsr, electronics, state, frames = fsr_of(), Electronics(), None, []
     for seq, touch in enumerate(plan.touches(80.0)):

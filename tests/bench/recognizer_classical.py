@@ -27,7 +27,7 @@ from probe.arm.links import Arm
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
-from probe.scan.kinesthetic import JointErrors, kinesthetic
+from probe.scan.kinesthetic import JointErrors, follow_poses
 from probe.scan.places import surface_to_sensor, touch_at
 from probe.scan.raster import raster
 from probe.sensor import SensorType
@@ -177,7 +177,7 @@ def scanned(scene, level, rng, theta, sigma_tactels):
     T_base_face = surface_to_sensor(300, 0, 0.2, 100) @ surface_to_sensor(-x, -y, 0)
     wanted = np.array([T_base_face @ surface_to_sensor(x, y, theta) for x, y in plan.places_mm])
     if sigma_tactels is None:
-        arm = kinesthetic(Arm(), wanted, JointErrors(), rng)
+        arm = follow_poses(Arm(), wanted, JointErrors(), rng)
         believed, true = arm.believed, arm.true
     else:
         believed, true = wanted, wanted.copy()

@@ -34,7 +34,7 @@ from probe.arm.links import Arm
 from probe.circuit import Electronics, fsr_of, read_counts
 from probe.contact.contract import Touch
 from probe.contact.press import press
-from probe.scan.kinesthetic import JointErrors, Kinesthetic, kinesthetic
+from probe.scan.kinesthetic import ArmPath, JointErrors, follow_poses
 from probe.scan.places import surface_to_sensor
 from probe.scan.raster import raster
 from probe.sensor import SensorType
@@ -111,17 +111,17 @@ def scanned(database: str, name: str, pitch_mm: float, tactels: float, counts: b
     return Scan(signals, believed, np.array(true), pitch_mm)
 
 
-def moved_arm(stands, tactels: float, seed: int) -> Kinesthetic:
+def moved_arm(stands, tactels: float, seed: int) -> ArmPath:
     """Follow a scan, lifted between touches, with joint errors of the wanted size."""
     lift = surface_to_sensor(0, 0, 0, 10.0)
     path = [pose for stand in stands for pose in (lift @ stand, stand)]
     scale = 1.0
     for _ in range(3):
         errors = JointErrors((3e-4 * scale,) * 5, (1e-3 * scale,) * 5)
-        track = kinesthetic(Arm(), path, errors, np.random.default_rng(seed))
+        track = follow_poses(Arm(), path, errors, np.random.default_rng(seed))
         away = (track.true - track.believed)[1::2, :2, 3]
         scale *= tactels * P / math.sqrt(float((away**2).sum(axis=1).mean()))
-    return Kinesthetic(*(getattr(track, name)[1::2] for name in track.__dataclass_fields__))
+    return ArmPath(*(getattr(track, name)[1::2] for name in track.__dataclass_fields__))
 
 
 def rms(values) -> float:

@@ -31,7 +31,7 @@ import numpy as np
 from probe.arm.links import Arm
 from probe.contact.contract import Touch
 from probe.errors import ContactError
-from probe.scan.kinesthetic import JointErrors, kinesthetic
+from probe.scan.kinesthetic import JointErrors, follow_poses
 from probe.scan.places import surface_to_sensor
 from probe.scan.raster import raster
 from probe.sensor import SensorType
@@ -153,7 +153,7 @@ def scanned(scene, encoding, kind, level, sigma_tactels, most, rng, manner=None)
     if sigma_tactels is None:
         lift = surface_to_sensor(0, 0, 0, 10.0)
         path = [pose for stand in wanted for pose in (lift @ stand, stand)]
-        arm = kinesthetic(Arm(), path, JointErrors(), rng)
+        arm = follow_poses(Arm(), path, JointErrors(), rng)
         believed, true = arm.believed[1::2], arm.true[1::2]
         spread = [planar_covariance(each) for each in arm.covariance[1::2]]
     else:

@@ -1,6 +1,7 @@
 """From a spec to a simulated touch: registered faces are the surfaces of the written parts."""
 
 import itertools
+import json
 import math
 from pathlib import Path
 
@@ -11,9 +12,11 @@ import shapely
 from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.circuit import QUIET, Electronics, fsr_of
+from probe.command import run
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.errors import SurfaceError
+from probe.recording.read import Recording
 from probe.sensor import SensorType
 from probe.simulate.part import part_surface
 from probe.simulate.registered import DatabaseUnreadableError, registered_surface
@@ -254,3 +257,46 @@ def test_part_alone_needs_no_database(tmp_path, lab):
     frame = next(frames_of(str(copy), {"accuracy": "tabs"}))
     assert frame.counts.shape == (16, 16)
     assert np.array_equal(part_mesh(copy).corners, surface_of(str(copy)).surface.corners)
+
+
+@pytest.mark.parametrize("kind", ["raster", "kinesthetic"])
+def test_a_scan_carries_the_poses_that_the_robot_believes(lab, tmp_path, kind):
+    out, truth = tmp_path / "a.h5", tmp_path / "a.json"
+    words = ["simulate", f"{lab / 'lab.db'}#Cube/F1", "--scan", kind, "--theta", "30",
+             "--force", "50", "--touches", "3", "--frames", "2"]  # fmt: skip
+    assert run([*words, "-o", str(out), "--truth", str(truth)]) == 0
+    held, told = Recording(out), json.loads(truth.read_text())
+    block, kept = held.block(), told["touches"]
+    assert (told["scan"], held.origin.more["scan"], len(kept), len(held)) == (kind, kind, 3, 6)
+    true = np.repeat([one["T_base_probe"] for one in kept], 2, axis=0)
+    off_mm = np.linalg.norm((block.pose - true)[:, :3, 3], axis=1)
+    places = np.array([(one["x_mm"], one["y_mm"]) for one in kept])
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    assert min(steps) == pytest.approx(4.25 * 1.5875, abs=1.0)
+    assert max(steps) < 2 * 4.25 * 1.5875
+    assert [one["theta_deg"] for one in kept] == pytest.approx([30] * 3, abs=0.3)
+    if kind == "raster":
+        assert (block.pose == true).all()
+        assert not block.wrist.any()
+        return
+    assert 0.02 < off_mm.max() < 6 * held.origin.more["pose_error_mm"] < 2
+    assert [one["felt_n"] for one in kept] == pytest.approx([50] * 3, abs=1.1)
+    middle = (10 - 50 / 8 + 7.5) * 1023 / 25
+    assert block.wrist.mean(axis=1) == pytest.approx([middle] * 6, abs=8)
+
+
+def test_a_round_face_is_scanned_from_all_around(tmp_path):
+    spec = "objects: [{name: Can, shape: {cylinder: {diameter: 90 mm, height: 40 mm}}}]"
+    (tmp_path / "set.yaml").write_text(spec)
+    target = f"{tmp_path / 'lab.db'}"
+    encode(read_specs([tmp_path / "set.yaml"]), folder=tmp_path / "out",
+           database=f"sqlite:///{target}", formats=("stl",))  # fmt: skip
+    truth = tmp_path / "a.json"
+    words = ["simulate", f"{target}#Can", "--scan", "raster", "--touches", "12"]
+    assert run([*words, "-o", str(tmp_path / "a.h5"), "--truth", str(truth)]) == 0
+    told, poses = json.loads(truth.read_text()), Recording(tmp_path / "a.h5").block().pose
+    for one, pose in zip(told["touches"], poses, strict=True):
+        in_object = np.linalg.inv(told["T_base_object"]) @ pose
+        assert in_object == pytest.approx(np.array(one["T_object_probe"]), abs=1e-9)
+    assert np.ptp(poses[:, 2, 2]) > 0.5, "it goes round"
+    assert run([*words[:3], "kinesthetic"]) == 2

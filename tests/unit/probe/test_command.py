@@ -434,6 +434,11 @@ def test_touch_i_is_the_same_among_any_number_of_touches(asked, tmp_path):
     assert not (many[0] == many[1]).all()
 
 
+def test_a_scan_chooses_its_places(asked, tmp_path):
+    for words in (("--scan", "spiral"), ("--scan", "raster", "--x", "1")):
+        assert error_of(asked("simulate", "washer", *words))[0] == 2
+
+
 def test_boards_from_text():
     assert board_from("none") is None
     assert board_from("simulated") == Electronics()

@@ -11,8 +11,8 @@ from probe.arm.inverse import inverse
 from probe.arm.links import Arm, forward
 from probe.contact.contract import Touch
 from probe.errors import ContactError, PoseError, SurfaceError
-from probe.scan.approach import Guard, guarded_approach
-from probe.scan.kinesthetic import JointErrors, joint_path, kinesthetic, played
+from probe.scan.approach import ApproachLimits, guarded_approach
+from probe.scan.kinesthetic import JointErrors, follow_poses, joint_path, joints_with_play
 from probe.scan.places import surface_to_sensor, touch_at
 from probe.scan.raster import raster
 from probe.sensor import SensorType
@@ -59,7 +59,7 @@ def test_the_wanted_force_is_reached_and_never_exceeded_much(law):
 
 def test_nothing_there_gives_up_and_goes_back():
     bench = Bench(lambda d: 8 * d, at=1e9)
-    end = guarded_approach(bench, Guard(travel_mm=12, step_mm=0.5))
+    end = guarded_approach(bench, ApproachLimits(travel_mm=12, step_mm=0.5))
     assert not end
     assert (end.reason, end.travel_mm, end.felt_at_mm) == ("no contact", 0, math.inf)
     assert max(bench.went) == 12
@@ -75,7 +75,7 @@ def test_a_surface_too_hard_for_the_step_lifts_the_sensor():
 
 
 def test_a_surface_too_soft_ends_at_the_travel_limit():
-    end = guarded_approach(Bench(lambda d: 0.6 + 0.1 * d), Guard(travel_mm=10))
+    end = guarded_approach(Bench(lambda d: 0.6 + 0.1 * d), ApproachLimits(travel_mm=10))
     assert (end.reason, end.travel_mm) == ("travel limit", 10)
     assert end.force_n == pytest.approx(1.3)
 
@@ -96,12 +96,12 @@ def test_forces_and_limits_that_make_no_sense():
     with pytest.raises(ContactError, match=r"the force at 0 mm is nan"):
         guarded_approach(lambda travel: math.nan)
     for guard in (
-        Guard(force_n=0.1),
-        Guard(most_n=80),
-        Guard(step_mm=0),
-        Guard(travel_mm=0.1),
-        Guard(tolerance_n=0),
-        Guard(travel_mm=math.inf),
+        ApproachLimits(force_n=0.1),
+        ApproachLimits(most_n=80),
+        ApproachLimits(step_mm=0),
+        ApproachLimits(travel_mm=0.1),
+        ApproachLimits(tolerance_n=0),
+        ApproachLimits(travel_mm=math.inf),
     ):
         with pytest.raises(ContactError, match="contradict each other"):
             guarded_approach(lambda travel: 0.0, guard)
@@ -254,7 +254,7 @@ def scan_poses():
 def test_a_perfect_arm_is_where_it_believes():
     poses = scan_poses()
     perfect = JointErrors((0.0,) * 5, (0.0,) * 5)
-    found = kinesthetic(Arm(), poses, perfect, np.random.default_rng(1))
+    found = follow_poses(Arm(), poses, perfect, np.random.default_rng(1))
     assert found.believed == pytest.approx(np.array(poses), abs=1e-9)
     assert found.true == pytest.approx(np.array(poses), abs=1e-9)
     assert np.abs(np.diff(found.angles_rad, axis=0)).max() < 0.5  # no jump to another branch
@@ -266,7 +266,7 @@ def test_the_covariance_holds_what_happens():
     rng = np.random.default_rng(2)
     normed = []
     for _ in range(10):
-        found = kinesthetic(Arm(), poses, errors, rng)
+        found = follow_poses(Arm(), poses, errors, rng)
         off = (found.true - found.believed)[:, :3, 3]
         for error, covariance in zip(off, found.covariance, strict=True):
             normed.append(error @ np.linalg.solve(covariance[:3, :3], error))
@@ -276,7 +276,7 @@ def test_the_covariance_holds_what_happens():
 def test_the_same_seed_gives_the_same_poses():
     poses = scan_poses()
     first, second = (
-        kinesthetic(Arm(), poses, JointErrors(), np.random.default_rng(5)) for _ in range(2)
+        follow_poses(Arm(), poses, JointErrors(), np.random.default_rng(5)) for _ in range(2)
     )
     assert (first.true == second.true).all()
     apart = np.linalg.norm((first.true - first.believed)[:, :3, 3], axis=1)
@@ -288,7 +288,7 @@ def test_play_drags_the_joint_along():
     motor = np.zeros((7, 5))
     motor[:, 0] = 0, 1, 2, 1.9, 1.85, 1, 0
     motor[:, 1] = motor[:, 0]
-    stands = played(motor, errors, np.random.default_rng(3))
+    stands = joints_with_play(motor, errors, np.random.default_rng(3))
     assert stands[1:, 0] == pytest.approx([0.9, 1.9, 1.9, 1.9, 1.1, 0.1])
     assert stands[:, 1] == pytest.approx(motor[:, 1])
     assert np.abs(stands[:, 2]).max() <= 0.1
@@ -297,7 +297,7 @@ def test_play_drags_the_joint_along():
 def test_a_pose_out_of_reach_is_named():
     poses = [*scan_poses()[:3], surface_to_sensor(900, 0, 0, 100)]
     with pytest.raises(PoseError, match=r"pose 3 of 4: .* out of reach .*nearer"):
-        kinesthetic(Arm(), poses, JointErrors(), np.random.default_rng(1))
+        follow_poses(Arm(), poses, JointErrors(), np.random.default_rng(1))
 
 
 def test_a_path_keeps_its_branch():

@@ -11,7 +11,7 @@ from generator.spec import read_specs
 from probe.arm.links import Arm
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
-from probe.scan.kinesthetic import JointErrors, kinesthetic
+from probe.scan.kinesthetic import JointErrors, follow_poses
 from probe.scan.places import surface_to_sensor, touch_at
 from probe.scan.raster import raster
 from probe.sensor import SensorType
@@ -66,7 +66,7 @@ class Scan:
         middle = scene.centre_mm()
         T_base_face = surface_to_sensor(300, 0, 0.2, 100) @ surface_to_sensor(*-middle, 0)
         wanted = [T_base_face @ surface_to_sensor(x, y, theta) for x, y in plan.places_mm]
-        arm = kinesthetic(Arm(), wanted, JointErrors(), rng)
+        arm = follow_poses(Arm(), wanted, JointErrors(), rng)
         tips = Tips(lengths_mm=rng.normal(0, 0.03, (16, 16)))
         gains = np.exp(rng.normal(0, 0.1, (16, 16)))
         self.believed, self.readings, self.true = arm.believed, [], []
