@@ -14,9 +14,11 @@ Windows (N, rows, columns) -> `Decodings`, one `Decoded` each: place, margin, re
     element, register, scattered, keys,
                                       field elements, linear maps, look-up, character sums,
       spectrum, dual, score, ranked     elimination, log-likelihoods, ranking
+    any_method, registered            one window by any method, on a lab's array too
     command, plot                     decode-window
 """
 
+from decoder.any_method import decode
 from decoder.decoded import Candidate, Decoded, Decodings, Reason
 from decoder.errors import DecoderError, MethodError, WindowError
 from decoder.exact import decode_exact
@@ -34,6 +36,7 @@ __all__ = [
     "Reason",
     "Strength",
     "WindowError",
+    "decode",
     "decode_exact",
     "decode_good_tuple",
     "decode_likelihood",

@@ -30,7 +30,6 @@ ROWS are the symbols, rows apart by spaces, ? where none is seen: [bold]decode-w
 01 01 00 01" --profile thesis[/]. Symbols of GF(q) are 0, 1, 2 (=A), 3 (=A^2), ...
 """
 EPILOG = "Exit codes: 0 decoded, 1 not decoded, 2 bad input, 4 database, 130 interrupted."
-METHODS = ("table", "serial", "milestones", "logarithm", "likelihood")
 NAME = "decode-window"
 
 app = console.application()
@@ -61,7 +60,8 @@ def decode(
         str, typer.Option(metavar="URL", show_default=False,
                           help="A lab's database: its array, the registered cells as prior, and "
                                "the object and face of the answer.")] = "",
-    method: Annotated[str, typer.Option(help=", ".join(METHODS) + ".")] = "logarithm",
+    method: Annotated[
+        str, typer.Option(help="table, serial, milestones, logarithm, likelihood.")] = "logarithm",
     error: Annotated[
         float, typer.Option(help="likelihood: how often a symbol is wrong.")] = 0.05,
     doubt: Annotated[
@@ -78,31 +78,27 @@ def decode(
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
 ) -> int:  # fmt: skip
     """Decode one window; `HELP` is what people see."""
-    from decoder.exact import decode_exact
-    from decoder.likelihood import decode_likelihood
+    from decoder.any_method import METHODS, decode_on
     from decoder.window import parsed
 
     if method not in METHODS:
         raise typer.BadParameter(f"unknown method '{method}'; choose one of {', '.join(METHODS)}")
     held: Registered | None = None
     if database:
-        from decoder.registered import prior, registered
+        from decoder.registered import registered
 
         if array:
             raise typer.BadParameter("both --array and --database were given; give one of them")
         held = registered(database, profile)
     chosen = held.array if held else _array(profile, array)
     window = parsed(" ".join(rows), chosen.order)
-    if method == "likelihood":
-        found = decode_likelihood(
-            chosen, window, prior=prior(held, window) if held else None,
-            rotations=_turns(rotations), error=error, doubt=doubt, blank=blank, top=top,
-        )[0]  # fmt: skip
-    else:
-        found = decode_exact(chosen, window, method)[0]
+    found = decode_on(
+        chosen, window, method, held,
+        rotations=_turns(rotations), error=error, doubt=doubt, blank=blank, top=top,
+    )  # fmt: skip
     known = _described(chosen, window, found, method, top)
     if held:
-        known |= _holder(held, found)
+        known |= {"object": found.object, "face": found.face}
     if plot is not None:
         from decoder.plot import draw
 
@@ -173,16 +169,6 @@ def _described(
         "array": {"rows": array.rows, "columns": array.columns, "symbols": array.order},
         "seen": seen,
     }
-
-
-def _holder(held: Registered, found: Decoded) -> dict[str, Any]:
-    """Return object and face of an answer, None where nothing is registered."""
-    from decoder.registered import holder
-
-    names = None
-    if found.row is not None and found.column is not None:
-        names = holder(held, found.row, found.column)
-    return {"object": names[0] if names else None, "face": names[1] if names else None}
 
 
 def _place(candidate: Candidate) -> dict[str, Any]:

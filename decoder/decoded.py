@@ -52,9 +52,17 @@ class Decoded:
     reason: str  #: "" if decoded, otherwise "too few symbols", "ambiguous", ...
     rotation: int = 0  #: quarter turns, counter-clockwise, that bring the window upright
     doubt: float | None = None  #: probability that the best candidate is wrong
+    object: str | None = None  #: that holds the place; None: nobody asked, or none is registered
+    face: str | None = None  #: of that object
 
     def __bool__(self) -> bool:
         return self.row is not None
+
+    def __str__(self) -> str:
+        if self.row is None:
+            return f"not decoded: {self.reason}"
+        turned = f", turned by {90 * self.rotation} degrees" if self.rotation else ""
+        return f"row {self.row}, column {self.column} (t = {self.t}){turned}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,10 +1,57 @@
 """The front door of encoded objects: about a dozen names over the four packages.
 
-Under it stand the two things that all packages share and that may import none of them: the
-root of the errors (`encoded_objects.errors`) and how a command starts, shows progress and ends
+::
+
+    encode            a spec, a solid, a mesh -> printable parts and a registered object
+    open_lab          a lab's database -> what a touch can be told apart from
+    Reader            of a lab -> object, face and pose of a touch: a `Recognition`
+    Recording         a file of frames, each a `Frame`
+    SensorType        what the probe is
+    simulate          a part or a face, touched -> frames with their truth
+    decode            a window -> its place on the array
+    EncodedObjectsError   the root of every error that a person can cause
+
+    >>> from encoded_objects import decode
+    >>> print(decode("01 11 01 01 00 01", profile="thesis"))
+    row 1, column 61 (t = 2206)
+
+A name is loaded from its package when it is first used; importing this module loads nothing
+else. Beside the names stand the two things that all packages share: the root of the errors
+(`encoded_objects.errors`) and how a command starts, shows progress and ends
 (`encoded_objects.console`).
 """
 
 from __future__ import annotations
 
+from importlib import import_module
+from typing import Any
+
 __version__ = "0.1.0"
+
+#: name: the module that holds it; `__init__.pyi` says the same to type checkers
+HOMES = {
+    "EncodedObjectsError": "encoded_objects.errors",
+    "Frame": "probe.frame",
+    "Reader": "recognizer.touch.reader",
+    "Recognition": "recognizer.touch.recognition",
+    "Recording": "probe.recording.read",
+    "SensorType": "probe.sensor",
+    "decode": "decoder.any_method",
+    "encode": "generator.cad.encode",
+    "open_lab": "recognizer.touch.lab",
+    "simulate": "probe.simulate.simulation",
+}
+
+__all__ = ["__version__", *HOMES]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in HOMES:
+        raise AttributeError(f"module 'encoded_objects' has no attribute '{name}'")
+    value = getattr(import_module(HOMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -29,6 +29,17 @@ class EncodedObjectsError(Exception):
         The way out, as an instruction ("set pitch to 5.7 mm or less").
     place
         Where: a file, `file:line:column`, the name of a face, a port's URL.
+
+    Examples
+    --------
+    >>> from encoded_objects import EncodedObjectsError, decode
+    >>> try:
+    ...     decode("01 12", profile="thesis")
+    ... except EncodedObjectsError as error:
+    ...     print(error.cause)
+    ...     print(error.fix)
+    row 2 '12': '2' is no symbol of this array, which has 0 to 1, or ? for one that is not seen
+    write one digit per symbol, rows apart by spaces, as '01 11 0?'
     """
 
     exit_code = 2

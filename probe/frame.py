@@ -20,7 +20,15 @@ WRIST = 4  #: transducers of the wrist
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """A 16x16 image with its time, number, wrist readings and, where known, its pose."""
+    """A 16x16 image with its time, number, wrist readings and, where known, its pose.
+
+    Examples
+    --------
+    >>> from encoded_objects import Recording
+    >>> frame = next(Recording("touch.h5").frames())
+    >>> frame.counts.shape, frame.counts.dtype.name, frame.seq, frame.pose
+    ((16, 16), 'uint16', 0, None)
+    """
 
     counts: NDArray[np.uint16]  #: (16, 16) ADC counts
     t_ns: int  #: ns; of the device since it started, unwrapped

@@ -35,8 +35,8 @@ def surface_of(target: str) -> Scene:
 
     Examples
     --------
-    >>> scene = surface_of("lab.db#Cube/F1")  # doctest: +SKIP
-    >>> scene.surface.top_mm, scene.region.convex  # doctest: +SKIP
+    >>> scene = surface_of("lab.db#Cube/F1")
+    >>> scene.surface.top_mm, scene.region.convex
     (1.0, True)
     """
     if target == WASHER:

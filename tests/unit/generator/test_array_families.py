@@ -1,7 +1,5 @@
 """Sequences, folds and products: sizes, random access, errors with their way out, costs."""
 
-import doctest
-import importlib
 import json
 import subprocess
 import sys
@@ -398,13 +396,6 @@ def test_a_face_costs_what_it_shows():
     huge = {"family": "prba", "degree": 64}
     face = 2**31 + np.arange(64)[:, None], 2**30 + np.arange(64)
     assert best_of_five(lambda: array_from(huge).symbols(*face)) < 0.2
-
-
-@pytest.mark.parametrize("module", ["field", "primitive", "sequence", "definition"])
-def test_examples_in_docstrings_run(module):
-    result = doctest.testmod(importlib.import_module(f"generator.array.{module}"))
-    assert result.attempted
-    assert not result.failed
 
 
 def test_import_is_light():

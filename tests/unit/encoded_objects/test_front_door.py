@@ -1,0 +1,62 @@
+"""The public names: pinned, lazy, seen by type checkers, each with an example."""
+
+from __future__ import annotations
+
+import ast
+import doctest
+import importlib
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+import encoded_objects
+
+NAMES = {
+    "EncodedObjectsError", "Frame", "Reader", "Recognition", "Recording", "SensorType",
+    "decode", "encode", "open_lab", "simulate",
+}  # fmt: skip
+WAITING = {"Reader", "Recognition", "open_lab"}
+HEAVY = ("numpy", "scipy", "sqlalchemy", "typer", "rich", "pydantic", "yaml", "h5py")
+OURS = ("generator", "decoder", "probe", "recognizer")
+
+
+def test_the_public_names_are_these():
+    assert set(encoded_objects.__all__) == NAMES | {"__version__"}
+    assert dir(encoded_objects) == sorted(encoded_objects.__all__)
+    with pytest.raises(AttributeError, match="has no attribute 'utils'"):
+        encoded_objects.utils  # noqa: B018
+
+
+def test_importing_it_loads_nothing():
+    code = "import sys, encoded_objects; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = {name.partition(".")[0] for name in done.stdout.split()}
+    assert loaded & {*HEAVY, *OURS} == set()
+
+
+@pytest.mark.parametrize("name", sorted(NAMES))
+def test_each_name_is_documented_by_an_example_that_runs(name):
+    module = importlib.import_module(encoded_objects.HOMES[name])
+    value = getattr(encoded_objects, name)
+    assert value is getattr(module, name)
+    (found,) = (one for one in doctest.DocTestFinder(recurse=False).find(value, name, module))
+    assert found.examples or name in WAITING, f"{name} has no example"
+    # The examples themselves run with those of all modules, see test_docstrings.
+
+
+def test_type_checkers_see_the_same_names_in_the_same_places():
+    stub = Path(encoded_objects.__file__).with_suffix(".pyi")
+    told = {
+        alias.asname: (node.module, alias.name)
+        for node in ast.parse(stub.read_text()).body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    assert told == {name: (home, name) for name, home in encoded_objects.HOMES.items()}
+
+
+def test_the_version_is_said_once():
+    assert encoded_objects.__version__ == version("encoded-objects")
