@@ -1,7 +1,7 @@
-"""What is asked: how many touches, of which kinds and levels, and how each is drawn.
+"""What a campaign is: how many touches, of which kinds and levels, and how each is drawn.
 
-Campaign + number -> Plan. Kind and level of a touch come from its number alone, as the touch
-itself does (`trial`), so that no way of sharing the work can change a result. A campaign
+Campaign + number -> TouchPlan. Kind and level of a touch come from its number alone, as the
+touch itself does (`draw`), so that no way of sharing the work can change a result. A campaign
 has several series: the touches, and for the picture of error against run time a few touches
 again by readers that spend more or less.
 """
@@ -16,13 +16,12 @@ import numpy as np
 
 from recognizer.touch.reader import THOROUGH, Reader
 from recognizer.touch.symbols.fit import FitSettings
+from recognizer.validation.draw import TouchPlan
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.levels import LEVELS
+from recognizer.validation.settings import SHARING
 from recognizer.validation.surfaces import FOREIGN
-from recognizer.validation.trial import Plan
 
-SHARD = 1000  #: touches in a file, if nothing else is asked
-PIECE = 25  #: touches that a worker takes at once
 TOUCHES = "touches"  #: name of the series that is counted
 BLANK, STRANGE = "blank", "foreign"
 ON_FACES = ("face", "edge", "corner", "worn")
@@ -55,14 +54,14 @@ AS_IS = "as it is"  #: the reader with the settings that it has
 class Campaign:
     """Everything that decides the results, but for the set itself."""
 
-    touches: int
+    touches: int = 1000
     seed: int = 1
     kinds: Shares = KINDS
     levels: Shares = LEVEL_SHARES
     overlay: str = "tab"
     files: bool = True  #: touch the written STL files
     study: int = 0  #: touches of every reader of `READERS`; 0: no study
-    shard: int = SHARD  #: touches in a file: at most so many are lost with a run
+    shard: int = SHARING.shard  #: touches in a file: at most so many are lost with a run
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +77,7 @@ class Series:
 
 
 @dataclass(frozen=True, slots=True, order=True)
-class Piece:
+class Batch:
     """Touches first ... last - 1 of a series."""
 
     series: str
@@ -104,22 +103,24 @@ def shards_of(series: Series) -> int:
     return math.ceil(series.touches / series.shard)
 
 
-def pieces_of(series: Series, shard: int) -> Iterator[Piece]:
-    """Yield the pieces of a shard."""
+def batches_of(series: Series, shard: int) -> Iterator[Batch]:
+    """Yield the batches of a shard."""
     end = min((shard + 1) * series.shard, series.touches)
-    for first in range(shard * series.shard, end, PIECE):
-        yield Piece(series.name, first, min(first + PIECE, end))
+    for first in range(shard * series.shard, end, SHARING.batch):
+        yield Batch(series.name, first, min(first + SHARING.batch, end))
 
 
-def plan_of(campaign: Campaign, series: Series, database: str, number: int) -> tuple[str, Plan]:
+def plan_of(
+    campaign: Campaign, series: Series, database: str, number: int
+) -> tuple[str, TouchPlan]:
     """Return the kind of a touch as `kinds` names it, and the plan that draws it."""
     rng = np.random.default_rng([campaign.seed, number, 1])
-    kind, level = _drawn(series.kinds, rng), _drawn(series.levels, rng)
+    kind, level = _draw(series.kinds, rng), _draw(series.levels, rng)
     surface = kind
     if kind == STRANGE:
         strange = [name for name in FOREIGN if name != BLANK]
         surface = strange[int(rng.integers(len(strange)))]
-    plan = Plan(database, campaign.seed, level, surface, files=campaign.files)
+    plan = TouchPlan(database, campaign.seed, level, surface, files=campaign.files)
     return kind, plan
 
 
@@ -189,7 +190,7 @@ def levels_of(text: str) -> Shares:
     return shares_of(text, LEVELS, "--levels")
 
 
-def _drawn(shares: Shares, rng: np.random.Generator) -> str:
+def _draw(shares: Shares, rng: np.random.Generator) -> str:
     ends = np.cumsum([share for _, share in shares])
     place = int(np.searchsorted(ends, rng.random() * ends[-1], side="right"))
     return shares[min(place, len(shares) - 1)][0]

@@ -1,7 +1,7 @@
 """Who does the work: the workers of a dask cluster, on any number of machines.
 
 Workers must run the same code and see the same database (a shared folder, or PostgreSQL);
-they say so if they do not. A worker that is lost loses only the pieces that it was at.
+they say so if they do not. A worker that is lost loses only the batches that it was at.
 """
 
 from __future__ import annotations
@@ -9,24 +9,24 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
-from recognizer.validation.campaign import Piece
+from encoded_objects.errors import require
+from recognizer.validation.campaign import Batch
 from recognizer.validation.errors import WorkersError
-from recognizer.validation.work import Touched, Work, touch
+from recognizer.validation.settings import SHARING
+from recognizer.validation.work import BatchResult, Work, touch
 
 if TYPE_CHECKING:
     from distributed import Client
 
-WAIT_S = 20.0  #: for the scheduler, and for its first worker
 
-
-def on_cluster(address: str, work: Work, pieces: Iterable[Piece]) -> Iterator[Touched]:
-    """Do pieces on the workers of a scheduler.
+def on_cluster(address: str, work: Work, batches: Iterable[Batch]) -> Iterator[BatchResult]:
+    """Do batches on the workers of a scheduler.
 
     Parameters
     ----------
     address
         Of the scheduler, `tcp://host:8786`.
-    work, pieces
+    work, batches
         What is to be done.
 
     Raises
@@ -34,16 +34,16 @@ def on_cluster(address: str, work: Work, pieces: Iterable[Piece]) -> Iterator[To
     WorkersError
         There is no scheduler or no worker, or they see other code or another set.
     """
-    client = connected(address)
+    client = connect(address)
     futures: list[Any] = []
     try:
         from distributed import as_completed
 
-        futures += [client.submit(touch, work, piece, pure=False) for piece in pieces]
+        futures += [client.submit(touch, work, batch, pure=False) for batch in batches]
         for future in as_completed(futures, loop=client.loop):
             error = future.exception()
             if error is not None:
-                raise _told(error) from error
+                raise _failure(error) from error
             yield future.result()
             future.release()
     finally:
@@ -51,38 +51,37 @@ def on_cluster(address: str, work: Work, pieces: Iterable[Piece]) -> Iterator[To
         client.close()
 
 
-def connected(address: str) -> Client:
+def connect(address: str) -> Client:
     """Return a client of a scheduler that has a worker.
 
     Raises
     ------
     WorkersError
-        The extra is not installed, or nobody answers.
+        Nobody answers.
+    MissingExtraError
+        dask is not installed.
     """
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise WorkersError(
-            "a cluster needs dask", fix="pip install 'encoded-objects[cluster]'"
-        ) from error
+    require("distributed", extra="cluster", purpose="--cluster")
+    from distributed import Client
+
     fix = f"start one: dask scheduler, and dask worker {address} on every machine"
     try:
-        client = Client(address, timeout=WAIT_S, set_as_default=False)
+        client = Client(address, timeout=SHARING.cluster_wait_s, set_as_default=False)
     except (OSError, ValueError) as error:
         raise WorkersError("no scheduler answers", fix=fix, place=address) from error
     try:
-        client.wait_for_workers(1, timeout=WAIT_S)
+        client.wait_for_workers(1, timeout=SHARING.cluster_wait_s)
     except TimeoutError as error:
         client.close()
         raise WorkersError("the scheduler has no worker", fix=fix, place=address) from error
     return client
 
 
-def _told(error: Any) -> Exception:
-    """Return what a worker raised; what became of a piece that outlived its workers."""
+def _failure(error: Any) -> Exception:
+    """Return what a worker raised; what became of a batch that outlived its workers."""
     if type(error).__name__ == "KilledWorker":
         return WorkersError(
-            "several workers were lost at the same piece",
+            "several workers were lost at the same touches",
             fix="see the workers' logs and memory, go on with --resume",
         )
     return error if isinstance(error, Exception) else WorkersError(str(error))

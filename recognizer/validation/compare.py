@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from recognizer.validation.errors import ValidationError
+from recognizer.validation.files import write_text
 from recognizer.validation.pictures import against
 from recognizer.validation.pipeline import RESULTS, TIMES_FILE
 from recognizer.validation.report import PAIR, environment
-from recognizer.validation.run import write_text
 
 SAME, BETTER, WORSE = "same within chance", "better", "worse"
 

@@ -24,7 +24,7 @@ from probe.surface.indenters import Cross, Plate, Rough, Strip, TiltedPlane
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.signal import signal_of
-from recognizer.validation.statistics import rounded
+from recognizer.validation.statistics import round_digits
 
 BALANCE = 1e-6  #: of the load
 FINITE, REFUSED, NO_ANSWER = "finite", "refused", "no answer"
@@ -94,7 +94,7 @@ SCENES: tuple[Scene, ...] = (
 )  # fmt: skip
 
 
-def pressed() -> Iterator[dict[str, Any]]:
+def press_scenes() -> Iterator[dict[str, Any]]:
     """Press every scene with both overlays; yield what came of it, and whether it passes."""
     for kind in ("tab", "pad"):
         plain = Overlay(kind="pad" if kind == "pad" else "tab")
@@ -108,7 +108,7 @@ def pressed() -> Iterator[dict[str, Any]]:
                 "expected": scene.expected,
                 "outcome": outcome,
                 "told": told,
-                "out_of_balance": None if close else rounded(balance or 0.0, 2),
+                "out_of_balance": None if close else round_digits(balance or 0.0, 2),
                 "passes": outcome in scene.expected and close,
             }
 
@@ -163,4 +163,4 @@ def read_images(reader: Reader) -> Iterator[dict[str, Any]]:
 
 def extremes(reader: Reader) -> list[dict[str, Any]]:
     """Return the table of stiff and extreme cases."""
-    return [*pressed(), *read_images(reader)]
+    return [*press_scenes(), *read_images(reader)]

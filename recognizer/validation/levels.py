@@ -24,10 +24,18 @@ from probe.surface.contract import Surface
 
 Array = NDArray[np.float64]
 
-COUNTS_PER_N = 150.0  #: of a tactel under small forces
-FULL = 1023  #: counts, 10 bits
-BIAS = 8.0  #: counts of an unloaded tactel
-POINTS = 19  #: on each tab
+
+@dataclass(frozen=True, slots=True)
+class ReadoutSettings:
+    """What all levels share: the board, and how finely the contact is computed."""
+
+    counts_per_n: float = 150.0  #: of a tactel under small forces
+    full: int = 1023  #: counts, 10 bits
+    bias: float = 8.0  #: counts of an unloaded tactel
+    points: int = 19  #: on each tab
+
+
+READOUT = ReadoutSettings()
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +65,7 @@ LEVELS = {level.name: level for level in (LOW, TYPICAL, HARD, MISMATCH)}
 
 
 @dataclass(frozen=True, slots=True)
-class Printed:
+class PrintedSurface:
     """A surface as a printer leaves it: everything wider by a stroke's excess, and scaled."""
 
     surface: Surface
@@ -83,7 +91,7 @@ class Printed:
         return highest
 
 
-def read(
+def read_sensor(
     surface: Surface, sensor: SensorType, touch: Touch, level: Level, rng: np.random.Generator
 ) -> tuple[NDArray[np.uint16], Contact]:
     """Return the counts (rows, columns) of a sensor drawn from a level, and the contact.
@@ -96,10 +104,10 @@ def read(
     shape = (sensor.rows, sensor.columns)
     if level.wider_mm > 0 or level.scale != 0:
         about = (touch.x_mm, touch.y_mm)
-        surface = Printed(surface, level.wider_mm, level.scale, about)
+        surface = PrintedSurface(surface, level.wider_mm, level.scale, about)
     if sensor.overlay.kind == "tab":
         tips = Tips(
-            points=POINTS,
+            points=READOUT.points,
             lengths_mm=level.length_mm * rng.standard_normal(shape),
             shifts_mm=level.shift_mm * rng.standard_normal((*shape, 2)),
         )
@@ -114,5 +122,5 @@ def read(
     forces = np.exp(level.gain * rng.standard_normal(shape)) * forces**level.exponent
     forces = forces + level.noise_n * rng.standard_normal(shape)
     forces.reshape(-1)[rng.permutation(forces.size)[: level.dead]] = 0.0
-    counts = np.clip(np.rint(BIAS + COUNTS_PER_N * forces), 0, FULL)
-    return counts.astype(np.uint16), contact
+    counts = np.rint(READOUT.bias + READOUT.counts_per_n * forces)
+    return np.clip(counts, 0, READOUT.full).astype(np.uint16), contact

@@ -16,33 +16,30 @@ from typing import Any
 import numpy as np
 
 from recognizer.validation.campaign import (
-    KINDS,
-    LEVEL_SHARES,
     Campaign,
     kinds_of,
     levels_of,
     series_of,
     shards_of,
 )
+from recognizer.validation.draw import TouchPlan
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.extremes import extremes
-from recognizer.validation.left_out import left_out
+from recognizer.validation.files import write_json, write_text
 from recognizer.validation.precision import contact_study, decoder_study, reader_study
 from recognizer.validation.progress import TouchProgress
 from recognizer.validation.provenance import circumstances, provenance, rule
+from recognizer.validation.record import RECORD, RunRecord, read_record
 from recognizer.validation.report import page_of, require_report
 from recognizer.validation.result import ValidationResult, result_from
 from recognizer.validation.results import results_of
 from recognizer.validation.run import (
-    ASKED,
-    Asked,
-    alone,
-    prepare,
-    read_asked,
+    lock_folder,
+    prepare_run,
     touch_all,
-    write_json,
-    write_text,
 )
+from recognizer.validation.savings import find_savings
+from recognizer.validation.settings import STUDIES
 from recognizer.validation.shards import (
     TIMES,
     columns_of,
@@ -50,14 +47,11 @@ from recognizer.validation.shards import (
     read_series,
     write_table,
 )
-from recognizer.validation.trial import Plan
-from recognizer.validation.work import prepared
+from recognizer.validation.work import prepare_reader
 from recognizer.validation.workers import workers_of
 
 TRIALS, RESULTS, TIMES_FILE = "trials.parquet", "results.json", "times.json"
 REPORT, PROVENANCE = "report.html", "provenance.json"
-DEFAULT_TOUCHES = 1000
-STUDY_SHARE, STUDY = 0.05, (10, 200)  #: touches of a reader of the study: share, least and most
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,16 +135,16 @@ def validate(
     """
     require_report("validate-set")
     begun, start = datetime.now(UTC), time.monotonic()
-    named = [specs] if isinstance(specs, str | Path) else specs
+    named = [Path(spec) for spec in ([specs] if isinstance(specs, str | Path) else specs)]
     place, steps = Path(folder), progress or TouchProgress()
     options = CampaignOptions(touches, seed, kinds, levels, overlay, surfaces, study, shard)
-    known = resume and (place / ASKED).exists()
-    campaign = _campaign(options, read_asked(place).campaign if known else None)
-    with alone(place):
-        asked = prepare(place, campaign, [Path(spec) for spec in named], database, resume=resume)
-        touch_all(asked, place, workers_of(jobs, cluster), steps)
+    known = resume and (place / RECORD).exists()
+    campaign = _campaign(options, read_record(place).campaign if known else None)
+    with lock_folder(place):
+        record = prepare_run(place, campaign, named, database, resume=resume)
+        touch_all(record, place, workers_of(jobs, cluster), steps)
         steps.begin("report", 0, 0)
-        results = _finish(asked, place)
+        results = _finish(record, place)
         seconds = round(time.monotonic() - start, 3)
         write_json(place / PROVENANCE, circumstances(begun, seconds, jobs, cluster))
     return result_from(results, seconds, place)
@@ -165,19 +159,19 @@ def report_anew(folder: Path) -> ValidationResult:
         The run is not there, or not done.
     """
     require_report("validate-set report")
-    asked, start = read_asked(folder), time.monotonic()
-    for series in series_of(asked.campaign):
+    record, start = read_record(folder), time.monotonic()
+    for series in series_of(record.campaign):
         if len(done_shards(folder, series)) < shards_of(series):
             raise ValidationError(
                 "the run is not done", fix="go on with it by --resume", place=str(folder)
             )
-    with alone(folder):
-        results = _finish(asked, folder)
+    with lock_folder(folder):
+        results = _finish(record, folder)
     return result_from(results, round(time.monotonic() - start, 3), folder)
 
 
 def _campaign(options: CampaignOptions, known: Campaign | None) -> Campaign:
-    """Return what is asked for, options over what was asked before over defaults."""
+    """Return what is record for, options over what was record before over defaults."""
     for given, allowed, option in (
         (options.overlay, ("tab", "pad"), "--overlay"),
         (options.surfaces, ("files", "database"), "--surfaces"),
@@ -186,9 +180,9 @@ def _campaign(options: CampaignOptions, known: Campaign | None) -> Campaign:
             raise ValidationError(
                 f"'{given}' is not known", fix=f"give {' or '.join(allowed)}", place=option
             )
-    base = known or Campaign(DEFAULT_TOUCHES, kinds=KINDS, levels=LEVEL_SHARES)
+    base = known or Campaign()
     touches = base.touches if options.touches is None else options.touches
-    study = base.study if known else _study(touches)
+    study = base.study if known else STUDIES.touches_of(touches)
     return replace(
         base,
         touches=touches,
@@ -202,18 +196,14 @@ def _campaign(options: CampaignOptions, known: Campaign | None) -> Campaign:
     )
 
 
-def _study(touches: int) -> int:
-    return int(min(max(STUDY_SHARE * touches, STUDY[0]), STUDY[1]))
-
-
-def _finish(asked: Asked, folder: Path) -> dict[str, Any]:
+def _finish(record: RunRecord, folder: Path) -> dict[str, Any]:
     """Write everything that follows from the touches; returns the results."""
-    campaign, work = asked.campaign, asked.work_now(folder)
+    campaign, work = record.campaign, record.work_now(folder)
     series = series_of(campaign)
     table = read_series(folder, series[0])
     rows = columns_of(table)
     spent = columns_of(read_series(folder, series[0], TIMES))
-    reader = prepared(work)
+    reader = prepare_reader(work)
     results = results_of(rows)
     times: dict[str, Any] = {name: _cpu_ms(spent[name]) for name in ("drawing", "reading")}
     results["rule"] = rule()
@@ -224,14 +214,14 @@ def _finish(asked: Asked, folder: Path) -> dict[str, Any]:
             "decoders": decoder_study(reader.lab.arrays[0], campaign.seed),
             "readers": reader_study(folder, campaign),
         }
-        plan = Plan(work.database, campaign.seed, kind="face", files=campaign.files)
-        saved = left_out(reader, plan, studies["readers"])
+        plan = TouchPlan(work.database, campaign.seed, kind="face", files=campaign.files)
+        saved = find_savings(reader, plan, studies["readers"])
         results["study"] = {name: study.counted for name, study in studies.items()}
         results["left_out"] = saved.counted
         times |= {name: study.spent for name, study in studies.items()}
         times["left_out"] = saved.spent
     results["extremes"] = extremes(reader)
-    results["provenance"] = provenance(asked, work.database)
+    results["provenance"] = provenance(record, work.database)
     write_table(table, folder / TRIALS)
     write_json(folder / RESULTS, results)
     write_json(folder / TIMES_FILE, times)

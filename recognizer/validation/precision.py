@@ -23,12 +23,8 @@ from probe.contact.press import table
 from recognizer.touch.lab import EmbossedArray
 from recognizer.validation.campaign import Campaign, series_of, settings_of
 from recognizer.validation.results import line_of
+from recognizer.validation.settings import STUDIES
 from recognizer.validation.shards import TIMES, columns_of, read_series
-
-WINDOWS = 200  #: for each decoder
-WRONG_SYMBOLS = 0.05  #: of the windows that decoders read
-LARGEST_SERIAL = 1 << 13  #: places up to which the serial method is shown
-DEPTH = 2  #: rows and columns of a view beyond the window
 
 Ints = NDArray[np.int64]
 
@@ -66,9 +62,9 @@ def reader_study(folder: Path, campaign: Campaign) -> Study:
 def decoder_study(encoding: EmbossedArray, seed: int) -> Study:
     """Return what decoders make of damaged windows at registered places of an array."""
     study, array = Study(), encoding.array
-    shape = (array.window[0] + DEPTH, array.window[1] + DEPTH)
+    shape = (array.window[0] + STUDIES.beyond, array.window[1] + STUDIES.beyond)
     rng = np.random.default_rng([seed, 2])
-    keys = encoding.keys[rng.integers(len(encoding.keys), size=WINDOWS)]
+    keys = encoding.keys[rng.integers(len(encoding.keys), size=STUDIES.windows)]
     rows, columns = (part.astype(np.int64) for part in np.divmod(keys, np.uint64(array.columns)))
     down, along = np.indices(shape)
     windows = array.symbols(
@@ -76,12 +72,12 @@ def decoder_study(encoding: EmbossedArray, seed: int) -> Study:
         (columns[:, None, None] + along) % array.columns,
     )
     other = (windows + rng.integers(1, array.order, windows.shape)) % array.order
-    windows = np.where(rng.random(windows.shape) < WRONG_SYMBOLS, other, windows)
+    windows = np.where(rng.random(windows.shape) < STUDIES.wrong_symbols, other, windows)
     for name, decode in _decoders(encoding):
         decode(windows[:2])
         start = time.process_time()
         found = decode(windows)
-        study.spent.append(round(1e3 * (time.process_time() - start) / WINDOWS, 5))
+        study.spent.append(round(1e3 * (time.process_time() - start) / STUDIES.windows, 5))
         right = (found.rows == rows.astype(np.uint64)) & (
             found.columns == columns.astype(np.uint64)
         )
@@ -89,8 +85,8 @@ def decoder_study(encoding: EmbossedArray, seed: int) -> Study:
             {
                 "decoder": name,
                 "view": list(shape),
-                "wrong_symbols": WRONG_SYMBOLS,
-                "windows": WINDOWS,
+                "wrong_symbols": STUDIES.wrong_symbols,
+                "windows": STUDIES.windows,
                 "right": int((found.answered & right).sum()),
                 "wrong": int((found.answered & ~right).sum()),
                 "rejected": int((~found.answered).sum()),
@@ -103,7 +99,7 @@ def _decoders(encoding: EmbossedArray) -> Iterator[tuple[str, Callable[[Ints], D
     array = encoding.array
     places = array.rows * array.columns
     methods = ["logarithm"]
-    if places <= LARGEST_SERIAL:
+    if places <= STUDIES.largest_serial:
         methods = ["table", "serial", "milestones", *methods]
     for method in methods:
         yield method, _exact(array, method)

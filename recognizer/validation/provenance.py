@@ -15,33 +15,33 @@ from pathlib import Path
 from typing import Any
 
 from recognizer.validation.campaign import KINDS, LEVEL_SHARES, Campaign, Shares
-from recognizer.validation.levels import LEVELS, POINTS
-from recognizer.validation.made import members_of
-from recognizer.validation.rows import ENOUGH
-from recognizer.validation.run import Asked
-from recognizer.validation.trial import INSIDE_MM, NEAR_MM, Plan
+from recognizer.validation.draw import TouchPlan
+from recognizer.validation.encoded_set import members_of
+from recognizer.validation.levels import LEVELS, READOUT
+from recognizer.validation.record import RunRecord
+from recognizer.validation.settings import DRAWING, JUDGING
 
 LIBRARIES = ("numpy", "scipy", "pyarrow", "matplotlib")
 
 
-def provenance(asked: Asked, database: str) -> dict[str, Any]:
+def provenance(record: RunRecord, database: str) -> dict[str, Any]:
     """Return what a run was, so that it can be done again."""
-    campaign = asked.campaign
-    plan = Plan(database)
+    campaign = record.campaign
+    plan = TouchPlan(database)
     return {
-        "command": command_of(asked),
+        "command": command_of(record),
         "versions": {
             "encoded-objects": version("encoded-objects"),
-            "source, sha256": asked.code_digest,
+            "source, sha256": record.code_digest,
             "python": platform.python_version(),
             **{name: version(name) for name in LIBRARIES},
         },
         "campaign": asdict(campaign),
-        "contact": f"tabs, {POINTS} points a tab" if campaign.overlay == "tab" else "layer",
+        "contact": f"tabs, {READOUT.points} points a tab" if campaign.overlay == "tab" else "layer",
         "force_n": list(plan.force_n),
         "tilt_deg": round(math.degrees(plan.tilt_rad), 6),
         "levels": [asdict(LEVELS[name]) for name, _ in campaign.levels],
-        "set": asked.set_digest,
+        "set": record.set_digest,
         "members": [asdict(member) for member in members_of(database)],
     }
 
@@ -49,18 +49,18 @@ def provenance(asked: Asked, database: str) -> dict[str, Any]:
 def rule() -> dict[str, float]:
     """Return the limits by which touches are judged."""
     return {
-        "enough": ENOUGH,
-        "near_mm": NEAR_MM,
-        "inside_mm": INSIDE_MM,
-        "worn": Plan("").worn,
+        "enough": JUDGING.enough,
+        "near_mm": JUDGING.near_mm,
+        "inside_mm": DRAWING.inside_mm,
+        "worn": DRAWING.worn,
     }
 
 
-def command_of(asked: Asked) -> str:
+def command_of(record: RunRecord) -> str:
     """Return the command that does a run again, in any folder."""
-    campaign, plain = asked.campaign, Campaign(asked.campaign.touches)
-    words = ["validate-set", *map(_shown, asked.specs)]
-    words += [] if asked.specs else ["--database", _shown(asked.database)]
+    campaign, plain = record.campaign, Campaign(record.campaign.touches)
+    words = ["validate-set", *map(_bare_path, record.specs)]
+    words += [] if record.specs else ["--database", _bare_path(record.database)]
     words += ["--touches", str(campaign.touches), "--seed", str(campaign.seed)]
     if campaign.kinds != KINDS:
         words += ["--kinds", _shares(campaign.kinds)]
@@ -86,7 +86,7 @@ def circumstances(begun: datetime, seconds: float, processes: int, cluster: str)
     }
 
 
-def _shown(path: str) -> str:
+def _bare_path(path: str) -> str:
     """Return a path without the machine's folders."""
     return Path(path).name if Path(path).is_absolute() or "://" in path else path
 

@@ -22,12 +22,13 @@ from recognizer.touch.symbols.fit import Fit, fit_lattices
 from recognizer.touch.symbols.gain import image_of
 from recognizer.touch.symbols.pressing import pressing_of
 from recognizer.validation.campaign import plan_of, series_of
+from recognizer.validation.draw import DrawnTouch, draw_touch
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.pictures import figure_on
-from recognizer.validation.rows import row_of, seen_of, touched
-from recognizer.validation.run import read_asked
-from recognizer.validation.trial import Drawn, drawn, judged
-from recognizer.validation.work import prepared
+from recognizer.validation.record import read_record
+from recognizer.validation.rows import find_face, row_of, symbols_in_view
+from recognizer.validation.trial import judge
+from recognizer.validation.work import prepare_reader
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,22 +66,22 @@ def repeat_touch(folder: Path, number: int, plot: Path | None) -> dict[str, Any]
             fix=f"give {', '.join(FORMATS)}",
             place=str(plot),
         )
-    asked = read_asked(folder)
-    series = series_of(asked.campaign)[0]
+    record = read_record(folder)
+    series = series_of(record.campaign)[0]
     if number >= series.touches:
         raise ValidationError(
             f"touch {number} of {series.touches}",
             fix=f"give 0 ... {series.touches - 1}",
             place=str(folder),
         )
-    work = asked.work_now(folder)
-    reader = prepared(work)
-    kind, plan = plan_of(asked.campaign, series, work.database, number)
-    found = drawn(plan, number, reader)
+    work = record.work_now(folder)
+    reader = prepare_reader(work)
+    kind, plan = plan_of(record.campaign, series, work.database, number)
+    found = draw_touch(plan, number, reader)
     answer = recognise(reader, signal_of(found.counts.astype(np.float64)), number)
-    trial = judged(plan, number, found, answer, 0.0)
-    row = row_of(trial, kind, seen_of(reader.lab, reader.sensor, trial))
-    row = {name: _shown(value) for name, value in row.items()}
+    trial = judge(plan, number, found, answer, 0.0)
+    row = row_of(trial, kind, symbols_in_view(reader.lab, reader.sensor, trial))
+    row = {name: _or_none(value) for name, value in row.items()}
     if plot is not None:
         with figure_on(plot, 2, 2, (10.5, 10.0)) as axes:
             _draw_surface(axes[0], found, reader)
@@ -90,12 +91,12 @@ def repeat_touch(folder: Path, number: int, plot: Path | None) -> dict[str, Any]
     return row
 
 
-def _shown(value: Any) -> Any:
+def _or_none(value: Any) -> Any:
     """Return a value, None for what is no number or has no bound."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _draw_surface(axis: Axes, found: Drawn, reader: Reader) -> None:
+def _draw_surface(axis: Axes, found: DrawnTouch, reader: Reader) -> None:
     """Draw heights about the sensor, surface frame, and the sensor on them."""
     touch, reach = found.touch, 1.2 * reader.sensor.reach_mm
     x = touch.x_mm + np.linspace(-reach, reach, GRID)
@@ -113,14 +114,14 @@ def _draw_surface(axis: Axes, found: Drawn, reader: Reader) -> None:
     axis.set_ylabel("y of the surface, mm")
 
 
-def _draw_counts(axis: Axes, found: Drawn, reader: Reader) -> None:
+def _draw_counts(axis: Axes, found: DrawnTouch, reader: Reader) -> None:
     image = axis.imshow(found.counts, extent=_extent(reader), cmap="viridis")
     axis.figure.colorbar(image, ax=axis, shrink=0.8, label="counts")
     axis.set_title("2  what the sensor reads")
     _sensor_labels(axis)
 
 
-def _draw_fit(axis: Axes, found: Drawn, reader: Reader) -> None:
+def _draw_fit(axis: Axes, found: DrawnTouch, reader: Reader) -> None:
     """Draw the likeliest lattice and its symbols over the counts."""
     axis.imshow(found.counts, extent=_extent(reader), cmap="Greys")
     signal = signal_of(found.counts.astype(np.float64))
@@ -151,14 +152,14 @@ def _draw_fit(axis: Axes, found: Drawn, reader: Reader) -> None:
 
 
 def _draw_answer(
-    axis: Axes, found: Drawn, reader: Reader, answer: Recognition, row: dict[str, Any]
+    axis: Axes, found: DrawnTouch, reader: Reader, answer: Recognition, row: dict[str, Any]
 ) -> None:
     """Draw the face, the true place and the answered one."""
     scene, touch = found.scene, found.touch
     if scene is not None:
         for start, end in zip(scene.region.starts, scene.region.ends, strict=True):
             axis.plot(*np.array([start, end]).T, color="#555c66", lw=1)
-        held = touched(reader.lab, scene.object_name, scene.face)
+        held = find_face(reader.lab, scene.object_name, scene.face)
         if held is not None:
             axis.plot(*held[0].centres_mm.T, ".", color="#aab0b8", ms=3)
         axis.plot(

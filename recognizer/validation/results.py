@@ -1,7 +1,7 @@
 """All rows of a run -> what the report and `results.json` say. No time, no place, no machine.
 
 The order is that of the report: verdict, kinds and levels, confusion, pose, what accuracy
-depends on, margins, the worst touches. `precision`, `extremes` and `left_out` add theirs.
+depends on, margins, the worst touches. `precision`, `extremes` and `savings` add theirs.
 """
 
 from __future__ import annotations
@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from recognizer.validation.campaign import ON_FACES, STRANGE
 from recognizer.validation.levels import LEVELS
+from recognizer.validation.settings import LIMITS
 from recognizer.validation.statistics import (
     calibration,
     quantiles_of,
     rms,
-    rounded,
+    round_digits,
     share_of,
 )
 from recognizer.validation.trial import REJECTED, RIGHT, WRONG
@@ -28,9 +29,6 @@ from recognizer.validation.trial import REJECTED, RIGHT, WRONG
 Columns = dict[str, Any]
 Mask = NDArray[np.bool_]
 
-#: Bounds of what is validated (design): name, whether a share must be at least or a size at most.
-ANSWERED, RMS_MM, RMS_DEG = 0.995, 0.1, 0.3
-STRONG = "mismatch"
 WORST = 20
 QUANTILES = (0.5, 0.9, 0.99, 1.0)
 
@@ -79,7 +77,7 @@ def results_of(rows: Columns) -> dict[str, Any]:
         "against": {
             name: {
                 "unit": unit,
-                "bins": _binned(rows, name, edges, inside if name in _INSIDE else whole),
+                "bins": _bins(rows, name, edges, inside if name in _INSIDE else whole),
             }
             for name, (unit, edges) in BINS.items()
         },
@@ -131,15 +129,15 @@ def _verdict(rows: Columns, fair: Mask) -> list[dict[str, Any]]:
     """Return each bound, what was found, and whether it holds."""
     everything = line_of(rows, np.ones(len(fair), bool))
     expected = line_of(rows, fair)
-    strong = rows["level"] == STRONG
+    strong = rows["level"] == LIMITS.hardest
     hard = line_of(rows, fair & strong) if (fair & strong).any() else expected
     under = "under strong mismatch" if (fair & strong).any() else "all levels"
     answered = expected["answered"]
     checks = [
         ("wrong answers, all touches", everything["wrongly"], "=", 0.0, ""),
-        ("answered, of touches that show enough symbols", answered, ">=", ANSWERED, ""),
-        (f"pose, rms, {under}", hard["rms_mm"], "<=", RMS_MM, "mm"),
-        (f"turn, rms, {under}", hard["rms_deg"], "<=", RMS_DEG, "degrees"),
+        ("answered, of touches that show enough symbols", answered, ">=", LIMITS.answered, ""),
+        (f"pose, rms, {under}", hard["rms_mm"], "<=", LIMITS.rms_mm, "mm"),
+        (f"turn, rms, {under}", hard["rms_deg"], "<=", LIMITS.rms_deg, "degrees"),
     ]
     found = []
     for name, value, sign, bound, unit in checks:
@@ -153,7 +151,7 @@ def _verdict(rows: Columns, fair: Mask) -> list[dict[str, Any]]:
 
 def _confusion(rows: Columns, on_face: Mask) -> dict[str, Any]:
     """Return who was taken for whom: objects as a matrix, faces as the pairs that occurred."""
-    names = sorted(set(rows["object"][on_face].tolist()), key=_counted)
+    names = sorted(set(rows["object"][on_face].tolist()), key=_natural_key)
     answers = [str(answer).rpartition("/")[0] for answer in rows["answer"]]
     place = {name: i for i, name in enumerate(names)}
     matrix = np.zeros((len(names), len(names) + 1), int)
@@ -173,7 +171,7 @@ def _confusion(rows: Columns, on_face: Mask) -> dict[str, Any]:
         "matrix": matrix.tolist(),
         "faces": [
             {"object": a, "face": b, **{v: count[v] for v in (RIGHT, WRONG, REJECTED)}}
-            for (a, b), count in sorted(faces.items(), key=lambda one: [*map(_counted, one[0])])
+            for (a, b), count in sorted(faces.items(), key=lambda one: [*map(_natural_key, one[0])])
         ],
         "confused": [
             {"touched": a, "answered": b, "count": n} for (a, b), n in sorted(confused.items())
@@ -181,7 +179,7 @@ def _confusion(rows: Columns, on_face: Mask) -> dict[str, Any]:
     }
 
 
-def _counted(name: str) -> tuple[str | int, ...]:
+def _natural_key(name: str) -> tuple[str | int, ...]:
     """Return a name's key in an order in which Box-2 comes before Box-10."""
     return tuple(int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", name))
 
@@ -207,7 +205,7 @@ def _pose(rows: Columns) -> dict[str, Any]:
     return found
 
 
-def _binned(rows: Columns, name: str, edges: list[float], where: Mask) -> list[dict[str, Any]]:
+def _bins(rows: Columns, name: str, edges: list[float], where: Mask) -> list[dict[str, Any]]:
     found = []
     last = edges[-2]
     for low, high in pairwise(edges):
@@ -254,5 +252,5 @@ def _plain(value: Any) -> Any:
     """Return a value as JSON has it: null for what is no number."""
     plain = value.item() if hasattr(value, "item") else value
     if isinstance(plain, float):
-        return rounded(plain) if np.isfinite(plain) else None
+        return round_digits(plain) if np.isfinite(plain) else None
     return plain

@@ -14,6 +14,7 @@ import numpy as np
 
 from probe.sensor import SensorType
 from recognizer.touch.lab import EncodedFace, Lab
+from recognizer.validation.settings import JUDGING
 from recognizer.validation.trial import Trial
 
 Row = dict[str, Any]
@@ -33,7 +34,7 @@ COLUMNS: dict[str, str | int] = {
     "tilt_deg": 6,
     "edge_mm": 6,
     "symbols": "whole",  #: registered ones whose centre lies under the sensor
-    "enough": "truth",  #: whether that is `Enough`
+    "enough": "truth",  #: whether that is enough (`JudgeSettings`)
     "verdict": "text",
     "reason": "text",
     "answer": "text",
@@ -44,11 +45,9 @@ COLUMNS: dict[str, str | int] = {
     "noise": 6,
 }
 
-ENOUGH = 1.5  #: symbols in view over those of a window, from which an answer is expected
-
 
 @dataclass(frozen=True, slots=True)
-class Time:
+class CpuTime:
     """CPU seconds of a touch."""
 
     number: int
@@ -57,14 +56,14 @@ class Time:
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class SymbolsInView:
     """What of a face is under the sensor."""
 
     symbols: int
     enough: bool
 
 
-def row_of(trial: Trial, kind: str, seen: Seen) -> Row:
+def row_of(trial: Trial, kind: str, seen: SymbolsInView) -> Row:
     """Return the row of a trial, its numbers as they are kept."""
     row: Row = {}
     given: Row = {
@@ -79,23 +78,26 @@ def row_of(trial: Trial, kind: str, seen: Seen) -> Row:
     return row
 
 
-def seen_of(lab: Lab, sensor: SensorType, trial: Trial) -> Seen:
+def symbols_in_view(lab: Lab, sensor: SensorType, trial: Trial) -> SymbolsInView:
     """Return how many symbols a touch had in view, and whether they were enough.
 
-    Enough is `ENOUGH` times the cells of the array's window, on a face that is not worn.
+    Enough is `JudgeSettings.enough` times the cells of the array's window, on a face that is
+    not worn.
     """
-    found = touched(lab, trial.object, trial.face)
+    found = find_face(lab, trial.object, trial.face)
     if found is None:
-        return Seen(0, enough=False)
+        return SymbolsInView(0, enough=False)
     face, window = found
     angle = np.radians(trial.theta_deg)
     c, s = np.cos(angle), np.sin(angle)
     own = (face.centres_mm - (trial.x_mm, trial.y_mm)) @ np.array([[c, -s], [s, c]])
     symbols = int((np.abs(own) < sensor.half_mm).all(axis=1).sum())
-    return Seen(symbols, enough=trial.kind != "worn" and symbols >= ENOUGH * window)
+    return SymbolsInView(
+        symbols, enough=trial.kind != "worn" and symbols >= JUDGING.enough * window
+    )
 
 
-def touched(lab: Lab, object_name: str, face: str) -> tuple[EncodedFace, int] | None:
+def find_face(lab: Lab, object_name: str, face: str) -> tuple[EncodedFace, int] | None:
     """Return a face of the lab, and the cells of its array's window; None if it is foreign."""
     for encoding in lab.arrays:
         for object_id, name in encoding.names.items():

@@ -7,21 +7,20 @@ the shard is, it is done. Other tools read them as they are.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from recognizer.validation.campaign import Series, shards_of
-from recognizer.validation.rows import COLUMNS, Row, Time
+from recognizer.validation.files import whole_file
+from recognizer.validation.rows import COLUMNS, CpuTime, Row
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 SHARDS, TIMES = "shards", "times"
 GROUP = 100_000  #: rows that a file holds together
-_UNDONE = ".writing"
 
 
 def shard_file(folder: Path, series: str, shard: int, what: str = SHARDS) -> Path:
@@ -38,7 +37,7 @@ def row_schema() -> pa.Schema:
 
 
 def write_shard(
-    folder: Path, series: str, shard: int, rows: Iterable[Row], times: Iterable[Time]
+    folder: Path, series: str, shard: int, rows: Iterable[Row], times: Iterable[CpuTime]
 ) -> None:
     """Write a shard and its times, in the order of the touches' numbers."""
     import pyarrow as pa
@@ -46,7 +45,7 @@ def write_shard(
     ordered = sorted(rows, key=lambda row: row["number"])
     spent = sorted(times, key=lambda time: time.number)
     schema = pa.schema([(f.name, pa.int64() if f.name == "number" else pa.float64())
-                        for f in fields(Time)])  # fmt: skip
+                        for f in fields(CpuTime)])  # fmt: skip
     columns = {name: [getattr(time, name) for time in spent] for name in schema.names}
     write_table(pa.table(columns, schema=schema), shard_file(folder, series, shard, TIMES))
     table = pa.Table.from_pylist(ordered, schema=row_schema())
@@ -57,13 +56,8 @@ def write_table(table: pa.Table, path: Path) -> None:
     """Write a table under a name that it gets when all of it is on the disk."""
     import pyarrow.parquet as pq
 
-    path.parent.mkdir(parents=True, exist_ok=True)
-    undone = path.with_name(path.name + _UNDONE)
-    with open(undone, "wb") as file:
+    with whole_file(path) as file:
         pq.write_table(table, file, compression="zstd", row_group_size=GROUP)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(undone, path)
 
 
 def done_shards(folder: Path, series: Series) -> set[int]:

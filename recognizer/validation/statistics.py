@@ -47,22 +47,22 @@ def share_of(hits: int, of: int) -> dict[str, Any]:
     return {
         "count": hits,
         "of": of,
-        "share": None if of == 0 else rounded(hits / of),
-        "low": rounded(low),
-        "high": rounded(high),
+        "share": None if of == 0 else round_digits(hits / of),
+        "low": round_digits(low),
+        "high": round_digits(high),
     }
 
 
 def rms(values: Array) -> float | None:
     """Return the root of the mean square; None where there is nothing."""
-    return rounded(math.sqrt(float(np.mean(values**2)))) if len(values) else None
+    return round_digits(math.sqrt(float(np.mean(values**2)))) if len(values) else None
 
 
 def quantiles_of(values: Array, at: tuple[float, ...]) -> list[float | None]:
     """Return quantiles; None where there is nothing."""
     if len(values) == 0:
         return [None] * len(at)
-    return [rounded(float(value)) for value in np.quantile(values, at)]
+    return [round_digits(float(value)) for value in np.quantile(values, at)]
 
 
 def chi2_quantile(probability: float, freedom: int = FREEDOM) -> float:
@@ -84,7 +84,7 @@ def calibration(chi2: Array) -> list[dict[str, Any]]:
     ]
 
 
-def rounded(value: float, digits: int = DIGITS) -> float:
+def round_digits(value: float, digits: int = DIGITS) -> float:
     """Return a number with so many significant digits; -0 becomes 0."""
     if value == 0 or not math.isfinite(value):
         return 0.0 if value == 0 else value

@@ -1,4 +1,4 @@
-"""What is touched: encoded faces, worn ones, and surfaces that no database knows.
+"""Surfaces that no database knows.
 
 Everything else than a registered face must be refused, whatever it looks like.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from generator.alphabet import alphabet_named
 from generator.array import profile
 from probe.surface.contract import Surface
-from probe.surface.face import Face, endless
+from probe.surface.face import endless
 from probe.surface.indenters import Plate, Rough
 from probe.surface.symbols import Relief
 from recognizer.touch.lab import EmbossedArray
 
 Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,23 +61,6 @@ class Dots:
         away = (points_mm / self.period_mm + 0.5) % 1.0 - 0.5
         inside = np.hypot(away[:, 0], away[:, 1]) * self.period_mm < self.diameter_mm / 2
         return np.where(inside, self.height_mm, 0.0)
-
-
-def worn(face: Face, share: float, rng: np.random.Generator) -> Face:
-    """Return a face of which a share of the symbols is worn away."""
-    lattice = face.lattice
-    if lattice is None:
-        return face
-    salt = int(rng.integers(1 << 31))
-    label_at = lattice.label_at
-
-    def left(rows: Ints, columns: Ints) -> Ints:
-        labels = label_at(rows, columns)
-        cell = (rows * 73_856_093) ^ (columns * 19_349_663) ^ salt
-        drawn = ((cell * 2_654_435_761) % (1 << 32)) / (1 << 32)
-        return np.where(drawn < share, -1, labels)
-
-    return replace(face, lattice=replace(lattice, label_at=left))
 
 
 def blank(_encoding: EmbossedArray, _rng: np.random.Generator) -> Surface:

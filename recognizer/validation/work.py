@@ -1,6 +1,6 @@
-"""What a worker does with a piece: touch, read, compare. The same anywhere.
+"""What a worker does with a batch: touch, read, compare. The same anywhere.
 
-Work + Piece -> Touched. A worker prepares its reader once and keeps it; it refuses when it
+Work + Batch -> BatchResult. A worker prepares its reader once and keeps it; it refuses when it
 runs other code or sees another set than the one that asked.
 """
 
@@ -15,18 +15,19 @@ from pathlib import Path
 
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader, reader_for
-from recognizer.validation.campaign import Campaign, Piece, plan_of, reader_with, series_of
+from recognizer.validation.campaign import Batch, Campaign, plan_of, reader_with, series_of
+from recognizer.validation.draw import sensor_of
+from recognizer.validation.encoded_set import set_digest
 from recognizer.validation.errors import WorkersError
-from recognizer.validation.made import set_digest
-from recognizer.validation.rows import Row, Time, row_of, seen_of
-from recognizer.validation.trial import sensor_of, trial
+from recognizer.validation.rows import CpuTime, Row, row_of, symbols_in_view
+from recognizer.validation.trial import trial
 
 PACKAGES = ("generator", "decoder", "probe", "recognizer")
 
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """What all pieces share."""
+    """What all batches share."""
 
     campaign: Campaign
     database: str  #: as the workers find it
@@ -35,43 +36,43 @@ class Work:
 
 
 @dataclass(frozen=True, slots=True)
-class Touched:
-    """A piece that is done."""
+class BatchResult:
+    """A batch that is done."""
 
-    piece: Piece
+    batch: Batch
     rows: tuple[Row, ...]
-    times: tuple[Time, ...]
+    times: tuple[CpuTime, ...]
 
 
-#: Takes work and pieces, yields what is done in any order. `workers`, `cluster`.
-Workers = Callable[[Work, Iterable[Piece]], Iterator[Touched]]
+#: Takes work and batches, yields what is done in any order. `workers`, `cluster`.
+Workers = Callable[[Work, Iterable[Batch]], Iterator[BatchResult]]
 
 
-def touch(work: Work, piece: Piece) -> Touched:
-    """Return what became of the touches of a piece.
+def touch(work: Work, batch: Batch) -> BatchResult:
+    """Return what became of the touches of a batch.
 
     Raises
     ------
     WorkersError
         The code or the set is not the one that was asked for.
     """
-    reader = prepared(work)
-    series = next(s for s in series_of(work.campaign) if s.name == piece.series)
+    reader = prepare_reader(work)
+    series = next(s for s in series_of(work.campaign) if s.name == batch.series)
     reading = reader_with(reader, series.reader)
     rows, times = [], []
-    for number in range(piece.first, piece.last):
+    for number in range(batch.first, batch.last):
         kind, plan = plan_of(work.campaign, series, work.database, number)
         start = time.process_time()
         found = trial(plan, number, reading)
         spent = time.process_time() - start
-        seen = seen_of(reader.lab, reader.sensor, found)
+        seen = symbols_in_view(reader.lab, reader.sensor, found)
         rows.append(row_of(found, kind, seen))
-        times.append(Time(number, round(spent - found.seconds, 6), round(found.seconds, 6)))
-    return Touched(piece, tuple(rows), tuple(times))
+        times.append(CpuTime(number, round(spent - found.seconds, 6), round(found.seconds, 6)))
+    return BatchResult(batch, tuple(rows), tuple(times))
 
 
 @lru_cache(maxsize=1)
-def prepared(work: Work) -> Reader:
+def prepare_reader(work: Work) -> Reader:
     """Return the reader of a campaign; checks that it is of the same code and set."""
     if work.code_digest != code_digest():
         raise WorkersError(

@@ -1,7 +1,7 @@
 """Who does the work: this process, or several on this machine.
 
 A pool that loses a process (out of memory, killed) is made anew and given what is not done,
-at most `LOSSES` times without a piece done between. Workers leave interrupts to the
+at most `SharingSettings.losses` times without a batch done between. Workers leave interrupts to the
 process that started them, and end when it is gone.
 """
 
@@ -16,11 +16,10 @@ from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from multiprocessing import active_children, connection, get_context, parent_process
 
-from recognizer.validation.campaign import Piece
+from recognizer.validation.campaign import Batch
 from recognizer.validation.errors import WorkersError
-from recognizer.validation.work import Touched, Work, Workers, touch
-
-LOSSES = 3  #: pools in a row that break before they have done anything
+from recognizer.validation.settings import SHARING
+from recognizer.validation.work import BatchResult, Work, Workers, touch
 
 
 def workers_of(processes: int, cluster: str = "") -> Workers:
@@ -32,42 +31,42 @@ def workers_of(processes: int, cluster: str = "") -> Workers:
     return here if processes == 1 else partial(in_processes, processes)
 
 
-def here(work: Work, pieces: Iterable[Piece]) -> Iterator[Touched]:
-    """Do one piece after another."""
-    for piece in pieces:
-        yield touch(work, piece)
+def here(work: Work, batches: Iterable[Batch]) -> Iterator[BatchResult]:
+    """Do one batch after another."""
+    for batch in batches:
+        yield touch(work, batch)
 
 
-def in_processes(processes: int, work: Work, pieces: Iterable[Piece]) -> Iterator[Touched]:
-    """Do pieces in several processes at a time.
+def in_processes(processes: int, work: Work, batches: Iterable[Batch]) -> Iterator[BatchResult]:
+    """Do batches in several processes at a time.
 
     Raises
     ------
     WorkersError
         Processes were lost again and again.
     """
-    left = list(pieces)
+    left = list(batches)
     lost = 0
     while left:
         before = len(left)
         try:
-            for done in _pooled(processes, work, left):
-                left.remove(done.piece)
+            for done in _run_pool(processes, work, left):
+                left.remove(done.batch)
                 yield done
         except BrokenProcessPool as error:
             lost = lost + 1 if len(left) == before else 1
-            if lost > LOSSES:
+            if lost > SHARING.losses:
                 raise WorkersError(
-                    f"processes are lost, {LOSSES + 1} times in a row",
+                    f"processes are lost, {SHARING.losses + 1} times in a row",
                     fix="see whether the memory suffices, take a smaller -j, go on with --resume",
                 ) from error
 
 
-def _pooled(processes: int, work: Work, pieces: list[Piece]) -> Iterator[Touched]:
+def _run_pool(processes: int, work: Work, batches: list[Batch]) -> Iterator[BatchResult]:
     # Begun anew rather than forked: no open database and no thread is taken over.
     pool = ProcessPoolExecutor(processes, get_context("spawn"), initializer=_begin)
     try:
-        waiting = [pool.submit(touch, work, piece) for piece in pieces]
+        waiting = [pool.submit(touch, work, batch) for batch in batches]
         yield from _as_done(waiting)
     except BaseException:
         for process in active_children():
@@ -77,7 +76,7 @@ def _pooled(processes: int, work: Work, pieces: list[Piece]) -> Iterator[Touched
         pool.shutdown(cancel_futures=True)
 
 
-def _as_done(waiting: list[Future[Touched]]) -> Iterator[Touched]:
+def _as_done(waiting: list[Future[BatchResult]]) -> Iterator[BatchResult]:
     """Yield what is done, as it is done; an interrupt comes through at once."""
     left = set(waiting)
     while left:

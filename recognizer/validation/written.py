@@ -8,7 +8,6 @@ there is nothing. Thesis 6.3.
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +18,6 @@ from generator.database.url import normal_url, part_path
 from probe.simulate.part import part_surface
 from probe.simulate.registered import registered_object
 from probe.simulate.scene import Scene
-from probe.surface.contract import Surface
-from recognizer.touch.lab import EncodedFace
 from recognizer.validation.errors import SetError
 
 Array = NDArray[np.float64]
@@ -88,54 +85,3 @@ def check_file(path: Path, part: RegisteredPart) -> None:
     if digest != part.sha256:
         cause = "the file is not the one that the database registers"
         raise SetError(cause, fix=fix, place=str(path))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class WornAway:
-    """A surface on which some symbols are worn down to the face."""
-
-    surface: Surface
-    centres_mm: Array  #: (n, 2) of the worn symbols, surface frame
-    rotation_rad: float  #: turns the surface's x axis into the array's
-    pitch_mm: float
-
-    @property
-    def top_mm(self) -> float:
-        """Height of what is left."""
-        return self.surface.top_mm
-
-    def heights_mm(self, points_mm: Array) -> Array:
-        """Return the heights, none above the face in the cell of a worn symbol."""
-        heights = self.surface.heights_mm(points_mm)
-        c, s = np.cos(self.rotation_rad), np.sin(self.rotation_rad)
-        turned = np.array([[c, s], [-s, c]])
-        high = np.flatnonzero(heights > 0)
-        away = points_mm[high, None, :] @ turned - self.centres_mm @ turned
-        gone = (np.abs(away) <= self.pitch_mm / 2).all(axis=2).any(axis=1)
-        heights = heights.copy()
-        heights[high[gone]] = 0.0
-        return heights
-
-
-def worn_away(
-    surface: Surface,
-    face: EncodedFace,
-    pitch_mm: float,
-    share: float,
-    rng: np.random.Generator,
-) -> WornAway:
-    """Return a surface of which a share of the symbols is worn away.
-
-    Parameters
-    ----------
-    surface
-        Of the face, face frame.
-    face, pitch_mm
-        Where its symbols are.
-    share
-        Probability that a symbol is gone.
-    rng
-        Draws them.
-    """
-    gone = rng.random(len(face.centres_mm)) < share
-    return WornAway(surface, face.centres_mm[gone], face.rotation_rad, pitch_mm)

@@ -36,7 +36,7 @@ from recognizer.touch.lab import EmbossedArray, EncodedFace, Lab, cell_keys  # n
 from recognizer.touch.reader import reader_for  # noqa: E402
 from recognizer.touch.recognise import recognise  # noqa: E402
 from recognizer.touch.signal import signal_of  # noqa: E402
-from recognizer.validation.levels import TYPICAL, read  # noqa: E402
+from recognizer.validation.levels import TYPICAL, read_sensor  # noqa: E402
 
 SIDE = 8  # symbols along an edge
 STYLE = SymbolStyle()
@@ -110,7 +110,7 @@ def measured(faces: int, touches: int) -> str:
         lattice = Lattice(drawn, listed(R, C, held.labels), 0.0, -2.0, -58.0)
         x, y = rng.uniform(12, 48, 2)
         touch = Touch(x, y, rng.uniform(-math.pi, math.pi), rng.uniform(20, 120))
-        image, _ = read(Face(lattice, polygon([SQUARE])), SensorType(), touch, TYPICAL, rng)
+        image, _ = read_sensor(Face(lattice, polygon([SQUARE])), SensorType(), touch, TYPICAL, rng)
         start = time.process_time()
         found = recognise(reader, signal_of(image.astype(float)))
         ms.append(1e3 * (time.process_time() - start))

@@ -45,8 +45,9 @@ from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import reader_for
 from recognizer.touch.recognise import recognise
 from recognizer.touch.signal import signal_of
-from recognizer.validation.levels import BIAS, LEVELS, read
-from recognizer.validation.surfaces import FOREIGN, worn
+from recognizer.validation.levels import LEVELS, READOUT, read_sensor
+from recognizer.validation.surfaces import FOREIGN
+from recognizer.validation.wear import wear_face
 
 SPECS = Path(__file__).parents[2] / "fixtures" / "specs"
 SHAPES = {"thesis": ("cube", "prism", "tetrahedron", "box"), "product": ("cube",),
@@ -163,7 +164,7 @@ def scanned(scene, encoding, kind, level, sigma_tactels, most, rng, manner=None)
         spread = [np.array([sigma, sigma, 0.003])] * len(true)
     surface = scene.surface
     if kind == "worn":
-        surface = worn(surface, 0.2, rng)
+        surface = wear_face(surface, 0.2, rng)
     elif kind in FOREIGN:
         surface = FOREIGN[kind](encoding, rng)
     back, number = np.linalg.inv(T_base_face), int(rng.integers(1 << 30))
@@ -177,7 +178,9 @@ def scanned(scene, encoding, kind, level, sigma_tactels, most, rng, manner=None)
         touch = Touch(x, y, turn, float(rng.uniform(*manner.force_n)),
                       tilt * math.cos(towards), tilt * math.sin(towards))  # fmt: skip
         try:
-            counts, _ = read(surface, SENSOR, touch, LEVELS[level], np.random.default_rng(number))
+            counts, _ = read_sensor(
+                surface, SENSOR, touch, LEVELS[level], np.random.default_rng(number)
+            )
         except ContactError:
             continue  # the plate slips off
         felt.counts.append(counts.astype(float))
@@ -252,7 +255,7 @@ def classical(lab, felt, name, sigma, tally):
     """Read a scan the thesis's way, after every eighth touch and at the end."""
     merging = Merging(window_tactels=max(0.75, 2 * (sigma or 0)))
     poses = np.array([touch.believed.pose for touch in felt.touches])
-    images = [np.maximum(counts - BIAS, 0) for counts in felt.counts]
+    images = [np.maximum(counts - READOUT.bias, 0) for counts in felt.counts]
     first, n = None, len(images)
     for k in [*range(8, n, 8), n]:
         start = time.process_time()

@@ -27,7 +27,8 @@ from recognizer.touch.symbols.gain import first_gain, image_of, normalize_image 
 from recognizer.touch.symbols.pressing import pressing_of  # noqa: E402
 from recognizer.touch.symbols.search import search  # noqa: E402
 from recognizer.touch.verify import verify_hypotheses  # noqa: E402
-from recognizer.validation.trial import Plan, drawn, judged, sensor_of  # noqa: E402
+from recognizer.validation.draw import TouchPlan, draw_touch, sensor_of  # noqa: E402
+from recognizer.validation.trial import judge  # noqa: E402
 
 SETTINGS = {
     "1 lattice, 1 + 1 steps": FitSettings(1, 1, 1, 1),
@@ -80,8 +81,8 @@ def main() -> None:
     reader = reader_for(open_lab(options.database), sensor_of("tab"))
     points = {}
     for level in ("typical", "mismatch"):
-        plan = Plan(options.database, options.seed, level)
-        touches = [drawn(plan, number, reader) for number in range(options.touches)]
+        plan = TouchPlan(options.database, options.seed, level)
+        touches = [draw_touch(plan, number, reader) for number in range(options.touches)]
         signals = [signal_of(each.counts.astype(float)) for each in touches]
         print(f"{level}:")
         for name, ms in stages(reader, signals).items():
@@ -91,7 +92,7 @@ def main() -> None:
             found = []
             for number, (touch, signal) in enumerate(zip(touches, signals, strict=True)):
                 (answer, _), ms = clocked(lambda s=signal, r=one: recognise_with_hypothesis(r, s))
-                found.append((judged(plan, number, touch, answer, ms / 1e3), ms))
+                found.append((judge(plan, number, touch, answer, ms / 1e3), ms))
             right = [t for t, _ in found if t.verdict == "right"]
             wrong = sum(t.verdict == "wrong" for t, _ in found)
             rms = float(np.sqrt(np.mean([t.error_mm**2 for t in right])))

@@ -53,8 +53,8 @@ from recognizer.touch.reader import Reader, reader_for  # noqa: E402
 from recognizer.touch.recognise import recognise  # noqa: E402
 from recognizer.touch.recognition import Recognition  # noqa: E402
 from recognizer.touch.signal import signal_of  # noqa: E402
-from recognizer.validation.levels import LEVELS, read  # noqa: E402
-from recognizer.validation.trial import INSIDE_MM, NEAR_MM  # noqa: E402
+from recognizer.validation.levels import LEVELS, read_sensor  # noqa: E402
+from recognizer.validation.settings import DRAWING, JUDGING  # noqa: E402
 
 SHAPES = {
     "R20": "{cylinder: {diameter: 40 mm, height: 70 mm}}",
@@ -102,7 +102,7 @@ def reader(database: str) -> Reader:
 
 
 def touches(touched: RoundPart, rng: np.random.Generator) -> Iterator[Touch]:
-    return random_touches(touched.region, rng, Touches(margin_mm=INSIDE_MM))
+    return random_touches(touched.region, rng, Touches(margin_mm=DRAWING.inside_mm))
 
 
 def truth(touched: RoundPart, touch: Touch, height_mm: float) -> np.ndarray:
@@ -130,7 +130,7 @@ def judged(touched: RoundPart, touch: Touch, answer: Recognition) -> Outcome:
     away[:2] = T[:2, 3] - (touch.x_mm, touch.y_mm)
     away[2] = math.remainder(math.atan2(T[1, 0], T[0, 0]) - touch.theta_rad, 2 * math.pi)
     named = (answer.object, answer.face) == (touched.object_name, touched.face.name)
-    if not named or math.hypot(*away[:2]) > NEAR_MM:
+    if not named or math.hypot(*away[:2]) > JUDGING.near_mm:
         return Outcome("wrong")
     meant = truth(touched, touch, T[2, 3])
     turn = np.linalg.inv(meant[:3, :3]) @ answer.T_object_probe[:3, :3]
@@ -150,7 +150,7 @@ def one_touch(job: tuple[str, str, str, int]) -> Outcome:
     for touch in touches(touched, rng):
         surface = touched.under(touch).surface
         try:
-            counts, _ = read(surface, SensorType(), touch, LEVELS[level], rng)
+            counts, _ = read_sensor(surface, SensorType(), touch, LEVELS[level], rng)
         except ContactError:
             continue  # the plate slips off: no touch
         start = time.process_time()
@@ -167,11 +167,13 @@ def one_scan(job: tuple[str, str, str, int]) -> Outcome:
     scan, outcome, first, start = begin_scan(reader(database)), Outcome("refused"), math.nan, 0.0
     for k in range(MOST):
         at = np.array([[touch.x_mm, touch.y_mm]])
-        inside = touched.region.contains(at)[0] and touched.region.distance_mm(at)[0] > INSIDE_MM
+        inside = (
+            touched.region.contains(at)[0] and touched.region.distance_mm(at)[0] > DRAWING.inside_mm
+        )
         if inside:
             try:
                 surface = touched.under(touch).surface
-                counts, _ = read(surface, SensorType(), touch, LEVELS[level], rng)
+                counts, _ = read_sensor(surface, SensorType(), touch, LEVELS[level], rng)
             except ContactError:
                 inside = False
         if inside:
@@ -233,9 +235,11 @@ def strips(options: argparse.Namespace, databases: dict[str, str]) -> None:
         for force in FORCES_N:
             rng, found = np.random.default_rng(1), []
             for _ in range(min(options.touches, 12)):
-                drawn = next(random_touches(touched.region, rng, Touches((force, force), 0.0,
-                                                                         INSIDE_MM)))  # fmt: skip
-                _, contact = read(touched.under(drawn).surface, sensor, drawn, LEVELS["low"], rng)
+                ranges = Touches((force, force), 0.0, DRAWING.inside_mm)
+                drawn = next(random_touches(touched.region, rng, ranges))
+                _, contact = read_sensor(
+                    touched.under(drawn).surface, sensor, drawn, LEVELS["low"], rng
+                )
                 bend = touched.face.round.bend(drawn.x_mm, drawn.y_mm).turned(drawn.theta_rad)
                 c, s = math.cos(bend.towards_rad), math.sin(bend.towards_rad)
                 forces = contact.forces_n.reshape(-1)
@@ -252,7 +256,7 @@ def picture(options: argparse.Namespace, databases: dict[str, str]) -> None:
 
     touched, touch = part(databases["R40"], "R40"), Touch(100.0, 31.0, math.radians(25), 80.0)
     surface = touched.under(touch).surface
-    counts, contact = read(
+    counts, contact = read_sensor(
         surface, SensorType(), touch, LEVELS["typical"], np.random.default_rng(1)
     )
     touch_picture(surface, SensorType(), touch, contact.forces_n, counts, Path(options.output),

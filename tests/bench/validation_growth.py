@@ -19,9 +19,9 @@ import numpy as np
 from database_scale import array_of, blocks, fill
 
 from generator.database.open import open_database
-from recognizer.validation.campaign import Campaign, Piece
-from recognizer.validation.made import set_digest
-from recognizer.validation.work import Work, code_digest, prepared, touch
+from recognizer.validation.campaign import Batch, Campaign
+from recognizer.validation.encoded_set import set_digest
+from recognizer.validation.work import Work, code_digest, prepare_reader, touch
 
 
 def main() -> None:
@@ -43,9 +43,9 @@ def main() -> None:
             )
             work = Work(campaign, url, set_digest(url), code_digest())
             start = time.process_time()
-            reader = prepared(work)
+            reader = prepare_reader(work)
             opened = time.process_time() - start
-            found = touch(work, Piece("touches", 0, options.touches))
+            found = touch(work, Batch("touches", 0, options.touches))
             drawing, reading = (
                 float(np.median([getattr(t, name) for t in found.times]))
                 for name in ("drawing", "reading")

@@ -20,13 +20,14 @@ import numpy as np  # noqa: E402
 
 from recognizer.touch.lab import open_lab  # noqa: E402
 from recognizer.touch.reader import reader_for  # noqa: E402
+from recognizer.validation.draw import TouchPlan, sensor_of  # noqa: E402
 from recognizer.validation.surfaces import FOREIGN  # noqa: E402
-from recognizer.validation.trial import Plan, Trial, sensor_of, trial  # noqa: E402
+from recognizer.validation.trial import Trial, trial  # noqa: E402
 
 CHI2_95 = 7.815  # 3 degrees of freedom
 
 
-def several(job: tuple[Plan, str, range]) -> list[Trial]:
+def several(job: tuple[TouchPlan, str, range]) -> list[Trial]:
     plan, overlay, numbers = job
     key = (plan.database, overlay)
     if key not in READERS:
@@ -69,7 +70,7 @@ def main() -> None:
     with ProcessPoolExecutor(options.j) as pool:
         for kind in kinds:
             for level in options.levels.split(","):
-                plan = Plan(options.database, options.seed, level, kind)
+                plan = TouchPlan(options.database, options.seed, level, kind)
                 starts = range(options.first, options.first + options.touches, 50)
                 end = options.first + options.touches
                 jobs = [(plan, options.overlay, range(s, min(s + 50, end))) for s in starts]

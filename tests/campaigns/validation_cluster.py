@@ -18,7 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from validation_shards import differing, shards
@@ -42,9 +42,11 @@ def cluster(folder: Path):
 
     try:
         start("scheduler", "--port", "0", "--host", "127.0.0.1", "--scheduler-file", str(told))
-        while not told.exists():
+        address = ""
+        while not address:
             time.sleep(0.1)
-        address = json.loads(told.read_text())["address"]
+            with suppress(FileNotFoundError, ValueError):  # not there, or being written
+                address = json.loads(told.read_text())["address"]
         for _ in range(2):
             start("worker", address, "--nthreads", "1", "--no-nanny")
         yield address, started[1:]

@@ -33,7 +33,7 @@ from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import reader_for
 from recognizer.touch.recognise import recognise
 from recognizer.touch.signal import signal_of
-from recognizer.validation.levels import LEVELS, read
+from recognizer.validation.levels import LEVELS, read_sensor
 
 SHAPES = {
     "cylinder": "{cylinder: {diameter: 36 mm, height: 30 mm}}",
@@ -212,7 +212,9 @@ def test_one_touch_of_the_written_part_tells_object_face_and_pose(touched, name)
     rng, answered = np.random.default_rng(8), 0
     drawn = random_touches(part.region, rng, Touches((40.0, 120.0), margin_mm=INSIDE_MM))
     for _, touch in zip(range(5), drawn, strict=False):
-        counts, _ = read(part.under(touch).surface, reader.sensor, touch, LEVELS["typical"], rng)
+        counts, _ = read_sensor(
+            part.under(touch).surface, reader.sensor, touch, LEVELS["typical"], rng
+        )
         answer = recognise(reader, signal_of(counts.astype(np.float64)))
         if not answer:
             continue
@@ -245,7 +247,7 @@ def test_the_reader_takes_no_blank_round_face_for_an_encoded_one(touched):
     drawn = random_touches(part.region, rng, Touches(margin_mm=INSIDE_MM))
     for _, touch in zip(range(3), drawn, strict=False):
         blank = Blank(radius, (touch.x_mm, touch.y_mm))
-        counts, _ = read(blank, reader.sensor, touch, LEVELS["typical"], rng)
+        counts, _ = read_sensor(blank, reader.sensor, touch, LEVELS["typical"], rng)
         assert not recognise(reader, signal_of(counts.astype(np.float64)))
 
 

@@ -18,8 +18,8 @@ import pytest
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import reader_for
 from recognizer.validation.command import run
+from recognizer.validation.draw import TouchPlan, draw_touch, sensor_of
 from recognizer.validation.errors import SetError
-from recognizer.validation.trial import Plan, drawn, sensor_of
 from recognizer.validation.written import written_surface
 
 TOUCHES, SHARD = 18, 6
@@ -233,7 +233,7 @@ def test_written_files_are_what_is_registered(reference):
     reader = reader_for(open_lab(database), sensor_of("tab"))
     for number in range(4):
         said, written = (
-            drawn(Plan(database, level="low", files=files), number, reader)
+            draw_touch(TouchPlan(database, level="low", files=files), number, reader)
             for files in (False, True)
         )
         assert said.touch == written.touch

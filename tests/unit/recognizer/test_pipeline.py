@@ -33,9 +33,11 @@ from recognizer.touch.signal import CONTACT_N, signal_of
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.template import psi, template_of
 from recognizer.touch.verify import verify_hypotheses
+from recognizer.validation.draw import TouchPlan, draw_touch, sensor_of
 from recognizer.validation.levels import LEVELS
+from recognizer.validation.settings import DRAWING
 from recognizer.validation.surfaces import FOREIGN
-from recognizer.validation.trial import INSIDE_MM, Plan, drawn, sensor_of, trial
+from recognizer.validation.trial import trial
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +83,7 @@ def test_a_clean_touch_is_placed(url, reader, name, face):
 
 @pytest.mark.parametrize("level", list(LEVELS))
 def test_touches_of_a_level(url, reader, level):
-    found = [trial(Plan(url, 3, level), number, reader) for number in range(12)]
+    found = [trial(TouchPlan(url, 3, level), number, reader) for number in range(12)]
     assert all(t.verdict != "wrong" for t in found)
     right = [t for t in found if t.verdict == "right"]
     assert len(right) >= 11
@@ -90,31 +92,31 @@ def test_touches_of_a_level(url, reader, level):
 
 
 def test_touches_through_a_pad(url, pad_reader):
-    found = [trial(Plan(url, 3, "typical"), number, pad_reader) for number in range(8)]
+    found = [trial(TouchPlan(url, 3, "typical"), number, pad_reader) for number in range(8)]
     assert all(t.verdict != "wrong" for t in found)
     assert sum(t.verdict == "right" for t in found) >= 6
 
 
 @pytest.mark.parametrize("kind", list(FOREIGN))
 def test_other_surfaces_are_refused(url, reader, kind):
-    found = [trial(Plan(url, 5, "typical", kind), number, reader) for number in range(6)]
+    found = [trial(TouchPlan(url, 5, "typical", kind), number, reader) for number in range(6)]
     assert [t.verdict for t in found] == ["rejected"] * 6
     assert {t.reason for t in found} <= {NOT_ENCODED, TOO_FEW, AMBIGUOUS, NO_CONTACT, OUTSIDE}
 
 
 @pytest.mark.parametrize("kind", ["edge", "corner", "worn"])
 def test_hard_touches_are_never_wrong(url, reader, kind):
-    plan = Plan(url, 7, "typical", kind)
+    plan = TouchPlan(url, 7, "typical", kind)
     found = [trial(plan, number, reader) for number in range(10)]
     assert all(t.verdict != "wrong" for t in found)
     if kind == "edge":
-        assert all(t.edge_mm < INSIDE_MM for t in found)
+        assert all(t.edge_mm < DRAWING.inside_mm for t in found)
         assert any(t.verdict == "right" for t in found)
 
 
 def test_a_trial_is_known_by_its_number(url, reader):
-    plan = Plan(url, 11, "hard")
-    again = [drawn(plan, number, reader) for number in (4, 4, 5)]
+    plan = TouchPlan(url, 11, "hard")
+    again = [draw_touch(plan, number, reader) for number in (4, 4, 5)]
     assert again[0].touch == again[1].touch != again[2].touch
     assert (again[0].counts == again[1].counts).all()
     first, second = trial(plan, 4, reader), trial(plan, 4, reader)

@@ -21,7 +21,7 @@ from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import reader_for
 from recognizer.touch.recognition import NO_CONTACT, TOO_FEW
 from recognizer.touch.signal import signal_of
-from recognizer.validation.levels import MISMATCH, TYPICAL, read
+from recognizer.validation.levels import MISMATCH, TYPICAL, read_sensor
 from recognizer.validation.surfaces import FOREIGN
 
 SENSOR = SensorType()
@@ -55,7 +55,7 @@ def scanned(surface, places, theta, level, seed):
     touches, true = [], []
     for k, (x, y) in enumerate(places):
         touch = Touch(x, y, theta, float(rng.uniform(40, 110)), *rng.normal(0, 0.008, 2))
-        counts, _ = read(surface, SENSOR, touch, level, np.random.default_rng(seed))
+        counts, _ = read_sensor(surface, SENSOR, touch, level, np.random.default_rng(seed))
         error = rng.normal(0, 1, 3) * SPREAD
         pose = np.array([c * x - s * y + 200, s * x + c * y - 70, theta + 0.6]) + error
         signal = signal_of(counts.astype(float))

@@ -11,10 +11,10 @@ import pytest
 
 from recognizer.validation.campaign import Campaign, series_of
 from recognizer.validation.command import run
-from recognizer.validation.extremes import pressed
+from recognizer.validation.extremes import press_scenes
 from recognizer.validation.result import ValidationResult, bound_from, result_from
 from recognizer.validation.results import results_of
-from recognizer.validation.rows import Time
+from recognizer.validation.rows import CpuTime
 from recognizer.validation.shards import (
     columns_of,
     done_shards,
@@ -58,7 +58,7 @@ def row(number, verdict="right", **changed):
 
 def columns(rows, tmp_path):
     series = series_of(Campaign(len(rows)))[0]
-    write_shard(tmp_path, series.name, 0, rows, [Time(r["number"], 0.1, 0.2) for r in rows])
+    write_shard(tmp_path, series.name, 0, rows, [CpuTime(r["number"], 0.1, 0.2) for r in rows])
     return columns_of(read_series(tmp_path, series))
 
 
@@ -135,7 +135,7 @@ def test_touches_of_nothing_but_foreign_surfaces(tmp_path):
 
 def test_a_shard_is_there_when_it_is_whole(tmp_path):
     series = series_of(Campaign(5, shard=3))[0]
-    write_shard(tmp_path, series.name, 1, [row(4), row(3)], [Time(4, 1, 1), Time(3, 1, 1)])
+    write_shard(tmp_path, series.name, 1, [row(4), row(3)], [CpuTime(4, 1, 1), CpuTime(3, 1, 1)])
     assert done_shards(tmp_path, series) == {1}
     table = pq.read_table(shard_file(tmp_path, series.name, 1))
     assert table.schema.equals(row_schema())
@@ -167,7 +167,7 @@ def test_what_a_plain_install_lacks_is_said_in_one_line(monkeypatch, capsys):
 
 
 def test_stiff_and_extreme_scenes_are_finite_or_refused():
-    lines = list(pressed())
+    lines = list(press_scenes())
     assert {line["outcome"] for line in lines} == {"finite", "refused"}
     failed = [line["case"] for line in lines if not line["passes"]]
     assert set(failed) <= {"place that is no number"}

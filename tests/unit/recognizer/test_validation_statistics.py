@@ -9,16 +9,22 @@ from scipy.stats import binomtest, chi2
 from recognizer.validation.campaign import (
     KINDS,
     Campaign,
+    batches_of,
     kinds_of,
     levels_of,
-    pieces_of,
     plan_of,
     series_of,
     shards_of,
 )
 from recognizer.validation.compare import BETTER, SAME, WORSE, _share, _size
 from recognizer.validation.errors import ValidationError
-from recognizer.validation.statistics import calibration, chi2_quantile, rounded, share_of, wilson
+from recognizer.validation.statistics import (
+    calibration,
+    chi2_quantile,
+    round_digits,
+    share_of,
+    wilson,
+)
 
 
 @pytest.mark.parametrize(("hits", "of"), [(0, 10), (1, 10), (9, 10), (10, 10), (995, 1000), (3, 7)])
@@ -45,10 +51,10 @@ def test_an_honest_covariance_is_calibrated_and_a_proud_one_is_not():
 
 
 def test_rounded_keeps_what_it_must():
-    assert rounded(1234567.0) == 1234570.0
-    assert rounded(-0.0) == 0.0
-    assert math.copysign(1, rounded(-0.0)) == 1
-    assert math.isnan(rounded(math.nan))
+    assert round_digits(1234567.0) == 1234570.0
+    assert round_digits(-0.0) == 0.0
+    assert math.copysign(1, round_digits(-0.0)) == 1
+    assert math.isnan(round_digits(math.nan))
 
 
 def test_shares_are_read_from_options():
@@ -95,7 +101,7 @@ def test_pieces_cover_every_touch_once(touches):
         numbers = [
             n
             for shard in range(shards_of(series))
-            for piece in pieces_of(series, shard)
+            for piece in batches_of(series, shard)
             for n in range(piece.first, piece.last)
         ]
         assert numbers == list(range(series.touches))

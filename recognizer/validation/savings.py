@@ -19,14 +19,12 @@ from generator.database.transaction import reading
 from probe.contact.press import LEVELS, level_for, table
 from probe.contact.tips import Tips, tip_points
 from recognizer.touch.reader import Reader
+from recognizer.validation.draw import TouchPlan, draw_touch
 from recognizer.validation.precision import Study
-from recognizer.validation.trial import Plan, drawn
-
-OBJECTS = 20  #: read to know what reading all would take
-REPEATS = 5
+from recognizer.validation.settings import STUDIES
 
 
-def left_out(reader: Reader, plan: Plan, readers: Study) -> Study:
+def find_savings(reader: Reader, plan: TouchPlan, readers: Study) -> Study:
     """Return what was left out for a touch of a registered face.
 
     Parameters
@@ -55,15 +53,17 @@ def _objects(study: Study, reader: Reader) -> None:
     """Objects read from the database: that whose cells were met."""
     with reading(open_database(reader.lab.url, writable=False)) as connection:
         names = object_names(connection)
-        spent = [_spent(partial(read_object, connection, name), 1) for name in names[:OBJECTS]]
+        spent = [
+            _cpu_ms(partial(read_object, connection, name), 1) for name in names[: STUDIES.objects]
+        ]
     one = float(np.median(spent))
     _add(study, "objects read from the database: the one that is touched", 1, len(names),
          "objects", one, one * len(names))  # fmt: skip
 
 
-def _heights(study: Study, plan: Plan, reader: Reader) -> None:
+def _heights(study: Study, plan: TouchPlan, reader: Reader) -> None:
     """Heights asked: under the tips, not of the whole face."""
-    found = drawn(plan, 0, reader)
+    found = draw_touch(plan, 0, reader)
     if found.scene is None:
         return
     points = tip_points(reader.sensor, Tips())[0].reshape(-1, 2)
@@ -76,8 +76,8 @@ def _heights(study: Study, plan: Plan, reader: Reader) -> None:
     surface = found.scene.surface
     surface.heights_mm(under)
     _add(study, "heights asked of the surface: under the tips", len(under), len(whole), "points",
-         _spent(lambda: surface.heights_mm(under)),
-         _spent(lambda: surface.heights_mm(whole)))  # fmt: skip
+         _cpu_ms(lambda: surface.heights_mm(under)),
+         _cpu_ms(lambda: surface.heights_mm(whole)))  # fmt: skip
 
 
 def _levels(study: Study, reader: Reader) -> None:
@@ -111,14 +111,14 @@ def _add(
     whole_ms: float | None,
 ) -> None:
     study.counted.append({"what": what, "needed": needed, "of": of, "unit": unit})
-    study.spent += [_kept(ms), _kept(whole_ms)]
+    study.spent += [_three_digits(ms), _three_digits(whole_ms)]
 
 
-def _kept(ms: float | None) -> Any:
+def _three_digits(ms: float | None) -> Any:
     return None if ms is None else float(f"{ms:.3g}")
 
 
-def _spent(work: Callable[[], object], repeats: int = REPEATS) -> float:
+def _cpu_ms(work: Callable[[], object], repeats: int = STUDIES.repeats) -> float:
     """Return the median CPU time of something, ms."""
     times = []
     for _ in range(repeats):

@@ -57,7 +57,7 @@ def make_parts(specs: list[Path], folder: Path, database: str) -> None:
     command += ["--format", "stl", "--json"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
     if done.returncode:
-        cause, fix, place = _told(done.stdout, done.stderr)
+        cause, fix, place = _first_problem(done.stdout, done.stderr)
         raise SetError(f"encode-object: {cause}", fix=fix, place=place, exit_code=done.returncode)
 
 
@@ -111,7 +111,7 @@ def set_digest(database: str) -> str:
     return hashlib.sha256(json.dumps(held).encode()).hexdigest()
 
 
-def _told(stdout: str, stderr: str) -> tuple[str, str, str]:
+def _first_problem(stdout: str, stderr: str) -> tuple[str, str, str]:
     """Return cause, fix and place of the first problem that `encode-object` reports."""
     try:
         first = json.loads(stdout)["error"]

@@ -1,0 +1,158 @@
+"""What is touched, where, and what the sensor reads. Nothing but its number decides a touch.
+
+TouchPlan + number -> DrawnTouch. It is drawn from `default_rng([seed, number])`, so any touch
+can be repeated by its number, in any order and on any machine.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.contact.contract import Touch
+from probe.errors import ContactError
+from probe.sensor import Overlay, SensorType
+from probe.simulate.registered import registered_surface
+from probe.simulate.scene import Scene
+from probe.simulate.touch import Touches, random_touches
+from probe.surface.contract import Surface
+from probe.surface.face import Face
+from recognizer.touch.lab import EmbossedArray
+from recognizer.touch.reader import Reader
+from recognizer.validation.levels import LEVELS, read_sensor
+from recognizer.validation.settings import DRAWING
+from recognizer.validation.surfaces import FOREIGN
+from recognizer.validation.wear import wear_face, wear_part
+from recognizer.validation.written import written_surface
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class TouchPlan:
+    """What is drawn.
+
+    `kind` is `face` (the sensor's centre at least `inside_mm` from the edges), `edge` (nearer
+    than that), `corner` (within `inside_mm` of a corner), `worn` (a face with a share of its
+    symbols gone), or one of the surfaces of `surfaces.FOREIGN`.
+    """
+
+    database: str
+    seed: int = 1
+    level: str = "typical"
+    kind: str = "face"
+    force_n: tuple[float, float] = DRAWING.force_n
+    tilt_rad: float = DRAWING.tilt_rad
+    worn: float = DRAWING.worn
+    files: bool = False  #: touch the written STL files, not what the database says of them
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DrawnTouch:
+    """What is touched, and what the sensor reads."""
+
+    surface: Surface
+    scene: Scene | None  #: None for a foreign surface
+    touch: Touch
+    counts: NDArray[np.uint16]
+
+
+def draw_touch(plan: TouchPlan, number: int, reader: Reader) -> DrawnTouch:
+    """Return what is touched in a trial, and the reading."""
+    rng = np.random.default_rng([plan.seed, number])
+    level = LEVELS[plan.level]
+    ranges = Touches(force_n=plan.force_n, tilt_rad=plan.tilt_rad)
+    encoding = reader.lab.arrays[int(rng.integers(len(reader.lab.arrays)))]
+    while True:
+        scene: Scene | None = None
+        surface: Surface
+        if plan.kind in FOREIGN:
+            surface = FOREIGN[plan.kind](encoding, rng)
+            touch = _anywhere(rng, ranges)
+        else:
+            face = encoding.face(_by_name(encoding)[int(rng.integers(len(encoding.faces)))])
+            scene = scene_of(plan.database, face.object, face.face, plan.files)
+            most = _inmost(plan.database, face.object, face.face, plan.files)
+            touch = _on(scene, plan.kind, most, rng, ranges)
+            surface = scene.under(touch).surface
+            if plan.kind == "worn" and isinstance(surface, Face):
+                surface = wear_face(surface, plan.worn, rng)
+            elif plan.kind == "worn":
+                pitch = encoding.style.pitch_mm
+                surface = wear_part(surface, face, pitch, plan.worn, rng)
+        try:
+            counts, _ = read_sensor(surface, reader.sensor, touch, level, rng)
+        except ContactError:
+            continue  # the plate slips off: no touch
+        return DrawnTouch(surface, scene, touch, counts)
+
+
+@lru_cache(maxsize=8)
+def _by_name(encoding: EmbossedArray) -> list[int]:
+    """Return the faces in the order of their objects' names.
+
+    Their numbers follow the order of registration, which a set made in parallel leaves to chance.
+    """
+    faces, names = encoding.faces.tolist(), encoding.names
+    return sorted(range(len(faces)), key=lambda n: (names[faces[n][0]], faces[n][1]))
+
+
+@lru_cache(maxsize=512)
+def scene_of(database: str, object_name: str, face: str, files: bool) -> Scene:
+    """Return a face as it was written, or as the database says that it is."""
+    if files:
+        return written_surface(database, object_name, face)
+    return registered_surface(database, object_name, face)
+
+
+def _on(scene: Scene, kind: str, most: float, rng: np.random.Generator, ranges: Touches) -> Touch:
+    """Draw a touch of a face; where a face is too small for its kind, anywhere on it."""
+    inside = DRAWING.inside_mm
+    if kind == "corner":
+        touch = next(random_touches(scene.region, rng, ranges))
+        corner = scene.region.starts[int(rng.integers(len(scene.region.starts)))]
+        towards = np.array([touch.x_mm, touch.y_mm]) - corner
+        by = inside * rng.random() / max(float(np.hypot(*towards)), inside)
+        at = corner + towards * by
+        return replace(touch, x_mm=float(at[0]), y_mm=float(at[1]))
+    if kind == "edge":
+        for touch in random_touches(scene.region, rng, ranges):
+            if scene.region.distance_mm(np.array([[touch.x_mm, touch.y_mm]]))[0] < inside:
+                return touch
+    margin = min(inside, 0.8 * most)
+    return next(random_touches(scene.region, rng, replace(ranges, margin_mm=margin)))
+
+
+@lru_cache(maxsize=512)
+def _inmost(database: str, object_name: str, face: str, files: bool) -> float:
+    """Return how far the inmost point of a face lies from its edges, mm, nearly."""
+    scene = scene_of(database, object_name, face, files)
+    low, high = scene.region.box_mm
+    x, y = (low + (high - low) * np.linspace(0, 1, 64)[:, None]).T
+    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    points = points[scene.region.contains(points)]
+    return float(scene.region.distance_mm(points).max())
+
+
+def _anywhere(rng: np.random.Generator, ranges: Touches) -> Touch:
+    low, high = ranges.force_n
+    theta, towards = rng.uniform(-math.pi, math.pi, 2)
+    tilt = ranges.tilt_rad * math.sqrt(rng.random())
+    x, y = rng.uniform(0, 100, 2)
+    return Touch(
+        x_mm=float(x),
+        y_mm=float(y),
+        theta_rad=float(theta),
+        force_n=float(rng.uniform(low, high)),
+        tilt_x_rad=tilt * math.cos(towards),
+        tilt_y_rad=tilt * math.sin(towards),
+    )
+
+
+def sensor_of(overlay: str) -> SensorType:
+    """Return the usual sensor with a tab or a pad overlay."""
+    return SensorType(overlay=Overlay(kind="pad" if overlay == "pad" else "tab"))

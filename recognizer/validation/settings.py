@@ -1,0 +1,77 @@
+"""Numbers that decide what is drawn, how it is judged, and what a campaign must reach.
+
+One frozen value a stage. What a person may change stands in `campaign.Campaign`; what is
+wrong with simulated sensors, in `levels.LEVELS`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class DrawSettings:
+    """Where and how touches are drawn."""
+
+    force_n: tuple[float, float] = (20.0, 120.0)  #: as a hand or an arm presses
+    tilt_rad: float = math.radians(2.0)  #: at most, of the wrist
+    worn: float = 0.2  #: probability that a symbol of a worn face is gone
+    inside_mm: float = 9.0
+    """A touch inside a face keeps so far from its edges: a sensor of 25 mm then shows most of
+    its window; nearer ones are of the kind `edge`, or `corner` about a corner."""
+
+
+@dataclass(frozen=True, slots=True)
+class JudgeSettings:
+    """When an answer is right, and when one is expected."""
+
+    near_mm: float = 2.0
+    """An answer farther from the truth is wrong: under half of the finest pitch (4.5 mm), so
+    that the next cell is never taken for the true one."""
+    enough: float = 1.5
+    """Symbols in view over those of a window, from which an answer is expected: as many
+    as a window has need not stand as a window."""
+
+
+@dataclass(frozen=True, slots=True)
+class AcceptanceLimits:
+    """What a campaign must reach (design, section 4); no answer may be wrong."""
+
+    answered: float = 0.995  #: of the touches that show enough symbols
+    rms_mm: float = 0.1  #: place, at the level `hardest`
+    rms_deg: float = 0.3  #: turn, same
+    hardest: str = "mismatch"  #: wrong in everything at once
+
+
+@dataclass(frozen=True, slots=True)
+class StudySettings:
+    """How much the pictures of error against run time rest on."""
+
+    share: float = 0.05  #: of the touches, for every reader
+    least: int = 10  #: touches of a reader, whatever the share
+    most: int = 200
+    windows: int = 200  #: damaged ones for each decoder
+    wrong_symbols: float = 0.05  #: of these windows
+    beyond: int = 2  #: rows and columns of a view beyond the window, so that errors show
+    largest_serial: int = 1 << 13  #: places up to which the serial method ends in time
+    objects: int = 20  #: read to know what reading all would take
+    repeats: int = 5  #: of what is timed; the median counts
+
+    def touches_of(self, touches: int) -> int:
+        """Return how many of a campaign's touches every reader gets."""
+        return int(min(max(self.share * touches, self.least), self.most))
+
+
+@dataclass(frozen=True, slots=True)
+class SharingSettings:
+    """How touches are shared among workers; changes no result."""
+
+    shard: int = 1000  #: touches in a file, lost at most with a run
+    batch: int = 25  #: touches that a worker takes at once, 1/8 s: calls cost nothing then
+    losses: int = 3  #: pools in a row that break before they have done anything
+    cluster_wait_s: float = 20.0  #: for the scheduler, and for its first worker
+
+
+DRAWING, JUDGING, LIMITS = DrawSettings(), JudgeSettings(), AcceptanceLimits()
+STUDIES, SHARING = StudySettings(), SharingSettings()

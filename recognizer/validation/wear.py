@@ -1,0 +1,83 @@
+"""Symbols that are worn away, of faces as the database says them and as they were written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.surface.contract import Surface
+from probe.surface.face import Face
+from recognizer.touch.lab import EncodedFace
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def wear_face(face: Face, share: float, rng: np.random.Generator) -> Face:
+    """Return a face of which a share of the symbols is worn away."""
+    lattice = face.lattice
+    if lattice is None:
+        return face
+    salt = int(rng.integers(1 << 31))
+    label_at = lattice.label_at
+
+    def left(rows: Ints, columns: Ints) -> Ints:
+        labels = label_at(rows, columns)
+        cell = (rows * 73_856_093) ^ (columns * 19_349_663) ^ salt
+        drawn = ((cell * 2_654_435_761) % (1 << 32)) / (1 << 32)
+        return np.where(drawn < share, -1, labels)
+
+    return replace(face, lattice=replace(lattice, label_at=left))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WornAway:
+    """A surface on which some symbols are worn down to the face."""
+
+    surface: Surface
+    centres_mm: Array  #: (n, 2) of the worn symbols, surface frame
+    rotation_rad: float  #: turns the surface's x axis into the array's
+    pitch_mm: float
+
+    @property
+    def top_mm(self) -> float:
+        """Height of what is left."""
+        return self.surface.top_mm
+
+    def heights_mm(self, points_mm: Array) -> Array:
+        """Return the heights, none above the face in the cell of a worn symbol."""
+        heights = self.surface.heights_mm(points_mm)
+        c, s = np.cos(self.rotation_rad), np.sin(self.rotation_rad)
+        turned = np.array([[c, s], [-s, c]])
+        high = np.flatnonzero(heights > 0)
+        away = points_mm[high, None, :] @ turned - self.centres_mm @ turned
+        gone = (np.abs(away) <= self.pitch_mm / 2).all(axis=2).any(axis=1)
+        heights = heights.copy()
+        heights[high[gone]] = 0.0
+        return heights
+
+
+def wear_part(
+    surface: Surface,
+    face: EncodedFace,
+    pitch_mm: float,
+    share: float,
+    rng: np.random.Generator,
+) -> WornAway:
+    """Return a surface of which a share of the symbols is worn away.
+
+    Parameters
+    ----------
+    surface
+        Of the face, face frame.
+    face, pitch_mm
+        Where its symbols are.
+    share
+        Probability that a symbol is gone.
+    rng
+        Draws them.
+    """
+    gone = rng.random(len(face.centres_mm)) < share
+    return WornAway(surface, face.centres_mm[gone], face.rotation_rad, pitch_mm)
