@@ -62,9 +62,10 @@ def info(
     def action() -> int:
         from encoded_objects.console import output
         from probe.command import described
+        from probe.port.url import is_url
 
         values: dict[str, Any]
-        if what.startswith(("serial:", "sim:", "file:", "/dev/")):
+        if is_url(what) or what.startswith("/dev/"):
             values, lines = described.probe(what, sensor, seconds)
         elif what.endswith(".json"):
             values, lines = described.calibration(what)

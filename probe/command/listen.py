@@ -10,6 +10,7 @@ from encoded_objects.console.output import message
 from probe.client.stream import Stream, name_of
 from probe.errors import PortError
 from probe.frame import COLUMNS, ROWS
+from probe.port.url import is_url
 from probe.recording.read import Recording
 
 Counts = NDArray[np.uint16]
@@ -23,7 +24,7 @@ def frames_of(source: str, sensor: int | None, seconds: float) -> tuple[Counts, 
     PortError, RecordingError
         When it is not there, or gives no frame.
     """
-    if not source.startswith(("serial:", "sim:", "file:")):
+    if not is_url(source):
         recording = Recording(source)
         return recording.block().counts, recording.origin.sensor
 

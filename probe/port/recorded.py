@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from probe.frame import Frame
+from probe.port.address import Address, number, refuse_unknown
 from probe.port.contract import Port
 from probe.port.software import SoftwareProbe
-from probe.port.url import Address, number, refuse_unknown
 from probe.protocol import IdentPacket
 
 PAUSE_NS = 10_000_000  #: between the end of a recording and its repetition

@@ -17,9 +17,9 @@ from pathlib import Path
 import serial
 
 from probe.errors import PortError
+from probe.port.address import Address, number, refuse_unknown
 from probe.port.contract import Port
 from probe.port.listing import list_ports
-from probe.port.url import Address, number, refuse_unknown
 
 BAUD = 1_000_000
 WRITE_TIMEOUT_S = 1.0

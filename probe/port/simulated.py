@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 
 from probe.errors import PortError, ProbeError
 from probe.frame import Frame
+from probe.port.address import Address, number, refuse_unknown, split_url
 from probe.port.contract import Port
 from probe.port.pattern import moving_pattern
 from probe.port.software import SoftwareProbe
-from probe.port.url import Address, number, refuse_unknown
 from probe.protocol import IdentPacket
 
 if TYPE_CHECKING:
@@ -64,13 +64,12 @@ class EmulatedPort:
     def __init__(self, url: str, frames: Iterator[Frame], rate: float) -> None:
         from probe.port.emulated import emulated_probe
         from probe.port.serial_line import open_serial
-        from probe.port.url import address_of
 
         self._url = url
         self._emulator: AbstractContextManager[EmulatedProbe] = emulated_probe()
         probe = self._emulator.__enter__()
         try:
-            self._line = open_serial(address_of(probe.url))
+            self._line = open_serial(split_url(probe.url))
         except PortError:
             self._emulator.__exit__(None, None, None)
             raise

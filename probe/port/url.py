@@ -10,28 +10,29 @@ file:recording.h5?speed=1&loop=1           a recording; speed=0: as fast as it i
 =========================================  ===================================================
 
 Whatever stands behind it speaks the protocol, so one client reads them all. Options follow
-the last question mark.
+the last question mark. A scheme is a module and a line of `SCHEMES`; another package adds one by
+an entry point of the group `encoded_objects.ports`, the scheme's name = module:function, where
+the function takes an `Address` and returns a `Port`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from urllib.parse import parse_qsl
+from collections.abc import Callable
+from importlib import import_module
 
 from probe.errors import PortError
+from probe.port.address import Address, split_url
 from probe.port.contract import Port
 
+GROUP = "encoded_objects.ports"
 EXAMPLES = "serial:///dev/ttyACM0?baud=1000000, sim: or file:recording.h5"
 
-
-@dataclass(frozen=True, slots=True)
-class Address:
-    """A port URL in its parts."""
-
-    url: str
-    scheme: str  #: serial, sim or file
-    target: str  #: device, part, database#object/face, or recording; empty for the pattern
-    options: dict[str, str] = field(default_factory=dict)
+#: scheme: what opens it, and what its URL has to name
+SCHEMES = {
+    "serial": ("probe.port.serial_line:open_serial", "device"),
+    "sim": ("probe.port.simulated:open_simulation", ""),
+    "file": ("probe.port.recorded:open_recording", "recording"),
+}
 
 
 def open_port(url: str) -> Port:
@@ -50,17 +51,7 @@ def open_port(url: str) -> Port:
         When the file is no recording.
     """
     address = address_of(url)
-    if address.scheme == "serial":
-        from probe.port.serial_line import open_serial
-
-        return open_serial(address)
-    if address.scheme == "file":
-        from probe.port.recorded import open_recording
-
-        return open_recording(address)
-    from probe.port.simulated import open_simulation
-
-    return open_simulation(address)
+    return _opener(address)(address)
 
 
 def address_of(url: str) -> Address:
@@ -71,69 +62,47 @@ def address_of(url: str) -> Address:
     PortError
         When the scheme is unknown, or what it needs is missing.
     """
-    scheme, colon, rest = url.partition(":")
-    if not colon or scheme not in ("serial", "sim", "file"):
+    scheme, colon, _ = url.partition(":")
+    if not is_url(url):
         guess = f"serial://{url}" if url.startswith("/dev/") else f"file:{url}"
+        known = [f"{name}:" for name in (*SCHEMES, *sorted(_others()))]
         raise PortError(
-            "this is no port URL, it must begin with serial:, sim: or file:",
+            f"this is no port URL, it must begin with {', '.join(known[:-1])} or {known[-1]}",
             fix=f"write {guess}" if not colon else f"write for example {EXAMPLES}",
             place=url,
         )
-    target, mark, query = rest.rpartition("?")
-    if not mark or "#" in query:  # a question mark within the address of a database
-        target, query = rest, ""
-    if target.startswith("//"):
-        target = target[2:]
-    if scheme != "sim" and not target:
-        missing = "device" if scheme == "serial" else "recording"
+    address, (_, needed) = split_url(url), SCHEMES.get(scheme, ("", ""))
+    if needed and not address.target:
         raise PortError(
-            f"the URL names no {missing}", fix=f"write for example {EXAMPLES}", place=url
+            f"the URL names no {needed}", fix=f"write for example {EXAMPLES}", place=url
         )
+    return address
+
+
+def is_url(text: str) -> bool:
+    """Tell whether a text begins with a scheme that can be opened."""
+    scheme, colon, _ = text.partition(":")
+    return bool(colon) and (scheme in SCHEMES or scheme in _others())
+
+
+def _opener(address: Address) -> Callable[[Address], Port]:
+    if address.scheme in SCHEMES:
+        module, _, name = SCHEMES[address.scheme][0].partition(":")
+        opener: Callable[[Address], Port] = getattr(import_module(module), name)
+        return opener
     try:
-        options = dict(parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query)))
-    except ValueError as bad:
+        opener = _others()[address.scheme]()
+    except (ImportError, AttributeError) as broken:
         raise PortError(
-            f"the options {query!r} cannot be read", fix="write name=value&name=value", place=url
-        ) from bad
-    return Address(url, scheme, target, options)
-
-
-def number(address: Address, name: str, default: float, least: float = 0.0) -> float:
-    """Return an option that is a finite number, at least `least`.
-
-    Raises
-    ------
-    PortError
-        When it is none.
-    """
-    given = address.options.get(name)
-    if given is None:
-        return default
-    try:
-        value = float(given)
-    except ValueError:
-        value = float("nan")
-    if not least <= value < float("inf"):
-        raise PortError(
-            f"{name}={given!r} is no number from {least:g}",
-            fix=f"write for example {name}={default:g}",
+            f"the package that opens {address.scheme}: does not load: {broken}",
+            fix="install it again",
             place=address.url,
-        )
-    return value
+        ) from broken
+    return opener
 
 
-def refuse_unknown(address: Address, known: tuple[str, ...]) -> None:
-    """Refuse options that this scheme does not have.
+def _others() -> dict[str, Callable[[], Callable[[Address], Port]]]:
+    """Return the schemes of other packages, and how each is loaded."""
+    from importlib.metadata import entry_points
 
-    Raises
-    ------
-    PortError
-        With the options that it has.
-    """
-    unknown = sorted(set(address.options) - set(known))
-    if unknown:
-        raise PortError(
-            f"{address.scheme}: has no option {', '.join(unknown)}",
-            fix=f"its options are {', '.join(known)}",
-            place=address.url,
-        )
+    return {entry.name: entry.load for entry in entry_points(group=GROUP)}

@@ -13,8 +13,9 @@ import pytest
 from probe.client import Client
 from probe.errors import PortError
 from probe.port import list_ports, open_port
+from probe.port.address import Address, number
 from probe.port.serial_line import _refused, open_serial
-from probe.port.url import Address, address_of, number
+from probe.port.url import address_of
 
 
 @pytest.mark.parametrize(
@@ -62,6 +63,40 @@ def test_urls_that_mean_nothing_are_refused(url, says):
     assert says in str(refused.value)
     assert refused.value.fix
     assert refused.value.exit_code == 3
+
+
+@pytest.fixture
+def another_package(tmp_path, monkeypatch):
+    """A distribution on the path that opens echo:, and another whose module is gone."""
+    (tmp_path / "echo_port.py").write_text(
+        "class Echo:\n"
+        "    def __init__(self, address):\n"
+        "        self.url, self._waiting = address.url, address.options['say'].encode()\n"
+        "    def read(self, timeout_s):\n"
+        "        said, self._waiting = self._waiting, b''\n"
+        "        return said\n"
+        "    def write(self, data):\n"
+        "        self._waiting += data\n"
+        "    def close(self):\n"
+        "        pass\n"
+    )
+    for name, module in (("echo", "echo_port:Echo"), ("lost", "no_such_module:Port")):
+        info = tmp_path / f"{name}-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+        entry = f"[encoded_objects.ports]\n{name} = {module}\n"
+        (info / "entry_points.txt").write_text(entry)
+    monkeypatch.syspath_prepend(tmp_path)
+
+
+def test_another_package_adds_a_scheme(another_package):
+    port = open_port("echo:?say=hello")
+    port.write(b"!")
+    assert (port.url, port.read(0.1)) == ("echo:?say=hello", b"hello!")
+    with pytest.raises(PortError, match="sim:, file:, echo: or lost:"):
+        open_port("http://probe")
+    with pytest.raises(PortError, match="no_such_module.*install it again"):
+        open_port("lost:")
 
 
 def test_numbers_have_defaults():

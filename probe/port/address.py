@@ -1,0 +1,80 @@
+"""A port's URL in its parts: scheme, what stands behind it, and options."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from urllib.parse import parse_qsl
+
+from probe.errors import PortError
+
+
+@dataclass(frozen=True, slots=True)
+class Address:
+    """A port URL in its parts."""
+
+    url: str
+    scheme: str  #: serial, sim, file, or that of another package
+    target: str  #: device, part, database#object/face, or recording; empty for the pattern
+    options: dict[str, str] = field(default_factory=dict)
+
+
+def split_url(url: str) -> Address:
+    """Return the parts of a URL, whatever its scheme.
+
+    Raises
+    ------
+    PortError
+        When its options cannot be read.
+    """
+    scheme, _, rest = url.partition(":")
+    target, mark, query = rest.rpartition("?")
+    if not mark or "#" in query:  # a question mark within the address of a database
+        target, query = rest, ""
+    try:
+        options = dict(parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query)))
+    except ValueError as bad:
+        raise PortError(
+            f"the options {query!r} cannot be read", fix="write name=value&name=value", place=url
+        ) from bad
+    return Address(url, scheme, target.removeprefix("//"), options)
+
+
+def number(address: Address, name: str, default: float, least: float = 0.0) -> float:
+    """Return an option that is a finite number, at least `least`.
+
+    Raises
+    ------
+    PortError
+        When it is none.
+    """
+    given = address.options.get(name)
+    if given is None:
+        return default
+    try:
+        value = float(given)
+    except ValueError:
+        value = float("nan")
+    if not least <= value < float("inf"):
+        raise PortError(
+            f"{name}={given!r} is no number from {least:g}",
+            fix=f"write for example {name}={default:g}",
+            place=address.url,
+        )
+    return value
+
+
+def refuse_unknown(address: Address, known: tuple[str, ...]) -> None:
+    """Refuse options that this scheme does not have.
+
+    Raises
+    ------
+    PortError
+        With the options that it has.
+    """
+    unknown = sorted(set(address.options) - set(known))
+    if unknown:
+        raise PortError(
+            f"{address.scheme}: has no option {', '.join(unknown)}",
+            fix=f"its options are {', '.join(known)}",
+            place=address.url,
+        )
