@@ -7,8 +7,10 @@
     Reader            of a lab -> object, face and pose of a touch: a `Recognition`
     Recording         a file of frames, each a `Frame`
     SensorType        what the probe is
+    Scan              several touches of one face -> one belief
     simulate          a part or a face, touched -> frames with their truth
     decode            a window -> its place on the array
+    validate          a set made, touched and read -> right, wrong, rejected
     EncodedObjectsError   the root of every error that a person can cause
 
     >>> from encoded_objects import decode
@@ -26,7 +28,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 #: name: the module that holds it; `__init__.pyi` says the same to type checkers
 HOMES = {
@@ -35,11 +37,13 @@ HOMES = {
     "Reader": "recognizer.touch.reader",
     "Recognition": "recognizer.touch.recognition",
     "Recording": "probe.recording.read",
+    "Scan": "recognizer.scan.session",
     "SensorType": "probe.sensor",
     "decode": "decoder.any_method",
     "encode": "generator.cad.encode",
     "open_lab": "recognizer.touch.lab",
     "simulate": "probe.simulate.simulation",
+    "validate": "recognizer.validation.pipeline",
 }
 
 __all__ = ["__version__", *HOMES]

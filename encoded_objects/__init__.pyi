@@ -7,8 +7,10 @@ from probe.frame import Frame as Frame
 from probe.recording.read import Recording as Recording
 from probe.sensor import SensorType as SensorType
 from probe.simulate.simulation import simulate as simulate
+from recognizer.scan.session import Scan as Scan
 from recognizer.touch.lab import open_lab as open_lab
 from recognizer.touch.reader import Reader as Reader
 from recognizer.touch.recognition import Recognition as Recognition
+from recognizer.validation.pipeline import validate as validate
 
 __version__: str

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from importlib.util import find_spec
 from typing import Any
 
 from generator.export.colours import BODY_RGB
@@ -18,6 +19,11 @@ _PAGE = (8.27, 11.69)  # inches
 _LINES = 44  # objects on one page
 _INK, _EDGE = "#0F172A", "#475569"
 _COLUMNS = (("object", 0.0), ("parts", 0.56), ("symbols", 0.67), ("plates", 0.8))
+
+
+def can_draw() -> bool:
+    """Tell whether what draws the pages is installed; a plain install leaves it out."""
+    return find_spec("matplotlib") is not None
 
 
 def overview_pdf(

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from generator.export.atomic import Staging
 from generator.export.bed import Plate, arranged
-from generator.export.overview import overview_pdf
+from generator.export.overview import can_draw, overview_pdf
 from generator.export.packing import Packed, packing_csv
 from generator.export.threemf import PrintFile, print_file
 from generator.layout.placement import Layout
@@ -80,7 +80,8 @@ def written_set(
         for kind in ("", "-prusaslicer")
         if with_models
     ]
-    names = [f"{name}-packing.csv", f"{name}-overview.pdf", *models]
+    overview = [f"{name}-overview.pdf"] if can_draw() else []
+    names = [f"{name}-packing.csv", *overview, *models]
     if _unchanged(folder, names, listed):
         return tuple(folder / each for each in names)
     with Staging(folder) as staging:
@@ -95,9 +96,10 @@ def written_set(
             for number, content in enumerate(contents, 1):
                 staging.write(f"{name}-plate-{number}.3mf", content.content)
                 staging.write(f"{name}-plate-{number}-prusaslicer.3mf", content.prusaslicer)
-        progress("drawing the overview", 0.9)
-        beds = [printer_named(plate.printer).bed_mm for plate in plates]
-        staging.write(f"{name}-overview.pdf", overview_pdf(name, packed, beds))
+        if overview:
+            progress("drawing the overview", 0.9)
+            beds = [printer_named(plate.printer).bed_mm for plate in plates]
+            staging.write(overview[0], overview_pdf(name, packed, beds))
         staging.write(f"{name}-packing.csv", listed)  # last: it says that the others are there
         staging.commit()
     return tuple(folder / each for each in names)

@@ -10,14 +10,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from sqlalchemy import Connection, Engine
 
+from encoded_objects.errors import install_line
 from generator.database.part_state import part_state
 from generator.database.read import find_object, read_layout, read_parts
 from generator.database.register import require_in_use
 from generator.database.transaction import reading
+from generator.export.overview import can_draw
 from generator.pipeline.made import Made, made_of
 from generator.pipeline.make import Order, Product, made_at
 from generator.pipeline.parallel import Engines, Task, Workers
@@ -97,7 +100,11 @@ def _together(
         for order, product in zip(orders, done, strict=True)
     ]
     files = written_set(objects, folder, workers, within(progress, 0.8, 1.0))
-    return [product.made for product in done], files
+    made = [product.made for product in done]
+    if not can_draw():
+        notice = f"the set has no overview: matplotlib is not installed; {install_line('report')}"
+        made[0] = replace(made[0], warnings=(*made[0].warnings, notice))
+    return made, files
 
 
 def set_folder(orders: Sequence[Order], folder: Path | None) -> Path:

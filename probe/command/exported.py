@@ -9,6 +9,7 @@ import numpy as np
 
 from encoded_objects.console.files import refuse_taken, staged
 from encoded_objects.console.output import number, write, write_json
+from encoded_objects.errors import require
 from probe.calibration import Calibration, calibrated, read_calibration
 from probe.errors import CalibrationError, RecordingError
 from probe.frame import median_filter
@@ -53,6 +54,8 @@ def export_files(
         if out is not None:
             refuse_taken(out, suffix, replace=replace)
             outputs.append(out)
+    if png is not None:
+        require("matplotlib", extra="report", purpose="--png")
     recording = Recording(path, live=live)
     known = None if calibration is None else calibration_for(calibration, recording)
     if png is not None:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.console.files import staged
+from encoded_objects.errors import MissingExtraError, require
 from probe.calibration import Calibration, calibrated, calibration_hash, drift_of
 from probe.calibration.average import BIAS_FRAMES
 from probe.frame import Frame, median_filter
@@ -122,11 +123,16 @@ class LiveState:
 
     def save(self) -> None:
         """Save the image that is shown, and its counts as an array."""
-        from probe.plot.frame import frame_picture
-
         image = self.image()
         if image is None or self.frame is None:
             return
+        try:
+            require("matplotlib", extra="report", purpose="a picture")
+        except MissingExtraError as error:
+            self.notice = str(error)
+            return
+        from probe.plot.frame import frame_picture
+
         picture = next_free(self.folder, "image", ".png")
         title = f"frame {self.frame.seq}" + (", median of 3x3" if self.median else "")
         if self.bias is not None:

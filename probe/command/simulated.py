@@ -15,6 +15,7 @@ from encoded_objects.console.files import refuse_taken, staged
 from encoded_objects.console.interruption import interruption
 from encoded_objects.console.output import message, write, write_json
 from encoded_objects.console.progress import progress_bar
+from encoded_objects.errors import require
 from probe.command.recorded import check_output
 from probe.simulate.simulation import SimulatedProbe, SimulatedTouch
 
@@ -81,6 +82,8 @@ def check_outputs(
     for out, suffix in ((png, ".png"), (truth, ".json")):
         if out is not None:
             refuse_taken(out, suffix, replace=replace)
+    if png is not None:
+        require("matplotlib", extra="report", purpose="--png")
 
 
 def _picture(felt: SimulatedTouch, probe: SimulatedProbe, png: Path) -> None:

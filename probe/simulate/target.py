@@ -36,8 +36,8 @@ def surface_of(target: str) -> Scene:
     Examples
     --------
     >>> scene = surface_of("lab.db#Cube/F1")
-    >>> scene.surface.top_mm, scene.region.convex
-    (1.0, True)
+    >>> scene.object_name, scene.face, scene.surface.top_mm
+    ('Cube', 'F1', 1.0)
     """
     if target == WASHER:
         return _washer()

@@ -15,6 +15,7 @@ from encoded_objects.console.files import refuse_taken, staged, taken
 from encoded_objects.console.interruption import interruption
 from encoded_objects.console.output import message, warning, write_json
 from encoded_objects.console.progress import ProgressBar, progress_bar
+from encoded_objects.errors import require
 from probe.frame import Frame
 from recognizer.command import report
 from recognizer.command.placed import object_in_base
@@ -156,6 +157,7 @@ def _counted(frames: Iterator[Frame], told: ProgressBar) -> Iterator[Frame]:
 def _refuse_pictures(plot: Path, *, replace: bool) -> None:
     """Refuse a picture's name that is taken, also by that of one of several touches."""
     refuse_taken(plot, ".png", replace=replace)
+    require("matplotlib", extra="report", purpose="--plot")
     there = [
         path
         for path in plot.parent.glob(f"{plot.stem}-*.png")

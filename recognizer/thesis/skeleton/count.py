@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.errors import require
 from generator.alphabet import Glyph
 from recognizer.thesis.skeleton.graph import Path, graph
 
@@ -94,6 +95,7 @@ _TINY = 1e-9
 
 
 def _corners(path: Path, bow: float, turn_rad: float) -> Path:
+    require("skimage", extra="thesis", purpose="the thesis's reading")
     from skimage.measure import approximate_polygon
 
     pieces = approximate_polygon(np.array(path), bow)

@@ -18,6 +18,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.errors import require
 from generator.alphabet import Alphabet, Glyph, SymbolStyle
 from recognizer.thesis.filters import TactileImage, magnified
 from recognizer.thesis.skeleton.count import Counting, Points, points_of_glyph, points_of_skeleton
@@ -63,6 +64,7 @@ def symbols(
     image
         Over its bias; of any resolution, it is magnified until strokes are `THICK` samples wide.
     """
+    require("skimage", extra="thesis", purpose="the thesis's reading")
     from scipy.ndimage import find_objects, label
     from skimage.morphology import skeletonize
 

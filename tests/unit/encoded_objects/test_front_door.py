@@ -7,18 +7,19 @@ import doctest
 import importlib
 import subprocess
 import sys
-from importlib.metadata import version
+import tomllib
 from pathlib import Path
 
 import pytest
 
 import encoded_objects
 
+ROOT = Path(__file__).parents[3]
 NAMES = {
-    "EncodedObjectsError", "Frame", "Reader", "Recognition", "Recording", "SensorType",
-    "decode", "encode", "open_lab", "simulate",
+    "EncodedObjectsError", "Frame", "Reader", "Recognition", "Recording", "Scan", "SensorType",
+    "decode", "encode", "open_lab", "simulate", "validate",
 }  # fmt: skip
-WAITING = {"Reader", "Recognition", "open_lab"}
+WAITING = {"Reader", "Recognition", "Scan", "open_lab", "validate"}
 HEAVY = ("numpy", "scipy", "sqlalchemy", "typer", "rich", "pydantic", "yaml", "h5py")
 OURS = ("generator", "decoder", "probe", "recognizer")
 
@@ -59,4 +60,7 @@ def test_type_checkers_see_the_same_names_in_the_same_places():
 
 
 def test_the_version_is_said_once():
-    assert encoded_objects.__version__ == version("encoded-objects")
+    build = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    assert build["project"]["dynamic"] == ["version"]
+    assert build["tool"]["hatch"]["version"] == {"path": "encoded_objects/__init__.py"}
+    assert f"## [{encoded_objects.__version__}] - " in (ROOT / "CHANGELOG.md").read_text()
