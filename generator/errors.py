@@ -10,6 +10,7 @@
         ├── AlphabetError     a symbol that cannot be embossed as asked
         ├── LayoutError       a face that shows no place, or an array that is full
         ├── SolidError        a part that cannot be made or did not pass its proof
+        ├── PrintError        a slicer that is missing or fails, or G-code that cannot be read
         └── DatabaseError     exit code 4: cannot be opened, newer, or holds another object
 
 Every error says what was given, what is allowed, and the way out (`fix`).
@@ -42,6 +43,10 @@ class LayoutError(GeneratorError):
 
 class SolidError(GeneratorError):
     """A part that cannot be made, or that did not pass its proof of closure."""
+
+
+class PrintError(GeneratorError):
+    """A slicer that is missing or fails, G-code that cannot be read, or no part in it."""
 
 
 class DatabaseError(GeneratorError):

@@ -1,0 +1,1 @@
+"""G-code -> the surface that the beads leave: parts as a filament printer makes them."""
