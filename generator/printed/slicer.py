@@ -1,0 +1,230 @@
+"""A part's file -> G-code by PrusaSlicer, and where the part lies in it.
+
+The part is sliced as its file has it, the flat back on the bed; its box is put on the middle
+of a bed that is large enough, which gives T_part_gcode, and what was printed is compared with
+the part's box, so that a slicer that turned, scaled or moved it does not pass. PrusaSlicer
+2.5 gives other G-code each run unless its memory lies where it lay and one processor works.
+mm.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import shutil
+import struct
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.errors import PrintError
+from generator.printed.gcode import read_gcode
+from generator.printed.profiles import PrintProfile, settings_of
+from generator.printed.toolpath import Toolpath
+
+Floats = NDArray[np.float64]
+
+NAMES = ("prusa-slicer", "PrusaSlicer", "prusa-slicer-console")
+TIMEOUT_S = 600
+_BED_MARGIN_MM = 20.0  # around the part: skirt, brim, purge line
+_AGREE_MM = 0.25  # the box of the printed plastic and the part's: a seam's share of a width
+_KINDS = (".stl", ".3mf", ".obj", ".amf")
+
+# The machine's own business: nothing of it is on the part.
+_WITHOUT = {
+    "start_gcode": "G28",
+    "end_gcode": "M84",
+    "before_layer_gcode": "",
+    "layer_gcode": "G92 E0",
+    "toolchange_gcode": "",
+    "start_filament_gcode": '""',
+    "end_filament_gcode": '""',
+    "skirts": "0",
+    "brim_width": "0",
+    "thumbnails": "",
+    "post_process": "",
+    "complete_objects": "0",
+    "support_material": "0",
+    "gcode_label_objects": "0",
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SlicedPart:
+    """One part's moves, and how they lie to the part."""
+
+    toolpath: Toolpath
+    T_part_gcode: Floats  #: (4, 4) a shift
+    low_mm: Floats  #: (3,) the part's box, part frame
+    high_mm: Floats  #: (3,)
+
+
+def slice_part(
+    file: Path, profile: PrintProfile, *, supports: bool = False, cache: Path | None = None
+) -> SlicedPart:
+    """Slice the file of one part.
+
+    Parameters
+    ----------
+    file
+        Binary STL, mm, as the part is printed.
+    profile
+        Machine, nozzle, layers.
+    supports
+        Print supports where the slicer finds them needed (whole parts); they are removed.
+    cache
+        Folder that keeps G-code by the part's bytes and all settings; the same is not sliced
+        twice.
+
+    Raises
+    ------
+    PrintError
+        PrusaSlicer is missing or refuses, or what it printed is not where the part is.
+    """
+    low, high = stl_box(file)
+    size = high - low
+    settings = settings_of(profile) | _WITHOUT | {"support_material": str(int(supports))}
+    bed = np.ceil(np.maximum(size[:2] + 2 * _BED_MARGIN_MM, 100.0))
+    width, depth = bed.tolist()
+    settings["bed_shape"] = f"0x0,{width:g}x0,{width:g}x{depth:g},0x{depth:g}"
+    settings["max_print_height"] = f"{max(200.0, float(size[2]) + 10):g}"
+    T_part_gcode = np.eye(4)
+    T_part_gcode[:2, 3] = (low + high)[:2] / 2 - bed / 2
+    T_part_gcode[2, 3] = low[2]
+    middle = f"{width / 2:g},{depth / 2:g}"
+    text = "".join(f"{key} = {value}\n" for key, value in settings.items())
+    with tempfile.TemporaryDirectory() as folder:
+        kept = Path(folder)
+        if cache is not None:
+            kept = cache
+            kept.mkdir(parents=True, exist_ok=True)
+        key = hashlib.sha256(file.read_bytes() + text.encode() + slicer_version().encode())
+        gcode = kept / f"{file.stem}-{key.hexdigest()[:16]}.gcode"
+        if not gcode.exists():
+            _run(file, text, middle, gcode)
+        path = read_gcode(gcode)
+    sliced = SlicedPart(path, T_part_gcode, low, high)
+    _check_place(sliced, file)
+    return sliced
+
+
+def stl_box(file: Path) -> tuple[Floats, Floats]:
+    """Return the lowest and highest x, y, z of a binary STL, mm.
+
+    Raises
+    ------
+    PrintError
+        When it cannot be read.
+    """
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        raise PrintError(
+            f"cannot read the part: {error.strerror}", fix="check the name", place=str(file)
+        ) from None
+    count = struct.unpack_from("<I", content, 80)[0] if len(content) >= 84 else 0
+    if not count or len(content) != 84 + 50 * count:
+        raise PrintError(
+            "not a binary STL", fix="give a part's STL as encode-object writes it", place=str(file)
+        )
+    facet = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    corners = np.frombuffer(content, facet, offset=84)["corners"].reshape(-1, 3).astype(np.float64)
+    return corners.min(axis=0), corners.max(axis=0)
+
+
+def find_slicer() -> str:
+    """Return the program; raises `PrintError` when it is not installed."""
+    found = next((path for name in NAMES if (path := shutil.which(name))), None)
+    if found is None:
+        raise PrintError(
+            "PrusaSlicer is not installed",
+            fix="install it (Debian, Ubuntu: apt-get install prusa-slicer)",
+        )
+    return found
+
+
+@lru_cache(maxsize=1)
+def slicer_version() -> str:
+    """Return the slicer's version, as its help begins."""
+    help_text = subprocess.run(  # noqa: S603
+        [find_slicer(), "--help"], capture_output=True, text=True, timeout=60, check=False
+    ).stdout
+    match = re.search(r"PrusaSlicer-([\w.]+)", help_text)
+    return match[1] if match else "unknown"
+
+
+def _run(file: Path, settings: str, middle: str, gcode: Path) -> None:
+    """Slice into a file of another name first, so that none is left half written."""
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "settings.ini").write_text(settings, encoding="utf-8")
+        part = Path(folder) / f"part{file.suffix}"
+        shutil.copyfile(file, part)
+        written = Path(folder) / "part.gcode"
+        command = [
+            *_steady(), find_slicer(), "--export-gcode", "--load", f"{folder}/settings.ini",
+            "--center", middle, "-o", str(written), str(part),
+        ]  # fmt: skip
+        try:
+            done = subprocess.run(  # noqa: S603
+                command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False
+            )
+        except subprocess.TimeoutExpired:
+            raise PrintError(
+                f"PrusaSlicer did not end within {TIMEOUT_S} s",
+                fix="print a smaller part",
+                place=str(file),
+            ) from None
+        if done.returncode or not written.exists():
+            lines = (done.stderr + done.stdout).splitlines()
+            said = [line for line in lines if line.strip() and "[trace]" not in line]
+            raise PrintError(
+                f"PrusaSlicer refuses: {said[-1] if said else f'exit code {done.returncode}'}",
+                fix="open the part in PrusaSlicer and look",
+                place=str(file),
+            )
+        shutil.move(written, gcode)
+
+
+@lru_cache(maxsize=1)
+def _steady() -> tuple[str, ...]:
+    """Return the command's beginning that makes the slicer give the same G-code again."""
+    steady: tuple[str, ...] = ()
+    if shutil.which("setarch"):
+        steady += ("setarch", "-R")
+    if shutil.which("taskset"):
+        # Any one processor does; several slicers at once take different ones.
+        allowed = sorted(os.sched_getaffinity(0))
+        steady += ("taskset", "-c", str(allowed[os.getpid() % len(allowed)]))
+    if steady:
+        tried = subprocess.run([*steady, "true"], capture_output=True, check=False)  # noqa: S603
+        if tried.returncode:  # a container that forbids it
+            return ()
+    return steady
+
+
+def _check_place(sliced: SlicedPart, file: Path) -> None:
+    """Refuse G-code whose plastic does not fill the part's box."""
+    path, T = sliced.toolpath, sliced.T_part_gcode
+    laid = path.of_part
+    height = path.height_mm[laid]
+    width = path.volume_mm3[laid] / np.maximum(path.length_mm[laid], 0.05) / height
+    half = np.minimum(width + height * (1 - np.pi / 4), 2.0) / 2
+    ends = np.stack([path.start_mm[laid], path.end_mm[laid]]) + T[:3, 3]
+    low = (ends[..., :2] - half[:, None]).min(axis=(0, 1))
+    high = (ends[..., :2] + half[:, None]).max(axis=(0, 1))
+    off = np.abs(np.concatenate([low - sliced.low_mm[:2], high - sliced.high_mm[:2]]))
+    layer = float(np.median(height))
+    above = abs(float(ends[..., 2].max()) - sliced.high_mm[2])
+    if off.max() > _AGREE_MM or above > layer + 1e-3:
+        by = max(float(off.max()), above)
+        raise PrintError(
+            f"the plastic reaches {by:.2f} mm beyond or short of the part",
+            fix="print profiles must not scale, turn or add; say which one you gave",
+            place=str(file),
+        )
