@@ -1,1 +1,44 @@
-"""G-code -> the surface that the beads leave: parts as a filament printer makes them."""
+"""G-code -> the surface that the beads leave: parts as a filament printer makes them.
+
+::
+
+    part's STL --slicer--> G-code --gcode--> Toolpath --faults--> Toolpath
+        --beads, deposit--> Deposit --view (above | sideways)--> PrintedSurface
+        --survey, check--> what became of each symbol
+
+Nothing here knows how touches are simulated; a `PrintedSurface` is a grid of heights over a
+face. What is modelled and what is not stands in `beads`, `faults` and `view`. mm throughout.
+"""
+
+from __future__ import annotations
+
+from generator.printed.deposit import Deposit, deposit
+from generator.printed.faults import NAMED, PrintFaults, print_faults
+from generator.printed.gcode import read_gcode
+from generator.printed.profiles import (
+    PROFILES,
+    PrintProfile,
+    print_profile,
+    profile_of_printer,
+)
+from generator.printed.slicer import SlicedPart, slice_part
+from generator.printed.surface import PrintedSurface
+from generator.printed.view import face_surface, is_seen
+
+__all__ = [
+    "NAMED",
+    "PROFILES",
+    "Deposit",
+    "PrintFaults",
+    "PrintProfile",
+    "PrintedSurface",
+    "SlicedPart",
+    "deposit",
+    "face_surface",
+    "is_seen",
+    "print_faults",
+    "print_profile",
+    "profile_of_printer",
+    "read_gcode",
+    "slice_part",
+]
