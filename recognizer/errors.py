@@ -4,7 +4,8 @@
 
     EncodedObjectsError       exit code 2
     └── RecognizerError
-        └── LabError          the database holds nothing that can be read by touch
+        ├── LabError          the database holds nothing that can be read by touch
+        └── TouchError        an image that is none of the sensor's
 
 A touch that is not recognised is no error but a value with a reason (`recognition`).
 """
@@ -20,3 +21,7 @@ class RecognizerError(EncodedObjectsError):
 
 class LabError(RecognizerError):
     """A database without an object that can be read by touch."""
+
+
+class TouchError(RecognizerError):
+    """An image of another shape than the sensor, or of values that are no numbers."""

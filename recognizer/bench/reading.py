@@ -28,12 +28,11 @@ from recognizer.scan.mosaic.grow import added
 from recognizer.scan.mosaic.mosaic import Mosaic, no_touches
 from recognizer.scan.mosaic.touch import PlacedTouch, decoded_place
 from recognizer.touch.lab import open_lab
-from recognizer.touch.reader import Reader, reader_for
+from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import Recognition
 from recognizer.touch.signal import Signal, signal_of
 
-LEAST_N = 0.05  #: of the strongest tactels, for a contact
 FACES = 24  #: mosaics that are kept
 TOUCHES = 300  #: of one mosaic
 
@@ -112,7 +111,7 @@ class Reading:
             return
         self._tell("preparing")
         try:
-            self.reader = reader_for(open_lab(self.database), self.sensor)
+            self.reader = Reader(open_lab(self.database), self.sensor)
         except EncodedObjectsError as error:
             self.reader = None
             self._tell("off", cause=error.cause, fix=error.fix)
@@ -184,4 +183,4 @@ def _signal(offered: Offered) -> Signal:
     except ProbeError:  # another sensor's readings: beyond the board's range
         return signal_of(counts)
     trust = 1.0 - found.bad.astype(np.float64)
-    return signal_of(found.values, trust=trust, floor=0.0, least=LEAST_N, newtons=True)
+    return signal_of(found.values, trust=trust, floor=0.0, newtons=True)

@@ -18,6 +18,7 @@ from recognizer.bench.errors import UnknownError
 from recognizer.bench.files import kept, named
 from recognizer.bench.images import FILTERS
 from recognizer.bench.session import Session
+from recognizer.touch.settings import DEFAULTS
 
 Ports = tuple[tuple[str, str], ...]
 
@@ -98,7 +99,7 @@ def work_routes(session: Session, ports: Ports) -> APIRouter:
 
     @routes.get("/bench")
     def bench() -> dict[str, Any]:
-        sensor = session.sensor
+        sensor, reader = session.sensor, session.reading.reader
         return {
             "ports": offered(),
             "database": session.database,
@@ -111,9 +112,8 @@ def work_routes(session: Session, ports: Ports) -> APIRouter:
                 "overlay": sensor.overlay.kind,
                 "overlay_mm": sensor.overlay.height_mm,
             },
-            "margin": 12.0 if session.reading.reader is None
-            else session.reading.reader.thresholds.margin,
-        }  # fmt: skip
+            "margin": (reader.settings if reader else DEFAULTS).belief.margin,
+        }
 
     @routes.post("/port")
     def port(body: Port) -> dict[str, Any]:

@@ -3,10 +3,10 @@
 ::
 
     app           options
-    source        recording or port -> touches, the sensor, its calibration
+    port          a port -> touches, the sensor, its calibration
     answers       touches -> answers, printed as they come
-    placed        the object in the robot's base
-    report        answers and errors as text and as JSON
+    in_base       the object in the robot's base
+    report        answers as text and as JSON
 
 Results go to stdout, progress and messages to stderr. Exit codes: 0 recognised, 1 nothing
 recognised, or ran but failed, 2 bad input, 3 device, 4 database, 130 interrupted. Nothing heavy is

@@ -17,19 +17,21 @@ from encoded_objects.console.output import message, warning, write_json
 from encoded_objects.console.progress import ProgressBar, progress_bar
 from encoded_objects.errors import require
 from probe.frame import Frame
+from probe.recording.read import Recording
+from probe.sensor import SensorType
 from recognizer.command import report
-from recognizer.command.placed import object_in_base
-from recognizer.command.source import Source, at_port, listened, recorded
+from recognizer.command.in_base import object_in_base
+from recognizer.command.port import listen, source_at
 from recognizer.touch.contacts import TouchImage
-from recognizer.touch.lab import open_lab
-from recognizer.touch.reader import Reader, reader_for
-from recognizer.touch.recognise import recognise
+from recognizer.touch.lab import Lab, open_lab
+from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import Recognition
 from recognizer.touch.robot import ObjectPose
+from recognizer.touch.source import TouchSource, source_of
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class RecognizeOptions:
     """What the command line says; see `app`."""
 
     recording: Path | None
@@ -55,10 +57,10 @@ class Answer:
 
     touch: TouchImage
     found: Recognition
-    placed: ObjectPose | None
+    in_base: ObjectPose | None
 
 
-def recognize_touches(asked: Asked) -> int:
+def recognize_touches(options: RecognizeOptions) -> int:
     """Read touches and print answers; returns the exit code.
 
     Raises
@@ -68,59 +70,79 @@ def recognize_touches(asked: Asked) -> int:
     DatabaseError, LabError
         The database cannot be read, or holds no encoded object.
     """
-    if asked.plot is not None:
-        _refuse_pictures(asked.plot, replace=asked.replace)
+    if options.plot is not None:
+        _refuse_pictures(options.plot, replace=options.replace)
     with interruption() as interrupted:
-        lab = open_lab(asked.database)
-        if asked.recording is not None:
-            source, read = recorded(
-                asked.recording, overlay=asked.overlay, calibration=asked.calibration,
-                every=asked.every, live=asked.live,
+        lab = open_lab(options.database)
+        if options.recording is not None:
+            recording = Recording(options.recording, live=options.live)
+            source = source_of(
+                recording, SensorType(), overlay=options.overlay,
+                calibration=options.calibration, every=options.every,
             )  # fmt: skip
-            reader = reader_for(lab, source.sensor)
-            return _finished(asked, reader, source, read(interrupted), interrupted)
-        source = at_port(asked.port, overlay=asked.overlay, calibration=asked.calibration,
-                         every=asked.every)  # fmt: skip
-        reader = reader_for(lab, source.sensor)  # before frames come
-        with listened(source, interrupted, asked.sensor, asked.calibration) as frames:
-            return _finished(asked, reader, source, frames, interrupted)
+            reader = _reader(lab, source)
+            return _print_answers(options, reader, source, recording.frames(), interrupted)
+        source = source_at(
+            options.port, overlay=options.overlay, calibration=options.calibration,
+            every=options.every,
+        )  # fmt: skip
+        reader = _reader(lab, source)  # before frames come
+        with listen(source, interrupted, options.sensor, options.calibration) as frames:
+            return _print_answers(options, reader, source, frames, interrupted)
 
 
-def _finished(
-    asked: Asked, reader: Reader, source: Source, frames: Iterator[Frame], interrupted: Event
+def _reader(lab: Lab, source: TouchSource) -> Reader:
+    if source.notice:
+        warning(source.notice)
+    return Reader(lab, source.sensor)
+
+
+def _until(interrupted: Event, frames: Iterator[Frame]) -> Iterator[Frame]:
+    for frame in frames:
+        if interrupted.is_set():
+            return
+        yield frame
+
+
+def _print_answers(
+    options: RecognizeOptions,
+    reader: Reader,
+    source: TouchSource,
+    frames: Iterator[Frame],
+    interrupted: Event,
 ) -> int:
     """Answer and print all touches; returns the exit code."""
     out = sys.stdout  # a bar would take it for its terminal
     values: list[dict[str, Any]] = []
     kept: list[Answer] = []
     read = answered = 0
-    lines = asked.as_json and asked.follow
+    lines = options.as_json and options.follow
     with ExitStack() as stack:
-        told = None
-        if asked.as_json or not out.isatty():  # otherwise the answers show how far it is
-            told = stack.enter_context(progress_bar("reading", source.frames))
-            frames = _counted(frames, told)
-        for answer in _answers(asked, reader, source, frames, interrupted):
+        bar = None
+        if options.as_json or not out.isatty():  # otherwise the answers show how far it is
+            bar = stack.enter_context(progress_bar("reading", source.frames))
+            frames = _show_count(frames, bar)
+        for answer in _answers(options, reader, source, frames, interrupted):
             read += 1
             answered += bool(answer.found)
-            if asked.plot is not None:
-                if asked.follow:
-                    _draw(reader, source, answer, asked.plot)
+            if options.plot is not None:
+                if options.follow:
+                    _draw(reader, source, answer, options.plot)
                 else:
                     kept.append(answer)
-            if not asked.as_json:
-                out.write(report.sentence(answer.touch, answer.found, answer.placed) + "\n")
+            if not options.as_json:
+                out.write(report.sentence(answer.touch, answer.found, answer.in_base) + "\n")
                 out.flush()
                 continue
-            entry = report.entry(answer.touch, answer.found, answer.placed)
+            entry = report.entry(answer.touch, answer.found, answer.in_base)
             if lines:
                 write_json(entry, line=True)
                 out.flush()
             else:
                 values.append(entry)
-    if asked.plot is not None and kept:
-        _draw_all(reader, source, kept, asked.plot, interrupted)
-    if asked.as_json and not lines:
+    if options.plot is not None and kept:
+        _draw_all(reader, source, kept, options.plot, interrupted)
+    if options.as_json and not lines:
         write_json(values)
     elif read != 1:
         message(report.summary(read, answered, source.frames))
@@ -131,26 +153,31 @@ def _finished(
 
 
 def _answers(
-    asked: Asked, reader: Reader, source: Source, frames: Iterator[Frame], interrupted: Event
+    options: RecognizeOptions,
+    reader: Reader,
+    source: TouchSource,
+    frames: Iterator[Frame],
+    interrupted: Event,
 ) -> Iterator[Answer]:
-    most = 1 if asked.port and not asked.follow and asked.most is None else asked.most
+    most = 1 if options.port and not options.follow and options.most is None else options.most
     warned = ""
-    for number, touch in enumerate(source.touches(frames), start=1):
+    touches = source.touches(_until(interrupted, frames), reader.settings)
+    for number, touch in enumerate(touches, start=1):
         if interrupted.is_set():  # what an interruption cuts short is no touch
             return
-        found = recognise(reader, source.signal(touch), touch.seq)
-        placed, trouble = object_in_base(touch, found, asked.joints_deg, asked.joint_error_deg)
+        found = reader.read(touch.counts, calibration=source.calibration, seq=touch.seq)
+        in_base, trouble = object_in_base(touch, found, options.joints_deg, options.joint_error_deg)
         if trouble and trouble != warned:
             warning(f"touch {touch.seq}: the place in the robot's base is not known: {trouble}")
             warned = trouble
-        yield Answer(touch, found, placed)
+        yield Answer(touch, found, in_base)
         if number == most:
             return
 
 
-def _counted(frames: Iterator[Frame], told: ProgressBar) -> Iterator[Frame]:
+def _show_count(frames: Iterator[Frame], bar: ProgressBar) -> Iterator[Frame]:
     for number, frame in enumerate(frames, start=1):
-        told.show(number, f"{number:,} frames")
+        bar.show(number, f"{number:,} frames")
         yield frame
 
 
@@ -168,23 +195,23 @@ def _refuse_pictures(plot: Path, *, replace: bool) -> None:
 
 
 def _draw_all(
-    reader: Reader, source: Source, answers: list[Answer], plot: Path, interrupted: Event
+    reader: Reader, source: TouchSource, answers: list[Answer], plot: Path, interrupted: Event
 ) -> None:
     """Draw the answers: one into the file, several into files with their numbers."""
-    with progress_bar("drawing", len(answers)) as told:
+    with progress_bar("drawing", len(answers)) as bar:
         for number, answer in enumerate(answers, start=1):
             if interrupted.is_set():
                 return
             one = len(answers) == 1
             path = plot if one else plot.with_stem(f"{plot.stem}-{answer.touch.seq}")
             _draw(reader, source, answer, path)
-            told.show(number, f"{number:,} of {len(answers):,}")
+            bar.show(number, f"{number:,} of {len(answers):,}")
 
 
-def _draw(reader: Reader, source: Source, answer: Answer, path: Path) -> None:
+def _draw(reader: Reader, source: TouchSource, answer: Answer, path: Path) -> None:
     from recognizer.command.plot.touch import touch_picture
 
-    pose = None if answer.placed is None else answer.placed.T_robot_object
+    pose = None if answer.in_base is None else answer.in_base.T_robot_object
     with staged(path) as draft:
-        signal = source.signal(answer.touch)
+        signal = reader.signal(answer.touch.counts, calibration=source.calibration)
         touch_picture(reader, signal, answer.found, draft, T_robot_object=pose)

@@ -109,10 +109,10 @@ def recognize(
     angles = _angles(joints)
 
     def action() -> int:
-        from recognizer.command.answers import Asked, recognize_touches
+        from recognizer.command.answers import RecognizeOptions, recognize_touches
 
         return recognize_touches(
-            Asked(
+            RecognizeOptions(
                 recording=recording, port=port, database=database, follow=follow, every=every,
                 most=most, overlay=overlay, calibration=calibration, sensor=sensor, live=live,
                 joints_deg=angles, joint_error_deg=joint_error, plot=plot, replace=replace,

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from recognizer.scan.composite import Composite
 from recognizer.scan.settings import ScanSettings
-from recognizer.touch.belief import CLEARLY, null_log_likelihood, unworn_labels_at, weigh_cells
+from recognizer.touch.belief import null_log_likelihood, unworn_labels_at, weigh_cells
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.locate import (
     Hypothesis,
@@ -37,10 +37,12 @@ from recognizer.touch.recognition import (
     RunnerUp,
     refusal,
 )
-from recognizer.touch.round import SHARES, bend_at
+from recognizer.touch.round import bend_at
+from recognizer.touch.settings import HypothesisSettings
 from recognizer.touch.symbols.fit import Fit, score_cells
 from recognizer.touch.symbols.gain import Image, bend_image
-from recognizer.touch.symbols.refine import explained_share, initial_lattices, refine_lattices
+from recognizer.touch.symbols.projection import explained_share
+from recognizer.touch.symbols.refine import refine_lattices
 from recognizer.touch.symbols.template import ResponseTemplate
 
 Array = NDArray[np.float64]
@@ -77,9 +79,13 @@ class Located:
 
 
 def located(
-    encoding: EmbossedArray, composites: Sequence[Composite], limits: ScanSettings
+    encoding: EmbossedArray,
+    composites: Sequence[Composite],
+    limits: ScanSettings,
+    settings: HypothesisSettings,
 ) -> list[Located]:
     """Return the likeliest places of composites of one encoding."""
+    settings = replace(settings, kept=limits.places)
     found: list[Located] = []
     for each in composites[: limits.located]:
         fit = each.fit
@@ -88,8 +94,8 @@ def located(
         listed = replace(
             fit, cells=fit.cells[telling], scores=fit.scores[telling], seen=fit.seen[telling]
         )
-        for place in find_hypotheses(encoding, (listed,), limits.places):
-            score = log_likelihood(encoding, fit, place)
+        for place in find_hypotheses(encoding, (listed,), settings):
+            score = log_likelihood(encoding, fit, place, settings)
             found.append(Located(encoding, each, replace(place, score=score), fit, score))
     return found
 
@@ -99,21 +105,19 @@ def posed(
 ) -> Located:
     """Return a place whose last touch was fitted again with the symbols that belong there."""
     encoding, place, fit = found.encoding, found.place, found.fit
-    worn = fit.cells[weigh_cells(encoding, fit, place).worn]
+    worn = fit.cells[weigh_cells(encoding, fit, place, reader.settings.belief).worn]
 
     def shown(cells: Ints) -> Ints:
         return unworn_labels_at(encoding, place, worn, cells)
 
     bend = bend_at(encoding, place, fit)
-    shares = (1.0,) if bend is None else SHARES
+    shares = (1.0,) if bend is None else reader.settings.round.shares
     if bend is not None:
         image = bend_image(image, reader.sensor, bend, shares)
-    start = initial_lattices(
-        np.tile(fit.pose, (len(shares), 1)), np.tile(fit.gain, (len(shares), 1))
-    )
-    lattices = refine_lattices(image, template, start, steps=limits.verify_steps, shown=shown)
+    pose, gain = (np.tile(each, (len(shares), 1)) for each in (fit.pose, fit.gain))
+    lattices = refine_lattices(image, template, pose, gain, steps=limits.verify_steps, shown=shown)
     best = int(np.argmax(lattices.value))
-    again = score_cells(image, template, lattices, reader.settings)[best]
+    again = score_cells(image, template, lattices)[best]
     if bend is not None:
         image = bend_image(image, reader.sensor, bend, shares[best : best + 1])
     finer = replace(
@@ -152,7 +156,7 @@ def answered(
     if other is not None:
         runner_up = RunnerUp(*other.face, other.index)
     return answer_at(
-        best.encoding, best.fit, best.place, reader.thresholds, seq,
+        best.encoding, best.fit, best.place, reader.settings.belief, seq,
         reason=_doubt(reader, best, margin, limits, by_hand=by_hand),
         margin=margin, runner_up=runner_up,
     )  # fmt: skip
@@ -163,17 +167,18 @@ def _doubt(
 ) -> str:
     """Return why the best place may not be believed; nothing if it may."""
     encoding, fit, place = best.encoding, best.fit, best.place
-    cells = weigh_cells(encoding, fit, place)
+    belief = reader.settings.belief
+    cells = weigh_cells(encoding, fit, place, belief)
     told = int(cells.agree.sum())
     chance = null_log_likelihood(encoding, fit)
     joined = int((best.composite.agreement.chosen >= 0).sum()) > 1
-    surprise = limits.surprise_by_hand if by_hand and joined else reader.thresholds.surprise
+    surprise = limits.surprise_by_hand if by_hand and joined else belief.surprise
     if fit.value - chance < surprise:
         return TOO_FEW  # if every cell agreed fully it would be no surprise either
-    if best.score - chance < reader.thresholds.surprise:
+    if best.score - chance < belief.surprise:
         return NOT_ENCODED
-    if (cells.against > CLEARLY).sum() > max(reader.thresholds.contradicted, limits.wrong * told):
+    if (cells.against > belief.clearly).sum() > max(belief.contradicted, limits.wrong * told):
         return NOT_ENCODED
-    if best.score - chance < surprise or told < reader.thresholds.least_inliers:
+    if best.score - chance < surprise or told < belief.least_inliers:
         return TOO_FEW
-    return AMBIGUOUS if margin < reader.thresholds.margin else ""
+    return AMBIGUOUS if margin < belief.margin else ""

@@ -26,7 +26,6 @@ from recognizer.scan.views import (
     views_of,
     widest_mm,
 )
-from recognizer.touch.belief import WHOLE
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import (
@@ -37,8 +36,7 @@ from recognizer.touch.recognition import (
     Recognition,
     refusal,
 )
-from recognizer.touch.symbols.gain import Image, image_of
-from recognizer.touch.symbols.pressing import pressing_of
+from recognizer.touch.symbols.gain import Image, image_of_signal
 
 Array = NDArray[np.float64]
 
@@ -129,7 +127,7 @@ def extend_scan(scan: ScanBelief, touch: PlacedTouch) -> ScanBelief:
         )
         shown.append(each)
         lattices.append(tuple(item.agreement.lattice for item in sums))
-        found += located(encoding, sums, limits)
+        found += located(encoding, sums, limits, reader.settings.hypotheses)
         images.append(image)
     found.sort(key=lambda item: -item.score)
     answer = answered(reader, found, limits, touch.seq, by_hand=by_hand)
@@ -164,8 +162,10 @@ def _posed(
     if best.composite.agreement.chosen[-1] >= 0:
         k = next(n for n, each in enumerate(reader.prepared) if each[0] is best.encoding)
         finer = posed(reader, images[k], reader.prepared[k][1], best, limits)
-        many = len(best.fit.cells) >= reader.thresholds.many_inliers
-        least = reader.thresholds.explained_by_many if many else reader.thresholds.explained
+        many = len(best.fit.cells) >= reader.settings.belief.many_inliers
+        least = (
+            reader.settings.belief.explained_by_many if many else reader.settings.belief.explained
+        )
         if finer.explained >= least and tells_place(finer.fit.covariance):
             return finer, True
     return replace(best, fit=expected_fit(best.composite, stands)), False
@@ -194,10 +194,13 @@ def _believed(
 
 def _tells_alone(reader: Reader, views: list[tuple[tuple[View, ...], ...]]) -> bool:
     """Whether the last touch shows cells enough for an answer, if they were all clear."""
-    least = reader.thresholds.surprise + reader.thresholds.margin
+    least = reader.settings.belief.surprise + reader.settings.belief.margin
     for (encoding, _, _), each in zip(reader.prepared, views, strict=True):
         options = math.log(encoding.array.order + 1)
-        cells = max((int((view.fit.seen >= WHOLE).sum()) for view in each[-1]), default=0)
+        cells = max(
+            (int((view.fit.seen >= reader.settings.belief.whole).sum()) for view in each[-1]),
+            default=0,
+        )
         if cells * options > math.log(len(encoding.keys)) + least:
             return True
     return False
@@ -205,8 +208,7 @@ def _tells_alone(reader: Reader, views: list[tuple[tuple[View, ...], ...]]) -> b
 
 def _image(reader: Reader, touch: PlacedTouch, height_mm: float) -> Image:
     signal = touch.signal
-    pressing = pressing_of(reader.sensor, height_mm)
-    return image_of(reader.sensor, signal.forces, signal.trust, pressing, newtons=signal.newtons)
+    return image_of_signal(reader.sensor, signal, height_mm, reader.settings)
 
 
 def _near(lattices: tuple[PlaneLattice, ...], stands: Stands) -> Array:

@@ -18,9 +18,9 @@ from recognizer.scan.mosaic.touch import Placed, PlacedTouch, placed
 from recognizer.scan.settings import ScanSettings
 from recognizer.touch.contacts import TouchImage
 from recognizer.touch.lab import Lab
-from recognizer.touch.reader import Reader, reader_for
+from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import Recognition
-from recognizer.touch.signal import Signal, signal_of
+from recognizer.touch.signal import Signal
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ class Scan:
         sensor: SensorType | None = None,
         settings: ScanSettings | None = None,
     ) -> None:
-        reader = lab if isinstance(lab, Reader) else reader_for(lab, sensor or SensorType())
+        reader = lab if isinstance(lab, Reader) else Reader(lab, sensor or SensorType())
         self._belief = begin_scan(reader, settings)
         self._places = TouchPlaces(self._belief.settings)
         self._answer = self._belief.recognition
@@ -103,7 +103,7 @@ class Scan:
         given = touch.seq if isinstance(touch, TouchImage) and seq is None else seq
         if isinstance(touch, TouchImage):
             pose, touch = touch.pose if pose is None else pose, touch.counts
-        signal = touch if isinstance(touch, Signal) else signal_of(np.asarray(touch, np.float64))
+        signal = touch if isinstance(touch, Signal) else self._belief.reader.signal(touch)
         number = self.touches if given is None else given
         self._belief = extend_scan(self._belief, self._places.place(signal, pose, number))
         found = self._belief.recognition

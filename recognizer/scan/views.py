@@ -21,11 +21,11 @@ from recognizer.scan.mosaic.touch import PlacedTouch
 from recognizer.scan.settings import ScanSettings
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.reader import Reader
-from recognizer.touch.round import BENDS
+from recognizer.touch.settings import FitSettings
 from recognizer.touch.symbols.bends import guess_bends
-from recognizer.touch.symbols.fit import Fit, FitSettings, fit_lattices, score_cells
+from recognizer.touch.symbols.fit import Fit, fit_lattices, score_cells
 from recognizer.touch.symbols.gain import Image, bend_image, first_gain
-from recognizer.touch.symbols.refine import initial_lattices, refine_lattices
+from recognizer.touch.symbols.refine import refine_lattices
 from recognizer.touch.symbols.search import Bank
 from recognizer.touch.symbols.template import ResponseTemplate
 
@@ -134,14 +134,14 @@ def fits_of(
     hard
         Whether more may be spent on an image that the usual search does not explain.
     """
-    settings = reader.settings
+    settings = reader.settings.first
     if known and len(near):
         expected = _near(image, template, settings, near[:1], None)
         if expected and expected[0].noise <= clean:
             return (View(expected[0], led=True),)
     found = fit_lattices(image, template, bank, settings)
     if hard and found and found[0].noise > clean:
-        found = fit_lattices(image, template, bank, reader.thorough)
+        found = fit_lattices(image, template, bank, reader.settings.thorough)
     views = tuple(View(fit, led=False) for fit in found)
     rest = [pose for pose in near if not any(_same(pose, f, template.pitch_mm) for f in found)]
     for fit in _near(image, template, settings, np.array(rest).reshape(-1, 3), found):
@@ -168,13 +168,16 @@ def round_views(
     near
         (k, 3) as for `fits_of`.
     """
+    settings = reader.settings
     views: list[View] = []
-    for guess in guess_bends(image, reader.sensor, encoding.radii_mm, template.ink, BENDS):
+    for guess in guess_bends(
+        image, reader.sensor, encoding.radii_mm, template.ink, settings.round.bends
+    ):
         under = bend_image(image, reader.sensor, guess.bend)
-        found = fit_lattices(under, template, bank, reader.settings, [guess.gain])
+        found = fit_lattices(under, template, bank, settings.first, [guess.gain])
         views += [View(fit, led=False) for fit in found]
         rest = [pose for pose in near if not any(_same(pose, f, template.pitch_mm) for f in found)]
-        led = _near(under, template, reader.settings, np.array(rest).reshape(-1, 3), found)
+        led = _near(under, template, settings.first, np.array(rest).reshape(-1, 3), found)
         views += [View(fit, led=True) for fit in led]
     return tuple(views)
 
@@ -190,9 +193,9 @@ def _near(
     gain = found[0].gain if found else first_gain(image, template.ink)
     if gain is None or not len(near):
         return ()
-    starts = initial_lattices(near, np.repeat(gain[None], len(near), axis=0))
-    lattices = refine_lattices(image, template, starts, steps=settings.final_steps)
-    return score_cells(image, template, lattices, settings)
+    gains = np.repeat(gain[None], len(near), axis=0)
+    lattices = refine_lattices(image, template, near, gains, steps=settings.final_steps)
+    return score_cells(image, template, lattices)
 
 
 def views_of(found: Sequence[tuple[View, ...]]) -> Views:

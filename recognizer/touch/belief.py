@@ -20,44 +20,22 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from generator.database.registered import Bend
 from recognizer.touch.lab import EmbossedArray
-from recognizer.touch.locate import Hypothesis, labels_at
+from recognizer.touch.locate import Hypothesis, labels_at, neighbours, under_centre
+from recognizer.touch.settings import BeliefSettings
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.gain import Image
-from recognizer.touch.symbols.refine import explained_share
+from recognizer.touch.symbols.projection import explained_share
 from recognizer.touch.symbols.template import ResponseTemplate
 
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-WHOLE = 6.0  #: tactels that look at a cell which counts as seen
-CLEARLY, PLAINLY = 8.0, 16.0  #: nats by which a cell speaks for another symbol
-
-
-@dataclass(frozen=True, slots=True)
-class BeliefSettings:
-    """When an answer is given."""
-
-    margin: float = 10.0  #: nats over the best other place
-    margin_by_few: float = 14.0  #: the same where fewer than `many_inliers` cells speak
-    surprise: float = 3.0  #: nats over symbols of no registered place
-    sure: float = 7.0  #: nats below which a share of `well` must be explained
-    wide: float = 0.9  #: tenths of a mm by which strokes are hardly printed wider; the same holds
-    well: float = 0.8
-    explained: float = 0.72  #: share of the image's variance
-    explained_by_many: float = 0.58  #: the same where `many_inliers` cells agree
-    many_inliers: int = 11
-    least_inliers: int = 4  #: cells that hold a symbol, are seen, and agree
-    contradicted: int = 1  #: cells that speak `CLEARLY` for another symbol; `PLAINLY`: none
-    rim_mm: float = 2.0  #: how far the sensor's centre may lie beyond the face
-    places: int = 8  #: that are verified at most, two at least
-    near: float = 14.0  #: nats below the best within which places are
-    verify_steps: int = 4
-
 
 @dataclass(frozen=True, slots=True)
 class Support:
-    """What speaks for a reading."""
+    """What speaks for a hypothesis."""
 
     surprise: float  #: nats over symbols of no registered place
     explained: float  #: share of the image's variance
@@ -79,31 +57,46 @@ class Support:
         )
 
 
-def support(
-    image: Image,
-    template: ResponseTemplate,
-    embossed: EmbossedArray,
-    fit: Fit,
-    hypothesis: Hypothesis,
-    score: float,
-) -> Support:
-    """Return what speaks for a place, under the fit it was verified with."""
-    cells = weigh_cells(embossed, fit, hypothesis)
-    worn = fit.cells[cells.worn]
-    return Support(
-        surprise=score - null_log_likelihood(embossed, fit),
-        explained=explained_share(
-            image,
-            template,
-            fit.pose,
-            fit.gain,
-            lambda at: unworn_labels_at(embossed, hypothesis, worn, at),
-        ),
-        inliers=int(cells.agree.sum()),
-        clear=int((cells.seen & (cells.against > CLEARLY)).sum()),
-        plain=int((cells.seen & (cells.against > PLAINLY)).sum()),
-        wider=float(fit.nuisance[0]),
-    )
+@dataclass(frozen=True, slots=True, eq=False)
+class VerifiedHypothesis:
+    """A place with pose and gain fitted to the symbols that the database holds there."""
+
+    image: Image  #: on a round face: under the bend there
+    template: ResponseTemplate
+    embossed: EmbossedArray
+    hypothesis: Hypothesis
+    fit: Fit
+    score: float  #: log-likelihood of the image, nats
+    bend: Bend | None = None  #: of a round face, in the axes of the sensor
+
+    @property
+    def index(self) -> tuple[int, int]:
+        """Row and column of the array's cell under the sensor's centre."""
+        return under_centre(self.embossed, self.fit, self.hypothesis)
+
+    def same_place(self, other: VerifiedHypothesis) -> bool:
+        """Whether both say the same place, up to a cell's rounding."""
+        if self.embossed is not other.embossed or self.hypothesis.face != other.hypothesis.face:
+            return False
+        return neighbours(self.embossed, self.index, other.index)
+
+    def support(self) -> Support:
+        """Return what speaks for it."""
+        embossed, fit, limits = self.embossed, self.fit, self.image.settings.belief
+        cells = weigh_cells(embossed, fit, self.hypothesis, limits)
+        worn = fit.cells[cells.worn]
+
+        def shown(at: Ints) -> Ints:
+            return unworn_labels_at(embossed, self.hypothesis, worn, at)
+
+        return Support(
+            surprise=self.score - null_log_likelihood(embossed, fit),
+            explained=explained_share(self.image, self.template, fit.pose, fit.gain, shown),
+            inliers=int(cells.agree.sum()),
+            clear=int((cells.seen & (cells.against > limits.clearly)).sum()),
+            plain=int((cells.seen & (cells.against > limits.plainly)).sum()),
+            wider=float(fit.nuisance[0]),
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,13 +109,15 @@ class CellEvidence:
     against: NDArray[np.float64]  #: nats by which they speak for another symbol
 
 
-def weigh_cells(embossed: EmbossedArray, fit: Fit, hypothesis: Hypothesis) -> CellEvidence:
+def weigh_cells(
+    embossed: EmbossedArray, fit: Fit, hypothesis: Hypothesis, settings: BeliefSettings
+) -> CellEvidence:
     """Return what the cells of a fit say of a place."""
     order = embossed.array.order
     held = labels_at(embossed, hypothesis, fit.cells)
     own = fit.scores[np.arange(len(held)), held]
     worn = np.asarray((held < order) & (fit.scores[:, order] > own))
-    seen = np.asarray(fit.seen >= WHOLE)
+    seen = np.asarray(fit.seen >= settings.whole)
     against = np.where(worn, 0.0, fit.scores[:, :order].max(axis=1) - own)
     tells = own > _marginal(fit) - math.log(2.0)
     return CellEvidence(worn, seen, seen & (held < order) & tells, against)

@@ -17,21 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.frame import Frame
+from recognizer.touch.settings import DEFAULTS, ContactSettings, ReaderSettings
 from recognizer.touch.signal import signal_of
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class ContactSettings:
-    """When frames are one touch, and when it is read."""
-
-    alike: float = 0.6  #: correlation of images of one touch; of two places it is below 0.3
-    steady: float = 0.05  #: share by which sums may be off that of the first frame averaged
-    still: float = 0.9  #: correlation with it
-    few: int = 5  #: frames that make a touch steady
-    enough: int = 22  #: frames that are averaged, 0.1 s at 220 frames a second
-    fragments: int = 64  #: unlike images without a steady one from which each is a touch
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +48,9 @@ def every_frame(frames: Iterable[Frame], together: int = 1) -> Iterator[TouchIma
 
 
 def cut_touches(
-    frames: Iterable[Frame], cutting: ContactSettings | None = None, trust: Array | None = None
+    frames: Iterable[Frame],
+    settings: ReaderSettings = DEFAULTS,
+    trust: Array | None = None,
 ) -> Iterator[TouchImage]:
     """Yield the touches of a film, each as soon as it is told.
 
@@ -67,21 +58,20 @@ def cut_touches(
     ----------
     frames
         One after another as the sensor gave them.
-    cutting
-        Limits.
+    settings
+        When something is touched, and when frames are one touch.
     trust
         (rows, columns) 0 for bad tactels of a calibration.
     """
-    chosen = cutting or ContactSettings()
-    contact = _Contact(chosen)
+    contact = _Contact(settings.contacts)
     for frame in frames:
-        signal = signal_of(frame.counts.astype(np.float64), trust=trust)
+        signal = signal_of(frame.counts.astype(np.float64), trust=trust, settings=settings.signal)
         if signal.contact:
             image = signal.forces * signal.trust
             yield from contact.take(_ContactFrame(frame, image, float(image.sum())))
         else:
             yield from contact.end()
-            contact = _Contact(chosen)
+            contact = _Contact(settings.contacts)
     yield from contact.end()
 
 
@@ -98,7 +88,7 @@ class _ContactFrame:
 class _Contact:
     """What is known of the contact that lasts."""
 
-    cutting: ContactSettings
+    settings: ContactSettings
     steady: bool = False  # whether a steady touch was found in it
     fragments: list[TouchImage] = field(default_factory=list)
     first: int = 0  # number of the first frame of what is alike
@@ -109,7 +99,7 @@ class _Contact:
 
     def take(self, felt: _ContactFrame) -> Iterator[TouchImage]:
         """Add a frame; yield what is told by it."""
-        if self.last is None or _correlation(self.last, felt.image) < self.cutting.alike:
+        if self.last is None or _correlation(self.last, felt.image) < self.settings.alike:
             yield from self._closed()
             self.first = felt.frame.seq
         self.last = felt.image
@@ -117,7 +107,7 @@ class _Contact:
             self._keep_best()
             self.group = []
         self.group.append(felt)
-        if len(self.group) == self.cutting.enough:
+        if len(self.group) == self.settings.enough:
             yield from self._steady(self.group)
             self.group = []
 
@@ -131,11 +121,11 @@ class _Contact:
     def _closed(self) -> Iterator[TouchImage]:
         """End what is alike; where it was not read, read the longest rest in it."""
         self._keep_best()
-        if self.read is None and len(self.best) >= self.cutting.few:
+        if self.read is None and len(self.best) >= self.settings.few:
             yield from self._steady(self.best)
         elif self.read is None and self.best and not self.steady:
             self.fragments.append(_average(_frames(self.best), self.first))
-            if len(self.fragments) >= self.cutting.fragments:
+            if len(self.fragments) >= self.settings.fragments:
                 yield from self.fragments
                 self.fragments = []
         self.read, self.group, self.best = None, [], []
@@ -143,7 +133,7 @@ class _Contact:
     def _steady(self, group: list[_ContactFrame]) -> Iterator[TouchImage]:
         """Read frames that rest, unless they show what was read before."""
         image = np.mean([felt.image for felt in group], axis=0)
-        if self.read is None or _correlation(self.read, image) < self.cutting.alike:
+        if self.read is None or _correlation(self.read, image) < self.settings.alike:
             seq = self.first if self.read is None else group[0].frame.seq
             yield _average(_frames(group), seq)
             self.read, self.steady, self.fragments = image, True, []
@@ -154,8 +144,8 @@ class _Contact:
             return True
         first = self.group[0]
         return (
-            abs(felt.total - first.total) <= self.cutting.steady * first.total
-            and _correlation(first.image, felt.image) >= self.cutting.still
+            abs(felt.total - first.total) <= self.settings.steady * first.total
+            and _correlation(first.image, felt.image) >= self.settings.still
         )
 
     def _keep_best(self) -> None:

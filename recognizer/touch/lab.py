@@ -11,6 +11,7 @@ import json
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,13 +25,10 @@ from generator.database.read import read_array, read_object, read_styles, read_s
 from generator.database.registered import Developable, RegisteredObject, RegisteredStyle, RoundFace
 from generator.database.transaction import reading
 from recognizer.errors import LabError
+from recognizer.touch.settings import DEFAULTS, LabSettings
 from recognizer.touch.windows import Windows, index_windows
 
 Ints = NDArray[np.int64]
-
-DENSE = 1 << 22  #: arrays of at most so many cells are looked up in a table
-LEAST_MM, MOST_MM = 15.0, 400.0  #: radii of round faces that are told apart from flat ones
-FINER = 1.35  #: from one of them to the next
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,14 +107,27 @@ def cell_keys(columns: int, rows: Ints, columns_at: Ints) -> NDArray[np.uint64]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lab:
-    """Everything that a touch can be told apart from."""
+    """Everything that a touch can be told apart from; prints as what it holds."""
 
     url: str
     arrays: tuple[EmbossedArray, ...]
 
+    def __str__(self) -> str:
+        objects = {name for each in self.arrays for name in each.names.values()}
+        faces = sum(len(each.faces) for each in self.arrays)
+        symbols = sum(len(each.keys) for each in self.arrays)
+        return f"{self.url}: {len(objects):,} objects, {faces:,} faces, {symbols:,} symbols"
 
-def open_lab(url: str) -> Lab:
+
+def open_lab(database: str | Path, settings: LabSettings = DEFAULTS.lab) -> Lab:
     """Return what a database holds.
+
+    Parameters
+    ----------
+    database
+        A file (`lab.db`), `sqlite:///lab.db`, or `postgresql://user@host/name`.
+    settings
+        Which radii of round faces are told apart, and how cells are kept.
 
     Raises
     ------
@@ -125,9 +136,10 @@ def open_lab(url: str) -> Lab:
     LabError
         It holds no encoded object.
     """
+    url = str(database)
     engine = open_database(url, writable=False)
     with reading(engine) as connection:
-        arrays = tuple(_embossed_arrays(connection, engine))
+        arrays = tuple(_embossed_arrays(connection, engine, settings))
     if not arrays:
         raise LabError(
             "the database holds no encoded object",
@@ -137,7 +149,9 @@ def open_lab(url: str) -> Lab:
     return Lab(url, arrays)
 
 
-def _embossed_arrays(connection: Connection, engine: Engine) -> Iterable[EmbossedArray]:
+def _embossed_arrays(
+    connection: Connection, engine: Engine, settings: LabSettings
+) -> Iterable[EmbossedArray]:
     styles: dict[tuple[int, str, SymbolStyle], list[RegisteredStyle]] = {}
     for entry in read_styles(connection):
         styles.setdefault((entry.array_id, entry.alphabet, entry.style), []).append(entry)
@@ -154,7 +168,7 @@ def _embossed_arrays(connection: Connection, engine: Engine) -> Iterable[Embosse
         faces, owners = np.unique(mine[:, 2:4], axis=0, return_inverse=True)
         keys = cell_keys(array.columns, mine[:, 0], mine[:, 1])
         dense = None
-        if array.rows * array.columns <= DENSE:
+        if array.rows * array.columns <= settings.dense:
             dense = np.full(array.rows * array.columns, len(mine), np.int32)
             dense[keys] = np.arange(len(mine))
         yield EmbossedArray(
@@ -169,24 +183,27 @@ def _embossed_arrays(connection: Connection, engine: Engine) -> Iterable[Embosse
             names={entry.object_id: entry.name for entry in objects},
             engine=engine,
             radii_mm=radii_of(
-                one for entry in objects for one in surfaces.get(entry.object_id, ())
+                (one for entry in objects for one in surfaces.get(entry.object_id, ())), settings
             ),
         )
 
 
-def radii_of(surfaces: Iterable[Developable]) -> tuple[float, ...]:
+def radii_of(
+    surfaces: Iterable[Developable], settings: LabSettings = DEFAULTS.lab
+) -> tuple[float, ...]:
     """Return radii of which one is near to each at which a plate can touch round faces.
 
     A cone has all radii from its largest down.
     """
+    least, finer = settings.least_mm, settings.finer
     steps: set[int] = set()
     for surface in surfaces:
         if surface.concave:
             continue  # a flat plate feels nothing in a hole
         largest = surface.radius_mm / math.cos(surface.half_angle_rad)
-        last = round(math.log(min(max(largest, LEAST_MM), MOST_MM) / LEAST_MM) / math.log(FINER))
+        last = round(math.log(min(max(largest, least), settings.most_mm) / least) / math.log(finer))
         steps |= set(range(last + 1)) if surface.half_angle_rad else {last}
-    return tuple(LEAST_MM * FINER**step for step in sorted(steps))
+    return tuple(least * finer**step for step in sorted(steps))
 
 
 def _encoded_faces(found: RegisteredObject) -> Iterable[tuple[int, EncodedFace]]:

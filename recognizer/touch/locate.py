@@ -1,4 +1,4 @@
-"""Cells in view -> the places of the database that they can be. Thesis 6.3.
+"""Cells in view -> hypotheses: the places of the database that they can be. Thesis 6.3.
 
 A `Fit` names cells (i, j) of a lattice; a place says which array cell (row, column) the cell
 (0, 0) is, and which face holds the symbols: cell (i, j) is then (row - j, column + i) where
@@ -10,32 +10,24 @@ what it should and no more.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.touch.lab import EmbossedArray, cell_keys
+from recognizer.touch.settings import HypothesisSettings
 from recognizer.touch.symbols.fit import Fit
+from recognizer.touch.symbols.projection import Shown
 
 Ints = NDArray[np.int64]
 Array = NDArray[np.float64]
 
-CAP = 8.0  #: nats that one cell can cost at most
-CORNER = 8.0  #: tactels on a cell below which it can cost less than that
-WORN = 4.0  #: nats that a symbol costs that is registered but not felt at all
-ANCHORS = 3  #: cells tried as the one that is surely registered, where no window is seen whole
-AGAIN = 2  #: the same, when the best place is known
-WINDOWS = 4  #: whole windows that are looked up, the surest ones
-SURE = 6.0  #: nats by which each of their cells shows its symbol rather than any other
-MANY = 1024  #: candidates, from which on those count that two windows agree on
-LARGE = 1 << 18  #: registered cells, from which on a touch must show four symbols surely
-FIRST, FOLLOWED = 6, 512  #: after so many cells only so many candidates go on
-
 
 @dataclass(frozen=True, slots=True)
 class Hypothesis:
-    """One reading of a fit."""
+    """A registered place at which the lattice of a fit may lie."""
 
     fit: int  #: which of the fits
     row: int  #: array row of lattice cell (0, 0), on the torus
@@ -44,47 +36,53 @@ class Hypothesis:
     score: float  #: log-likelihood of the image, nats
 
 
-def find_hypotheses(embossed: EmbossedArray, fits: tuple[Fit, ...], keep: int) -> list[Hypothesis]:
-    """Return the likeliest places over all fits, best first, at most `keep` of each fit."""
+def find_hypotheses(
+    embossed: EmbossedArray, fits: tuple[Fit, ...], settings: HypothesisSettings
+) -> list[Hypothesis]:
+    """Return the likeliest places over all fits, best first, at most `kept` of each fit."""
     found: list[Hypothesis] = []
     for number, fit in enumerate(fits):
-        found += _hypotheses_of(embossed, fit, number, keep)
+        found += _hypotheses_of(embossed, fit, number, settings)
     return sorted(found, key=lambda hypothesis: -hypothesis.score)
 
 
 def find_rivals(
-    embossed: EmbossedArray, fit: Fit, hypothesis: Hypothesis, number: int, keep: int
+    embossed: EmbossedArray,
+    fit: Fit,
+    best: Hypothesis,
+    number: int,
+    settings: HypothesisSettings,
 ) -> list[Hypothesis]:
     """Return the likeliest other places of the whole database under a fit, best first.
 
-    `places` looks where a few windows point to; a place that differs from the best one in a
-    cell of such a window is found here, under scores that the best place has made sharp.
+    `find_hypotheses` looks where a few windows point to; a place that differs from the best one
+    in a cell of such a window is found here, under scores that the best place has made sharp.
 
     Parameters
     ----------
-    place
-        The best one.
+    best
+        Whose rivals are sought.
     number
         Of the fit, which the places get.
-    keep
-        How many at most.
     """
-    scores = _bounded_scores(fit)
-    held = labels_at(embossed, hypothesis, fit.cells)
+    scores = _bounded_scores(fit, settings)
+    held = labels_at(embossed, best, fit.cells)
     sure = np.where(held < embossed.array.order, scores.max(axis=1) - scores[:, -1], 0.0)
-    found = _anchor_candidates(embossed, fit, scores, sure, AGAIN)
+    found = _anchor_candidates(embossed, fit, scores, sure, settings.anchors_again, settings)
+    one_more = replace(settings, kept=settings.kept + 1)
     return [
         other
-        for other in _rank_candidates(embossed, fit, number, scores, found, keep + 1)
-        if (other.row, other.column, other.face)
-        != (hypothesis.row, hypothesis.column, hypothesis.face)
+        for other in _rank_candidates(embossed, fit, number, scores, found, one_more)
+        if (other.row, other.column, other.face) != (best.row, best.column, best.face)
     ]
 
 
-def log_likelihood(embossed: EmbossedArray, fit: Fit, hypothesis: Hypothesis) -> float:
+def log_likelihood(
+    embossed: EmbossedArray, fit: Fit, hypothesis: Hypothesis, settings: HypothesisSettings
+) -> float:
     """Return the log-likelihood of the image if the fit lies at this place, nats."""
     labels = labels_at(embossed, hypothesis, fit.cells)
-    scores = _bounded_scores(fit)[np.arange(len(labels)), labels]
+    scores = _bounded_scores(fit, settings)[np.arange(len(labels)), labels]
     return float(scores.sum()) + fit.value
 
 
@@ -96,6 +94,17 @@ def labels_at(embossed: EmbossedArray, hypothesis: Hypothesis, cells: Ints) -> I
         (hypothesis.column + cells[:, 0]) % array.columns,
     )
     return np.where(held_by == hypothesis.face, label, array.order).astype(np.int64)
+
+
+def shown_at(embossed: EmbossedArray, hypotheses: Sequence[Hypothesis]) -> Shown:
+    """Return what the cells of lattices show if each lies at its place."""
+
+    def shown(cells: Ints) -> Ints:
+        each = zip(hypotheses, cells, strict=True)
+        labels = np.stack([labels_at(embossed, place, seen) for place, seen in each])
+        return np.where(labels == embossed.array.order, -1, labels)
+
+    return shown
 
 
 def under_centre(embossed: EmbossedArray, fit: Fit, hypothesis: Hypothesis) -> tuple[int, int]:
@@ -111,34 +120,41 @@ def neighbours(embossed: EmbossedArray, a: tuple[int, int], b: tuple[int, int]) 
     return (a[0] - b[0] + 1) % array.rows <= 2 and (a[1] - b[1] + 1) % array.columns <= 2
 
 
-def _bounded_scores(fit: Fit) -> Array:
+def _bounded_scores(fit: Fit, settings: HypothesisSettings) -> Array:
     """Return scores (m, q + 1) in which a registered symbol may be worn away, or read wrong.
 
     Of a cell of which the sensor sees only a corner, less is believed.
     """
-    symbols = np.maximum(fit.scores[:, :-1], fit.scores[:, -1:] - WORN)
-    least = CAP * np.minimum(1.0, fit.seen / CORNER)[:, None]
+    symbols = np.maximum(fit.scores[:, :-1], fit.scores[:, -1:] - settings.worn)
+    least = settings.cap * np.minimum(1.0, fit.seen / settings.corner)[:, None]
     return np.asarray(np.maximum(np.concatenate([symbols, fit.scores[:, -1:]], axis=1), -least))
 
 
-def _hypotheses_of(embossed: EmbossedArray, fit: Fit, number: int, keep: int) -> list[Hypothesis]:
-    scores = _bounded_scores(fit)
-    found = _window_candidates(embossed, fit)
+def _hypotheses_of(
+    embossed: EmbossedArray, fit: Fit, number: int, settings: HypothesisSettings
+) -> list[Hypothesis]:
+    scores = _bounded_scores(fit, settings)
+    found = _window_candidates(embossed, fit, settings)
     if found is None:
         symbol = scores[:, :-1].max(axis=1) - scores[:, -1]  # a symbol rather than none
-        found = _anchor_candidates(embossed, fit, scores, symbol, ANCHORS)
-    return _rank_candidates(embossed, fit, number, scores, found, keep)
+        found = _anchor_candidates(embossed, fit, scores, symbol, settings.anchors, settings)
+    return _rank_candidates(embossed, fit, number, scores, found, settings)
 
 
 def _rank_candidates(
-    embossed: EmbossedArray, fit: Fit, number: int, scores: Array, found: _Candidates, keep: int
+    embossed: EmbossedArray,
+    fit: Fit,
+    number: int,
+    scores: Array,
+    found: _Candidates,
+    settings: HypothesisSettings,
 ) -> list[Hypothesis]:
     """Return the likeliest candidates, best first."""
     rows, columns, owners = found
     if len(rows) == 0:
         return []
-    values = _log_likelihoods(embossed, fit, scores, rows, columns, owners)
-    best = np.argsort(-values, kind="stable")[:keep]
+    values = _log_likelihoods(embossed, fit, scores, found, settings)
+    best = np.argsort(-values, kind="stable")[: settings.kept]
     return [
         Hypothesis(
             number, int(rows[k]), int(columns[k]), int(owners[k]), float(values[k]) + fit.value
@@ -147,7 +163,9 @@ def _rank_candidates(
     ]
 
 
-def _window_candidates(embossed: EmbossedArray, fit: Fit) -> _Candidates | None:
+def _window_candidates(
+    embossed: EmbossedArray, fit: Fit, settings: HypothesisSettings
+) -> _Candidates | None:
     """Return where (0, 0) can lie, from the surest whole windows; None if there is none."""
     order = embossed.array.order
     symbols = np.sort(fit.scores[:, :order], axis=1)
@@ -160,7 +178,7 @@ def _window_candidates(embossed: EmbossedArray, fit: Fit) -> _Candidates | None:
         for i, j in named:
             inside = [named.get((i + c, j - r)) for r in range(down) for c in range(right)]
             cells = [n for n in inside if n is not None]
-            if len(cells) == len(inside) and (least := float(sure[cells].min())) > SURE:
+            if len(cells) == len(inside) and (least := float(sure[cells].min())) > settings.sure:
                 seen.append((least, k, cells))
     if not seen:
         return None
@@ -168,7 +186,7 @@ def _window_candidates(embossed: EmbossedArray, fit: Fit) -> _Candidates | None:
     seen = [window for window in seen if len(window[2]) == largest]
     found: list[Ints] = []
     shifts: list[Ints] = []
-    for _, k, cells in sorted(seen, reverse=True)[:WINDOWS]:
+    for _, k, cells in sorted(seen, reverse=True)[: settings.windows]:
         weakest = min(cells, key=lambda n: float(sure[n]))
         second = int(np.argsort(fit.scores[weakest, :order])[-2])
         for other in (int(labels[weakest]), second):
@@ -178,11 +196,16 @@ def _window_candidates(embossed: EmbossedArray, fit: Fit) -> _Candidates | None:
             at = embossed.windows()[k].at(code).astype(np.int64)
             found.append(at)
             shifts.append(np.tile(fit.cells[cells[0]], (len(at), 1)))
-    return _origins(embossed, np.concatenate(found), np.concatenate(shifts))
+    return _origins(embossed, np.concatenate(found), np.concatenate(shifts), settings)
 
 
 def _anchor_candidates(
-    embossed: EmbossedArray, fit: Fit, scores: Array, symbol: Array, anchors: int
+    embossed: EmbossedArray,
+    fit: Fit,
+    scores: Array,
+    symbol: Array,
+    anchors: int,
+    settings: HypothesisSettings,
 ) -> _Candidates:
     """Return where (0, 0) can lie if one of a few cells is a registered one.
 
@@ -196,26 +219,29 @@ def _anchor_candidates(
     order = embossed.array.order
     found: list[Ints] = [np.zeros(0, np.int64)]
     shifts: list[Ints] = [np.zeros((0, 2), np.int64)]
-    tried = np.argsort(-symbol, kind="stable")[: anchors if len(embossed.keys) <= LARGE else 0]
+    small = len(embossed.keys) <= settings.large
+    tried = np.argsort(-symbol, kind="stable")[: anchors if small else 0]
     for anchor in tried[symbol[tried] > 0]:
-        likely = scores[anchor, :order] > -CAP
+        likely = scores[anchor, :order] > -settings.cap
         at = np.flatnonzero(likely[embossed.labels[:-1]])
         found.append(at)
         shifts.append(np.tile(fit.cells[anchor], (len(at), 1)))
-    return _origins(embossed, np.concatenate(found), np.concatenate(shifts))
+    return _origins(embossed, np.concatenate(found), np.concatenate(shifts), settings)
 
 
-def _origins(embossed: EmbossedArray, at: Ints, cells: Ints) -> _Candidates:
+def _origins(
+    embossed: EmbossedArray, at: Ints, cells: Ints, settings: HypothesisSettings
+) -> _Candidates:
     """Return where (0, 0) lies, each place once, if cells (n, 2) are the registered ones `at`."""
     array = embossed.array
     rows, columns = np.divmod(embossed.keys[at], np.uint64(array.columns))
     row = (rows.astype(np.int64) + cells[:, 1]) % array.rows
     column = (columns.astype(np.int64) - cells[:, 0]) % array.columns
     owners = embossed.owners[at]
-    _, hypothesis = np.unique(cell_keys(array.columns, row, column), return_inverse=True)
-    both = hypothesis.reshape(-1).astype(np.int64) * (len(embossed.faces) + 1) + owners
+    _, place = np.unique(cell_keys(array.columns, row, column), return_inverse=True)
+    both = place.reshape(-1).astype(np.int64) * (len(embossed.faces) + 1) + owners
     _, once, votes = np.unique(both, return_index=True, return_counts=True)
-    if len(once) > MANY and (votes > 1).any():
+    if len(once) > settings.many and (votes > 1).any():
         once = once[votes > 1]  # several windows say the same
     return row[once], column[once], owners[once]
 
@@ -224,22 +250,21 @@ def _log_likelihoods(
     embossed: EmbossedArray,
     fit: Fit,
     scores: Array,
-    rows: Ints,
-    columns: Ints,
-    owners: NDArray[np.int32],
+    found: _Candidates,
+    settings: HypothesisSettings,
 ) -> Array:
     """Return the log-likelihood of each candidate, 0 if every cell is at its best.
 
     The surest cells come first; of many candidates only the best are followed to the end.
     """
-    array = embossed.array
+    array, (rows, columns, owners) = embossed.array, found
     spread = scores.max(axis=1) - scores.min(axis=1)
-    order = np.argsort(-spread * np.minimum(fit.seen, 12.0), kind="stable")
+    order = np.argsort(-spread * np.minimum(fit.seen, settings.heavy), kind="stable")
     total = np.zeros(len(rows))
     kept = np.arange(len(rows))
     for done, n in enumerate(order.tolist()):
-        if done == FIRST and len(kept) > FOLLOWED:
-            kept = np.argpartition(-total, FOLLOWED)[:FOLLOWED]
+        if done == settings.first and len(kept) > settings.followed:
+            kept = np.argpartition(-total, settings.followed)[: settings.followed]
             low = np.full(len(rows), -np.inf)
             low[kept] = total[kept]
             total = low

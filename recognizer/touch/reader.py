@@ -1,47 +1,151 @@
-"""What is prepared once for a lab and a sensor: templates, banks of lattices, and limits."""
+"""Counts of a sensor -> Recognition: one touch, or all touches of a recording."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
 
-from probe.sensor import SensorType
-from recognizer.touch.belief import BeliefSettings
-from recognizer.touch.lab import EmbossedArray, Lab
-from recognizer.touch.symbols.fit import FitSettings
-from recognizer.touch.symbols.search import Bank, bank_of
-from recognizer.touch.symbols.template import ResponseTemplate, template_of
+import numpy as np
+from numpy.typing import ArrayLike
 
-#: For touches that the first try does not answer.
-THOROUGH = FitSettings(candidates=12, steps=4, finalists=6, final_steps=6, crossed=3)
+from probe.calibration import Calibration, calibrated
+from probe.recording.read import Recording
+from recognizer.errors import TouchError
+from recognizer.touch.prepare import PreparedLab
+from recognizer.touch.recognise import recognise
+from recognizer.touch.recognition import Recognition
+from recognizer.touch.signal import Signal, signal_of
+from recognizer.touch.source import source_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Reader:
-    """Everything that is prepared once for a lab and a sensor."""
+class Reader(PreparedLab):
+    """What reads touches; prepared once for a lab and a sensor.
 
-    lab: Lab
-    sensor: SensorType
-    settings: FitSettings = field(default_factory=FitSettings)
-    thorough: FitSettings = field(default_factory=lambda: THOROUGH)
-    thresholds: BeliefSettings = field(default_factory=BeliefSettings)
-    prepared: tuple[tuple[EmbossedArray, ResponseTemplate, Bank], ...] = ()
+    Parameters
+    ----------
+    lab
+        Of `open_lab`.
+    sensor
+        That feels; by default `fsr-16` with tabs.
+    settings
+        Every number that decides.
 
+    Examples
+    --------
+    >>> import numpy as np, tempfile
+    >>> from generator.pipeline import encode
+    >>> from generator.spec import read_specs
+    >>> from probe.contact.contract import Touch
+    >>> from probe.contact.press import press
+    >>> from probe.simulate.registered import registered_surface
+    >>> from recognizer.touch.lab import open_lab
+    >>> folder = Path(tempfile.mkdtemp())
+    >>> _ = (folder / "cube.yaml").write_text("{name: Cube, shape: {cube: 40 mm}}")
+    >>> _ = encode(read_specs([folder / "cube.yaml"]), folder=folder, formats=("stl",),
+    ...            database=f"{folder}/lab.db")
+    >>> reader = Reader(open_lab(folder / "lab.db"))
+    >>> surface = registered_surface(f"{folder}/lab.db", "Cube", "F1").surface
+    >>> counts = 100 * press(surface, reader.sensor, Touch(20, 19, 0.4, force_n=80)).forces_n
+    >>> answer = reader.read(counts)
+    >>> answer.object, answer.face, round(answer.x_mm), round(answer.y_mm)
+    ('Cube', 'F1', 20, 19)
+    >>> print(reader.read(np.zeros((16, 16))))
+    not recognised: no contact; press the probe onto the object
+    """
 
-def reader_for(
-    lab: Lab,
-    sensor: SensorType,
-    settings: FitSettings | None = None,
-    thresholds: BeliefSettings | None = None,
-) -> Reader:
-    """Return a reader with the templates of all encodings of a lab."""
-    prepared = []
-    for embossed in lab.arrays:
-        template = template_of(embossed.alphabet, embossed.style, sensor)
-        prepared.append((embossed, template, bank_of(template, sensor)))
-    return Reader(
-        lab=lab,
-        sensor=sensor,
-        settings=settings or FitSettings(),
-        thresholds=thresholds or BeliefSettings(),
-        prepared=tuple(prepared),
-    )
+    def read(
+        self,
+        counts: ArrayLike,
+        *,
+        calibration: Calibration | None = None,
+        trust: ArrayLike | None = None,
+        seq: int = 0,
+    ) -> Recognition:
+        """Return what one touch says.
+
+        Parameters
+        ----------
+        counts
+            (rows, columns) readings that rise with force, as the sensor gives them.
+        calibration
+            Of the sensor: what turns counts into newtons.
+        trust
+            (rows, columns) 0 for bad tactels, 1 for good ones.
+        seq
+            Number that the answer gets.
+
+        Raises
+        ------
+        TouchError
+            Of another shape than the sensor, or no numbers.
+        """
+        return recognise(self, self.signal(counts, calibration=calibration, trust=trust), seq)
+
+    def signal(
+        self,
+        counts: ArrayLike,
+        *,
+        calibration: Calibration | None = None,
+        trust: ArrayLike | None = None,
+    ) -> Signal:
+        """Return what of a touch is worth fitting: newtons where there is a calibration."""
+        values = np.asarray(counts, np.float64)
+        known = None if trust is None else np.asarray(trust, np.float64)
+        shape, sensor = (self.sensor.rows, self.sensor.columns), self.sensor
+        if values.shape != shape or (known is not None and known.shape != shape):
+            wrong = values.shape if known is None or values.shape != shape else known.shape
+            raise TouchError(
+                f"an image of shape {wrong}, of a sensor with {shape[0]} rows, {shape[1]} columns",
+                fix="make the reader for that sensor: Reader(lab, SensorType(rows=...))",
+                place=sensor.name,
+            )
+        if not np.isfinite(values).all():
+            raise TouchError(
+                "readings that are NaN or infinite",
+                fix="set them to 0, and trust to 0 there",
+                place=sensor.name,
+            )
+        if calibration is None:
+            return signal_of(values, trust=known, settings=self.settings.signal)
+        found = calibrated(values, calibration)
+        good = np.where(found.bad, 0.0, 1.0) * (1.0 if known is None else known)
+        return signal_of(found.values, trust=good, newtons=True, settings=self.settings.signal)
+
+    def read_all(
+        self,
+        recording: Recording | str | Path,
+        *,
+        every: bool = False,
+        calibration: str | Path | None = None,
+    ) -> Iterator[Recognition]:
+        """Yield what the touches of a recording say, as `recognize-object` does.
+
+        A recording that tells which overlay it was felt through is read by that.
+
+        Parameters
+        ----------
+        recording
+            As it is opened, or its file.
+        every
+            Every frame is a touch; otherwise force tells where one begins and ends.
+        calibration
+            File of the sensor's calibration; the one that the recording names is found beside it.
+
+        Raises
+        ------
+        RecordingError, CalibrationError
+            What is read cannot be read.
+        TouchError
+            It is of another sensor.
+        """
+        opened = recording if isinstance(recording, Recording) else Recording(recording)
+        given = None if calibration is None else Path(calibration)
+        source = source_of(opened, self.sensor, calibration=given, every=every)
+        if source.notice:
+            warnings.warn(source.notice, stacklevel=2)
+        reader = self if source.sensor == self.sensor else replace(self, sensor=source.sensor)
+        for touch in source.touches(opened.frames(), self.settings):
+            yield reader.read(touch.counts, calibration=source.calibration, seq=touch.seq)

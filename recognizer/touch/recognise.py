@@ -15,11 +15,11 @@ from __future__ import annotations
 
 import math
 
-from recognizer.touch.belief import BeliefSettings, symbols_to_name
+from recognizer.touch.belief import VerifiedHypothesis, symbols_to_name
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.locate import Hypothesis, under_centre
 from recognizer.touch.pose import face_covariance, face_pose, inside_mm, pose_on_object
-from recognizer.touch.reader import Reader
+from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.recognition import (
     AMBIGUOUS,
     NO_CONTACT,
@@ -30,52 +30,56 @@ from recognizer.touch.recognition import (
     RunnerUp,
     refusal,
 )
+from recognizer.touch.settings import BeliefSettings
 from recognizer.touch.signal import Signal
 from recognizer.touch.symbols.fit import Fit
-from recognizer.touch.verify import VerifiedHypothesis, index_of, same_place, verify_hypotheses
+from recognizer.touch.verify import verify_hypotheses
 
 
-def recognise(reader: Reader, signal: Signal, seq: int = 0) -> Recognition:
+def recognise(reader: PreparedLab, signal: Signal, seq: int = 0) -> Recognition:
     """Return what one touch says."""
     return recognise_with_hypothesis(reader, signal, seq)[0]
 
 
 def recognise_with_hypothesis(
-    reader: Reader, signal: Signal, seq: int = 0
+    reader: PreparedLab, signal: Signal, seq: int = 0
 ) -> tuple[Recognition, VerifiedHypothesis | None]:
-    """Return what one touch says, and the reading that was judged; None where there is none."""
+    """Return what one touch says, and the hypothesis that was judged; None where there is none."""
     if not signal.contact:
         return refusal(seq, NO_CONTACT), None
-    found = verify_hypotheses(reader, signal, reader.settings)
-    answer, cells = _answer(reader, found, seq)
-    if answer and cells >= reader.thresholds.many_inliers:
-        return answer, found[0]
+    limits = reader.settings.belief
+    first = verify_hypotheses(reader, signal, reader.settings.first)
+    answer, inliers = _answer(first, limits, seq)
+    if answer and inliers >= limits.many_inliers:
+        return answer, first[0]
     # Spend more where it is needed: no answer yet, or one that few cells speak for.
-    again = verify_hypotheses(reader, signal, reader.thorough)
-    second, cells = _answer(reader, again, seq)
-    if answer and second and not same_place(found[0], again[0]):
-        return refusal(seq, AMBIGUOUS, margin=0.0, runner_up=answer.runner_up), again[0]
-    if second and cells < reader.thresholds.many_inliers:
-        second = _refuse_few(reader.thresholds, again[0].embossed, second, cells)
-    return second, again[0] if again else None
+    second = verify_hypotheses(reader, signal, reader.settings.thorough)
+    final, inliers = _answer(second, limits, seq)
+    if answer and final and not first[0].same_place(second[0]):
+        return refusal(seq, AMBIGUOUS, margin=0.0, runner_up=answer.runner_up), second[0]
+    if final and inliers < limits.many_inliers:
+        final = _refuse_few(limits, second[0].embossed, final, inliers)
+    return final, second[0] if second else None
 
 
-def _answer(reader: Reader, found: list[VerifiedHypothesis], seq: int) -> tuple[Recognition, int]:
+def _answer(
+    found: list[VerifiedHypothesis], limits: BeliefSettings, seq: int
+) -> tuple[Recognition, int]:
     """Return what hypotheses, best first, say together, and how many cells speak for it."""
     if not found:
         return refusal(seq, TOO_FEW), 0
     best = found[0]
-    other = next((r for r in found[1:] if not same_place(best, r)), None)
+    other = next((one for one in found[1:] if not best.same_place(one)), None)
     margin = math.inf if other is None else best.score - other.score
     runner_up = None
     if other is not None:
         face = other.embossed.face(other.hypothesis.face)
-        runner_up = RunnerUp(face.object, face.face, index_of(other))
-    limits, speaks = reader.thresholds, best.support()
+        runner_up = RunnerUp(face.object, face.face, other.index)
+    support = best.support()
     reason = ""
-    if not speaks.holds(limits):
+    if not support.holds(limits):
         reason = NOT_ENCODED
-    elif speaks.inliers < limits.least_inliers:
+    elif support.inliers < limits.least_inliers:
         reason = TOO_FEW
     elif margin < limits.margin:
         reason = AMBIGUOUS
@@ -83,15 +87,15 @@ def _answer(reader: Reader, found: list[VerifiedHypothesis], seq: int) -> tuple[
         best.embossed, best.fit, best.hypothesis, limits, seq,
         reason=reason, margin=margin, runner_up=runner_up,
     )  # fmt: skip
-    return answer, speaks.inliers
+    return answer, support.inliers
 
 
 def _refuse_few(
-    limits: BeliefSettings, embossed: EmbossedArray, answer: Recognition, cells: int
+    limits: BeliefSettings, embossed: EmbossedArray, answer: Recognition, inliers: int
 ) -> Recognition:
     """Return an answer that few cells speak for, if they can name a place and do so plainly."""
     reason = ""
-    if cells < symbols_to_name(embossed):
+    if inliers < symbols_to_name(embossed):
         reason = TOO_FEW
     elif answer.margin is not None and answer.margin < limits.margin_by_few:
         reason = AMBIGUOUS

@@ -6,6 +6,7 @@ vertex, x along its first edge, z outward), `T_object_probe` to the object frame
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +18,16 @@ TOO_FEW = "too few symbols"
 AMBIGUOUS = "ambiguous"
 NOT_ENCODED = "not an encoded surface"
 OUTSIDE = "outside every face"
+
+#: What a person does about a reason.
+WAYS_OUT = {
+    NO_CONTACT: "press the probe onto the object",
+    TOO_FEW: "press harder, or where more symbols are: away from edges and holes",
+    AMBIGUOUS: "touch again a few mm beside",
+    NOT_ENCODED: "touch again more evenly, away from edges; is the object in this database, and "
+    "the overlay the right one (--overlay)?",
+    OUTSIDE: "move the probe onto the face",
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,7 +41,13 @@ class RunnerUp:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recognition:
-    """What one touch, or several, say."""
+    """What one touch, or several, say: true if it is an answer; prints as a line.
+
+    Examples
+    --------
+    >>> print(refusal(0, AMBIGUOUS))
+    not recognised: ambiguous; touch again a few mm beside
+    """
 
     seq: int
     object: str | None  #: None where it does not answer
@@ -46,6 +63,50 @@ class Recognition:
 
     def __bool__(self) -> bool:
         return self.object is not None
+
+    def __str__(self) -> str:
+        """Return what and where, or why not and what to do."""
+        if not self:
+            others = ""
+            if self.runner_up is not None and self.reason == AMBIGUOUS:
+                others = f", {self.runner_up.object}/{self.runner_up.face} among others"
+            way_out = f"; {self.way_out}" if self.way_out else ""
+            return f"not recognised: {self.reason}{others}{way_out}"
+        alone = self.margin is None or math.isinf(self.margin)
+        given = "" if math.isnan(self.spread_mm) else f" +- {self.spread_mm:.2f}"
+        return (
+            f"{self.object}/{self.face} at ({self.x_mm:.2f}, {self.y_mm:.2f}) mm{given}"
+            f" turned {self.theta_deg:.1f} degrees; array {self.index or (0, 0)}; "
+            + ("no other place comes near" if alone else f"margin {self.margin:.0f} nats")
+        )
+
+    @property
+    def x_mm(self) -> float:
+        """Of the probe on the face; NaN where it does not answer."""
+        return math.nan if self.T_face_probe is None else float(self.T_face_probe[0, 3])
+
+    @property
+    def y_mm(self) -> float:
+        """Of the probe on the face; NaN where it does not answer."""
+        return math.nan if self.T_face_probe is None else float(self.T_face_probe[1, 3])
+
+    @property
+    def theta_deg(self) -> float:
+        """Turn of the probe on the face, degrees; NaN where it does not answer."""
+        T = self.T_face_probe
+        return math.nan if T is None else math.degrees(math.atan2(T[1, 0], T[0, 0]))
+
+    @property
+    def spread_mm(self) -> float:
+        """Standard deviation of the place, mm; NaN where it is not known."""
+        if self.covariance is None:
+            return math.nan
+        return math.sqrt(max(float(self.covariance[:2, :2].trace()), 0.0))
+
+    @property
+    def way_out(self) -> str:
+        """What a person does about the reason; empty where it answers."""
+        return WAYS_OUT.get(self.reason, "")
 
     def as_json(self) -> dict[str, Any]:
         """Return the plain values that `recognize-object --json` prints."""

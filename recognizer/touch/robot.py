@@ -40,6 +40,11 @@ class ObjectPose:
     T_robot_object: Array  #: (4, 4), mm
     covariance: Array  #: (6, 6) of (x, y, z, rx, ry, rz), base axes, mm and rad
 
+    def __str__(self) -> str:
+        at = ", ".join(f"{value:.1f}" for value in self.T_robot_object[:3, 3])
+        spread = math.sqrt(max(float(self.covariance[:3, :3].trace()), 0.0))
+        return f"object in the robot's base at ({at}) mm +- {spread:.1f}"
+
 
 def carried_pose(
     arm: Arm, wrist: Wrist, joints_rad: ArrayLike, joint_covariance: ArrayLike, counts: ArrayLike

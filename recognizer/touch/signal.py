@@ -12,11 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from recognizer.touch.settings import DEFAULTS, SignalSettings
 
-CONTACT = 8.0  #: counts over the background by which the strongest tactels must rise
-CONTACT_N = 0.05  #: and newtons
-_FEW = 6  # tactels that must feel something
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,8 +32,8 @@ def signal_of(
     *,
     trust: Array | None = None,
     floor: float | None = None,
-    least: float | None = None,
     newtons: bool = False,
+    settings: SignalSettings = DEFAULTS.signal,
 ) -> Signal:
     """Return the signal of one image.
 
@@ -46,33 +44,33 @@ def signal_of(
     trust
         (rows, columns) of a calibration: 0 for bad tactels; 1 everywhere if not given.
     floor
-        Reading without force; by default what the lowest twentieth of the tactels read.
-    least
-        How far the strongest tactels must rise above the floor for a contact; by default
-        `CONTACT` counts, or `CONTACT_N` newtons.
+        Reading without force; by default what the lowest of the tactels read.
     newtons
         Whether the readings are newtons.
+    settings
+        How far the strongest tactels must rise for a contact, and the like.
     """
     known = np.ones(readings.shape) if trust is None else trust.astype(np.float64)
     good = readings[known > 0]
     if good.size == 0:
         return Signal(np.zeros(readings.shape), known, contact=False, newtons=newtons)
-    level = float(np.quantile(good, 0.05)) if floor is None else floor
+    level = float(np.quantile(good, settings.background)) if floor is None else floor
     forces = np.maximum(readings - level, 0.0)
-    rise = (CONTACT_N if newtons else CONTACT) if least is None else least
-    strongest = np.sort(forces[known > 0])[-_FEW:]
-    return Signal(forces, known * _alive(forces, known), bool(strongest[0] > rise), newtons)
+    rise = settings.contact_n if newtons else settings.contact_counts
+    strongest = np.sort(forces[known > 0])[-settings.strongest :]
+    alive = _alive(forces, known, settings)
+    return Signal(forces, known * alive, bool(strongest[0] > rise), newtons)
 
 
-def _alive(forces: Array, known: Array) -> Array:
+def _alive(forces: Array, known: Array, settings: SignalSettings) -> Array:
     """Return 0 for whole rows and columns that read nothing between ones that do."""
     alive = np.ones(forces.shape)
     for axis in (0, 1):
         total = (forces * known).sum(axis=1 - axis)
         middle = np.median(total)
-        dead = total < 0.02 * middle
+        dead = total < settings.dead * middle
         dead[0] = dead[-1] = False  # at the rim: rather the edge of a face
-        neighbours = np.minimum(np.roll(total, 1), np.roll(total, -1)) > 0.3 * middle
+        neighbours = np.minimum(np.roll(total, 1), np.roll(total, -1)) > settings.beside * middle
         where = np.flatnonzero(dead & neighbours)
         if axis == 0:
             alive[where] = 0

@@ -6,174 +6,103 @@ says are in view, then its rivals under that fit, wherever in the database they 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from recognizer.touch.belief import Support, support
+from recognizer.touch.belief import VerifiedHypothesis
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.locate import (
     Hypothesis,
     find_hypotheses,
     find_rivals,
-    labels_at,
     log_likelihood,
-    neighbours,
-    under_centre,
+    shown_at,
 )
-from recognizer.touch.reader import Reader
+from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.round import verify_on_round_faces
+from recognizer.touch.settings import FitSettings
 from recognizer.touch.signal import Signal
-from recognizer.touch.symbols.fit import Fit, FitSettings, fit_lattices, score_cells
-from recognizer.touch.symbols.gain import Image, image_of
-from recognizer.touch.symbols.pressing import pressing_of
-from recognizer.touch.symbols.refine import initial_lattices, refine_lattices
-from recognizer.touch.symbols.search import Bank
+from recognizer.touch.symbols.fit import Fit, fit_lattices, score_cells
+from recognizer.touch.symbols.gain import Image, image_of_signal
+from recognizer.touch.symbols.refine import refine_lattices
 from recognizer.touch.symbols.template import ResponseTemplate
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class VerifiedHypothesis:
-    """A place that was verified."""
-
-    image: Image
-    template: ResponseTemplate
-    embossed: EmbossedArray
-    hypothesis: Hypothesis
-    fit: Fit
-    score: float  #: log-likelihood of the image, nats
-
-    def support(self) -> Support:
-        """Return what speaks for it."""
-        return support(
-            self.image, self.template, self.embossed, self.fit, self.hypothesis, self.score
-        )
-
-
 def verify_hypotheses(
-    reader: Reader, signal: Signal, settings: FitSettings
+    reader: PreparedLab, signal: Signal, effort: FitSettings
 ) -> list[VerifiedHypothesis]:
-    """Return the verified places over all encodings, best first."""
+    """Return the verified places over all arrays of the lab, best first."""
     found: list[VerifiedHypothesis] = []
     for embossed, template, bank in reader.prepared:
-        pressing = pressing_of(reader.sensor, embossed.style.height_mm)
-        image = image_of(
-            reader.sensor, signal.forces, signal.trust, pressing, newtons=signal.newtons
-        )
-        seen = fit_lattices(image, template, bank, settings)
-        found += _verify_on_flat_faces(reader, image, embossed, template, seen)
+        height_mm = embossed.style.height_mm
+        image = image_of_signal(reader.sensor, signal, height_mm, reader.settings)
+        fits = fit_lattices(image, template, bank, effort)
+        found += _verify_on_flat_faces(image, embossed, template, fits)
         if embossed.radii_mm:
-            found += _verify_on_round_faces(reader, image, embossed, template, bank, settings)
-    return sorted(found, key=lambda reading: -reading.score)
+            found += verify_on_round_faces(image, reader.sensor, embossed, template, bank, effort)
+    return sorted(found, key=lambda verified: -verified.score)
 
 
 def _verify_on_flat_faces(
-    reader: Reader,
-    image: Image,
-    embossed: EmbossedArray,
-    template: ResponseTemplate,
-    found: tuple[Fit, ...],
+    image: Image, embossed: EmbossedArray, template: ResponseTemplate, fits: tuple[Fit, ...]
 ) -> list[VerifiedHypothesis]:
     """Return the likeliest places, best first, fitted to what the database holds there."""
-    limits = reader.thresholds
-    candidates = _on_flat_faces(embossed, find_hypotheses(embossed, found, limits.places))[
-        : limits.places
-    ]
+    settings = image.settings.hypotheses
+    candidates = _on_flat_faces(embossed, find_hypotheses(embossed, fits, settings))
+    candidates = candidates[: settings.kept]
     if not candidates:
         return []
-    near = [hypothesis.score > candidates[0].score - limits.near for hypothesis in candidates]
+    near = [place.score > candidates[0].score - settings.near for place in candidates]
     candidates = candidates[: max(2, sum(near))]
-    verified = _fit_hypotheses(reader, image, embossed, template, candidates, found)
+    verified = _fit_hypotheses(image, embossed, template, candidates, fits)
     best = verified[0]
+    rivals = find_rivals(embossed, best.fit, best.hypothesis, len(fits), settings)
     others = [
-        hypothesis
-        for hypothesis in _on_flat_faces(
-            embossed, find_rivals(embossed, best.fit, best.hypothesis, len(found), limits.places)
-        )
-        if hypothesis.score > best.score - limits.near
+        place
+        for place in _on_flat_faces(embossed, rivals)
+        if place.score > best.score - settings.near
     ]
     if others:  # also such as were verified before, under a fit that is not as good
-        everything = [replace(best.hypothesis, fit=len(found)), *others]
-        verified += _fit_hypotheses(
-            reader, image, embossed, template, everything, (*found, best.fit)
-        )
-    return sorted(verified, key=lambda reading: -reading.score)
+        everything = [replace(best.hypothesis, fit=len(fits)), *others]
+        verified += _fit_hypotheses(image, embossed, template, everything, (*fits, best.fit))
+    return sorted(verified, key=lambda one: -one.score)
 
 
 def _on_flat_faces(embossed: EmbossedArray, found: list[Hypothesis]) -> list[Hypothesis]:
     """Return the places on flat faces; those on round ones are read with their bend."""
     if not embossed.radii_mm:
         return found
-    return [hypothesis for hypothesis in found if embossed.face(hypothesis.face).round is None]
-
-
-def _verify_on_round_faces(
-    reader: Reader,
-    image: Image,
-    embossed: EmbossedArray,
-    template: ResponseTemplate,
-    bank: Bank,
-    settings: FitSettings,
-) -> list[VerifiedHypothesis]:
-    limits = reader.thresholds
-    return [
-        VerifiedHypothesis(read.image, template, embossed, read.hypothesis, read.fit, read.score)
-        for read in verify_on_round_faces(
-            image, reader.sensor, embossed, template, bank, settings, reader.settings, limits
-        )
-    ]
+    return [place for place in found if embossed.face(place.face).round is None]
 
 
 def _fit_hypotheses(
-    reader: Reader,
     image: Image,
     embossed: EmbossedArray,
     template: ResponseTemplate,
     candidates: list[Hypothesis],
-    found: tuple[Fit, ...],
+    fits: tuple[Fit, ...],
 ) -> list[VerifiedHypothesis]:
     """Return places with pose and gain fitted to their symbols, best first."""
-    starts = [found[hypothesis.fit] for hypothesis in candidates]
-    lattices = initial_lattices(
-        np.array([fit.pose for fit in starts]),
-        np.array([fit.gain for fit in starts]),
-    )
-
-    def shown(cells: NDArray[np.int64]) -> NDArray[np.int64]:
-        labels = np.stack(
-            [labels_at(embossed, hypothesis, cells[b]) for b, hypothesis in enumerate(candidates)]
-        )
-        return np.where(labels == embossed.array.order, -1, labels)
-
-    fitted = refine_lattices(
+    settings = image.settings.hypotheses
+    starts = [fits[place.fit] for place in candidates]
+    lattices = refine_lattices(
         image,
         template,
-        lattices,
-        steps=reader.thresholds.verify_steps,
-        shown=shown,
+        np.array([fit.pose for fit in starts]),
+        np.array([fit.gain for fit in starts]),
+        steps=settings.steps,
+        shown=shown_at(embossed, candidates),
     )
-    again = score_cells(image, template, fitted, reader.settings)
+    again = score_cells(image, template, lattices)
     verified = []
-    for hypothesis in candidates:
+    for place in candidates:
         # a place is as likely as under the best of the fits that began where its own did: what
         # one of them missed of gain and sharpness is no word against the symbols
-        fair = [again[b] for b, other in enumerate(candidates) if other.fit == hypothesis.fit]
-        scores = [log_likelihood(embossed, fit, hypothesis) for fit in fair]
+        fair = [again[b] for b, other in enumerate(candidates) if other.fit == place.fit]
+        scores = [log_likelihood(embossed, fit, place, settings) for fit in fair]
         best = int(np.argmax(scores))
         verified.append(
-            VerifiedHypothesis(image, template, embossed, hypothesis, fair[best], scores[best])
+            VerifiedHypothesis(image, template, embossed, place, fair[best], scores[best])
         )
-    return sorted(verified, key=lambda reading: -reading.score)
-
-
-def index_of(reading: VerifiedHypothesis) -> tuple[int, int]:
-    """Return the cell of the array under the sensor's centre."""
-    return under_centre(reading.embossed, reading.fit, reading.hypothesis)
-
-
-def same_place(a: VerifiedHypothesis, b: VerifiedHypothesis) -> bool:
-    """Whether two readings say the same place, up to a cell's rounding."""
-    if a.embossed is not b.embossed or a.hypothesis.face != b.hypothesis.face:
-        return False
-    return neighbours(a.embossed, index_of(a), index_of(b))
+    return sorted(verified, key=lambda one: -one.score)

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from recognizer.touch.reader import THOROUGH, Reader
-from recognizer.touch.symbols.fit import FitSettings
+from recognizer.touch.reader import Reader
+from recognizer.touch.settings import DEFAULTS
 from recognizer.validation.draw import TouchPlan
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.levels import LEVELS
@@ -135,19 +135,19 @@ def reader_with(reader: Reader, name: str) -> Reader:
         "finalists": finalists,
         "final_steps": final_steps,
     }
-    settings = replace(reader.settings, **asked)
-    return replace(reader, settings=settings, thorough=settings)
+    spent = replace(reader.settings.first, **asked)
+    return replace(reader, settings=replace(reader.settings, first=spent, thorough=spent))
 
 
 def settings_of(name: str) -> dict[str, int]:
     """Return what a reader of the study spends, as the report names it."""
-    given = FitSettings()
+    given = DEFAULTS.first
     if name == AS_IS:
         values = (given.candidates, given.steps, given.finalists, given.final_steps)
     else:
         values = READERS[name]
     named = dict(zip(("candidates", "steps", "finalists", "final steps"), values, strict=True))
-    return named | ({"second try": THOROUGH.candidates} if name == AS_IS else {})
+    return named | ({"second try": DEFAULTS.thorough.candidates} if name == AS_IS else {})
 
 
 def shares_of(text: str, allowed: Mapping[str, object] | tuple[str, ...], option: str) -> Shares:

@@ -19,8 +19,7 @@ from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import Recognition
 from recognizer.touch.signal import signal_of
 from recognizer.touch.symbols.fit import Fit, fit_lattices
-from recognizer.touch.symbols.gain import image_of
-from recognizer.touch.symbols.pressing import pressing_of
+from recognizer.touch.symbols.gain import image_of_signal
 from recognizer.validation.campaign import plan_of, series_of
 from recognizer.validation.draw import DrawnTouch, draw_touch
 from recognizer.validation.errors import ValidationError
@@ -127,11 +126,9 @@ def _draw_fit(axis: Axes, found: DrawnTouch, reader: Reader) -> None:
     signal = signal_of(found.counts.astype(np.float64))
     best: tuple[float, Fit, Alphabet, float] | None = None
     for encoding, template, bank in reader.prepared if signal.contact else ():
-        pressing = pressing_of(reader.sensor, encoding.style.height_mm)
-        image = image_of(
-            reader.sensor, signal.forces, signal.trust, pressing, newtons=signal.newtons
-        )
-        for fit in fit_lattices(image, template, bank, reader.settings):
+        height_mm = encoding.style.height_mm
+        image = image_of_signal(reader.sensor, signal, height_mm, reader.settings)
+        for fit in fit_lattices(image, template, bank, reader.settings.first):
             if best is None or fit.value > best[0]:
                 best = (fit.value, fit, encoding.alphabet, encoding.style.pitch_mm)
     if best is not None:

@@ -14,7 +14,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from recognizer.touch.lab import open_lab
-from recognizer.touch.reader import Reader, reader_for
+from recognizer.touch.reader import Reader
 from recognizer.validation.campaign import Batch, Campaign, plan_of, reader_with, series_of
 from recognizer.validation.draw import sensor_of
 from recognizer.validation.encoded_set import set_digest
@@ -84,7 +84,7 @@ def prepare_reader(work: Work) -> Reader:
             f"a worker sees another set under {work.database}",
             fix="let all machines share the folder, or give a PostgreSQL database",
         )
-    return reader_for(open_lab(work.database), sensor_of(work.campaign.overlay))
+    return Reader(open_lab(work.database), sensor_of(work.campaign.overlay))
 
 
 @lru_cache(maxsize=1)

@@ -54,7 +54,7 @@ from recognizer.scan.mosaic.planar import (
 from recognizer.scan.mosaic.touch import Placed, PlacedTouch, decoded_place, placed
 from recognizer.thesis.product import product_shift
 from recognizer.touch.lab import open_lab
-from recognizer.touch.reader import reader_for
+from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.signal import Signal, signal_of
 
@@ -260,7 +260,7 @@ def measure(database: str, profile: str, tactels: float, counts: bool, seed: int
     pairs(scan, patches)
     told("mosaic", scan, touches_of(scan, {}), face=False)
     if profile == "one-touch":
-        reader = reader_for(open_lab(database), SENSOR)
+        reader = Reader(open_lab(database), SENSOR)
         start = time.process_time()
         answers = [recognise(reader, signal, k) for k, signal in enumerate(scan.signals)]
         ms = 1e3 * (time.process_time() - start) / n

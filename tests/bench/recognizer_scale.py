@@ -33,7 +33,7 @@ from probe.surface.polygon import polygon  # noqa: E402
 from probe.surface.symbols import Relief, embossed  # noqa: E402
 from probe.surface.template import template  # noqa: E402
 from recognizer.touch.lab import EmbossedArray, EncodedFace, Lab, cell_keys  # noqa: E402
-from recognizer.touch.reader import reader_for  # noqa: E402
+from recognizer.touch.reader import Reader  # noqa: E402
 from recognizer.touch.recognise import recognise  # noqa: E402
 from recognizer.touch.signal import signal_of  # noqa: E402
 from recognizer.validation.levels import TYPICAL, read_sensor  # noqa: E402
@@ -95,7 +95,7 @@ def encoding_of(array, faces: int) -> EmbossedArray:
 
 def measured(faces: int, touches: int) -> str:
     encoding = encoding_of(array_4095(), faces)
-    reader = reader_for(Lab("", (encoding,)), SensorType())
+    reader = Reader(Lab("", (encoding,)), SensorType())
     start = time.process_time()
     encoding.windows()
     indexed = time.process_time() - start

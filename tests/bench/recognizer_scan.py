@@ -42,7 +42,7 @@ from recognizer.scan.mosaic.touch import PlacedTouch, placed
 from recognizer.thesis.image import Merging
 from recognizer.thesis.scan import read_scan as read_classically
 from recognizer.touch.lab import open_lab
-from recognizer.touch.reader import reader_for
+from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.signal import signal_of
 from recognizer.validation.levels import LEVELS, READOUT, read_sensor
@@ -306,7 +306,7 @@ def main() -> None:
             if not file.exists():
                 made(profile, url, Path(folder))
             lab = open_lab(url)
-            reader = reader_for(lab, SENSOR)
+            reader = Reader(lab, SENSOR)
             faces = {}
             for encoding in lab.arrays:
                 for n in range(len(encoding.faces)):

@@ -19,12 +19,12 @@ import numpy as np  # noqa: E402
 
 from recognizer.touch.lab import open_lab  # noqa: E402
 from recognizer.touch.locate import find_hypotheses  # noqa: E402
-from recognizer.touch.reader import reader_for  # noqa: E402
+from recognizer.touch.reader import Reader  # noqa: E402
 from recognizer.touch.recognise import recognise_with_hypothesis  # noqa: E402
+from recognizer.touch.settings import DEFAULTS, FitSettings  # noqa: E402
 from recognizer.touch.signal import signal_of  # noqa: E402
-from recognizer.touch.symbols.fit import FitSettings, fit_lattices  # noqa: E402
-from recognizer.touch.symbols.gain import first_gain, image_of, normalize_image  # noqa: E402
-from recognizer.touch.symbols.pressing import pressing_of  # noqa: E402
+from recognizer.touch.symbols.fit import fit_lattices  # noqa: E402
+from recognizer.touch.symbols.gain import first_gain, image_of_signal, normalize_image  # noqa: E402
 from recognizer.touch.symbols.search import search  # noqa: E402
 from recognizer.touch.verify import verify_hypotheses  # noqa: E402
 from recognizer.validation.draw import TouchPlan, draw_touch, sensor_of  # noqa: E402
@@ -50,11 +50,8 @@ def stages(reader, signals):
     encoding, template, bank = reader.prepared[0]
     rows = []
     for signal in signals:
-        pressing = pressing_of(reader.sensor, encoding.style.height_mm)
         image, made = clocked(
-            lambda signal=signal, pressing=pressing: image_of(
-                reader.sensor, signal.forces, signal.trust, pressing, newtons=False
-            )
+            lambda s=signal: image_of_signal(reader.sensor, s, encoding.style.height_mm)
         )
         gain = first_gain(image, template.ink)
         felt = normalize_image(image, gain[None])
@@ -62,9 +59,11 @@ def stages(reader, signals):
             part.reshape(bank.shape).astype(np.float32) for part in (felt.psi, felt.trust)
         )
         _, coarse = clocked(lambda s=seen, w=weights: search(bank, s, w, template.order, 4))
-        found, fitted = clocked(lambda i=image: fit_lattices(i, template, bank, reader.settings))
-        _, placed = clocked(lambda f=found: find_hypotheses(encoding, f, 8))
-        _, read = clocked(lambda s=signal: verify_hypotheses(reader, s, reader.settings))
+        found, fitted = clocked(
+            lambda i=image: fit_lattices(i, template, bank, reader.settings.first)
+        )
+        _, placed = clocked(lambda f=found: find_hypotheses(encoding, f, DEFAULTS.hypotheses))
+        _, read = clocked(lambda s=signal: verify_hypotheses(reader, s, reader.settings.first))
         _, whole = clocked(lambda s=signal: recognise_with_hypothesis(reader, s))
         rows.append((made, coarse, fitted - coarse, placed, read - fitted - placed, whole))
     names = ("image", "coarse search", "refinement", "places", "verification", "whole touch")
@@ -78,7 +77,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=9)
     parser.add_argument("--png")
     options = parser.parse_args()
-    reader = reader_for(open_lab(options.database), sensor_of("tab"))
+    reader = Reader(open_lab(options.database), sensor_of("tab"))
     points = {}
     for level in ("typical", "mismatch"):
         plan = TouchPlan(options.database, options.seed, level)
@@ -88,7 +87,8 @@ def main() -> None:
         for name, ms in stages(reader, signals).items():
             print(f"  {name:16s} {ms:7.2f} ms")
         for name, settings in SETTINGS.items():
-            one = replace(reader, settings=settings, thorough=settings)
+            spent = replace(DEFAULTS, first=settings, thorough=settings)
+            one = replace(reader, settings=spent)
             found = []
             for number, (touch, signal) in enumerate(zip(touches, signals, strict=True)):
                 (answer, _), ms = clocked(lambda s=signal, r=one: recognise_with_hypothesis(r, s))

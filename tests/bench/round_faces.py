@@ -49,7 +49,7 @@ from probe.simulate.touch import Touches, random_touches  # noqa: E402
 from recognizer.scan.grow import begin_scan, extend_scan  # noqa: E402
 from recognizer.scan.mosaic.touch import PlacedTouch, placed  # noqa: E402
 from recognizer.touch.lab import open_lab  # noqa: E402
-from recognizer.touch.reader import Reader, reader_for  # noqa: E402
+from recognizer.touch.reader import Reader  # noqa: E402
 from recognizer.touch.recognise import recognise  # noqa: E402
 from recognizer.touch.recognition import Recognition  # noqa: E402
 from recognizer.touch.signal import signal_of  # noqa: E402
@@ -98,7 +98,7 @@ def part(database: str, name: str) -> RoundPart:
 
 @lru_cache(maxsize=8)
 def reader(database: str) -> Reader:
-    return reader_for(open_lab(database), SensorType())
+    return Reader(open_lab(database), SensorType())
 
 
 def touches(touched: RoundPart, rng: np.random.Generator) -> Iterator[Touch]:

@@ -19,7 +19,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 import numpy as np  # noqa: E402
 
 from recognizer.touch.lab import open_lab  # noqa: E402
-from recognizer.touch.reader import reader_for  # noqa: E402
+from recognizer.touch.reader import Reader  # noqa: E402
 from recognizer.validation.draw import TouchPlan, sensor_of  # noqa: E402
 from recognizer.validation.surfaces import FOREIGN  # noqa: E402
 from recognizer.validation.trial import Trial, trial  # noqa: E402
@@ -31,7 +31,7 @@ def several(job: tuple[TouchPlan, str, range]) -> list[Trial]:
     plan, overlay, numbers = job
     key = (plan.database, overlay)
     if key not in READERS:
-        READERS[key] = reader_for(open_lab(plan.database), sensor_of(overlay))
+        READERS[key] = Reader(open_lab(plan.database), sensor_of(overlay))
     return [trial(plan, number, READERS[key]) for number in numbers]
 
 

@@ -30,7 +30,7 @@ from probe.simulate.registered import registered_object
 from probe.simulate.round import round_part
 from probe.simulate.touch import Touches, random_touches
 from recognizer.touch.lab import open_lab
-from recognizer.touch.reader import reader_for
+from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.signal import signal_of
 from recognizer.validation.levels import LEVELS, read_sensor
@@ -207,7 +207,7 @@ def test_a_plate_sees_the_written_face_fall_away_under_it(touched, name):
 @pytest.mark.parametrize("name", ["Tube", "Cone"])
 def test_one_touch_of_the_written_part_tells_object_face_and_pose(touched, name):
     database, parts = touched
-    reader, part = reader_for(open_lab(database), SensorType()), parts[name]
+    reader, part = Reader(open_lab(database), SensorType()), parts[name]
     surface = part.face.round.surface
     rng, answered = np.random.default_rng(8), 0
     drawn = random_touches(part.region, rng, Touches((40.0, 120.0), margin_mm=INSIDE_MM))
@@ -241,7 +241,7 @@ def test_one_touch_of_the_written_part_tells_object_face_and_pose(touched, name)
 
 def test_the_reader_takes_no_blank_round_face_for_an_encoded_one(touched):
     database, parts = touched
-    reader, part = reader_for(open_lab(database), SensorType()), parts["Tube"]
+    reader, part = Reader(open_lab(database), SensorType()), parts["Tube"]
     radius = part.face.round.surface.radius_mm
     rng = np.random.default_rng(2)
     drawn = random_touches(part.region, rng, Touches(margin_mm=INSIDE_MM))

@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from recognizer.touch.lab import open_lab
-from recognizer.touch.reader import reader_for
+from recognizer.touch.reader import Reader
 from recognizer.validation.command import run
 from recognizer.validation.draw import TouchPlan, draw_touch, sensor_of
 from recognizer.validation.errors import SetError
@@ -230,7 +230,7 @@ def test_a_folder_is_not_taken_twice_nor_resumed_otherwise(spec, reference, caps
 
 def test_written_files_are_what_is_registered(reference):
     database = str(reference[0] / "lab.db")
-    reader = reader_for(open_lab(database), sensor_of("tab"))
+    reader = Reader(open_lab(database), sensor_of("tab"))
     for number in range(4):
         said, written = (
             draw_touch(TouchPlan(database, level="low", files=files), number, reader)

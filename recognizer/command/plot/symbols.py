@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from generator.alphabet import Alphabet
 from probe.plot.canvas import HEAT, in_mm
 from probe.sensor import SensorType
-from recognizer.command.plot.winning import Winning
+from recognizer.command.plot.winning import WinningLattice
 from recognizer.touch.signal import Signal
 
 Array = NDArray[np.float64]
@@ -21,7 +21,7 @@ OTHER = "#ff5a5a"  #: symbols that it holds and that look otherwise, or are worn
 ACROSS = 240  #: points of the outlines, each way
 
 
-def draw_touch(axes: Axes, sensor: SensorType, signal: Signal, won: Winning | None) -> None:
+def draw_touch(axes: Axes, sensor: SensorType, signal: Signal, won: WinningLattice | None) -> None:
     """Draw readings, lattice, and outlines of the symbols; untrusted tactels are crossed."""
     half_x, half_y = sensor.half_mm
     box = (-half_x, half_x, -half_y, half_y)
@@ -48,14 +48,14 @@ def strokes_mm(alphabet: Alphabet, label: int, pitch_mm: float) -> Array:
     return np.array(alphabet.glyphs[label].strokes, np.float64) * (alphabet.reach * pitch_mm)
 
 
-def _cells(won: Winning, pitch: float) -> list[Array]:
+def _cells(won: WinningLattice, pitch: float) -> list[Array]:
     """Return the outlines of the cells, sensor frame."""
     corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1), (0, 0)])
     return [won.on_sensor((cell + corners) * pitch) for cell in won.cells]
 
 
 def _outlines(
-    axes: Axes, sensor: SensorType, won: Winning, which: NDArray[np.bool_], colour: str
+    axes: Axes, sensor: SensorType, won: WinningLattice, which: NDArray[np.bool_], colour: str
 ) -> None:
     """Draw how far the strokes reach of those symbols that the face holds."""
     half_x, half_y = sensor.half_mm

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from probe.plot.canvas import page
 from recognizer.command.plot.symbols import draw_touch
 from recognizer.command.plot.window import draw_window
-from recognizer.command.plot.winning import Winning, winning
+from recognizer.command.plot.winning import WinningLattice, winning_lattice
 from recognizer.command.plot.wireframe import draw_object
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import Recognition
@@ -42,7 +42,7 @@ def touch_picture(
     T_robot_object
         (4, 4), mm, where it is known.
     """
-    won = winning(reader, signal)
+    won = winning_lattice(reader, signal)
     with page(path, WIDTH, HEIGHT) as figure:
         figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 0.95))
         figure.suptitle(_title(found, T_robot_object))
@@ -67,7 +67,7 @@ def _say_why(axes: Axes, found: Recognition) -> None:
     axes.text(0.5, 0.5, "\n".join(lines), ha="center", va="center", transform=axes.transAxes)
 
 
-def _draw_solid(axes: object, reader: Reader, won: Winning, found: Recognition) -> None:
+def _draw_solid(axes: object, reader: Reader, won: WinningLattice, found: Recognition) -> None:
     if found.object is not None and found.face is not None and found.T_object_probe is not None:
         draw_object(
             axes, won.encoding, reader.sensor, found.object, found.face, found.T_object_probe

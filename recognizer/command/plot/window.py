@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from probe.plot.touch import MARK
 from probe.sensor import SensorType
 from recognizer.command.plot.symbols import strokes_mm
-from recognizer.command.plot.winning import Winning
+from recognizer.command.plot.winning import WinningLattice
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ AROUND = 8  #: cells beside the one under the sensor's centre
 FREE, OTHERS, OBJECT, FACE = "#ffffff", "#e4e4e4", "#cfe3f7", "#f7d9a8"
 
 
-def draw_window(axes: Axes, sensor: SensorType, won: Winning) -> None:
+def draw_window(axes: Axes, sensor: SensorType, won: WinningLattice) -> None:
     """Draw the cells around the sensor with their symbols."""
     encoding, place = won.encoding, won.place
     array, pitch = encoding.array, encoding.style.pitch_mm
@@ -67,7 +67,7 @@ def draw_window(axes: Axes, sensor: SensorType, won: Winning) -> None:
     axes.set_title(f"window on the array, {array.rows} x {array.columns}")
 
 
-def _on_array(won: Winning, points_mm: Array) -> Array:
+def _on_array(won: WinningLattice, points_mm: Array) -> Array:
     """Return sensor points (n, 2) as columns and rows of the array, in cells."""
     cells = won.on_lattice(points_mm) / won.encoding.style.pitch_mm
     return np.stack([won.place.column + cells[:, 0], won.place.row + 1 - cells[:, 1]], axis=1)

@@ -1,7 +1,8 @@
 """The lattice that explains a touch best, and the symbols that are on it.
 
-A touch -> Winning: pose of the lattice under the sensor, and for every cell in view the symbol
-that the database holds there and whether it is felt. A touch that is not answered has one too.
+A touch -> WinningLattice: pose of the lattice under the sensor, and for every cell in view the
+symbol that the database holds there and whether it is felt. A touch that is not answered has one
+too.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ CLEARLY = 3.0  #: nats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Winning:
+class WinningLattice:
     """The best reading of a touch."""
 
     encoding: EmbossedArray
@@ -52,14 +53,14 @@ class Winning:
         return turned
 
 
-def winning(reader: Reader, signal: Signal) -> Winning | None:
+def winning_lattice(reader: Reader, signal: Signal) -> WinningLattice | None:
     """Return the best reading of a touch; None where no symbol is seen."""
     _, best = recognise_with_hypothesis(reader, signal)
     if best is None:
         return None
     encoding, place, fit = best.embossed, best.hypothesis, best.fit
     shown = labels_at(encoding, place, fit.cells)
-    return Winning(
+    return WinningLattice(
         encoding=encoding,
         place=place,
         face=encoding.face(place.face),

@@ -17,17 +17,10 @@ from numpy.typing import NDArray
 
 from generator.database.registered import Bend
 from probe.sensor import SensorType
+from recognizer.touch.symbols.damped import ascend, damped_step
 from recognizer.touch.symbols.gain import Image, bounded_gain
 
 Array = NDArray[np.float64]
-
-DIRECTIONS = 18  #: of lines, over half a turn
-STEPS = 6  #: of Gauss and Newton
-AROUND = 5  #: tactels, side of the square over which forces are averaged
-APART = 0.35  #: rad by which two bends differ in direction, or else in radius
-_FIRST, _LEAST, _MOST = 0.45, 0.08, 0.8  # depth, heights of the overlay
-_STEP = 0.2  # largest change of a step
-_FAINT = 0.03  # root of a response below which its slope is not trusted
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,7 +46,8 @@ def guess_bends(
     ink
         Mean response of symbols.
     """
-    angles = np.arange(DIRECTIONS) * math.pi / DIRECTIONS
+    settings = image.settings.bends
+    angles = np.arange(settings.directions) * math.pi / settings.directions
     bends = [Bend(radius, float(angle)) for radius in radii_mm for angle in angles]
     height = sensor.overlay.height_mm
     symbol = image.pressing.symbol * height
@@ -64,22 +58,23 @@ def guess_bends(
     whole = float(seen @ seen)
     if not whole > 0:
         return []
-    plane, root, left = _fit_gains(image, falls, ink, smooth, seen)
+    fitted = _fit_gains(image, falls, ink, smooth, seen)
     found: list[BendGuess] = []
-    for b in np.argsort(left, kind="stable").tolist():
+    for b in np.argsort(-fitted.value, kind="stable").tolist():
         if len(found) == keep:
             break
-        if any(_same_bend(bends[b], one.bend) for one in found):
+        if any(_same_bend(bends[b], one.bend, settings.apart) for one in found):
             continue
-        scale = 2.0 * math.log(max(float(root[b]), 1e-9))
-        gain = bounded_gain(np.array([[scale, *plane[b]]]))[0]
-        found.append(BendGuess(bends[b], gain, float(left[b]) / whole))
+        scale = 2.0 * math.log(max(float(fitted.scale[b]), 1e-9))
+        gain = np.array([[scale, *fitted.plane[b]]])
+        gain = bounded_gain(gain, image.settings.gain.steepest)[0]
+        found.append(BendGuess(bends[b], gain, -float(fitted.value[b]) / whole))
     return found
 
 
-def _same_bend(a: Bend, b: Bend) -> bool:
+def _same_bend(a: Bend, b: Bend, apart: float) -> bool:
     turn = math.remainder(a.towards_rad - b.towards_rad, math.pi)
-    return a.radius_mm == b.radius_mm and abs(turn) < APART
+    return a.radius_mm == b.radius_mm and abs(turn) < apart
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,18 +92,28 @@ class _Average:
     def _sum(self, values: Array) -> Array:
         from scipy.ndimage import uniform_filter
 
+        around = self.image.settings.bends.around
         square = values.reshape(-1, *self.image.shape)
-        sums = uniform_filter(square, (0, AROUND, AROUND), mode="constant")
+        sums = uniform_filter(square, (0, around, around), mode="constant")
         return np.asarray(sums.reshape(values.shape))
 
 
-def _fit_gains(
-    image: Image, falls: Array, ink: float, smooth: _Average, seen: Array
-) -> tuple[Array, Array, Array]:
-    """Return planes (b, 3), roots of scales (b,), and what is left (b,)."""
-    pressing, basis = image.pressing, image.plane
+@dataclass(frozen=True, slots=True, eq=False)
+class _Strips:
+    """What planes under b bends explain of an image."""
 
-    def pressed(plane: Array) -> tuple[Array, ...]:
+    plane: Array  # (b, 3) depths
+    scale: Array  # (b,) root of the force scale
+    value: Array  # (b,) minus the sum of squares of what is left
+    normal: Array  # (b, 4, 4) of plane and root of the scale
+    right: Array  # (b, 4)
+
+
+def _fit_gains(image: Image, falls: Array, ink: float, smooth: _Average, seen: Array) -> _Strips:
+    """Return the planes under which bends explain an image best."""
+    pressing, basis, settings = image.pressing, image.plane, image.settings.bends
+
+    def pressed(plane: Array) -> _Strips:
         depth = plane @ basis.T - falls
         force = ink * pressing.force(depth)
         force += (1.0 - ink) * pressing.force(depth - pressing.symbol)
@@ -117,28 +122,23 @@ def _fit_gains(
         root = np.sqrt(np.maximum(smooth.of(force), 1e-9))
         scale = (root @ seen) / (root * root).sum(axis=1)
         away = seen - scale[:, None] * root
-        return plane, slope, root, scale, away, (away * away).sum(axis=1)
-
-    start = np.zeros((len(falls), 3))
-    start[:, 0] = _FIRST
-    best = pressed(start)
-    damping = np.full(len(falls), 1e-2)
-    for _ in range(STEPS):
-        plane, slope, root, scale, away, left = best
-        half = 0.5 * scale[:, None] / np.maximum(root, _FAINT)
+        half = 0.5 * scale[:, None] / np.maximum(root, settings.faint)
         columns = [half * smooth.of(slope * one) for one in basis.T]
         jacobian = np.stack([*columns, root], axis=-1)
-        normal = jacobian.swapaxes(1, 2) @ jacobian
-        diagonal = damping[:, None] * np.einsum("bkk->bk", normal) + 1e-9
-        right = (jacobian * away[..., None]).sum(axis=1)
-        step = np.linalg.solve(normal + diagonal[..., None] * np.eye(4), right[..., None])[..., 0]
-        moved = plane + np.clip(step[:, :3], -_STEP, _STEP)
-        moved[:, 0] = np.clip(moved[:, 0], _LEAST, _MOST)
-        tried = pressed(moved)
-        better = tried[-1] < left
-        damping = np.where(better, damping / 3.0, damping * 6.0)
-        best = tuple(
-            np.where(better.reshape(-1, *[1] * (old.ndim - 1)), new, old)
-            for new, old in zip(tried, best, strict=True)
+        return _Strips(
+            plane=plane,
+            scale=scale,
+            value=-(away * away).sum(axis=1),
+            normal=jacobian.swapaxes(1, 2) @ jacobian,
+            right=(jacobian * away[..., None]).sum(axis=1),
         )
-    return best[0], best[3], best[5]
+
+    def moved(at: _Strips, damping: Array) -> _Strips:
+        step = damped_step(at, damping, 1e-9)[:, :3]
+        plane = at.plane + np.clip(step, -settings.step, settings.step)
+        plane[:, 0] = np.clip(plane[:, 0], settings.least, settings.most)
+        return pressed(plane)
+
+    start = np.zeros((len(falls), 3))
+    start[:, 0] = settings.first
+    return ascend(pressed(start), moved, settings.steps, settings)

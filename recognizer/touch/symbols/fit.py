@@ -11,42 +11,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
+from recognizer.touch.settings import FitSettings
 from recognizer.touch.symbols.covariance import covariances
 from recognizer.touch.symbols.gain import Image, first_gain, normalize_image, tilted_gain
-from recognizer.touch.symbols.noise import NormalizedImage, log_likelihoods, psi_deviation
-from recognizer.touch.symbols.refine import (
-    NOISE,
-    Lattices,
-    best_values,
-    cells_and_offsets,
-    initial_lattices,
-    refine_lattices,
-    tables_at,
+from recognizer.touch.symbols.noise import log_likelihoods, psi_deviation
+from recognizer.touch.symbols.projection import (
+    Projection,
+    likeliest_labels,
+    project_template,
+    values_of,
 )
+from recognizer.touch.symbols.refine import Lattices, refine_lattices
 from recognizer.touch.symbols.search import Bank, search
-from recognizer.touch.symbols.template import Floats, ResponseTemplate, psi
+from recognizer.touch.symbols.template import PSI, ResponseTemplate, psi
 
 Array = NDArray[np.float64]
-
-SAME_SHIFT = 0.08  #: pitches by which two lattices that are one may differ
-SAME_TURN = 0.02  #: half turns
-
-
-@dataclass(frozen=True, slots=True)
-class FitSettings:
-    """How much work the fit spends."""
-
-    candidates: int = 2  #: lattices taken from the coarse search
-    steps: int = 2  #: Gauss-Newton steps of all of them
-    finalists: int = 1  #: lattices that are refined to the end
-    final_steps: int = 2
-    crossed: int = 0  #: gains that are tried on all lattices, and these turned by quarters
-    least_noise: float = 0.05  #: below it a fit is not believed
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,25 +73,26 @@ def fit_lattices(
     if sum(len(start) for start in starts) == 0:
         return ()
     each = [len(start) for start in starts]
-    lattices = initial_lattices(np.concatenate(starts), np.repeat(gains, each, axis=0))
-    lattices = refine_lattices(image, template, lattices, steps=settings.steps)
+    pose, gain = np.concatenate(starts), np.repeat(gains, each, axis=0)
+    lattices = refine_lattices(image, template, pose, gain, steps=settings.steps)
     if settings.crossed:
         lattices = _cross_gains(image, template, lattices, settings.crossed)
-    best = _distinct(lattices, template.pitch_mm)[: settings.finalists]
-    lattices = initial_lattices(lattices.pose[best], lattices.gain[best])
-    lattices = refine_lattices(image, template, lattices, steps=settings.final_steps)
-    found = score_cells(image, template, lattices, settings)
-    return tuple(found[b] for b in _distinct(lattices, template.pitch_mm))
+    best = _distinct(image, template, lattices)[: settings.finalists]
+    pose, gain = lattices.pose[best], lattices.gain[best]
+    lattices = refine_lattices(image, template, pose, gain, steps=settings.final_steps)
+    found = score_cells(image, template, lattices)
+    return tuple(found[b] for b in _distinct(image, template, lattices))
 
 
-def _distinct(found: Lattices, pitch: float) -> list[int]:
+def _distinct(image: Image, template: ResponseTemplate, found: Lattices) -> list[int]:
     """Return the numbers of lattices, best first, each once."""
+    same, pitch = image.settings.search, template.pitch_mm
     kept: list[int] = []
     for b in np.argsort(-found.value, kind="stable").tolist():
         away = found.pose[kept, :3] - found.pose[b, :3]
         shift = np.abs((away[:, :2] / pitch + 0.5) % 1.0 - 0.5).max(axis=1)
         turn = np.abs((away[:, 2] / math.pi + 1.0) % 2.0 - 1.0)
-        if not ((shift < SAME_SHIFT) & (turn < SAME_TURN)).any():
+        if not ((shift < same.same_shift) & (turn < same.same_turn)).any():
             kept.append(b)
     return kept
 
@@ -128,19 +113,16 @@ def _cross_gains(image: Image, template: ResponseTemplate, found: Lattices, gain
         pose[:, 2] += math.pi / 2
     poses = np.concatenate([*tried, found.pose])
     each = [
-        refine_lattices(
-            image, template, initial_lattices(poses, np.tile(gain, (len(poses), 1))), steps=1
-        )
+        refine_lattices(image, template, poses, np.tile(gain, (len(poses), 1)), steps=1)
         for gain in found.gain[best[:gains]]
     ]
     kept = np.argmax([lattices.value for lattices in each], axis=0)
     rows = np.arange(len(poses))
-    return Lattices(
-        pose=np.stack([lattices.pose for lattices in each])[kept, rows],
-        gain=np.stack([lattices.gain for lattices in each])[kept, rows],
-        value=np.stack([lattices.value for lattices in each])[kept, rows],
-        normal=np.stack([lattices.normal for lattices in each])[kept, rows],
-    )
+    picked = {
+        item.name: np.stack([getattr(lattices, item.name) for lattices in each])[kept, rows]
+        for item in fields(Lattices)
+    }
+    return Lattices(**picked)
 
 
 def _search_under(
@@ -148,8 +130,8 @@ def _search_under(
 ) -> Array:
     """Return the best lattices (n, 3) of the coarse search under a gain."""
     felt = normalize_image(image, gain[None])
-    response, bare = (np.expm1(felt.psi[0] * math.log(4.0)) / 3.0, felt.bare[0])
-    rest = np.maximum(1.0 - bare, 0.1)
+    response, bare = (np.expm1(felt.psi[0] * math.log(1 + PSI)) / PSI, felt.bare[0])
+    rest = np.maximum(1.0 - bare, image.settings.search.least_rest)
     seen = psi(np.maximum(response - bare, 0.0) / rest)
     weights = (felt.press[0] * rest) ** 2 * felt.trust
     return search(
@@ -165,25 +147,19 @@ def score_cells(
     image: Image,
     template: ResponseTemplate,
     lattices: Lattices,
-    settings: FitSettings,
-    noise: float | None = None,
 ) -> tuple[Fit, ...]:
     """Return the fits of lattices with the scores of all their cells, in their order.
 
-    Parameters
-    ----------
-    noise
-        With which scores are made; by default what the likeliest lattice leaves.
+    Scores are made with the noise that the likeliest lattice leaves.
     """
-    felt = normalize_image(image, lattices.gain)
-    cells, offsets = cells_and_offsets(image, lattices.pose, template.pitch_mm)
-    tables = tables_at(template, offsets, lattices.pose, felt)
-    away = _residuals(felt, tables, cells)
-    if noise is None:
-        best = np.minimum(np.abs(away[int(np.argmax(lattices.value))]), 4 * NOISE)
-        left = math.sqrt(float((felt.trust * best**2).sum() / felt.trust.sum()))
-        noise = max(settings.least_noise, left)
-    each = log_likelihoods(felt, tables, np.full(len(cells), noise))
+    settings = image.settings.noise
+    under = project_template(image, template, lattices.pose, lattices.gain)
+    felt, cells = under.felt, under.cells
+    away = _residuals(under)
+    best = np.minimum(np.abs(away[int(np.argmax(lattices.value))]), settings.far * settings.first)
+    left = math.sqrt(float((felt.trust * best**2).sum() / felt.trust.sum()))
+    noise = max(settings.least, left)
+    each = log_likelihoods(felt, under.tables, np.full(len(cells), noise))
     level = felt.measure + (felt.trust * np.log(felt.press)).sum(axis=1)
     covariance = covariances(image, lattices, away * felt.trust, noise)
     found = []
@@ -210,8 +186,10 @@ def score_cells(
     return tuple(found)
 
 
-def _residuals(felt: NormalizedImage, tables: Floats, cells: NDArray[np.int64]) -> Array:
+def _residuals(under: Projection) -> Array:
     """Return how far (b, n) readings lie from the likeliest labels, on a covered tactel's scale."""
-    scores = log_likelihoods(felt, tables, np.full(len(cells), NOISE))
-    values = best_values(cells, tables, scores, felt)
-    return (felt.psi - values[..., 0]) * felt.press / psi_deviation(values[:, :, None])[..., 0]
+    felt, cells = under.felt, under.cells
+    scores = log_likelihoods(felt, under.tables, np.full(len(cells), felt.settings.first))
+    values = values_of(under, likeliest_labels(cells, scores))
+    deviation = psi_deviation(values[:, :, None], felt.settings)[..., 0]
+    return (felt.psi - values[..., 0]) * felt.press / deviation

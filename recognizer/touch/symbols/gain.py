@@ -16,20 +16,13 @@ from numpy.typing import NDArray
 
 from generator.database.registered import Bend
 from probe.sensor import SensorType
+from recognizer.touch.settings import DEFAULTS, ReaderSettings
+from recognizer.touch.signal import Signal
 from recognizer.touch.symbols.noise import NormalizedImage
-from recognizer.touch.symbols.pressing import Pressing
-from recognizer.touch.symbols.template import psi
+from recognizer.touch.symbols.pressing import Pressing, pressing_of
+from recognizer.touch.symbols.template import PSI, psi
 
 Array = NDArray[np.float64]
-
-STEEPEST = 1.7  #: slope of a gain plane; over 1 a part of the sensor hangs in the air
-USUAL = 0.25  #: depth of a usual touch, heights of the overlay, where the scale is not known
-LEAST_PRESS = 0.2  #: of a tactel where the plane presses little or not at all
-LEAST_GAIN = 0.12  #: of the largest over the sensor: below it a tactel tells nothing of symbols
-_AROUND = 5  # tactels, side of a neighbourhood
-_EVEN = 0.3  # share of the highest readings that the lowest reach on the bare face
-_HIGH = 0.06  # and share of the highest of all
-_FEW = 10  # tactels, at least
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,25 +36,27 @@ class Image:
     pressing: Pressing
     newtons: bool  #: whether the scale of the pressing is that of the forces
     plane: Array  #: (n, 3) basis of planes: 1, x and y over the half widths
+    settings: ReaderSettings
     falls: Array | None = None  #: (1 or b, n) of a round face under b planes, overlay heights
 
 
-def image_of(
-    sensor: SensorType, forces: Array, trust: Array, pressing: Pressing, *, newtons: bool
+def image_of_signal(
+    sensor: SensorType, signal: Signal, height_mm: float, settings: ReaderSettings = DEFAULTS
 ) -> Image:
-    """Return what is fitted of a frame: forces (rows, columns), trust (rows, columns).
+    """Return what is fitted of a touch of symbols of a height.
 
-    The face is taken as flat; `bent` gives the same image of a round one.
+    The face is taken as flat; `bend_image` gives the same image of a round one.
     """
     points = sensor.centres_mm().reshape(-1, 2)
     return Image(
         points_mm=points,
-        forces=forces.reshape(-1).astype(np.float64),
-        trust=trust.reshape(-1).astype(np.float64),
-        shape=forces.shape,
-        pressing=pressing,
-        newtons=newtons,
+        forces=signal.forces.reshape(-1).astype(np.float64),
+        trust=signal.trust.reshape(-1).astype(np.float64),
+        shape=signal.forces.shape,
+        pressing=pressing_of(sensor, height_mm, settings.gain),
+        newtons=signal.newtons,
         plane=np.column_stack([np.ones(len(points)), points / np.array(sensor.half_mm)]),
+        settings=settings,
     )
 
 
@@ -96,12 +91,12 @@ def first_gain(image: Image, ink: float) -> Array | None:
     plane = np.linalg.lstsq(basis * (root * ink)[:, None], image.forces * root, rcond=None)[0]
     if not (np.isfinite(plane).all() and plane[0] > 0):
         return None
-    pressing = image.pressing
-    scale = pressing.scale if image.newtons else plane[0] / float(pressing.force(np.array(USUAL)))
+    pressing, usual = image.pressing, np.array(image.settings.gain.usual)
+    scale = pressing.scale if image.newtons else plane[0] / float(pressing.force(usual))
     depth = pressing.depth(np.array(plane[0] / scale))
     slopes = plane[1:] / (scale * float(pressing.slope(depth)))
     gain = np.array([math.log(scale), depth, *slopes])
-    return np.asarray(bounded_gain(gain[None], 0.9)[0])
+    return np.asarray(bounded_gain(gain[None], image.settings.gain.steepest_first)[0])
 
 
 def tilted_gain(image: Image) -> Array | None:
@@ -112,29 +107,31 @@ def tilted_gain(image: Image) -> Array | None:
     """
     from scipy.ndimage import percentile_filter
 
-    forces = image.forces.reshape(image.shape)
+    settings, forces = image.settings.gain, image.forces.reshape(image.shape)
     low, high = (
-        percentile_filter(forces, share, size=_AROUND, mode="nearest").reshape(-1)
-        for share in (20, 80)
+        percentile_filter(forces, share, size=settings.around, mode="nearest").reshape(-1)
+        for share in (settings.low_percent, settings.high_percent)
     )
     known = image.trust > 0
-    flat = known & (low > _EVEN * high) & (low > _HIGH * np.max(high))
-    top = known & (low < _EVEN / 2 * high) & (image.forces > 0.8 * high)
-    if flat.sum() < _FEW or top.sum() < _FEW:
+    flat = known & (low > settings.even * high) & (low > settings.high * np.max(high))
+    top = known & (low < settings.even / 2 * high) & (image.forces > settings.top * high)
+    if flat.sum() < settings.few or top.sum() < settings.few:
         return None
     pressing = image.pressing
     scale = pressing.scale
     if not image.newtons:
-        scale = float(np.median(image.forces[top])) / float(pressing.force(np.array(USUAL)))
+        scale = float(np.median(image.forces[top])) / float(
+            pressing.force(np.array(settings.usual))
+        )
     depth = pressing.depth(image.forces / scale) + np.where(flat, pressing.symbol, 0.0)
     basis, sure = image.plane, np.sqrt(image.trust * (flat | top))
     plane = np.linalg.lstsq(basis * sure[:, None], depth * sure, rcond=None)[0]
     if not (np.isfinite(plane).all() and plane[0] > 0):
         return None
-    return np.asarray(bounded_gain(np.array([[math.log(scale), *plane]]))[0])
+    return np.asarray(bounded_gain(np.array([[math.log(scale), *plane]]), settings.steepest)[0])
 
 
-def bounded_gain(gain: Array, steepest: float = STEEPEST) -> Array:
+def bounded_gain(gain: Array, steepest: float) -> Array:
     """Return gains (b, 4) whose slopes are at most `steepest` times the depth at the centre."""
     slope = np.abs(gain[:, 2:]).sum(axis=1)
     limit = steepest * gain[:, 1]
@@ -144,23 +141,25 @@ def bounded_gain(gain: Array, steepest: float = STEEPEST) -> Array:
 
 def normalize_image(image: Image, gain: Array) -> NormalizedImage:
     """Return the image as it is under gains (b, 4)."""
+    settings = image.settings.gain
     depth = gain[:, 1:] @ image.plane.T
     if image.falls is not None:
         depth = depth - image.falls
     plain = image.pressing.force(depth)
     lower = image.pressing.force(depth - image.pressing.symbol)
-    least = LEAST_GAIN * plain.max(axis=1, keepdims=True)
+    least = settings.least_gain * plain.max(axis=1, keepdims=True)
     share = np.maximum(plain, least)
     plateau = np.exp(gain[:, :1]) * share
     return NormalizedImage(
         psi=psi(image.forces / plateau),
-        press=np.clip(depth / (0.5 * gain[:, 1:2]), LEAST_PRESS, 1.0),
+        press=np.clip(depth / (settings.full_press * gain[:, 1:2]), settings.least_press, 1.0),
         bare=lower / share,
         contact=np.clip(plain / least, 0.0, 1.0),
         trust=image.trust,
-        measure=-(image.trust * np.log(plateau + 3.0 * image.forces)).sum(axis=1),
+        measure=-(image.trust * np.log(plateau + PSI * image.forces)).sum(axis=1),
         depth=depth,
         plain=plain,
         lower=lower,
         plateau=plateau,
+        settings=image.settings.noise,
     )

@@ -13,13 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from recognizer.touch.settings import NoiseSettings
 from recognizer.touch.symbols.template import Floats, psi
 
 Array = NDArray[np.float64]
-
-QUIET = 0.8  #: spread where nothing is felt, against a tactel that a plateau covers
-DISPLACED_MM = 1.0  #: slopes count by this much, in the same measure
-MOST = 8.0  #: nats that one tactel can cost
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,12 +33,13 @@ class NormalizedImage:
     plain: Array  #: (b, n) F of `pressing` there
     lower: Array  #: (b, n) and over the bare face
     plateau: Array  #: (b, n) force on a plateau, no less than where the sensor hangs in the air
+    settings: NoiseSettings
 
 
-def psi_deviation(tables: Floats | Array) -> Floats:
+def psi_deviation(tables: Floats | Array, settings: NoiseSettings) -> Floats:
     """Return the spread (b, n, q) of psi around templates (b, n, q, 6), in units of the noise."""
     value, x, y = tables[..., 0], tables[..., 1], tables[..., 2]
-    square = QUIET**2 + value * value + DISPLACED_MM**2 * (x * x + y * y)
+    square = settings.quiet**2 + value * value + settings.displaced_mm**2 * (x * x + y * y)
     return np.asarray(np.sqrt(square), np.float32)
 
 
@@ -56,10 +54,12 @@ def log_likelihoods(felt: NormalizedImage, tables: Floats, noise: Array) -> Arra
         (b,) standard deviation of psi on a covered tactel.
     """
     unit = noise[:, None] / np.maximum(felt.press, 1e-3)
-    symbols = _each(felt, tables[..., 0], psi_deviation(tables), unit)
+    symbols = _each(felt, tables[..., 0], psi_deviation(tables, felt.settings), unit)
     floor = psi(felt.bare)
     bare = np.stack([np.zeros_like(floor), floor], axis=-1)  # beyond the edge of the face, or not
-    nothing = _each(felt, bare, np.hypot(QUIET, bare), unit).max(axis=-1, keepdims=True)
+    nothing = _each(felt, bare, np.hypot(felt.settings.quiet, bare), unit).max(
+        axis=-1, keepdims=True
+    )
     return np.concatenate([symbols, nothing], axis=-1)
 
 
@@ -67,5 +67,5 @@ def _each(
     felt: NormalizedImage, values: Array | Floats, widths: Array | Floats, unit: Array
 ) -> Array:
     away = (felt.psi[..., None] - values) / (unit[..., None] * widths)
-    each = -np.minimum(0.5 * away * away, MOST) - np.log(widths)
+    each = -np.minimum(0.5 * away * away, felt.settings.most) - np.log(widths)
     return np.asarray(felt.trust[:, None] * each, np.float64)

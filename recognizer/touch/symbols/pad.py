@@ -17,14 +17,11 @@ from probe.contact.layer import layer
 from probe.sensor import SensorType
 from probe.surface.face import endless
 from probe.surface.symbols import Relief
+from recognizer.touch.settings import TemplateSettings
 
 Array = NDArray[np.float64]
 
-FINE = 20  #: tactels to a pitch
-CELLS = 2  #: pitches that are pressed, at each side half a cell beyond the one that is kept
-AMONG = 3  #: arrangements of neighbours over which a symbol is averaged
-LIGHT_MPA = 0.05  #: mean pressure, in units of Young's modulus; the pad is taken as linear
-_STIFF = 1e9  # N mm / rad: the plate stays level
+STIFF = 1e9  #: N mm / rad: the plate stays level
 
 
 def pad_responses(
@@ -32,8 +29,7 @@ def pad_responses(
     style: SymbolStyle,
     sensor: SensorType,
     axis_mm: Array,
-    *,
-    among: int = AMONG,
+    settings: TemplateSettings,
 ) -> Array:
     """Return the pressure at the base (order, n, n), 1 where it is highest, over a cell.
 
@@ -44,15 +40,16 @@ def pad_responses(
     """
     from scipy.ndimage import map_coordinates
 
-    pitch, fine = style.pitch_mm, style.pitch_mm / FINE
-    probe = SensorType(CELLS * FINE, CELLS * FINE, fine, sensor.overlay)
-    side = CELLS * pitch
-    force = LIGHT_MPA * sensor.overlay.young_mpa * side * side
+    pitch, fine = style.pitch_mm, style.pitch_mm / settings.pad_fine
+    across = settings.pad_cells * settings.pad_fine
+    probe = SensorType(across, across, fine, sensor.overlay)
+    side = settings.pad_cells * pitch
+    force = settings.pad_light * sensor.overlay.young_mpa * side * side
     rng = np.random.default_rng(1)
     found = []
     for label in range(alphabet.order):
-        total = np.zeros((CELLS * FINE, CELLS * FINE))
-        for _ in range(among):
+        total = np.zeros((across, across))
+        for _ in range(settings.pad_among):
             labels = rng.integers(alphabet.order, size=(4, 4))
             labels[1, 1] = label
             face = endless(
@@ -62,10 +59,10 @@ def pad_responses(
                 unit_mm=alphabet.reach * pitch,
                 relief=Relief(style.height_mm, style.stroke_mm, 0.0),  # only tops are pressed
             )
-            at = Touch(1.5 * pitch, -1.5 * pitch, 0.0, force, wrist=WristStiffness(_STIFF, _STIFF))
+            at = Touch(1.5 * pitch, -1.5 * pitch, 0.0, force, wrist=WristStiffness(STIFF, STIFF))
             total += layer(face, probe, at, cells_per_tactel=2).forces_n
-        found.append(total[::-1] / among)  # rows upwards
-    where = axis_mm / fine + (CELLS * FINE - 1) / 2
+        found.append(total[::-1] / settings.pad_among)  # rows upwards
+    where = axis_mm / fine + (across - 1) / 2
     grid = np.stack(np.meshgrid(where, where, indexing="ij"))
     smooth = np.array([map_coordinates(one, grid, order=3, mode="nearest") for one in found])
     return np.asarray(np.maximum(smooth, 0.0) / max(float(smooth.max()), 1e-300))

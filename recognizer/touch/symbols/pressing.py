@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import SensorType
+from recognizer.touch.settings import DEFAULTS, GainSettings
 
 Array = NDArray[np.float64]
-
-DEEPEST = 0.8  #: heights of the overlay; beyond it F goes on straight
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,31 +26,34 @@ class Pressing:
 
     hardens: bool  #: a tab does, a pad is taken as linear
     symbol: float  #: height of the symbols over that of the overlay
+    deepest: float  #: heights of the overlay; beyond it F goes on straight
     scale: float  #: N, of a tactel on a plateau, where readings are newtons
 
     def force(self, depth: Array) -> Array:
         """Return F (0 without contact) at depths in heights of the overlay."""
-        u = np.clip(depth, 0.0, DEEPEST)
+        u = np.clip(depth, 0.0, self.deepest)
         if not self.hardens:
             return 3.0 * np.maximum(depth, 0.0)
-        beyond = np.maximum(depth - DEEPEST, 0.0) * _steep(DEEPEST)
+        beyond = np.maximum(depth - self.deepest, 0.0) * _steep(self.deepest)
         return np.asarray((1 - u) ** -2 - (1 - u) + beyond)
 
     def slope(self, depth: Array) -> Array:
         """Return dF/du, 0 without contact."""
         if not self.hardens:
             return np.where(depth > 0, 3.0, 0.0)
-        return np.where(depth > 0, _steep(np.clip(depth, 0.0, DEEPEST)), 0.0)
+        return np.where(depth > 0, _steep(np.clip(depth, 0.0, self.deepest)), 0.0)
 
     def depth(self, force: Array) -> Array:
-        """Return the depths at which F has given values, at most `DEEPEST`."""
+        """Return the depths at which F has given values, at most `deepest`."""
         if not self.hardens:
             return np.asarray(force / 3.0)
-        table = np.linspace(0.0, DEEPEST, 257)
+        table = np.linspace(0.0, self.deepest, 257)
         return np.asarray(np.interp(force, self.force(table), table))
 
 
-def pressing_of(sensor: SensorType, height_mm: float) -> Pressing:
+def pressing_of(
+    sensor: SensorType, height_mm: float, settings: GainSettings = DEFAULTS.gain
+) -> Pressing:
     """Return how a sensor's overlay presses symbols of a height."""
     overlay = sensor.overlay
     if overlay.kind == "tab":
@@ -61,6 +63,7 @@ def pressing_of(sensor: SensorType, height_mm: float) -> Pressing:
     return Pressing(
         hardens=overlay.kind == "tab",
         symbol=height_mm / overlay.height_mm,
+        deepest=settings.deepest,
         scale=overlay.young_mpa / 3.0 * area,
     )
 

@@ -16,12 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import SensorType
+from recognizer.touch.settings import DEFAULTS, SearchSettings
 from recognizer.touch.symbols.template import Floats, ResponseTemplate
-
-ROTATIONS = 72  #: over the full turn
-PHASES = 2  #: places per tactel along each axis
-SHIFTS = 10  #: of the lattice along each axis
-_RIM = 1.0  #: tactels beyond the matrix at which a symbol's centre may lie
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,24 +34,14 @@ class Bank:
 
 
 def bank_of(
-    template: ResponseTemplate,
-    sensor: SensorType,
-    *,
-    rotations: int = ROTATIONS,
-    phases: int = PHASES,
-    shifts: int = SHIFTS,
+    template: ResponseTemplate, sensor: SensorType, settings: SearchSettings = DEFAULTS.search
 ) -> Bank:
-    """Return the tables of a search.
-
-    Parameters
-    ----------
-    rotations, phases, shifts
-        Finer is slower; work grows with rotations x phases^2 and with rotations x shifts^2.
-    """
+    """Return the tables of a search."""
+    rotations, phases, shifts = settings.rotations, settings.phases, settings.shifts
     d = sensor.pitch_mm
     turns = np.arange(rotations) * 2 * np.pi / rotations
-    reach = math.ceil(template.half_mm * 1.1 / d)
-    rim = math.ceil(_RIM)
+    reach = math.ceil(template.half_mm * settings.reach / d)
+    rim = math.ceil(settings.rim)
     offset = (np.arange(phases) + 0.5) / phases - 0.5  # of a place from its tactel, tactels
     k = np.arange(-reach, reach + 1)
     # tactel minus place, sensor frame: [ky, kx, py, px]

@@ -25,23 +25,17 @@ from numpy.typing import NDArray
 
 from generator.alphabet import Alphabet, SymbolStyle
 from probe.sensor import SensorType
+from recognizer.touch.settings import DEFAULTS, TemplateSettings
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
-STEP_MM = 0.05  #: grid of the tables
-_BULGE = 0.59  #: F(c)/F(1) = c (1 + bulge (1 - c)) for a tip covered by the share c
-_PENETRATION_MM = 0.4  #: of the plateau into the overlay, for the part of a wall that is felt
-_PSI = 3.0
-WIDER_MM = 0.1  #: unit of the width
-CROSS_TALK = 0.12  #: of a reading that its neighbours get; twice that at the far end
-PEAK = 98.0  #: percentile of a pad's responses that counts as 1
-LOW, HIGH = 0.7, 1.1  #: exponents between which the slope is taken
+PSI = 3.0  #: of log(1 + 3 y) / log 4
 
 
 def psi(response: NDArray[np.float64] | Floats) -> NDArray[np.float64]:
     """Return log(1 + 3 y) / log 4 of responses y >= 0 (negative ones count as 0)."""
-    return np.log1p(_PSI * np.maximum(response, 0.0)) / math.log1p(_PSI)
+    return np.log1p(PSI * np.maximum(response, 0.0)) / math.log1p(PSI)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +47,7 @@ class ResponseTemplate:
     half_mm: float  #: the grid covers offsets -half ... half in x and y
     rimmed: Floats  #: (n + 2, n + 2, order, 6) psi, slopes by x, y (mm), width, ...; 0 on the rim
     ink: float  #: mean response over a cell
+    step_mm: float  #: of the grid
 
     @property
     def size(self) -> int:
@@ -66,7 +61,7 @@ class ResponseTemplate:
 
     def at(self, offsets_mm: NDArray[np.float64]) -> Floats:
         """Return psi and slopes (..., order, 6) at offsets (..., 2); 0 outside the grid."""
-        index = np.rint((offsets_mm + self.half_mm) / STEP_MM)
+        index = np.rint((offsets_mm + self.half_mm) / self.step_mm)
         np.clip(index, -1, self.size, out=index)
         place = ((index[..., 1] + 1) * (self.size + 2) + index[..., 0] + 1).astype(np.intp)
         found = self.rimmed.reshape(-1, self.order * 6).take(place, axis=0)
@@ -74,81 +69,97 @@ class ResponseTemplate:
 
 
 @lru_cache(maxsize=16)
-def template_of(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType) -> ResponseTemplate:
+def template_of(
+    alphabet: Alphabet,
+    style: SymbolStyle,
+    sensor: SensorType,
+    settings: TemplateSettings = DEFAULTS.template,
+) -> ResponseTemplate:
     """Return the template of an alphabet, as embossed and as felt by a sensor."""
+    step, cross_talk, low, high = (
+        settings.step_mm, settings.cross_talk, settings.low, settings.high
+    )  # fmt: skip
     pad = sensor.overlay.kind == "pad"
     felt = _pad_responses if pad else _tab_responses
     half = style.pitch_mm / 2 if pad else _reach_mm(alphabet, style, sensor)
-    steps = math.ceil(half / STEP_MM) + (0 if pad else 1)
-    axis = np.asarray((np.arange(2 * steps + 1) - steps) * STEP_MM, np.float64)
+    steps = math.ceil(half / step) + (0 if pad else 1)
+    axis = np.asarray((np.arange(2 * steps + 1) - steps) * step, np.float64)
     usual, wide = (
-        felt(alphabet, replace(style, stroke_mm=style.stroke_mm + by), sensor, axis)
-        for by in (0.0, WIDER_MM)
+        felt(alphabet, replace(style, stroke_mm=style.stroke_mm + by), sensor, axis, settings)
+        for by in (0.0, settings.wider_mm)
     )
     rimmed = np.zeros((len(axis) + 2, len(axis) + 2, alphabet.order, 6), np.float32)
     values = rimmed[1:-1, 1:-1]
     for label in range(alphabet.order):
-        middle = _with_cross_talk(usual[label], CROSS_TALK, sensor)
+        middle = _with_cross_talk(usual[label], cross_talk, sensor, step)
         values[..., label, 0] = psi(middle)
-        values[..., label, 1] = np.gradient(values[..., label, 0], STEP_MM, axis=1)
-        values[..., label, 2] = np.gradient(values[..., label, 0], STEP_MM, axis=0)
-        values[..., label, 3] = psi(_with_cross_talk(wide[label], CROSS_TALK, sensor)) - psi(middle)
-        values[..., label, 4] = psi(_with_cross_talk(usual[label], 2 * CROSS_TALK, sensor)) - psi(
-            usual[label]
+        values[..., label, 1] = np.gradient(values[..., label, 0], step, axis=1)
+        values[..., label, 2] = np.gradient(values[..., label, 0], step, axis=0)
+        values[..., label, 3] = psi(_with_cross_talk(wide[label], cross_talk, sensor, step)) - psi(
+            middle
         )
-        values[..., label, 5] = (psi(middle**HIGH) - psi(middle**LOW)) / (HIGH - LOW)
-    ink = float(usual.sum() * STEP_MM**2 / style.pitch_mm**2) / alphabet.order
+        values[..., label, 4] = psi(
+            _with_cross_talk(usual[label], 2 * cross_talk, sensor, step)
+        ) - psi(usual[label])
+        values[..., label, 5] = (psi(middle**high) - psi(middle**low)) / (high - low)
+    ink = float(usual.sum() * step**2 / style.pitch_mm**2) / alphabet.order
     rimmed.setflags(write=False)
-    return ResponseTemplate(style.pitch_mm, alphabet.order, steps * STEP_MM, rimmed, ink)
+    return ResponseTemplate(style.pitch_mm, alphabet.order, steps * step, rimmed, ink, step)
 
 
 def _tab_responses(
-    alphabet: Alphabet, style: SymbolStyle, sensor: SensorType, axis: Array
+    alphabet: Alphabet,
+    style: SymbolStyle,
+    sensor: SensorType,
+    axis: Array,
+    settings: TemplateSettings,
 ) -> Array:
     """Return the responses (order, n, n) of tabs."""
+    from scipy.signal import fftconvolve
+
     x, y = np.meshgrid(axis, axis)
     reach = alphabet.reach * style.pitch_mm
-    return np.stack(
-        [
-            _tip_response(
-                _presence(_distance(np.array(g.strokes, float) * reach, x, y), style), sensor
-            )
-            for g in alphabet.glyphs
-        ]
-    )
+    tip = _disc(sensor.overlay.tab_diameter_mm / 2, settings.step_mm)
+
+    def felt(strokes: Array) -> Array:
+        presence = _presence(_distance(strokes * reach, x, y), style, settings)
+        cover = np.clip(fftconvolve(presence, tip, mode="same"), 0, 1)
+        return np.asarray(cover * (1 + settings.bulge * (1 - cover)))
+
+    return np.stack([felt(np.array(glyph.strokes, float)) for glyph in alphabet.glyphs])
 
 
 def _pad_responses(
-    alphabet: Alphabet, style: SymbolStyle, sensor: SensorType, axis: Array
+    alphabet: Alphabet,
+    style: SymbolStyle,
+    sensor: SensorType,
+    axis: Array,
+    settings: TemplateSettings,
 ) -> Array:
     """Return the responses (order, n, n) of a pad, 1 where they are highest."""
     from scipy.ndimage import uniform_filter
 
     from recognizer.touch.symbols.pad import pad_responses
 
-    wide = sensor.pitch_mm / 2
-    beyond = np.arange(axis[0] - wide, axis[-1] + wide + STEP_MM / 2, STEP_MM)
-    base = pad_responses(alphabet, style, sensor, beyond)
-    size = round(sensor.pitch_mm / STEP_MM)
+    wide, step = sensor.pitch_mm / 2, settings.step_mm
+    beyond = np.arange(axis[0] - wide, axis[-1] + wide + step / 2, step)
+    base = pad_responses(alphabet, style, sensor, beyond, settings)
+    size = round(sensor.pitch_mm / step)
     tactels = np.array([uniform_filter(one, size, mode="nearest") for one in base])
     cut = (tactels.shape[1] - len(axis)) // 2
     tactels = tactels[:, cut : cut + len(axis), cut : cut + len(axis)]
-    return np.asarray(tactels / np.percentile(tactels, PEAK))
+    return np.asarray(tactels / np.percentile(tactels, settings.pad_peak))
 
 
-def _with_cross_talk(
-    felt: NDArray[np.float64], share: float, sensor: SensorType
-) -> NDArray[np.float64]:
+def _with_cross_talk(felt: Array, share: float, sensor: SensorType, step: float) -> Array:
     """Return responses of tactels that hear a share of what stands one tactel away, all around."""
     from scipy.signal import fftconvolve
 
-    around = fftconvolve(felt, _annulus(sensor.pitch_mm), mode="same")
+    around = fftconvolve(felt, _annulus(sensor.pitch_mm, step), mode="same")
     return np.asarray(np.maximum((1 - share) * felt + share * around, 0.0))
 
 
-def _distance(
-    strokes: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _distance(strokes: Array, x: Array, y: Array) -> Array:
     """Return the distance to the nearest stroke's centre line, mm."""
     best = np.full(x.shape, np.inf)
     for (x0, y0), (x1, y1) in strokes:
@@ -159,12 +170,12 @@ def _distance(
     return best
 
 
-def _presence(distance: NDArray[np.float64], style: SymbolStyle) -> NDArray[np.float64]:
+def _presence(distance: Array, style: SymbolStyle, settings: TemplateSettings) -> Array:
     """Return how much of the plateau's pressure is felt at a point: 1 on it, falling on a wall."""
     top = style.stroke_mm / 2 - style.chamfer_mm
     slope = math.tan(max(style.draft_rad, 0.02))
-    wall = min(_PENETRATION_MM, style.height_mm) * slope + style.chamfer_mm
-    return np.clip(1 - (distance - top) / max(wall, STEP_MM), 0, 1)
+    wall = min(settings.penetration_mm, style.height_mm) * slope + style.chamfer_mm
+    return np.clip(1 - (distance - top) / max(wall, settings.step_mm), 0, 1)
 
 
 def _reach_mm(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType) -> float:
@@ -173,25 +184,20 @@ def _reach_mm(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType) -> flo
     return strokes + sensor.overlay.tab_diameter_mm / 2 + sensor.pitch_mm
 
 
-def _tip_response(presence: NDArray[np.float64], sensor: SensorType) -> NDArray[np.float64]:
-    from scipy.signal import fftconvolve
-
-    cover = fftconvolve(presence, _disc(sensor.overlay.tab_diameter_mm / 2), mode="same")
-    cover = np.clip(cover, 0, 1)
-    return np.asarray(cover * (1 + _BULGE * (1 - cover)))
-
-
-def _disc(radius: float) -> NDArray[np.float64]:
-    steps = math.ceil(radius / STEP_MM)
-    axis = np.arange(-steps, steps + 1) * STEP_MM
-    x, y = np.meshgrid(axis, axis)
-    disc = np.clip((radius - np.hypot(x, y)) / STEP_MM + 0.5, 0, 1)
+def _disc(radius: float, step: float) -> Array:
+    """Return the weights of a disc on the grid; their sum is 1."""
+    disc = np.clip((radius - _from_centre(math.ceil(radius / step), step)) / step + 0.5, 0, 1)
     return np.asarray(disc / disc.sum())
 
 
-def _annulus(radius: float) -> NDArray[np.float64]:
-    steps = math.ceil(radius / STEP_MM) + 1
-    axis = np.arange(-steps, steps + 1) * STEP_MM
-    x, y = np.meshgrid(axis, axis)
-    ring = np.clip(1 - np.abs(np.hypot(x, y) - radius) / STEP_MM, 0, 1)
+def _annulus(radius: float, step: float) -> Array:
+    """Return the weights of a ring, a step wide to both sides; their sum is 1."""
+    away = _from_centre(math.ceil(radius / step) + 1, step)
+    ring = np.clip(1 - np.abs(away - radius) / step, 0, 1)
     return np.asarray(ring / ring.sum())
+
+
+def _from_centre(steps: int, step: float) -> Array:
+    """Return the distances of grid points from their centre, (2 steps + 1) each way."""
+    axis = np.arange(-steps, steps + 1) * step
+    return np.asarray(np.hypot(*np.meshgrid(axis, axis)))

@@ -318,15 +318,15 @@ def test_pictures(asked, lab, images):
 
 
 def test_the_symbols_of_the_picture_are_those_of_the_touch(lab, images):
-    from recognizer.command.plot.winning import winning
+    from recognizer.command.plot.winning import winning_lattice
     from recognizer.touch.lab import open_lab
-    from recognizer.touch.reader import reader_for
+    from recognizer.touch.reader import Reader
     from recognizer.touch.recognise import recognise
     from recognizer.touch.signal import signal_of
 
-    reader = reader_for(open_lab(str(lab / "lab.db")), SensorType())
+    reader = Reader(open_lab(str(lab / "lab.db")), SensorType())
     signal = signal_of(images[0].astype(np.float64))
-    won, found = winning(reader, signal), recognise(reader, signal)
+    won, found = winning_lattice(reader, signal), recognise(reader, signal)
     assert won.face.face == found.face
     points = np.array([[0.0, 0.0], [3.0, -4.0]])
     assert won.on_sensor(won.on_lattice(points)) == pytest.approx(points)
@@ -348,4 +348,4 @@ def test_the_symbols_of_the_picture_are_those_of_the_touch(lab, images):
             near += 1
     assert near >= 9
     assert won.felt[won.registered >= 0].mean() > 0.8
-    assert winning(reader, signal_of(np.zeros((16, 16)))) is None
+    assert winning_lattice(reader, signal_of(np.zeros((16, 16)))) is None

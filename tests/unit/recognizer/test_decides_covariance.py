@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from recognizer.touch.settings import DEFAULTS
 from recognizer.touch.symbols.covariance import covariances
 
 SHAPE = (5, 6)
@@ -25,7 +26,9 @@ def asked(normal, *, hardens, form=(0.0, 0.0, 0.0, 0.0), away=None, noise=USUAL)
     pose = np.zeros((count, 7))
     pose[:, :3] = 5.0, -9.0, 1.0  # of no importance
     pose[:, 3:] = form
-    image = SimpleNamespace(pressing=SimpleNamespace(hardens=hardens), shape=SHAPE)
+    image = SimpleNamespace(
+        pressing=SimpleNamespace(hardens=hardens), shape=SHAPE, settings=DEFAULTS
+    )
     left = np.zeros((count, SHAPE[0] * SHAPE[1])) if away is None else away
     return covariances(image, SimpleNamespace(pose=pose, normal=normal), left, noise)
 

@@ -15,10 +15,9 @@ from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
-from recognizer.touch.belief import BeliefSettings, Support, symbols_to_name, weigh_cells
+from recognizer.touch.belief import Support, symbols_to_name, weigh_cells
 from recognizer.touch.lab import open_lab
 from recognizer.touch.locate import (
-    CAP,
     Hypothesis,
     find_hypotheses,
     find_rivals,
@@ -26,10 +25,11 @@ from recognizer.touch.locate import (
     log_likelihood,
 )
 from recognizer.touch.pose import inside_mm
-from recognizer.touch.reader import reader_for
+from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import _refuse_few, recognise, recognise_with_hypothesis
 from recognizer.touch.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, OUTSIDE, TOO_FEW
-from recognizer.touch.signal import CONTACT_N, signal_of
+from recognizer.touch.settings import DEFAULTS, BeliefSettings
+from recognizer.touch.signal import signal_of
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.template import psi, template_of
 from recognizer.touch.verify import verify_hypotheses
@@ -38,6 +38,8 @@ from recognizer.validation.levels import LEVELS
 from recognizer.validation.settings import DRAWING
 from recognizer.validation.surfaces import FOREIGN
 from recognizer.validation.trial import trial
+
+PLACES = DEFAULTS.hypotheses
 
 
 @pytest.fixture(scope="module")
@@ -53,12 +55,12 @@ def url(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def reader(url):
-    return reader_for(open_lab(url), SensorType())
+    return Reader(open_lab(url), SensorType())
 
 
 @pytest.fixture(scope="module")
 def pad_reader(url):
-    return reader_for(open_lab(url), sensor_of("pad"))
+    return Reader(open_lab(url), sensor_of("pad"))
 
 
 def felt(url, name, face, touch):
@@ -142,7 +144,7 @@ def test_dead_rows_are_told_from_the_image(url, reader):
 
 def test_contact_is_judged_in_its_own_unit():
     image = np.zeros((16, 16))
-    image[4:8, 4:8] = 2 * CONTACT_N
+    image[4:8, 4:8] = 2 * DEFAULTS.signal.contact_n
     assert signal_of(image, floor=0.0, newtons=True).contact
     assert not signal_of(image, floor=0.0).contact
 
@@ -152,11 +154,11 @@ def test_the_reading_behind_an_answer(url, reader):
     answer, hypothesis = recognise_with_hypothesis(reader, signal)
     assert hypothesis.embossed.face(hypothesis.hypothesis.face).face == answer.face == "F3"
     speaks = hypothesis.support()
-    assert speaks.holds(reader.thresholds)
+    assert speaks.holds(reader.settings.belief)
     assert speaks.explained > 0.85
     assert speaks.inliers >= 9
     assert speaks.clear == speaks.plain == 0
-    scores = [r.score for r in verify_hypotheses(reader, signal, reader.settings)]
+    scores = [r.score for r in verify_hypotheses(reader, signal, reader.settings.first)]
     assert scores == sorted(scores, reverse=True)
 
 
@@ -214,16 +216,16 @@ def place_of(encoding, at=40):
 def test_a_sure_lattice_is_placed_and_a_wrong_cell_costs_its_cap(reader):
     encoding = reader.lab.arrays[0]
     place, fit = place_of(encoding)
-    best = find_hypotheses(encoding, (fit,), 5)[0]
+    best = find_hypotheses(encoding, (fit,), PLACES)[0]
     assert (best.row, best.column, best.face) == (place.row, place.column, place.face)
     assert best.score == pytest.approx(-5.0)
-    assert log_likelihood(encoding, fit, place) == pytest.approx(-5.0)
+    assert log_likelihood(encoding, fit, place, PLACES) == pytest.approx(-5.0)
     scores = fit.scores.copy()
     middle = int(np.flatnonzero((fit.cells == 0).all(axis=1))[0])
     scores[middle] = [*np.roll(scores[middle][:-1], 1).tolist(), -30.0]
     spoiled = replace(fit, scores=scores)
-    assert log_likelihood(encoding, spoiled, place) == pytest.approx(-5.0 - CAP)
-    best = find_hypotheses(encoding, (spoiled,), 5)[0]
+    assert log_likelihood(encoding, spoiled, place, PLACES) == pytest.approx(-5.0 - PLACES.cap)
+    best = find_hypotheses(encoding, (spoiled,), PLACES)[0]
     assert (best.row, best.column, best.face) == (place.row, place.column, place.face)
 
 
@@ -238,10 +240,10 @@ def test_a_place_that_fits_nearly_as_well_is_found_wherever_it_is(reader, other)
     scores = fit.scores.copy()
     scores[rows, shown] = np.maximum(scores[rows, shown], -0.25)
     alike = replace(fit, scores=scores)
-    found = find_rivals(encoding, alike, place, 3, 8)
+    found = find_rivals(encoding, alike, place, 3, PLACES)
     best = found[0]
     assert (best.row, best.column, best.face, best.fit) == (row, column, second.face, 3)
-    assert best.score == pytest.approx(log_likelihood(encoding, alike, second))
+    assert best.score == pytest.approx(log_likelihood(encoding, alike, second, PLACES))
     assert all((p.row, p.column) != (place.row, place.column) for p in found)
 
 
@@ -257,7 +259,7 @@ def test_few_symbols_answer_only_if_they_can_name_a_place(url, reader):
     encoding = reader.lab.arrays[0]
     fewest, order = symbols_to_name(encoding), encoding.array.order
     assert order ** (fewest - 1) < len(encoding.keys) <= order**fewest
-    limits = reader.thresholds
+    limits = reader.settings.belief
     seen = [(bool(found), cells) for found, cells in at_the_rim(url, reader)]
     assert all(cells >= fewest for told, cells in seen if told)
     assert any(told and cells < limits.many_inliers for told, cells in seen)
@@ -268,32 +270,32 @@ def test_a_cell_that_says_hardly_anything_does_not_speak_for_a_place(url, reader
     forces = felt(url, "Cube", "F1", Touch(32.0, 24.0, 0.7, 80.0))
     _, read = recognise_with_hypothesis(reader, signal_of(forces, newtons=True))
     encoding, fit, place = read.embossed, read.fit, read.hypothesis
-    told = weigh_cells(encoding, fit, place).agree
+    told = weigh_cells(encoding, fit, place, DEFAULTS.belief).agree
     held = labels_at(encoding, place, fit.cells)
-    assert told.sum() >= reader.thresholds.many_inliers
+    assert told.sum() >= reader.settings.belief.many_inliers
     assert (held[told] < encoding.array.order).all()
     scores = fit.scores.copy()
     mute, torn = np.flatnonzero(told)[:2]
     scores[mute] = [0.0, -0.2, -0.2, -0.7, -0.5]  # looked at, and nearly as likely anything
     scores[torn] = -9.0
     scores[torn, [held[torn], (held[torn] + 1) % encoding.array.order]] = 0.0, -0.1
-    again = weigh_cells(encoding, replace(fit, scores=scores), place)
+    again = weigh_cells(encoding, replace(fit, scores=scores), place, DEFAULTS.belief)
     assert again.seen[mute]
     assert np.flatnonzero(told ^ again.agree).tolist() == [mute]
     scores[torn, (held[torn] + 1) % encoding.array.order] = 0.1
-    again = weigh_cells(encoding, replace(fit, scores=scores), place)
+    again = weigh_cells(encoding, replace(fit, scores=scores), place, DEFAULTS.belief)
     assert np.flatnonzero(told ^ again.agree).tolist() == sorted([mute, torn])
 
 
 def test_few_symbols_must_leave_other_places_far_behind(url, reader):
-    strict = replace(reader, thresholds=BeliefSettings(margin_by_few=1e6))
+    strict = replace(reader, settings=replace(DEFAULTS, belief=BeliefSettings(margin_by_few=1e6)))
     for found, cells in at_the_rim(url, strict):
-        assert not found or cells >= strict.thresholds.many_inliers
+        assert not found or cells >= strict.settings.belief.many_inliers
         assert found or found.reason in (AMBIGUOUS, NOT_ENCODED)
 
 
 def test_what_few_symbols_say_is_refused_by_their_number_first(url, reader):
-    encoding, limits = reader.lab.arrays[0], reader.thresholds
+    encoding, limits = reader.lab.arrays[0], reader.settings.belief
     told = recognise(reader, signal_of(felt(url, "Cube", "F1", Touch(32.0, 24.0, 0.7, 80.0)),
                                        newtons=True))  # fmt: skip
     near, fewest = replace(told, margin=limits.margin_by_few - 0.1), symbols_to_name(encoding)

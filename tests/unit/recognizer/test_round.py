@@ -13,19 +13,21 @@ from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.sensor import SensorType
 from probe.surface.face import endless
-from recognizer.touch.lab import FINER, LEAST_MM, MOST_MM, radii_of
+from recognizer.touch.lab import radii_of
+from recognizer.touch.settings import DEFAULTS
+from recognizer.touch.signal import Signal
 from recognizer.touch.symbols.bends import guess_bends
-from recognizer.touch.symbols.gain import Image, bend_image, image_of, normalize_image
-from recognizer.touch.symbols.pressing import pressing_of
+from recognizer.touch.symbols.gain import Image, bend_image, image_of_signal, normalize_image
 
 SENSOR = SensorType()
+RADII = DEFAULTS.lab
 INK = 0.35  # about the mean response of the symbols of the default alphabet
 BARS = ((((-0.9, 0.9), (0.9, 0.9)), ((-0.9, -0.9), (0.9, -0.9))),)  # fmt: skip
 
 
 def image(forces: np.ndarray) -> Image:
-    pressing = pressing_of(SENSOR, 1.0)
-    return image_of(SENSOR, forces, np.ones(forces.shape), pressing, newtons=True)
+    signal = Signal(forces, np.ones(forces.shape), contact=True, newtons=True)
+    return image_of_signal(SENSOR, signal, 1.0)
 
 
 class Rolled:
@@ -93,11 +95,11 @@ def test_no_forces_no_bend():
 def test_radii_are_near_to_those_of_the_faces():
     tube = Developable("cylinder", (1, 2), 47.0, 0.0, True, False, 0.02)
     (radius,) = radii_of([tube])
-    assert 1 / FINER < radius / 47.0 < FINER
+    assert 1 / RADII.finer < radius / 47.0 < RADII.finer
     assert radii_of([replace(tube, concave=True)]) == ()
     wide, narrow = (radii_of([replace(tube, radius_mm=r)]) for r in (1e6, 0.5))
-    assert wide[0] == pytest.approx(MOST_MM, rel=FINER - 1)
-    assert narrow == (LEAST_MM,)
+    assert wide[0] == pytest.approx(RADII.most_mm, rel=RADII.finer - 1)
+    assert narrow == (RADII.least_mm,)
     cone = Developable("cone", (1, 2), 47.0, 0.4, True, False, 0.02)
     assert len(radii_of([cone])) > 3
-    assert radii_of([cone])[0] == LEAST_MM
+    assert radii_of([cone])[0] == RADII.least_mm

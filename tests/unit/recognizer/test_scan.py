@@ -18,7 +18,7 @@ from recognizer.scan.mosaic.touch import PlacedTouch, placed
 from recognizer.scan.session import Scan, TouchPlaces
 from recognizer.scan.settings import ScanSettings
 from recognizer.touch.lab import open_lab
-from recognizer.touch.reader import reader_for
+from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import NO_CONTACT, TOO_FEW
 from recognizer.touch.signal import signal_of
 from recognizer.validation.levels import MISMATCH, TYPICAL, read_sensor
@@ -45,7 +45,7 @@ def lab(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def reader(lab):
-    return reader_for(lab, SENSOR)
+    return Reader(lab, SENSOR)
 
 
 def scanned(surface, places, theta, level, seed):

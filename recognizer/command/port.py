@@ -1,0 +1,75 @@
+"""A port -> touches, with the sensor that feels them and its calibration."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from threading import Event
+
+from encoded_objects.console.output import message
+from probe.calibration import read_calibration
+from probe.client.stream import Stream, name_of
+from probe.frame import Frame
+from probe.port.url import address_of
+from probe.recording.read import Recording
+from probe.sensor import SensorType
+from recognizer.touch.source import TouchSource, source_of, with_overlay
+
+SLICE_S = 0.1  #: how long frames are waited for before an interruption is looked for
+
+
+def source_at(url: str, *, overlay: str, calibration: Path | None, every: bool) -> TouchSource:
+    """Return what a port will give.
+
+    Raises
+    ------
+    PortError
+        The URL is none.
+    RecordingError
+        It is that of a recording that cannot be read.
+    CalibrationError
+        The calibration is none.
+    """
+    address = address_of(url)
+    if address.scheme == "file":
+        recording = Recording(Path(address.target))
+        source = source_of(
+            recording, SensorType(), overlay=overlay, calibration=calibration, every=every
+        )
+        return replace(source, place=url, frames=None)
+    return TouchSource(
+        place=url,
+        sensor=with_overlay(SensorType(), overlay or address.options.get("overlay", "")),
+        calibration=None if calibration is None else read_calibration(calibration),
+        together=int(every),
+        newest=every,
+    )
+
+
+@contextmanager
+def listen(
+    source: TouchSource, interrupted: Event, number: int | None, calibration: Path | None
+) -> Iterator[Iterator[Frame]]:
+    """Yield the frames of a port until it ends or an event does; lets go of it afterwards.
+
+    Raises
+    ------
+    PortError
+        The probe is not there, or went away for good.
+    CalibrationError
+        The calibration is another sensor's.
+    """
+    with Stream(source.place, sensor=number) as stream:
+        if calibration is not None:
+            read_calibration(calibration, sensor=name_of(stream.ident(), source.place) or None)
+
+        def frames() -> Iterator[Frame]:
+            while not (stream.ended or interrupted.is_set()):
+                waiting = stream.take(SLICE_S)
+                for notice in stream.client.notices():
+                    message(notice)
+                yield from waiting[-1:] if source.newest else waiting
+
+        yield frames()

@@ -1,0 +1,45 @@
+"""What is prepared once for a lab, a sensor and settings: templates and banks of lattices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+from generator.alphabet import Alphabet, SymbolStyle
+from probe.sensor import SensorType
+from recognizer.touch.lab import EmbossedArray, Lab
+from recognizer.touch.settings import DEFAULTS, ReaderSettings, SearchSettings, TemplateSettings
+from recognizer.touch.symbols.search import Bank, bank_of
+from recognizer.touch.symbols.template import ResponseTemplate, template_of
+
+Prepared = tuple[EmbossedArray, ResponseTemplate, Bank]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PreparedLab:
+    """A lab as a sensor feels it, with the numbers that decide; `Reader` is one."""
+
+    lab: Lab
+    sensor: SensorType = field(default_factory=SensorType)
+    settings: ReaderSettings = DEFAULTS
+    prepared: tuple[Prepared, ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        settings = self.settings.template, self.settings.search
+        made = tuple(
+            (each, *_template_and_bank(each.alphabet, each.style, self.sensor, *settings))
+            for each in self.lab.arrays
+        )
+        object.__setattr__(self, "prepared", made)
+
+
+@lru_cache(maxsize=16)
+def _template_and_bank(
+    alphabet: Alphabet,
+    style: SymbolStyle,
+    sensor: SensorType,
+    template: TemplateSettings,
+    search: SearchSettings,
+) -> tuple[ResponseTemplate, Bank]:
+    felt = template_of(alphabet, style, sensor, template)
+    return felt, bank_of(felt, sensor, search)

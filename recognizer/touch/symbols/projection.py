@@ -1,0 +1,141 @@
+"""What lies under the tactels: cells of lattices, templates at their offsets, and chosen labels.
+
+Poses (b, 7) and gains (b, 4) of b lattices + image (n tactels) -> cell and template under each
+tactel; labels -> psi and its slopes. A sensor point s lies at R(theta) s + (x, y) in the lattice
+frame. Lattice and sensor frame in mm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recognizer.touch.symbols.gain import Image, normalize_image
+from recognizer.touch.symbols.noise import NormalizedImage
+from recognizer.touch.symbols.template import PSI, Floats, ResponseTemplate, psi
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Which symbols cells show: (b, n, 2) cells of b lattices -> (b, n) labels, -1 for none.
+Shown = Callable[[Ints], Ints]
+
+
+@dataclass(frozen=True, slots=True)
+class Projection:
+    """Templates where lattices put them."""
+
+    felt: NormalizedImage
+    cells: Ints  #: (b, n, 2) column and upward row of the cell under each tactel
+    tables: Floats  #: (b, n, q, 6) templates there, for what is fitted of form and gain
+
+
+def project_template(
+    image: Image, template: ResponseTemplate, pose: Array, gain: Array
+) -> Projection:
+    """Return what lies under the tactels for poses (b, 7) and gains (b, 4)."""
+    felt = normalize_image(image, gain)
+    c, s = np.cos(pose[:, 2, None]), np.sin(pose[:, 2, None])
+    x, y = image.points_mm.T
+    c, s = c * (1 + pose[:, 6, None]), s * (1 + pose[:, 6, None])
+    u = np.stack([pose[:, 0, None] + c * x - s * y, pose[:, 1, None] + s * x + c * y], axis=-1)
+    cells = np.floor(u / template.pitch_mm)
+    tables = _tables(template, u - (cells + 0.5) * template.pitch_mm, pose, felt)
+    return Projection(felt, cells.astype(np.int64), tables)
+
+
+def likeliest_labels(cells: Ints, scores: Array) -> Ints:
+    """Return the label (b, n) of what fits best in the cell under each tactel; -1: no symbol.
+
+    Parameters
+    ----------
+    scores
+        (b, n, q + 1) log-likelihoods at each tactel; the last is no symbol.
+    """
+    local = cells - cells.min(axis=1, keepdims=True)
+    width = int(local.max()) + 1
+    count = width * width
+    dense = local[..., 1] * width + local[..., 0] + np.arange(len(cells))[:, None] * count
+    flat = dense.ravel()
+    sums = np.stack(
+        [
+            np.bincount(flat, column, count * len(cells))
+            for column in scores.reshape(flat.size, -1).T
+        ],
+        axis=1,
+    )
+    best = sums.argmax(axis=1)
+    best[best == scores.shape[2] - 1] = -1
+    return np.asarray(best[dense])
+
+
+def values_of(under: Projection, labels: Ints) -> Array:
+    """Return psi and slopes (b, n, 6) of given symbols, and of the bare face where there is none.
+
+    Beyond the edge of a face nothing is felt: a tactel without a symbol shows what is nearer.
+    """
+    tables, felt = under.tables, under.felt
+    every = np.arange(labels.size) * tables.shape[2] + labels.clip(min=0).ravel()
+    found = tables.reshape(-1, tables.shape[3]).take(every, axis=0).astype(np.float64)
+    found = found.reshape(*labels.shape, -1)
+    found[labels < 0] = 0.0
+    floor = psi(felt.bare)
+    bare = (labels < 0) & (felt.psi > floor / 2)
+    found[bare, 0] = floor[bare]
+    return np.asarray(found)
+
+
+def explained_share(
+    image: Image, template: ResponseTemplate, pose: Array, gain: Array, shown: Shown
+) -> float:
+    """Return the share of the variance of psi that given symbols explain where they stand.
+
+    It is less than 0 where they explain nothing.
+
+    Parameters
+    ----------
+    pose, gain
+        (7,) and (4,) of one lattice.
+    """
+    under = project_template(image, template, pose[None], gain[None])
+    labels = shown(under.cells)
+    values, seen = values_of(under, labels)[0, :, 0], under.felt.psi[0]
+    trust = image.trust * (labels[0] >= 0)
+    if image.falls is not None:  # where the face has fallen away there is nothing to explain
+        trust = trust * under.felt.contact[0]
+    mean = (trust * seen).sum() / max(trust.sum(), 1e-12)
+    whole = float((trust * (seen - mean) ** 2).sum())
+    return 1.0 - float((trust * (seen - values) ** 2).sum()) / max(whole, 1e-12)
+
+
+def response_of(value: Array | Floats) -> Array:
+    """Return y of psi(y)."""
+    return np.asarray(np.expm1(value * np.float32(math.log(1 + PSI))) / np.float32(PSI))
+
+
+def response_by_psi(response: Array) -> Array:
+    """Return dy/dpsi."""
+    return (1 + PSI * response) * math.log(1 + PSI) / PSI
+
+
+def _tables(
+    template: ResponseTemplate, offsets: Array, pose: Array, felt: NormalizedImage
+) -> Floats:
+    """Return templates (b, n, q, 6) at offsets, for what is fitted of form and gain."""
+    tables = template.at(offsets)
+    for slope, by in enumerate(pose[:, 3:6, None, None].astype(np.float32).swapaxes(0, 1), 3):
+        tables[..., 0] += tables[..., slope] * by
+    if (felt.contact < 1).any():
+        tables *= felt.contact[..., None, None].astype(np.float32)
+    if felt.bare.any():
+        bare = felt.bare[..., None].astype(np.float32)
+        response = response_of(tables[..., 0]).astype(np.float32)
+        total = response + (1 - response) * bare
+        by = (1 - bare) * (1 + 3 * response) / (1 + 3 * total)
+        tables = (tables * by[..., None]).astype(np.float32)
+        tables[..., 0] = psi(total)
+    return tables
