@@ -17,7 +17,7 @@ from decoder.errors import DecoderError, MethodError
 from decoder.exact import decode_exact
 from decoder.likelihood import BLANK, DOUBT, decode_likelihood
 from decoder.score import SYMBOL_ERROR
-from decoder.window import parsed
+from decoder.window import parse_window
 from generator.array import DEFAULT_PROFILE, FoldedArray, ProductArray, array_from
 from generator.array import profile as profile_named
 
@@ -76,11 +76,11 @@ def decode(
     """
     held: Registered | None = None
     if database:
-        from decoder.registered import registered
+        from decoder.registered import read_registered
 
         if array is not None:
             raise DecoderError("both an array and a database were given", fix="give one of them")
-        held = registered(database, profile)
+        held = read_registered(database, profile)
     if array is not None and profile:
         raise DecoderError("both an array and a profile were given", fix="give one of them")
     if held:
@@ -89,7 +89,7 @@ def decode(
         on = profile_named(profile or DEFAULT_PROFILE).array()
     else:
         on = array_from(array) if isinstance(array, Mapping) else array
-    labels = parsed(window, on.order) if isinstance(window, str) else np.asarray(window)
+    labels = parse_window(window, on.order) if isinstance(window, str) else np.asarray(window)
     return decode_on(
         on, labels, method, held,
         error=error, doubt=doubt, blank=blank, rotations=rotations, top=top,

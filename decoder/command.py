@@ -79,24 +79,24 @@ def decode(
 ) -> int:  # fmt: skip
     """Decode one window; `HELP` is what people see."""
     from decoder.any_method import METHODS, decode_on
-    from decoder.window import parsed
+    from decoder.window import parse_window
 
     if method not in METHODS:
         raise typer.BadParameter(f"unknown method '{method}'; choose one of {', '.join(METHODS)}")
     held: Registered | None = None
     if database:
-        from decoder.registered import registered
+        from decoder.registered import read_registered
 
         if array:
             raise typer.BadParameter("both --array and --database were given; give one of them")
-        held = registered(database, profile)
+        held = read_registered(database, profile)
     chosen = held.array if held else _array(profile, array)
-    window = parsed(" ".join(rows), chosen.order)
+    window = parse_window(" ".join(rows), chosen.order)
     found = decode_on(
         chosen, window, method, held,
         rotations=_turns(rotations), error=error, doubt=doubt, blank=blank, top=top,
     )  # fmt: skip
-    known = _described(chosen, window, found, method, top)
+    known = _answer_values(chosen, window, found, method, top)
     if held:
         known |= {"object": found.object, "face": found.face}
     if plot is not None:
@@ -132,7 +132,7 @@ def _turns(text: str) -> list[int]:
         raise typer.BadParameter(f"--rotations {text}: give quarter turns as 0,1,2,3") from None
 
 
-def _described(
+def _answer_values(
     array: FoldedArray | ProductArray, window: Labels, found: Decoded, method: str, top: int
 ) -> dict[str, Any]:
     """Return what `--json` prints."""

@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.array.residue import Digits, Residues, packed
+from generator.array.residue import Digits, Residues, pack_words
 
 Element = NDArray[Any]  #: (...) uint64 words, or (..., D) float64 digits
 Map = NDArray[Any]  #: a linear map, as `Elements.map_of` prepares it
@@ -64,7 +64,7 @@ class BinaryElements:
 
     def of_digits(self, digits: Digits) -> Element:
         """Return words from (..., D) digits."""
-        return packed(digits)
+        return pack_words(digits)
 
     def keys(self, a: Element) -> NDArray[np.uint64]:
         """Return the words themselves."""
@@ -76,7 +76,7 @@ class BinaryElements:
 
     def map_of(self, matrix: Digits) -> Map:
         """Return the table of the images of every byte, (bytes * 256,) words."""
-        return _byte_table(packed(matrix), self._bytes)
+        return _byte_table(pack_words(matrix), self._bytes)
 
     def apply(self, prepared: Map, a: Element) -> Element:
         """Return the images of words: one lookup per byte."""
@@ -90,7 +90,7 @@ class BinaryElements:
         rows = np.zeros((16 * self._bytes, self.ring.degree))
         known = self.ring.powers_of_x
         rows[: len(known)] = known[: len(rows)]
-        return _byte_table(packed(rows), 2 * self._bytes)
+        return _byte_table(pack_words(rows), 2 * self._bytes)
 
     def product(self, a: Element, b: Element) -> Element:
         """Return a b: every byte times every byte by table, then reduced."""

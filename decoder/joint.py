@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from decoder.errors import MethodError
-from decoder.ranked import Ranked, best_of, joined
+from decoder.ranked import Ranked, best_of, best_of_all
 from decoder.score import Scores
 from generator.array.product import ProductArray
 from generator.array.sequence import Sequence
@@ -71,7 +71,7 @@ class Joint:
             places, chosen, rest = best_of(values, number)
             places = rows[places // self._columns] * self._columns + places % self._columns
             found = self._ranked(places, chosen, rest)
-            best = found if best is None else joined([best, found], number)[0]
+            best = found if best is None else best_of_all([best, found], number)[0]
         assert best is not None
         return best
 

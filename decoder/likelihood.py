@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from decoder.decoded import Candidate, Decodings, Reason
 from decoder.errors import WindowError
 from decoder.places import Places
-from decoder.ranked import Ranked, joined
+from decoder.ranked import Ranked, best_of_all
 from decoder.ranking import Ranking, ranking_of
-from decoder.score import SYMBOL_ERROR, Scores, hard_scores, unrelated
+from decoder.score import SYMBOL_ERROR, Scores, hard_scores, unrelated_score
 from decoder.window import checked_labels, checked_scores
 from generator.array.fold import FoldedArray
 from generator.array.product import ProductArray
@@ -119,8 +119,8 @@ class Likelihood:
         if len(scores) == 0:
             none = np.zeros(0, dtype=np.uint64)
             return Decodings(self.array.columns, none, none, None, none.astype(np.uint8))
-        weighed = _weighed(self, scores, max(2, top))
-        return _answered(self, scores, weighed, top)
+        weighed = _weigh(self, scores, max(2, top))
+        return _answers(self, scores, weighed, top)
 
 
 _Weighed = tuple[Ranked, NDArray[np.uint8], NDArray[np.float64]]
@@ -144,7 +144,7 @@ def decode_likelihood(
     return decoder.decode(windows, top)
 
 
-def _weighed(decoder: Likelihood, scores: Scores, number: int) -> _Weighed:
+def _weigh(decoder: Likelihood, scores: Scores, number: int) -> _Weighed:
     """Return the best places, their rotation (N, K), and the doubt (N,)."""
     parts, places = [], 0
     for turn in decoder.rotations:
@@ -154,19 +154,19 @@ def _weighed(decoder: Likelihood, scores: Scores, number: int) -> _Weighed:
         block = max(1, min(_WINDOWS, _VALUES // ranking.work))
         starts = range(0, max(1, len(scores)), block)
         chunks = [ranking.rank(flat[start : start + block], number) for start in starts]
-        parts.append(_concatenated(chunks))
+        parts.append(_concatenate(chunks))
         places += ranking.size
-    best, source = joined(parts, number) if len(parts) > 1 else (parts[0], None)
+    best, source = best_of_all(parts, number) if len(parts) > 1 else (parts[0], None)
     rotations = np.array(decoder.rotations, dtype=np.uint8)
     turns = np.full(best.rows.shape, rotations[0]) if source is None else rotations[source]
     flat = scores.reshape(len(scores), -1, scores.shape[3])
     odds = decoder.blank / (1 - decoder.blank) * places
-    nothing = odds * np.exp((unrelated(flat) - best.values[:, 0]).clip(max=100.0))
+    nothing = odds * np.exp((unrelated_score(flat) - best.values[:, 0]).clip(max=100.0))
     others = np.where(np.isfinite(best.values[:, 0]), best.rest + nothing, 1e30)
     return best, turns, others / (1 + others)
 
 
-def _concatenated(chunks: list[Ranked]) -> Ranked:
+def _concatenate(chunks: list[Ranked]) -> Ranked:
     if len(chunks) == 1:
         return chunks[0]
     return Ranked(
@@ -177,19 +177,19 @@ def _concatenated(chunks: list[Ranked]) -> Ranked:
     )
 
 
-def _answered(decoder: Likelihood, scores: Scores, weighed: _Weighed, top: int) -> Decodings:
+def _answers(decoder: Likelihood, scores: Scores, weighed: _Weighed, top: int) -> Decodings:
     best, turns, doubts = weighed
     array = decoder.array
     reasons = np.where(doubts > decoder.doubt, Reason.AMBIGUOUS, Reason.NONE).astype(np.uint8)
-    listed = {i: _listed(best, turns, i) for i in range(len(scores))} if top else {}
+    listed = {i: _candidates(best, turns, i) for i in range(len(scores))} if top else {}
     refused = np.flatnonzero(reasons)
     if refused.size:
         reasons[refused] = _why(decoder, scores[refused], weighed, refused)
         if not top:
-            more = _weighed(decoder, scores[refused], LISTED)
+            more = _weigh(decoder, scores[refused], LISTED)
             for place, i in enumerate(refused.tolist()):
                 if reasons[i] != Reason.NOT_ENCODED:
-                    listed[i] = _listed(more[0], more[1], place, _FAR)
+                    listed[i] = _candidates(more[0], more[1], place, _FAR)
     single = best.rows.shape[1] < 2
     margins = np.full(len(scores), np.inf) if single else best.values[:, 0] - best.values[:, 1]
     second = min(1, best.rows.shape[1] - 1)
@@ -217,9 +217,11 @@ def _why(
     best = weighed[0]
     flat = scores.reshape(len(scores), -1, scores.shape[3])
     likely = best.values[refused, 0] + np.log1p(best.rest[refused])
-    places = sum(decoder.ranking(_turned(scores.shape, turn)).size for turn in decoder.rotations)
+    places = sum(
+        decoder.ranking(_turned_place(scores.shape, turn)).size for turn in decoder.rotations
+    )
     odds = decoder.blank / (1 - decoder.blank) * places
-    without = likely < unrelated(flat) + np.log(max(odds, np.finfo(float).tiny))
+    without = likely < unrelated_score(flat) + np.log(max(odds, np.finfo(float).tiny))
     reasons = np.where(without, Reason.NOT_ENCODED, Reason.AMBIGUOUS)
     known: dict[bytes, bool] = {}
     for i, seen in enumerate((scores != 0).any(axis=3)):
@@ -232,11 +234,11 @@ def _why(
     return reasons.astype(np.uint8)
 
 
-def _turned(shape: tuple[int, ...], turn: int) -> tuple[int, int]:
+def _turned_place(shape: tuple[int, ...], turn: int) -> tuple[int, int]:
     return (shape[2], shape[1]) if turn % 2 else (shape[1], shape[2])
 
 
-def _listed(
+def _candidates(
     best: Ranked, turns: NDArray[np.uint8], place: int, far: float = np.inf
 ) -> tuple[Candidate, ...]:
     values = best.values[place] - best.values[place, 0]

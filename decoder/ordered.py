@@ -23,7 +23,7 @@ from decoder.dual import binary_dual, odd_dual
 from decoder.element import elements_of
 from decoder.score import Scores
 from decoder.spectrum import Coefficients, Spectrum
-from generator.array.residue import packed
+from generator.array.residue import pack_words
 from generator.array.sequence import Sequence
 
 Keys = NDArray[np.uint64]
@@ -41,7 +41,7 @@ class Ordered:
         self._sequence = sequence
         self._tries = tries
         binary = sequence.ring.prime == 2
-        self._words = packed(self.spectrum.frequencies) if binary else None
+        self._words = pack_words(self.spectrum.frequencies) if binary else None
 
     def rank_keys(
         self, scores: Scores, number: int
@@ -81,7 +81,7 @@ class Ordered:
         flips = np.concatenate([np.zeros((len(basis), 1), np.uint64), basis], axis=1)
         signs = _signs(flips[..., None] & self._words)  # (N, D + 1, U)
         seen = weights * _signs(first[:, None] & self._words)
-        left, right, scores = _flipped(signs, seen)
+        left, right, scores = _best_flips(signs, seen)
         keys = first[:, None] ^ flips[lines, left] ^ flips[lines, right]
         return keys, scores, np.count_nonzero(trusted == 0, axis=1)
 
@@ -101,13 +101,13 @@ class Ordered:
         roots = np.exp(2j * np.pi / prime * np.arange(prime)).astype(np.complex64)
         signs = roots[ring.reduced(flips @ frequencies.T).astype(np.intp)]
         seen = weights * roots[ring.reduced(first @ frequencies.T).astype(np.intp)]
-        left, right, scores = _flipped(signs, seen)
+        left, right, scores = _best_flips(signs, seen)
         places = ring.reduced(first[:, None] + flips[lines, left] + flips[lines, right])
         keys = elements_of(ring).keys(places)
         return keys, scores, np.count_nonzero(trusted == 0, axis=1)
 
 
-def _flipped(
+def _best_flips(
     signs: NDArray[Any], seen: NDArray[Any]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float32]]:
     """Return the best pairs of flips (N, 6), 0 for none, and their scores."""

@@ -54,7 +54,7 @@ class Places:
         self.rows, self.columns = unique[:, 0], unique[:, 1]
         a, b = np.indices(shape).reshape(2, -1).astype(np.uint64)
         labels = array.symbols(
-            _moved(self.rows, a, array.rows), _moved(self.columns, b, array.columns)
+            _shift_places(self.rows, a, array.rows), _shift_places(self.columns, b, array.columns)
         )
         every = labels[..., None] == np.arange(array.order)
         self._codebook = every.reshape(len(unique), -1).T.astype(np.float32)
@@ -76,7 +76,9 @@ class Places:
         return Ranked(self.rows[places], self.columns[places], chosen, rest)
 
 
-def _moved(places: NDArray[np.uint64], steps: NDArray[np.uint64], cycle: int) -> NDArray[np.uint64]:
+def _shift_places(
+    places: NDArray[np.uint64], steps: NDArray[np.uint64], cycle: int
+) -> NDArray[np.uint64]:
     """Return (P, k) places + steps on a cycle of up to 2^64, without overflow."""
     steps = steps % np.uint64(cycle)
     room = np.uint64(cycle) - steps

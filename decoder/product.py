@@ -22,7 +22,7 @@ def convert_product(array: ProductArray, labels: Labels, method: str) -> tuple[T
     factors = np.concatenate([array.factors, np.full((1, 2), ERASED)])[labels]
     found = []
     for axis, sequence in enumerate((array.row_sequence, array.column_sequence)):
-        terms, agree = _agreed(factors[..., axis], 2 - axis)
+        terms, agree = _agreement(factors[..., axis], 2 - axis)
         part = convert_terms(sequence, list(range(terms.shape[1])), terms, method)
         found.append((part, agree))
     (in_rows, rows_agree), (in_columns, columns_agree) = found
@@ -32,7 +32,7 @@ def convert_product(array: ProductArray, labels: Labels, method: str) -> tuple[T
     return in_rows, in_columns
 
 
-def _agreed(factors: Labels, axis: int) -> tuple[Labels, NDArray[np.bool_]]:
+def _agreement(factors: Labels, axis: int) -> tuple[Labels, NDArray[np.bool_]]:
     """Return the (N, k) terms that the symbols of each line show, and whether they agree."""
     high = factors.max(axis=axis)
     low = np.where(factors == ERASED, np.iinfo(np.int64).max, factors).min(axis=axis)

@@ -64,7 +64,7 @@ def _highest(values: NDArray[np.float32], number: int) -> NDArray[np.intp]:
     return np.take_along_axis(inside, kept, axis=1)
 
 
-def joined(parts: list[Ranked], number: int) -> tuple[Ranked, NDArray[np.uint8]]:
+def best_of_all(parts: list[Ranked], number: int) -> tuple[Ranked, NDArray[np.uint8]]:
     """Return the K best of several hypotheses (rotations), and which each came from, (N, K)."""
     rows = np.concatenate([part.rows for part in parts], axis=1)
     columns = np.concatenate([part.columns for part in parts], axis=1)

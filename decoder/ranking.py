@@ -18,7 +18,7 @@ from decoder.element import elements_of
 from decoder.joint import Joint
 from decoder.ordered import Ordered
 from decoder.ranked import Ranked, best_of
-from decoder.score import Scores, unrelated
+from decoder.score import Scores, unrelated_score
 from decoder.transform import LARGEST_TRANSFORM, Transform
 from generator.array.fold import FoldedArray
 from generator.array.product import ProductArray
@@ -64,7 +64,7 @@ class AllPlaces:
             elements = elements_of(self._array.sequence.ring)
             logarithm = conversion(self._array.sequence, "logarithm")
             found = np.flatnonzero(np.isfinite(values.ravel()))
-            unseen = np.log(self.size) + unrelated(scores) - values[:, 0]
+            unseen = np.log(self.size) + unrelated_score(scores) - values[:, 0]
             rest += np.exp(unseen.clip(max=100.0))  # the places that were not tried
             t = np.zeros(values.shape, dtype=np.uint64)
             t.ravel()[found] = logarithm.convert(elements.of_keys(keys.ravel()[found]))

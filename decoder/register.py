@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from decoder.element import Element, elements_of
 from generator.array.contract import Labels
-from generator.array.residue import Digits, packed
+from generator.array.residue import Digits, pack_words
 from generator.array.sequence import Sequence
 
 LISTED = 64  #: most candidates that are listed
@@ -39,7 +39,7 @@ class Register:
         self.elements = elements_of(sequence.ring)
         maps = sequence.functionals(sequence.element(offsets))
         equations = maps.reshape(-1, sequence.ring.degree)
-        self._combinations, self._reduced, self.pivots = eliminated(equations, sequence.ring.prime)
+        self._combinations, self._reduced, self.pivots = eliminate(equations, sequence.ring.prime)
 
     @property
     def determined(self) -> bool:
@@ -56,9 +56,9 @@ class Register:
         words[..., self.pivots] = parts[..., : len(self.pivots)]
         checks = parts[..., len(self.pivots) :]
         starts = range(0, checks.shape[-1], 64)
-        blocks = [packed(checks[..., start : start + 64]) for start in starts]
+        blocks = [pack_words(checks[..., start : start + 64]) for start in starts]
         empty = np.zeros((0, *parts.shape[:2]), dtype=np.uint64)
-        return packed(words), np.array(blocks) if blocks else empty
+        return pack_words(words), np.array(blocks) if blocks else empty
 
     def read(self, labels: Labels) -> tuple[Element, NDArray[np.bool_]]:
         """Return the elements (N,) of windows, and which windows pass their checks.
@@ -98,7 +98,7 @@ class Register:
         return np.asarray(self.elements.keys(states) != 0)
 
 
-def eliminated(equations: Digits, prime: int) -> tuple[Digits, Digits, list[int]]:
+def eliminate(equations: Digits, prime: int) -> tuple[Digits, Digits, list[int]]:
     """Return (E, R, pivots): E @ equations = R modulo p, R in reduced row echelon form."""
     number, degree = equations.shape
     whole = np.concatenate([equations, np.eye(number)], axis=1).astype(np.int64)

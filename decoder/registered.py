@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from decoder.errors import DecoderError
 from generator.array import FoldedArray, ProductArray, array_from
 from generator.array.contract import Labels
-from generator.database.cells import faces_at, occupied
+from generator.database.cells import faces_at, occupied_cells
 from generator.database.open import open_database
 from generator.database.read import list_objects, read_array, read_object
 from generator.database.transaction import reading
@@ -31,7 +31,7 @@ class Registered:
     cells: NDArray[np.int64]  #: (n, 2) rows and columns, all different
 
 
-def registered(url: str, profile: str = "") -> Registered:
+def read_registered(url: str, profile: str = "") -> Registered:
     """Return the array of a database and its registered cells.
 
     Parameters
@@ -60,7 +60,9 @@ def registered(url: str, profile: str = "") -> Registered:
                 place=url,
             )
         array = array_from(read_array(connection, named[0]).definition)
-        return Registered(url, named[0], array, np.stack(occupied(connection, named[0]), axis=1))
+        return Registered(
+            url, named[0], array, np.stack(occupied_cells(connection, named[0]), axis=1)
+        )
 
 
 def prior(held: Registered, window: Labels) -> NDArray[np.int64]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from decoder.dual import binary_dual, odd_dual
 from decoder.element import Element, elements_of
 from generator.array.contract import Labels
-from generator.array.residue import packed
+from generator.array.residue import pack_words
 from generator.array.sequence import Sequence
 
 
@@ -41,7 +41,7 @@ def read_scattered(
     states: Element
     known: NDArray[np.bool_]
     if ring.prime == 2:
-        words = packed(functionals)
+        words = pack_words(functionals)
         basis, chosen = binary_dual(words, order, ring.degree)
         known = (chosen >= 0) & seen[lines, chosen]
         parts = np.where(known & (digits[lines, chosen] == 1), basis, np.uint64(0))

@@ -48,7 +48,7 @@ def hard_scores(labels: Labels, order: int, error: float = SYMBOL_ERROR) -> Scor
     return table[labels]
 
 
-def unrelated(scores: Scores) -> NDArray[np.float64]:
+def unrelated_score(scores: Scores) -> NDArray[np.float64]:
     """Return the log-likelihood of each window (N, k, q) if its symbols are unrelated.
 
     It is the share of a surface without code, and the expected share of one wrong place.

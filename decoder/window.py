@@ -19,7 +19,7 @@ ERASED = -1  #: label of a symbol that is not seen
 LARGEST_SCORE = 1e6  #: nats; beyond it single precision loses single cells
 
 
-def parsed(text: str, order: int) -> Labels:
+def parse_window(text: str, order: int) -> Labels:
     """Return the (rows, columns) labels of a window written as text.
 
     Labels above 9 are written apart by commas: "10,3 0,?".

@@ -32,6 +32,6 @@ def figures_of(text: str) -> list[int]:
     return [names.index(character) for character in text]
 
 
-def underlined(text: str) -> bool:
+def needs_bar(text: str) -> bool:
     """Whether a text needs a bar below to tell which way up it is."""
     return "6" in text or "9" in text

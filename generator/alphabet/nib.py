@@ -23,7 +23,7 @@ _FLATS = np.array(
 _NIB = _FLATS + np.tan(np.pi / 8) * np.stack([-_FLATS[:, 1], _FLATS[:, 0]], axis=1)
 
 
-def covered(strokes: NDArray[np.float64], width_mm: float) -> list[Lines]:
+def nib_outline(strokes: NDArray[np.float64], width_mm: float) -> list[Lines]:
     """Return the outline of strokes drawn by an octagonal nib.
 
     Parameters
@@ -54,10 +54,10 @@ def covered(strokes: NDArray[np.float64], width_mm: float) -> list[Lines]:
     known = np.concatenate(lines)
     union = CrossSection.batch_boolean(hulls, OpType.Add)
     scale = float(np.abs(strokes).max()) + width_mm
-    return [_named(ring, known, scale) for ring in union.to_polygons()]
+    return [_support_lines(ring, known, scale) for ring in union.to_polygons()]
 
 
-def moved(ring: Lines, distance_mm: float) -> NDArray[np.float64]:
+def offset_ring(ring: Lines, distance_mm: float) -> NDArray[np.float64]:
     """Return the (k, 2) corners of a ring whose every edge moves out by `distance_mm`.
 
     Corner i lies between edges i - 1 and i.
@@ -70,7 +70,7 @@ def moved(ring: Lines, distance_mm: float) -> NDArray[np.float64]:
     return np.stack([x, y], axis=1)
 
 
-def _named(ring: NDArray[np.float64], known: Lines, scale: float) -> Lines:
+def _support_lines(ring: NDArray[np.float64], known: Lines, scale: float) -> Lines:
     """Replace the rounded edges of a union by the support lines they lie on."""
     edge = np.roll(ring, -1, axis=0) - ring
     length = np.hypot(edge[:, 0], edge[:, 1])

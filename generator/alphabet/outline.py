@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.alphabet.known import Alphabet
-from generator.alphabet.nib import Lines, covered, moved
-from generator.alphabet.rings import crossing, edges_kept, signed_area
+from generator.alphabet.nib import Lines, nib_outline, offset_ring
+from generator.alphabet.rings import edges_cross, edges_kept, signed_area
 from generator.alphabet.strokes import Glyph
 from generator.errors import AlphabetError
 
@@ -112,13 +112,13 @@ def outline(glyph: Glyph, unit_mm: float, style: SymbolStyle, *, place: str = ""
     lines = _stroke_lines(glyph, unit_mm, style.stroke_mm, place)
     steps = _steps(style)
     if _regular(lines, [d for _, d in steps], style.stroke_mm):
-        rings = tuple(tuple(_frozen(moved(ring, d)) for ring in lines) for _, d in steps)
+        rings = tuple(tuple(_read_only(offset_ring(ring, d)) for ring in lines) for _, d in steps)
         return Tiers(tuple(z for z, _ in steps), rings)
     raise _collapse(glyph, unit_mm, style, place)
 
 
 @lru_cache(maxsize=256)
-def engraved(glyph: Glyph, unit_mm: float, stroke_mm: float, depth_mm: float) -> Tiers:
+def engrave(glyph: Glyph, unit_mm: float, stroke_mm: float, depth_mm: float) -> Tiers:
     """Return the tiers of a glyph cut into a facet as a groove with 45 degree walls.
 
     The stroke has its width at the surface and loses twice the depth at the floor, so the
@@ -135,7 +135,9 @@ def engraved(glyph: Glyph, unit_mm: float, stroke_mm: float, depth_mm: float) ->
             f"'{glyph.name}' collapses: stroke {stroke_mm:g} mm, depth {depth_mm:g} mm",
             fix=f"engrave less than {0.45 * stroke_mm:.2g} mm deep, or use larger figures",
         )
-    rings = tuple(tuple(_frozen(moved(ring, d)) for ring in lines) for d in (0.0, -depth_mm))
+    rings = tuple(
+        tuple(_read_only(offset_ring(ring, d)) for ring in lines) for d in (0.0, -depth_mm)
+    )
     return Tiers((0.0, -depth_mm), rings)
 
 
@@ -209,10 +211,10 @@ def _check_numbers(style: SymbolStyle, place: str) -> None:
 
 def _stroke_lines(glyph: Glyph, unit_mm: float, stroke_mm: float, place: str) -> list[Lines]:
     """Return the outline's lines, outer ring first, starting at its lowest left corner."""
-    rings = covered(np.array(glyph.strokes, dtype=np.float64) * unit_mm, stroke_mm)
+    rings = nib_outline(np.array(glyph.strokes, dtype=np.float64) * unit_mm, stroke_mm)
     begun = []
     for ring in rings:
-        corners = moved(ring, 0.0)
+        corners = offset_ring(ring, 0.0)
         order = np.lexsort(np.round(corners / stroke_mm, 6).T[::-1])
         first = int(order[0])
         area = signed_area(corners)
@@ -228,13 +230,13 @@ def _stroke_lines(glyph: Glyph, unit_mm: float, stroke_mm: float, place: str) ->
 
 def _regular(lines: list[Lines], distances: list[float], stroke_mm: float) -> bool:
     """Whether all edges survive at every distance and no two of them meet."""
-    normal = [moved(ring, 0.0) for ring in lines]
+    normal = [offset_ring(ring, 0.0) for ring in lines]
     for distance in distances:
-        rings = [moved(ring, distance) for ring in lines]
+        rings = [offset_ring(ring, distance) for ring in lines]
         short = SHORTEST_EDGE * stroke_mm
         if not all(edges_kept(a, b, short) for a, b in zip(normal, rings, strict=True)):
             return False
-        if crossing(rings):
+        if edges_cross(rings):
             return False
     return True
 
@@ -273,6 +275,6 @@ def _collapse(glyph: Glyph, unit_mm: float, style: SymbolStyle, place: str) -> A
     return AlphabetError(cause, fix="set " + ", or ".join(ways), place=place)
 
 
-def _frozen(ring: Ring) -> Ring:
+def _read_only(ring: Ring) -> Ring:
     ring.setflags(write=False)
     return ring

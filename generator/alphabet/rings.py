@@ -41,7 +41,7 @@ def segments(rings: Sequence[Ring]) -> tuple[Ring, Ring, NDArray[np.int64], NDAr
     return points[a], points[b], a, b
 
 
-def crossing(rings: Sequence[Ring]) -> bool:
+def edges_cross(rings: Sequence[Ring]) -> bool:
     """Whether two edges that share no corner meet, touching included.
 
     Neighbouring edges may not fold back on each other either.
@@ -55,7 +55,7 @@ def crossing(rings: Sequence[Ring]) -> bool:
 
 
 def _crossing_swept(starts: Ring, ends: Ring, a: NDArray[np.int64], b: NDArray[np.int64]) -> bool:
-    """`crossing` for many edges: only pairs whose x ranges overlap."""
+    """`edges_cross` for many edges: only pairs whose x ranges overlap."""
     low = np.minimum(starts[:, 0], ends[:, 0])
     high = np.maximum(starts[:, 0], ends[:, 0])
     order = np.argsort(low, kind="stable")
@@ -93,7 +93,7 @@ def _any_meeting(
     return bool(((np.abs(turn) <= 1e-12 * size) & (dot < 0)).any())
 
 
-def inside(points: Ring, rings: Sequence[Ring]) -> NDArray[np.bool_]:
+def points_inside(points: Ring, rings: Sequence[Ring]) -> NDArray[np.bool_]:
     """Whether points lie inside an area given by its rings (even-odd), points (n, 2).
 
     Orientation tests per edge, not sums of areas; a point on the border may fall either way.

@@ -59,7 +59,7 @@ def counts(glyph: Glyph) -> Counts:
     return Counts(ends, vertices, len(edges) - len(spokes) + pieces, pieces)
 
 
-def turned(glyph: Glyph, quarters: int) -> Glyph:
+def turn_glyph(glyph: Glyph, quarters: int) -> Glyph:
     """Return the glyph turned counter-clockwise by quarter turns about the symbol's centre."""
     strokes = glyph.strokes
     for _ in range(quarters % 4):
@@ -105,7 +105,7 @@ def check_distinguishable(alphabet: str, glyphs: tuple[Glyph, ...]) -> None:
                 place=place,
             )
         for quarters in (1, 2, 3):
-            if same_shape(glyph, turned(glyph, quarters)):
+            if same_shape(glyph, turn_glyph(glyph, quarters)):
                 raise AlphabetError(
                     f"symbol '{glyph.name}' looks the same after {90 * quarters} degrees",
                     fix="make it unsymmetric under quarter turns",
@@ -113,7 +113,7 @@ def check_distinguishable(alphabet: str, glyphs: tuple[Glyph, ...]) -> None:
                 )
     for one, other in combinations(glyphs, 2):
         for quarters in range(4):
-            if same_shape(one, turned(other, quarters)):
+            if same_shape(one, turn_glyph(other, quarters)):
                 raise AlphabetError(
                     f"symbol '{one.name}' is symbol '{other.name}' turned by {90 * quarters} "
                     "degrees",

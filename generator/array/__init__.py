@@ -17,7 +17,7 @@ from generator.array.contract import Labels, SymbolArray
 from generator.array.definition import array_from
 from generator.array.fold import FoldedArray
 from generator.array.product import ProductArray
-from generator.array.profiles import DEFAULT_PROFILE, PROFILES, Profile, enlarged, profile
+from generator.array.profiles import DEFAULT_PROFILE, PROFILES, Profile, next_larger, profile
 from generator.array.sequence import Sequence
 from generator.errors import ArrayError
 
@@ -32,6 +32,6 @@ __all__ = [
     "Sequence",
     "SymbolArray",
     "array_from",
-    "enlarged",
+    "next_larger",
     "profile",
 ]

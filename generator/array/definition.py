@@ -18,7 +18,7 @@ from typing import Any
 
 from generator.array.field import Field, field_of_order
 from generator.array.fold import FoldedArray
-from generator.array.notation import parsed
+from generator.array.notation import parse_polynomial
 from generator.array.primitive import primitive_polynomial
 from generator.array.product import ProductArray
 from generator.array.sequence import Sequence
@@ -198,7 +198,7 @@ def _polynomial(given: Mapping[str, Any], order: int) -> tuple[int, ...]:
     if isinstance(polynomial, int) and not isinstance(polynomial, bool) and polynomial > 0:
         polynomial = hex(polynomial)
     if isinstance(polynomial, str):
-        return parsed(_field(given, order), polynomial)
+        return parse_polynomial(_field(given, order), polynomial)
     if _are_integers(polynomial):
         return tuple(polynomial)
     raise ArrayError(

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from generator.array.contract import Labels
-from generator.array.notation import written
-from generator.array.residue import Digits, Powers, packed
+from generator.array.notation import format_polynomial
+from generator.array.residue import Digits, Powers, pack_words
 from generator.array.sequence import Sequence
 from generator.array.size import no_fold
 from generator.array.torus import on_torus
@@ -108,7 +108,7 @@ class FoldedArray:
         elements = self._gamma.at(c)  # (columns, D)
         in_row, in_column = np.broadcast_arrays(in_row, in_column)
         if field.characteristic == 2:
-            masks, words = packed(maps), packed(elements)[in_column]
+            masks, words = pack_words(maps), pack_words(elements)[in_column]
             codes = np.zeros(in_row.shape, dtype=np.int64)
             for digit in range(field.degree):
                 ones = np.bitwise_count(masks[in_row, digit] & words)
@@ -201,7 +201,7 @@ class FoldedArray:
         rank = self._window_rank(window)
         if rank < self.full_rank:
             smallest, larger = self._smallest_window(), self._smallest_window(window)
-            name = written(self.sequence.field, self.sequence.polynomial)
+            name = format_polynomial(self.sequence.field, self.sequence.polynomial)
             raise ArrayError(
                 f"a {a}x{b} window of {name} on {self.rows}x{self.columns} has rank {rank} of "
                 f"{self.full_rank}, so it occurs more than once",

@@ -16,7 +16,7 @@ _TERM = re.compile(r"(?P<number>\d+)?(?P<a>A(?:\^(?P<power>\d+))?)?(?P<x>x(?:\^(
 _GROUP = re.compile(r"([^()+]*)\(([^()]*)\)")
 
 
-def parsed(field: Field, text: str) -> tuple[int, ...]:
+def parse_polynomial(field: Field, text: str) -> tuple[int, ...]:
     """Return the polynomial written as `text`, e.g. "x^6+x^2+x+A" or "0x1099".
 
     Raises `ArrayError` that shows the term which is not understood.
@@ -70,8 +70,8 @@ def _term(field: Field, text: str, term: str) -> tuple[int, int]:
     return label, degree
 
 
-def written(field: Field, h: Sequence[int]) -> str:
-    """Return the polynomial as text that `parsed` reads: "x^6+x^2+x+A", or "0x1099" over GF(2)."""
+def format_polynomial(field: Field, h: Sequence[int]) -> str:
+    """Return the polynomial as text: "x^6+x^2+x+A", or "0x1099" over GF(2)."""
     if field.order == 2:
         return hex(sum(bit << k for k, bit in enumerate(h)))
     terms = []

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from generator.array.factor import period_factors
 from generator.array.field import Field, field_of_order
-from generator.array.notation import parsed
+from generator.array.notation import parse_polynomial
 from generator.array.polynomial import is_primitive
 from generator.errors import ArrayError
 
@@ -33,7 +33,7 @@ class PrimitivePolynomial:
     @property
     def labels(self) -> tuple[int, ...]:
         """Coefficients over GF(order), from x^0 to x^degree = 1."""
-        return parsed(field_of_order(self.order), self.text)
+        return parse_polynomial(field_of_order(self.order), self.text)
 
 
 @cache

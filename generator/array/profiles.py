@@ -119,7 +119,7 @@ def profile(name: str = DEFAULT_PROFILE) -> Profile:
         ) from None
 
 
-def enlarged(smaller: Profile) -> Profile:
+def next_larger(smaller: Profile) -> Profile:
     """Return the profile on the next larger fold of the same field: `large` "and up".
 
     255x257, 511x513, 1023x1025, 4095x4097, ... over GF(4); the window is the smallest one.

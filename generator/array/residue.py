@@ -161,7 +161,7 @@ class Powers:
         return ladder[bit]
 
 
-def packed(digits: Digits) -> Words:
+def pack_words(digits: Digits) -> Words:
     """Return (..., D) binary digits, D <= 64, as one 64-bit word each."""
     bits = np.packbits(digits.astype(np.uint8), axis=-1, bitorder="little")
     whole = np.zeros((*bits.shape[:-1], 8), dtype=np.uint8)

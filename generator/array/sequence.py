@@ -24,9 +24,9 @@ from generator.array.factor import (
     period_factors,
 )
 from generator.array.field import Field, Labels
-from generator.array.notation import written
+from generator.array.notation import format_polynomial
 from generator.array.polynomial import companion_powers, monic, norm
-from generator.array.residue import Digits, Powers, Residues, binary_rank, packed, rank_modulo
+from generator.array.residue import Digits, Powers, Residues, binary_rank, pack_words, rank_modulo
 from generator.array.torus import on_torus
 from generator.errors import ArrayError
 
@@ -70,9 +70,10 @@ class Sequence:
         self._refuse_undecodable()
         self.ring = Residues(field.characteristic, norm(field, self.polynomial))
         if not self.ring.is_primitive(self.factors):
+            given = format_polynomial(field, self.polynomial)
             raise ArrayError(
-                f"{written(field, self.polynomial)} is not primitive over GF({field.order}): its "
-                f"sequence repeats before {self.period} terms",
+                f"{given} is not primitive over GF({field.order}): its sequence repeats before "
+                f"{self.period} terms",
                 fix="take one on file (generator.array.primitive.primitive_polynomial("
                 f"{field.order}, {self.degree})) or leave polynomial: out",
             )
@@ -87,7 +88,7 @@ class Sequence:
         self._remembered: dict[int, list[int]] = {}
 
     def __repr__(self) -> str:
-        return f"Sequence(GF({self.field.order}), {written(self.field, self.polynomial)})"
+        return f"Sequence(GF({self.field.order}), {format_polynomial(self.field, self.polynomial)})"
 
     def _refuse_undecodable(self) -> None:
         largest = max(self.factors, default=1)
@@ -218,6 +219,6 @@ class Sequence:
             self._remembered = known = {}
             missing = offsets
         if missing:
-            maps = packed(self.functionals(self.element(missing))).tolist()
+            maps = pack_words(self.functionals(self.element(missing))).tolist()
             known.update(zip(missing, maps, strict=True))
         return [word for offset in offsets for word in known[offset]]

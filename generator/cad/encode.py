@@ -26,9 +26,9 @@ from generator.pipeline.choose import choose_array
 from generator.pipeline.encode import encode as encode_specs
 from generator.pipeline.encode import new_database
 from generator.pipeline.files import parts_of
-from generator.pipeline.made import Encoded, Made
-from generator.pipeline.make import Order, made_under_lock
-from generator.pipeline.plan import planned
+from generator.pipeline.made import Encoded, MadeObject
+from generator.pipeline.make import Order, make_under_lock
+from generator.pipeline.plan import plan_object
 from generator.polyhedron import Polyhedron
 from generator.polyhedron.read import READERS
 from generator.solid import Part
@@ -45,7 +45,7 @@ DIGITS = 6  #: of a coordinate (mm) by which two solids are told apart
 class EncodedSolid:
     """A solid that was encoded and registered."""
 
-    made: Made
+    made: MadeObject
     database: str  #: URL
     polyhedron: Polyhedron  #: mm, frame of the solid that was given
     layout: Layout  #: which cell stands where on which face
@@ -196,7 +196,7 @@ def encode(
     engine = open_if_there(url)
     with reading(engine) if engine else nullcontext() as connection:
         choice = choose_array([located], connection, polyhedron)
-    plan = planned(choice.specs[0], polyhedron)
+    plan = plan_object(choice.specs[0], polyhedron)
     plan = dataclasses.replace(plan, notes=(*plan.notes, *choice.notes))
     order = Order(
         plan,
@@ -205,7 +205,7 @@ def encode(
         verify,
         replace,
     )
-    product = made_under_lock(engine or new_database(url, plan), order)
+    product = make_under_lock(engine or new_database(url, plan), order)
     layout = product.placed.layout
     return EncodedSolid(product.made, url, polyhedron, layout, parts_of(plan, layout)[0])
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from generator.errors import ShapeError
 from generator.polyhedron import Polyhedron
-from generator.polyhedron.read.kernel import described
-from generator.polyhedron.read.merge import merged
+from generator.polyhedron.read.kernel import describe_shape
+from generator.polyhedron.read.merge import merge_triangles
 from generator.polyhedron.read.soup import soup_of_triangles
 from generator.polyhedron.read.step import polyhedron_of
 from generator.polyhedron.winged import polyhedron
@@ -37,8 +37,10 @@ def polyhedron_from(solid: Any) -> Polyhedron:
     """
     triangles = getattr(solid, "triangles", None)  # of trimesh.Trimesh, (n, 3, 3)
     if isinstance(triangles, np.ndarray):
-        return polyhedron("solid", *merged(soup_of_triangles(np.array(triangles, float), PLACE)))
-    return polyhedron_of(described(_kernel_shape(solid)), PLACE, "solid")
+        return polyhedron(
+            "solid", *merge_triangles(soup_of_triangles(np.array(triangles, float), PLACE))
+        )
+    return polyhedron_of(describe_shape(_kernel_shape(solid)), PLACE, "solid")
 
 
 def _kernel_shape(solid: Any) -> Any:

@@ -11,7 +11,7 @@ from encoded_objects import console
 from encoded_objects.console import Action
 
 if TYPE_CHECKING:
-    from generator.spec import Located
+    from generator.spec import LocatedSpec
 
 HELP = """Emboss objects with a pseudo-random array, so that a touch tells object, face and place.
 
@@ -119,7 +119,7 @@ def _make(
 
     wanted = format_option(formats) if formats else None
     url = database_option(database) if database else None
-    located: tuple[Located, ...] = read_specs(specs, database=url)
+    located: tuple[LocatedSpec, ...] = read_specs(specs, database=url)
 
     from generator.pipeline import encode as make
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from encoded_objects.console import output
 from generator.database.url import without_password
-from generator.pipeline import Encoded, Made
+from generator.pipeline import Encoded, MadeObject
 
 
 def print_made(result: Encoded, *, dry_run: bool, as_json: bool) -> None:
@@ -38,7 +38,7 @@ def print_made(result: Encoded, *, dry_run: bool, as_json: bool) -> None:
         output.write(following)
 
 
-def _object_text(made: Made, dry_run: bool) -> str:
+def _object_text(made: MadeObject, dry_run: bool) -> str:
     """Return a few lines on one object."""
     verb = "made"
     if dry_run:
@@ -75,7 +75,7 @@ def _file_list(folder: Path, files: tuple[Path, ...]) -> str:
     )
 
 
-def _next_step(objects: tuple[Made, ...]) -> str:
+def _next_step(objects: tuple[MadeObject, ...]) -> str:
     """Return what a person does next: look, and print."""
     files = [file for made in objects for file in made.files]
     picture = next((file for file in files if file.suffix == ".png"), None)

@@ -184,11 +184,11 @@ def import_(
 def _confirm(engine: Engine, names: list[str], *, as_json: bool) -> None:
     """Ask before cells are freed; leave when the answer is no."""
     from generator.command import object_report
-    from generator.database.read import existing
+    from generator.database.read import object_entry
     from generator.database.transaction import reading
 
     with reading(engine) as connection:
-        entries = [existing(connection, name) for name in dict.fromkeys(names)]
+        entries = [object_entry(connection, name) for name in dict.fromkeys(names)]
     if as_json or not sys.stdin.isatty():
         raise typer.BadParameter("--free removes objects for good; confirm it with --yes")
     sys.stderr.write(object_report.warning_before(entries))

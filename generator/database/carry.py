@@ -25,7 +25,7 @@ from generator.database.carry_check import (
     same_object,
 )
 from generator.database.occupancy import take_cells
-from generator.database.read import existing, find_object, list_objects
+from generator.database.read import find_object, list_objects, object_entry
 from generator.database.registered import ObjectEntry
 from generator.database.rows import insert_rows
 from generator.database.transaction import place_of
@@ -96,7 +96,7 @@ def carry(
     """
     new_names = dict(renamed or {})
     for name in (*names, *new_names):
-        existing(source, name)
+        object_entry(source, name)
     homes = homes or (source.engine.url, target.engine.url)
     arrays: dict[int, ArrayHere] = {}
     copied, known, refused = [], [], []
@@ -105,7 +105,7 @@ def carry(
             continue
         name = new_names.get(entry.name, entry.name)
         try:
-            if _copied(source, target, entry, name, arrays, origin, homes):
+            if _copy_object(source, target, entry, name, arrays, origin, homes):
                 copied.append(name)
             else:
                 known.append(name)
@@ -116,7 +116,7 @@ def carry(
     return Carried(tuple(copied), tuple(known), tuple(refused))
 
 
-def _copied(
+def _copy_object(
     source: Connection,
     target: Connection,
     entry: ObjectEntry,

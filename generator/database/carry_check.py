@@ -19,7 +19,7 @@ from generator.array import array_from
 from generator.array.contract import SymbolArray
 from generator.database import tables
 from generator.database.canonical import digest
-from generator.database.cells import array_key, faces_at, find_array, occupied
+from generator.database.cells import array_key, faces_at, find_array, occupied_cells
 from generator.database.read import read_array
 from generator.database.registered import ObjectEntry
 from generator.errors import GeneratorError
@@ -70,7 +70,7 @@ def array_here(source: Connection, target: Connection, array_id: int) -> ArrayHe
     if (array_key(array), array.rows, array.columns, array.order) != said:
         raise NotCarriedError("stands on an array whose definition was changed", _DAMAGED)
     number = find_array(target, array)
-    return ArrayHere(array, number, _keys(array, *occupied(target, number)))
+    return ArrayHere(array, number, _keys(array, *occupied_cells(target, number)))
 
 
 def check_alphabet(source: Connection, alphabet_id: int) -> None:

@@ -42,7 +42,7 @@ def occupancy(connection: Connection, array: SymbolArray) -> Occupancy:
     return Occupancy.from_tiles(tiles, array)
 
 
-def occupied(connection: Connection, array_id: int | None) -> Cells:
+def occupied_cells(connection: Connection, array_id: int | None) -> Cells:
     """Return the cells of an array that objects hold: rows (n,) and columns (n,), sorted.
 
     An array that the database does not know yet, None, has no cells taken.

@@ -119,7 +119,7 @@ def import_objects(
     from_file = home.get_backend_name() == "sqlite"
     name = Path(home.database or "").name if from_file else place_of(home)
     origin = Origin(name, datetime.now(UTC).isoformat(timespec="seconds"))
-    with _opened(home) as source_engine, reading(source_engine) as source:
+    with _open_unchanged(home) as source_engine, reading(source_engine) as source:
 
         def work(target: Connection) -> Carried:
             return carry(
@@ -137,16 +137,14 @@ def import_objects(
                 carried = in_turn(open_database(str(Path(folder) / "lab.db")), work)
             if dry_run:
                 return carried
-        return (
-            _rehearsed(open_database(url), work) if dry_run else in_turn(open_database(url), work)
-        )
+        return _rehearse(open_database(url), work) if dry_run else in_turn(open_database(url), work)
 
 
 class _RehearsedError(Exception):
     """Undoes a transaction whose outcome is known."""
 
 
-def _rehearsed(engine: Engine, work: Callable[[Connection], Carried]) -> Carried:
+def _rehearse(engine: Engine, work: Callable[[Connection], Carried]) -> Carried:
     outcome: list[Carried] = []
 
     def undone(target: Connection) -> None:
@@ -159,7 +157,7 @@ def _rehearsed(engine: Engine, work: Callable[[Connection], Carried]) -> Carried
 
 
 @contextmanager
-def _opened(home: URL) -> Iterator[Engine]:
+def _open_unchanged(home: URL) -> Iterator[Engine]:
     """Open a database that is not changed: of a file, a copy of its own."""
     url = home.render_as_string(hide_password=False)
     if home.get_backend_name() != "sqlite":

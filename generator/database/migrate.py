@@ -50,7 +50,7 @@ def migrate(engine: Engine, version_of: Callable[[Connection], int | None], *, k
             if version is None or version >= SCHEMA_VERSION:  # another program was first
                 return
             if keep and connection.dialect.name == "sqlite":
-                copy = _copied(Path(engine.url.database or "").absolute(), version)
+                copy = _copy_file(Path(engine.url.database or "").absolute(), version)
             upgrade(connection, version)
     except BaseException:
         if copy is not None:
@@ -80,7 +80,7 @@ def upgrade(connection: Connection, version: int) -> None:
     )
 
 
-def _copied(path: Path, version: int) -> Path:
+def _copy_file(path: Path, version: int) -> Path:
     """Copy a database file that we alone may write now; return the copy, a new file."""
     names = (f"{path.stem}.v{version}{f'-{n}' if n > 1 else ''}{path.suffix}" for n in count(1))
     for name in names:

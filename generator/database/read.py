@@ -35,10 +35,10 @@ from generator.polyhedron.frame import face_frame, face_polygon
 from generator.polyhedron.winged import Face, Polyhedron, WingedEdge
 
 __all__ = [
-    "existing",
     "faces_at",
     "find_object",
     "list_objects",
+    "object_entry",
     "object_names",
     "read_array",
     "read_layout",
@@ -66,7 +66,7 @@ def find_object(connection: Connection, name: str) -> ObjectEntry | None:
     return next(iter(found), None)
 
 
-def existing(connection: Connection, name: str) -> ObjectEntry:
+def object_entry(connection: Connection, name: str) -> ObjectEntry:
     """Return the entry of the object called `name`; raises as `read_object`."""
     entry = find_object(connection, name)
     if entry is None:
@@ -87,7 +87,7 @@ def read_object(connection: Connection, name: str) -> RegisteredObject:
     DatabaseError
         When no object has this name; the fix lists names that are known.
     """
-    entry = existing(connection, name)
+    entry = object_entry(connection, name)
     polyhedron = _read_polyhedron(connection, entry)
     layout = _layout_of(connection, entry)
     row = connection.execute(
@@ -132,7 +132,7 @@ def read_surfaces(connection: Connection) -> dict[int, tuple[Developable, ...]]:
 
 def read_layout(connection: Connection, name: str) -> Layout:
     """Return the layout of the object called `name`, bit for bit what was registered."""
-    return _layout_of(connection, existing(connection, name))
+    return _layout_of(connection, object_entry(connection, name))
 
 
 def _layout_of(connection: Connection, entry: ObjectEntry) -> Layout:
@@ -160,10 +160,10 @@ def _layout_of(connection: Connection, entry: ObjectEntry) -> Layout:
             FaceLayout(
                 face=row.face_id,
                 placement=Placement(row.row, row.column, row.rotation_rad, row.x_mm, row.y_mm),
-                rows=_frozen(r, np.int64),
-                columns=_frozen(c, np.int64),
-                labels=_frozen(label, np.int64),
-                centres_mm=_frozen(np.array([x, y], dtype=np.float64).T, np.float64),
+                rows=_read_only(r, np.int64),
+                columns=_read_only(c, np.int64),
+                labels=_read_only(label, np.int64),
+                centres_mm=_read_only(np.array([x, y], dtype=np.float64).T, np.float64),
                 places=row.places,
             )
         )
@@ -226,7 +226,7 @@ def read_parts(connection: Connection, object_id: int) -> tuple[RegisteredPart, 
             row.format,
             row.file,
             row.sha256,
-            _frozen(json.loads(row.T_object_part), np.float64),
+            _read_only(json.loads(row.T_object_part), np.float64),
         )
         for row in connection.execute(
             select(tables.parts).where(parts.object_id == object_id).order_by(parts.position)
@@ -315,7 +315,7 @@ def _read_polyhedron(connection: Connection, entry: ObjectEntry) -> Polyhedron:
         )
         for row in connection.execute(_of(tables.edges, entry, "edge_id"))
     )
-    return Polyhedron(entry.object_type, _frozen(points, np.float64), faces, edges)
+    return Polyhedron(entry.object_type, _read_only(points, np.float64), faces, edges)
 
 
 def _read_faces(
@@ -337,9 +337,9 @@ def _read_faces(
                 name=row.name,
                 face_type=row.face_type,
                 area_mm2=row.face_area,
-                T_object_face=_frozen(face_frame(polyhedron, row.face_id), np.float64),
+                T_object_face=_read_only(face_frame(polyhedron, row.face_id), np.float64),
                 polygon_mm=tuple(
-                    _frozen(loop, np.float64) for loop in face_polygon(polyhedron, row.face_id)
+                    _read_only(loop, np.float64) for loop in face_polygon(polyhedron, row.face_id)
                 ),
                 placement=placements.get(row.face_id),
                 round=rounds.get(row.face_id),
@@ -348,7 +348,7 @@ def _read_faces(
     return tuple(faces)
 
 
-def _frozen(values: Any, dtype: type[np.generic]) -> NDArray[Any]:
+def _read_only(values: Any, dtype: type[np.generic]) -> NDArray[Any]:
     """Return a read-only array of its own, contiguous."""
     array = np.array(values, dtype=dtype, order="C")
     array.setflags(write=False)

@@ -28,7 +28,7 @@ from generator.alphabet.outline import SymbolStyle
 from generator.array.contract import SymbolArray
 from generator.database import tables
 from generator.database.canonical import canonical, digest
-from generator.database.cells import array_key, cells_of, find_array, occupied
+from generator.database.cells import array_key, cells_of, find_array, occupied_cells
 from generator.database.occupancy import free_cells, take_cells
 from generator.database.read import find_object, read_layout
 from generator.database.registered import ObjectEntry, RegisteredPart
@@ -40,10 +40,10 @@ from generator.layout.placement import Layout
 from generator.polyhedron.winged import Polyhedron
 
 __all__ = [
-    "Registration",
+    "ObjectRecord",
     "find_array",
     "find_object",
-    "occupied",
+    "occupied_cells",
     "record_parts",
     "register",
     "remove_object",
@@ -56,7 +56,7 @@ _LARGEST = 2**63 - 1  #: of a whole number in the database
 
 
 @dataclass(frozen=True, slots=True)
-class Registration:
+class ObjectRecord:
     """An object, ready to be registered."""
 
     name: str
@@ -71,7 +71,7 @@ class Registration:
     parts: tuple[RegisteredPart, ...] = ()
 
 
-def register(connection: Connection, registration: Registration, *, replace: bool = False) -> int:
+def register(connection: Connection, registration: ObjectRecord, *, replace: bool = False) -> int:
     """Insert an object with its faces, edges, cells and parts; return its number.
 
     The same spec under a registered name changes nothing but its parts; pass the layout
@@ -212,7 +212,7 @@ def same_layout(one: Layout, other: Layout) -> bool:
     )
 
 
-def _check(registration: Registration) -> None:
+def _check(registration: ObjectRecord) -> None:
     """Refuse what the tables could not say."""
     array, layout = registration.array, registration.layout
     if max(array.rows, array.columns) > _LARGEST:
@@ -242,7 +242,7 @@ def _all_cells(layout: Layout) -> Cells:
     return np.concatenate([none, *rows]), np.concatenate([none, *columns])
 
 
-def _check_same(connection: Connection, known: ObjectEntry, registration: Registration) -> None:
+def _check_same(connection: Connection, known: ObjectEntry, registration: ObjectRecord) -> None:
     require_same_spec(connection, known, registration.spec)
     if not same_layout(read_layout(connection, registration.name), registration.layout):
         raise DatabaseError(
@@ -253,7 +253,7 @@ def _check_same(connection: Connection, known: ObjectEntry, registration: Regist
 
 
 def _insert_object(
-    connection: Connection, registration: Registration, known: ObjectEntry | None
+    connection: Connection, registration: ObjectRecord, known: ObjectEntry | None
 ) -> tuple[int, int]:
     """Return the numbers of array and object."""
     array, style = registration.array, registration.style

@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 
 from sqlalchemy import Connection, update
 
-from generator.database.read import existing
+from generator.database.read import object_entry
 from generator.database.register import remove_object
 from generator.database.registered import ObjectEntry
 from generator.database.tables import objects
@@ -25,20 +25,20 @@ def retire(connection: Connection, name: str) -> ObjectEntry:
     DatabaseError
         When no object has this name; the fix lists names that are known.
     """
-    if not existing(connection, name).retired_utc:
+    if not object_entry(connection, name).retired_utc:
         _mark(connection, name, datetime.now(UTC).isoformat(timespec="seconds"))
-    return existing(connection, name)
+    return object_entry(connection, name)
 
 
 def restore(connection: Connection, name: str) -> ObjectEntry:
     """Bring a retired object back into use; raises as `retire`."""
-    _mark(connection, existing(connection, name).name, None)
-    return existing(connection, name)
+    _mark(connection, object_entry(connection, name).name, None)
+    return object_entry(connection, name)
 
 
 def remove(connection: Connection, name: str) -> ObjectEntry:
     """Remove an object and free its cells; returns what its entry was. Raises as `retire`."""
-    entry = existing(connection, name)
+    entry = object_entry(connection, name)
     remove_object(connection, entry.object_id)
     return entry
 

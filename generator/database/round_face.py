@@ -128,7 +128,7 @@ class RoundFace:
             axis = T[:3, :2] @ up
             centre = T[:3, :2] @ low + T[:3, 3] + inward * self.surface.radius_mm * T[:3, 2]
             turn = -inward * beside / self.surface.radius_mm
-            return np.asarray(_about(centre, axis, turn) @ T @ back)
+            return np.asarray(_rotation_about(centre, axis, turn) @ T @ back)
         tip = self._tip()
         middle, away = (low + high) / 2.0 - tip, np.array([x, y]) - tip
         opened = math.atan2(middle[0] * away[1] - middle[1] * away[0], middle @ away)
@@ -140,7 +140,7 @@ class RoundFace:
         axis = math.cos(alpha) * (T[:3, :2] @ down) + inward * math.sin(alpha) * T[:3, 2]
         centre = T[:3, :2] @ tip + T[:3, 3]
         turn = inward * opened / math.sin(alpha)
-        return np.asarray(_about(centre, axis, turn) @ T @ back)
+        return np.asarray(_rotation_about(centre, axis, turn) @ T @ back)
 
     def _facet(self, x: float, y: float) -> int:
         """Return the facet that holds a place, or the nearest at the sides of the face."""
@@ -176,7 +176,7 @@ def round_face(polyhedron: Polyhedron, surface: Developable) -> RoundFace:
     return RoundFace(surface, development(polyhedron, surface))
 
 
-def _about(centre: Array, axis: Array, angle: float) -> Array:
+def _rotation_about(centre: Array, axis: Array, angle: float) -> Array:
     """Return the turn (4, 4) by an angle about a line."""
     k = axis / np.linalg.norm(axis)
     cross = np.array([[0.0, -k[2], k[1]], [k[2], 0.0, -k[0]], [-k[1], k[0], 0.0]])

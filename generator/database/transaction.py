@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from sqlalchemy import URL, Connection, Engine, text
 from sqlalchemy.exc import DBAPIError
 
-from generator.database.unreached import unreached
+from generator.database.unreached import connection_error
 from generator.errors import DatabaseError
 
 WAIT_S = 60.0  #: how long a writer waits for its turn, and a reader for a commit to end
@@ -45,7 +45,7 @@ def writing(engine: Engine) -> Iterator[Connection]:
                 take_turn(connection)
                 yield connection
     except DBAPIError as error:
-        raise explained(error, engine.url) from error
+        raise explain_error(error, engine.url) from error
 
 
 @contextmanager
@@ -60,7 +60,7 @@ def reading(engine: Engine) -> Iterator[Connection]:
             with connection.begin():
                 yield connection
     except DBAPIError as error:
-        raise explained(error, engine.url) from error
+        raise explain_error(error, engine.url) from error
 
 
 def take_turn(connection: Connection) -> None:
@@ -84,7 +84,7 @@ def place_of(url: URL) -> str:
     return url.set(drivername=url.get_backend_name()).render_as_string(hide_password=True)
 
 
-def explained(error: DBAPIError, url: URL) -> DatabaseError:
+def explain_error(error: DBAPIError, url: URL) -> DatabaseError:
     """Return the cause and the way out of what the database driver reports."""
     # SQLite names its errors (SQLITE_BUSY), PostgreSQL numbers them (SQLSTATE 55P03).
     code = getattr(error.orig, "sqlite_errorname", None) or getattr(error.orig, "sqlstate", None)
@@ -112,7 +112,7 @@ def explained(error: DBAPIError, url: URL) -> DatabaseError:
             )
         return DatabaseError(f"the database refuses the object: {first_line}", place=place)
     if code is None:
-        return unreached(str(error.orig), url, place)
+        return connection_error(str(error.orig), url, place)
     return DatabaseError(f"the database failed: {first_line} ({code})", place=place)
 
 

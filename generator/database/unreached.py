@@ -12,7 +12,7 @@ from sqlalchemy import URL
 from generator.errors import DatabaseError
 
 
-def unreached(said: str, url: URL, place: str) -> DatabaseError:
+def connection_error(said: str, url: URL, place: str) -> DatabaseError:
     """Return the error for a connection that was not made.
 
     Parameters

@@ -79,7 +79,7 @@ def array_svg(
     outlines
         The symbols by label; the last tier is drawn, mm.
     """
-    placed = [_unwrapped(face, pitch_mm) for face in faces]
+    placed = [_unwrap(face, pitch_mm) for face in faces]
     view = _view(rows, columns, [box for _, box in placed])
     cell = min(_CELL, max(4.0, _WIDE / view.columns))
     left = max(60, 24 + 7 * len(str(rows)))
@@ -112,7 +112,7 @@ def array_svg(
 Box = tuple[int, int, int, int]  # left, top, right, bottom
 
 
-def _unwrapped(face: FaceOnArray, pitch_mm: float) -> tuple[list[NDArray[np.float64]], Box]:
+def _unwrap(face: FaceOnArray, pitch_mm: float) -> tuple[list[NDArray[np.float64]], Box]:
     """Return the loops in cells from the anchor cell, and the box of their cells."""
     placement = face.layout.placement
     c, s = np.cos(placement.rotation_rad), np.sin(placement.rotation_rad)

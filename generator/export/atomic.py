@@ -67,11 +67,11 @@ class Staging:
         self._lock = -1
 
     def __enter__(self) -> Staging:
-        with _explained(self.folder, "make the folder"):
-            self._made = _missing(self.folder)
+        with _named_errors(self.folder, "make the folder"):
+            self._made = _missing_folders(self.folder)
             self.folder.mkdir(parents=True, exist_ok=True)
         try:
-            with _explained(self.folder, "write into the folder"):
+            with _named_errors(self.folder, "write into the folder"):
                 _remove_leftovers(self.folder)
                 self._hidden, self._lock = _locked_folder(self.folder)
         except BaseException:
@@ -95,7 +95,7 @@ class Staging:
         pieces = (content,) if isinstance(content, bytes) else content
         digest = hashlib.sha256()
         size = 0
-        with _explained(final, "write the file"):
+        with _named_errors(final, "write the file"):
             if final.is_dir():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(final))
             with open(self._hidden / name, "xb") as file:
@@ -115,9 +115,9 @@ class Staging:
         and some new files, and the rest of the new ones is removed by the next run.
         """
         for written in self.written:
-            with _explained(written.path, "replace the file"):
+            with _named_errors(written.path, "replace the file"):
                 os.replace(self._hidden / written.path.name, written.path)
-        with _explained(self.folder, "write into the folder"):
+        with _named_errors(self.folder, "write into the folder"):
             _flush_folder(self.folder)
         done, self.written = tuple(self.written), []
         return done
@@ -131,7 +131,7 @@ class Staging:
                 return
 
 
-def _missing(folder: Path) -> list[Path]:
+def _missing_folders(folder: Path) -> list[Path]:
     """Return the folders on the way that do not exist, the innermost first."""
     return [path for path in (folder, *folder.parents) if not path.exists()]
 
@@ -182,7 +182,7 @@ def _flush_folder(folder: Path) -> None:
 
 
 @contextmanager
-def _explained(path: Path, action: str) -> Iterator[None]:
+def _named_errors(path: Path, action: str) -> Iterator[None]:
     """Turn an error of the operating system into one that names place, cause and way out."""
     try:
         yield

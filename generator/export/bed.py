@@ -45,7 +45,7 @@ class _Skyline:
     places: list[BedPlace]
 
 
-def arranged(sizes: Sequence[Size], bed_mm: Size, gap_mm: float = 5.0) -> tuple[Plate, ...]:
+def arrange_plates(sizes: Sequence[Size], bed_mm: Size, gap_mm: float = 5.0) -> tuple[Plate, ...]:
     """Arrange rectangles on as many plates as needed.
 
     Parameters
@@ -65,7 +65,7 @@ def arranged(sizes: Sequence[Size], bed_mm: Size, gap_mm: float = 5.0) -> tuple[
 
     Examples
     --------
-    >>> [len(plate.places) for plate in arranged([(60, 60)] * 6, (250, 210))]
+    >>> [len(plate.places) for plate in arrange_plates([(60, 60)] * 6, (250, 210))]
     [6]
     """
     room = (bed_mm[0] + gap_mm, bed_mm[1] + gap_mm)
@@ -75,15 +75,15 @@ def arranged(sizes: Sequence[Size], bed_mm: Size, gap_mm: float = 5.0) -> tuple[
     for part in order:
         size = (sizes[part][0] + gap_mm, sizes[part][1] + gap_mm)
         if not any(_fits(turned, room) for turned in (size, size[::-1])):
-            plates.append(_alone(part, sizes[part], bed_mm))
+            plates.append(_oversize_plate(part, sizes[part], bed_mm))
             continue
         for plate in open_plates:
-            if _placed(plate, part, size, room):
+            if _place_part(plate, part, size, room):
                 break
         else:
             open_plates.append(_Skyline([(0.0, 0.0)], []))
-            _placed(open_plates[-1], part, size, room)
-    return (*(_centred(plate, sizes, bed_mm) for plate in open_plates), *plates)
+            _place_part(open_plates[-1], part, size, room)
+    return (*(_centre(plate, sizes, bed_mm) for plate in open_plates), *plates)
 
 
 def _fits(size: Size, room: Size) -> bool:
@@ -91,7 +91,7 @@ def _fits(size: Size, room: Size) -> bool:
     return size[0] <= room[0] + slack and size[1] <= room[1] + slack
 
 
-def _alone(part: int, size: Size, bed_mm: Size) -> Plate:
+def _oversize_plate(part: int, size: Size, bed_mm: Size) -> Plate:
     """Place a part that is too large in the direction in which it exceeds the bed less."""
     beyond = [
         (max(0.0, width - bed_mm[0]), max(0.0, depth - bed_mm[1]))
@@ -103,7 +103,7 @@ def _alone(part: int, size: Size, bed_mm: Size) -> Plate:
     return Plate((place,), beyond[int(turned)])
 
 
-def _placed(plate: _Skyline, part: int, size: Size, room: Size) -> bool:
+def _place_part(plate: _Skyline, part: int, size: Size, room: Size) -> bool:
     """Add a part to the plate where it lies lowest; False when it finds no place."""
     best: tuple[float, float, bool] | None = None
     for turned in (False, True):
@@ -137,7 +137,7 @@ def _raise(steps: list[tuple[float, float]], start: float, end: float, height: f
     steps[:] = sorted([*kept, (start, height), (end, after)])
 
 
-def _centred(plate: _Skyline, sizes: Sequence[Size], bed_mm: Size) -> Plate:
+def _centre(plate: _Skyline, sizes: Sequence[Size], bed_mm: Size) -> Plate:
     extents = []
     for place in plate.places:
         width, depth = sizes[place.part]

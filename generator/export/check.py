@@ -168,11 +168,11 @@ def _verified_step(part: str, volume_mm3: float, path: Path) -> StepReport:
     read = read_step(path)
     report = replace(read, volume_error=float(read.volume_mm3 / volume_mm3 - 1.0))
     if report.solids != 1:
-        raise _failed(part, path, f"holds {report.solids} solids where one is allowed")
+        raise _failure(part, path, f"holds {report.solids} solids where one is allowed")
     if not report.valid:
-        raise _failed(part, path, "holds a solid that the CAD kernel finds invalid")
+        raise _failure(part, path, "holds a solid that the CAD kernel finds invalid")
     if not abs(report.volume_error) <= STEP_VOLUME:
-        raise _failed(
+        raise _failure(
             part,
             path,
             f"has a volume of {read.volume_mm3:.6f} mm3 where {volume_mm3:.6f} mm3 was meant "
@@ -194,9 +194,9 @@ def _verified_stl(part: str, volume_mm3: float, path: Path) -> MeshReport:
     if report.triangles == 0:
         found = ["no triangles that can be read"]
     if found:
-        raise _failed(part, path, "has " + ", ".join(found))
+        raise _failure(part, path, "has " + ", ".join(found))
     if not abs(report.volume_error) <= STL_VOLUME:
-        raise _failed(
+        raise _failure(
             part,
             path,
             f"has a volume of {read.volume_mm3:.3f} mm3 where {volume_mm3:.3f} mm3 was meant",
@@ -204,7 +204,7 @@ def _verified_stl(part: str, volume_mm3: float, path: Path) -> MeshReport:
     return report
 
 
-def _failed(part: str, path: Path, reason: str) -> SolidError:
+def _failure(part: str, path: Path, reason: str) -> SolidError:
     return SolidError(
         f"part '{part}': {path.name} {reason}",
         fix="do not print it; report the spec together with this message",

@@ -49,7 +49,7 @@ def cut_triangles(corners: NDArray[np.float64], suspects: NDArray[np.int64]) -> 
         near = ((low <= high[number]) & (high >= low[number])).all(axis=1)
         near[number] = False
         one, *others = _in_integers(corners[np.r_[number, np.flatnonzero(near)]])
-        found[k] = any(crossing(one, other) for other in others)
+        found[k] = any(triangles_cross(one, other) for other in others)
     return found
 
 
@@ -77,12 +77,12 @@ def perhaps_folded(points: NDArray[np.float64], triangles: NDArray[np.int64]) ->
     return np.unique(np.concatenate([one[back], other[back], np.flatnonzero(lengths == 0)]))
 
 
-def crossing(one: Triangle, other: Triangle) -> bool:
+def triangles_cross(one: Triangle, other: Triangle) -> bool:
     """Return whether two triangles have more in common than the vertices they share."""
     shared = sorted(set(one) & set(other))
     if len(shared) == 3:
         return True
-    return any(not _between(point, shared) for point in _common(one, other))
+    return any(not _on_shared(point, shared) for point in _common(one, other))
 
 
 def _in_integers(corners: NDArray[np.float64]) -> list[Triangle]:
@@ -148,7 +148,7 @@ def _beyond(normal: Vector, point: Vector) -> HalfSpace:
     return (*normal, -_dot(normal, point))
 
 
-def _between(point: Point, shared: Sequence[Vector]) -> bool:
+def _on_shared(point: Point, shared: Sequence[Vector]) -> bool:
     """Return whether a point lies on the vertex or the segment that two triangles share."""
     if not shared:
         return False

@@ -21,7 +21,7 @@ _SPACE, _ZERO, _POINT, _MINUS = 32, 48, 46, 45
 
 
 @dataclass(frozen=True, slots=True)
-class Template:
+class TextTemplate:
     """A text and where its fields stand."""
 
     text: Bytes  #: (length,) ASCII with marked fields
@@ -31,10 +31,10 @@ class Template:
     name_columns: tuple[NDArray[np.intp], ...]  #: per kind of name: (k * width,) bytes
 
 
-def template_of(text: str, numbers: list[int]) -> Template:
+def template_of(text: str, numbers: list[int]) -> TextTemplate:
     """Return the template of `text`, whose number fields hold `numbers` in their order."""
     array = np.frombuffer(text.encode("ascii"), np.uint8)
-    return Template(
+    return TextTemplate(
         array,
         np.array(numbers, np.int64),
         np.flatnonzero(array == ord(NUMBER)),
@@ -43,8 +43,8 @@ def template_of(text: str, numbers: list[int]) -> Template:
     )
 
 
-def stamped(
-    template: Template,
+def stamp(
+    template: TextTemplate,
     first: NDArray[np.int64],
     width: int,
     decimals: Bytes,
@@ -123,7 +123,7 @@ def decimal_numbers(values: NDArray[np.float64], width: int, places: int) -> Byt
     return out
 
 
-def padded(names: list[str]) -> Bytes:
+def pad(names: list[str]) -> Bytes:
     """Return ASCII texts as rows of equal width, spaces behind, shape (m, width)."""
     width = max(map(len, names), default=0)
     text = "".join(name.ljust(width) for name in names)

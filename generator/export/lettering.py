@@ -34,7 +34,7 @@ def plain(text: str) -> str:
     return kept.encode("ascii", "replace").decode("ascii")
 
 
-def lettered(
+def write_lettering(
     image: Image.Image,
     subtitle: str,
     name: str,

@@ -25,7 +25,7 @@ from generator.export.faces import (
     symbol_triangles,
 )
 from generator.export.labels import Wanted, label_places
-from generator.export.lettering import FONT_SIZES, MARGIN, Font, Label, lettered, plain
+from generator.export.lettering import FONT_SIZES, MARGIN, Font, Label, plain, write_lettering
 from generator.export.raster import Visible, visible
 from generator.solid.part import Facet, Part
 from generator.solid.triangulate import Mesh
@@ -80,23 +80,25 @@ def preview_png(
     """
     rows = np.linspace(0.0, 1.0, HEIGHT * _SAMPLES)[:, None]
     fade = np.rint((1 - rows) * np.array(_PAPER[0]) + rows * np.array(_PAPER[1]))
-    picture = np.repeat(_packed(fade)[:, None], WIDTH * _SAMPLES, axis=1)
+    picture = np.repeat(_pack_colours(fade)[:, None], WIDTH * _SAMPLES, axis=1)
     apart = len(parts) > 1
     closed = _scene(parts, meshes, 0.0)
     scenes = (closed, _scene(parts, meshes, _APART) if apart else closed)
     eye = _best_eye(scenes[0].normals)
     cameras = (_axes(eye), _axes(-eye))
     room = (WIDTH // 2 - 2 * MARGIN, HEIGHT - _TOP - _BOTTOM - MARGIN)
-    scale = min(_fitting(scene, axes, room) for scene, axes in zip(scenes, cameras, strict=True))
+    scale = min(
+        _scale_to_fit(scene, axes, room) for scene, axes in zip(scenes, cameras, strict=True)
+    )
     memory = np.empty(((HEIGHT - _BOTTOM - _TOP) * _SAMPLES, WIDTH // 2 * _SAMPLES), np.int64)
     fonts = [ImageFont.load_default(size) for size in FONT_SIZES]
     labels = []
     for i, (scene, axes) in enumerate(zip(scenes, cameras, strict=True)):
         box = (i * WIDTH // 2, _TOP, (i + 1) * WIDTH // 2, HEIGHT - _BOTTOM)
-        labels += _drawn(picture, scene, axes, scale, box, memory, fonts[1])
+        labels += _draw_view(picture, scene, axes, scale, box, memory, fonts[1])
     image = Image.frombuffer("RGBX", picture.shape[::-1], picture, "raw", "RGBX", 0, 1)
     image = image.reduce(_SAMPLES).convert("RGB")
-    lettered(image, _subtitle(size_mm, parts), name, labels, scale, fonts, apart=apart)
+    write_lettering(image, _subtitle(size_mm, parts), name, labels, scale, fonts, apart=apart)
     return _png(np.asarray(image))
 
 
@@ -192,13 +194,13 @@ def _axes(eye: Points) -> Points:
     return axes
 
 
-def _fitting(scene: _Scene, axes: Points, room: tuple[int, int]) -> float:
+def _scale_to_fit(scene: _Scene, axes: Points, room: tuple[int, int]) -> float:
     """Return the pixels for a mm at which the scene fills the room."""
     width, height = np.ptp(scene.vertices @ axes[:2].T, axis=0).tolist()
     return float(min(room[0] / width, room[1] / height))
 
 
-def _drawn(
+def _draw_view(
     picture: Colours,
     scene: _Scene,
     axes: Points,
@@ -220,7 +222,7 @@ def _drawn(
 
     seen = visible(screen(flat), scene.triangles, memory)
     view = picture[top:bottom, left:right]
-    seen.paint(view, _shaded(scene, flat))
+    seen.paint(view, _shade(scene, flat))
     _draw_edges(view, screen(scene.edges @ axes.T), seen, 0.6 * fine)
     texts = [plain(name) for name in scene.names]
     halves = [font.getlength(text) / 2 + 9 for text in texts]
@@ -238,7 +240,7 @@ def _drawn(
     ]
 
 
-def _shaded(scene: _Scene, flat: Points) -> Colours:
+def _shade(scene: _Scene, flat: Points) -> Colours:
     """Return the colour of each triangle under the light; `flat` in screen axes."""
     light = _LIGHT / np.linalg.norm(_LIGHT)
     tints = np.array([BODY_RGB, SYMBOL_RGB], np.float64)
@@ -253,11 +255,11 @@ def _shaded(scene: _Scene, flat: Points) -> Colours:
         # Half of the way round the object still gets some light, so that no face is black.
         shade = _AMBIENT + (1.0 - _AMBIENT) * (0.5 + 0.5 * cosine)
         tint = tints[scene.symbols[some].astype(np.int64)]
-        colours[some] = _packed(np.minimum(np.rint(1.06 * tint * shade[:, None]), 255.0))
+        colours[some] = _pack_colours(np.minimum(np.rint(1.06 * tint * shade[:, None]), 255.0))
     return colours
 
 
-def _packed(rgb: Points) -> Colours:
+def _pack_colours(rgb: Points) -> Colours:
     """Return colours (n, 3) as one little-endian word each."""
     red, green, blue = rgb.astype(np.uint32).T
     words: Colours = red | green << 8 | blue << 16
@@ -267,7 +269,7 @@ def _packed(rgb: Points) -> Colours:
 def _draw_edges(view: Colours, edges: Points, seen: Visible, slack: float) -> None:
     """Draw the edges of the bodies where nothing lies in front of them."""
     height, width = view.shape
-    line = _packed(np.array([_LINE]))
+    line = _pack_colours(np.array([_LINE]))
     for start, end in edges:
         steps = int(np.abs(end - start)[:2].max()) + 2
         points = start + np.linspace(0.0, 1.0, steps)[:, None] * (end - start)

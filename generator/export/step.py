@@ -19,12 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.export.colours import SYMBOL_RGB
-from generator.export.fixed_text import decimal_numbers, decimal_width, padded, stamped
+from generator.export.fixed_text import decimal_numbers, decimal_width, pad, stamp
 from generator.export.step_entities import (
     PLACES,
     Entities,
-    listed,
     numbers_listed,
+    reference_list,
     step_string,
     triple,
     unit,
@@ -55,11 +55,11 @@ def step_chunks(part: Part) -> Iterator[bytes]:
     yield _header(name)
     units, origin = _units(entities), _origin(entities)
     style = _style(entities)
-    body = _Body(part, entities)
+    body = _StepBody(part, entities)
     shell: list[NDArray[np.int64]] = []
     coloured: list[NDArray[np.int64]] = []
     for embossing in part.embossings:
-        yield from _embossed(part, embossing, entities, style, body, shell, coloured)
+        yield from _write_symbols(part, embossing, entities, style, body, shell, coloured)
     shell.append(body.faces())
     coloured.append(_wrapped_colour(part, shell[-1], entities, style))
     yield entities.taken()
@@ -123,7 +123,7 @@ def _style(entities: Entities) -> str:
     return entities.add(f"PRESENTATION_STYLE_ASSIGNMENT(({usage}))")
 
 
-class _Body:
+class _StepBody:
     """The plain body: its points and edges, and the bounds of each facet so far."""
 
     def __init__(self, part: Part, entities: Entities) -> None:
@@ -160,7 +160,9 @@ class _Body:
             )
             plane = add(f"PLANE('',{placement})")
             numbers.append(self.entities.next)
-            add(f"ADVANCED_FACE('{step_string(facet.name)}',({listed(bounds)}),{plane},.T.)")
+            add(
+                f"ADVANCED_FACE('{step_string(facet.name)}',({reference_list(bounds)}),{plane},.T.)"
+            )
         return np.array(numbers, np.int64)
 
     def _bound(self, loop: tuple[int, ...], kind: str) -> str:
@@ -169,7 +171,7 @@ class _Body:
             add(f"ORIENTED_EDGE('',*,*,{self._edge(start, end)},.{'T' if start < end else 'F'}.)")
             for start, end in zip(loop, (*loop[1:], loop[0]), strict=True)
         ]
-        edge_loop = add(f"EDGE_LOOP('',({listed(oriented)}))")
+        edge_loop = add(f"EDGE_LOOP('',({reference_list(oriented)}))")
         return add(f"{kind}('',{edge_loop},.T.)")
 
     def _edge(self, start: int, end: int) -> str:
@@ -184,12 +186,12 @@ class _Body:
         return edge
 
 
-def _embossed(
+def _write_symbols(
     part: Part,
     embossing: Embossing,
     entities: Entities,
     style: str,
-    body: _Body,
+    body: _StepBody,
     shell: list[NDArray[np.int64]],
     coloured: list[NDArray[np.int64]],
 ) -> Iterator[bytes]:
@@ -199,7 +201,7 @@ def _embossed(
     centres = embossing.centres_mm @ facet_axes[:2] + embossing.T_part_facet[:3, 3]
     prefix = part.facets[embossing.facet].name
     names = tuple(
-        padded([f"'{step_string(f'{prefix}/{name}/{kind}')}'" for name in embossing.names])
+        pad([f"'{step_string(f'{prefix}/{name}/{kind}')}'" for name in embossing.names])
         for kind in KINDS
     )
     width = decimal_width(_largest_mm(part), PLACES)
@@ -224,7 +226,7 @@ def _embossed(
             )
             coordinates = decimal_numbers(points + centres[some, None, :], width, PLACES)
             rows = tuple(kind[some] for kind in names)
-            yield stamped(symbol.template, first, entities.width, coordinates, rows)
+            yield stamp(symbol.template, first, entities.width, coordinates, rows)
             shell.append((first[:, None] + symbol.faces).ravel())
             coloured.append((first[:, None] + symbol.coloured).ravel())
             footprints = (first + symbol.footprint).tolist()

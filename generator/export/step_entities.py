@@ -78,7 +78,7 @@ def triple(values: NDArray[np.float64], places: int) -> str:
     return "(" + ",".join(_real(value, places) for value in values.tolist()) + ")"
 
 
-def listed(references: Iterable[str]) -> str:
+def reference_list(references: Iterable[str]) -> str:
     """Return references with commas, in lines that an editor can show."""
     items = list(references)
     lines = (",".join(items[i : i + _PER_LINE]) for i in range(0, len(items), _PER_LINE))
@@ -86,7 +86,7 @@ def listed(references: Iterable[str]) -> str:
 
 
 def numbers_listed(numbers: NDArray[np.int64], width: int, block: int = 240_000) -> Iterator[bytes]:
-    """Yield the references to `numbers`, all of `width` digits, as `listed` would."""
+    """Yield the references to `numbers`, all of `width` digits, as `reference_list` would."""
     for start in range(0, len(numbers), block):
         some = numbers[start : start + block]
         text = np.full((len(some), width + 3), ord("\n"), np.uint8)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.alphabet.outline import Tiers
-from generator.export.fixed_text import DECIMAL, NAMES, NUMBER, Template, template_of
+from generator.export.fixed_text import DECIMAL, NAMES, NUMBER, TextTemplate, template_of
 from generator.export.step_entities import Entities, unit
 
 KINDS = ("top", "side", "inside")  #: of a symbol's faces; "inside": the facet within a ring
@@ -30,7 +30,7 @@ _Term = int | str  # a number of the template, or literal text such as "#100017"
 class SymbolTemplate:
     """The entities of one symbol, numbered from 0."""
 
-    template: Template
+    template: TextTemplate
     entities: int  #: how many
     footprint: int  #: bound of the facet
     faces: NDArray[np.int64]
@@ -75,10 +75,10 @@ def symbol_template(
     style
         Reference to the colour of tops and sides, "" for none.
     """
-    return _Builder(tiers, axes, entities, decimal_width, name_widths, style).built()
+    return _SymbolBuilder(tiers, axes, entities, decimal_width, name_widths, style).built()
 
 
-class _Builder:
+class _SymbolBuilder:
     def __init__(
         self,
         tiers: Tiers,

@@ -24,7 +24,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.export.bed import BedPlace, Plate, Size, arranged
+from generator.export.bed import BedPlace, Plate, Size, arrange_plates
 from generator.export.colours import BODY_RGB, SYMBOL_RGB, hexadecimal
 from generator.solid.part import Part
 from generator.solid.triangulate import Mesh, body_mesh, symbol_meshes
@@ -104,14 +104,14 @@ def print_files(
     gap_mm
         Least distance between two parts, mm.
     """
-    printed = [_printed(part) for part in parts]
-    plates = arranged([part.size for part in printed], bed_mm, gap_mm)
+    printed = [_print_meshes(part) for part in parts]
+    plates = arrange_plates([part.size for part in printed], bed_mm, gap_mm)
     return tuple(_plate(title, printed, plate) for plate in plates)
 
 
 def print_file(title: str, parts: Sequence[Part], plate: Plate) -> PrintFile:
     """Return the 3MF files of one plate; its places count `parts`, which are all on it."""
-    return _plate(title, [_printed(part) for part in parts], plate)
+    return _plate(title, [_print_meshes(part) for part in parts], plate)
 
 
 def _plate(title: str, printed: Sequence[_Printed], plate: Plate) -> PrintFile:
@@ -124,10 +124,10 @@ def _plate(title: str, printed: Sequence[_Printed], plate: Plate) -> PrintFile:
     )
 
 
-def _printed(part: Part) -> _Printed:
-    body = _joined((body_mesh(part),))
+def _print_meshes(part: Part) -> _Printed:
+    body = _join_meshes((body_mesh(part),))
     meshes = [mesh for mesh in symbol_meshes(part) if len(mesh.triangles)]
-    symbols = _joined(meshes) if meshes else None
+    symbols = _join_meshes(meshes) if meshes else None
     points = body.vertices if symbols is None else np.vstack([body.vertices, symbols.vertices])
     low, high = points.min(axis=0), points.max(axis=0)
     return _Printed(
@@ -135,7 +135,7 @@ def _printed(part: Part) -> _Printed:
     )
 
 
-def _joined(meshes: Sequence[Mesh]) -> _Shape:
+def _join_meshes(meshes: Sequence[Mesh]) -> _Shape:
     """Return meshes as one, with the vertices that a triangle uses."""
     vertices, triangles = [], []
     first = 0
@@ -149,7 +149,7 @@ def _joined(meshes: Sequence[Mesh]) -> _Shape:
 
 def _components(title: str, printed: Sequence[_Printed], plate: Plate) -> Iterator[str]:
     """Yield the model of a plate, an object of two components for each part."""
-    yield _opening(title)
+    yield _header(title)
     items = []
     number = 2
     for place in plate.places:
@@ -167,7 +167,7 @@ def _components(title: str, printed: Sequence[_Printed], plate: Plate) -> Iterat
         matrix = " ".join(f"{value:.9g}" for value in (*turn.T.ravel().tolist(), *shift.tolist()))
         items.append(f'<item objectid="{number}" transform="{matrix}"/>\n')
         number += 1
-    yield _closing(items)
+    yield _footer(items)
 
 
 def _volumes(title: str, printed: Sequence[_Printed], plate: Plate) -> Iterator[str]:
@@ -176,7 +176,7 @@ def _volumes(title: str, printed: Sequence[_Printed], plate: Plate) -> Iterator[
     The vertices are written where they lie on the bed: PrusaSlicer applies the transform of
     a build item to the first volume alone.
     """
-    yield _opening(title)
+    yield _header(title)
     items = []
     for number, place in enumerate(plate.places, 2):
         part = printed[place.part]
@@ -187,7 +187,7 @@ def _volumes(title: str, printed: Sequence[_Printed], plate: Plate) -> Iterator[
         ]
         yield from _mesh_object(number, part.name, 0, moved)
         items.append(f'<item objectid="{number}"/>\n')
-    yield _closing(items)
+    yield _footer(items)
 
 
 def _volume_settings(printed: Sequence[_Printed], plate: Plate) -> Iterator[str]:
@@ -213,7 +213,7 @@ def _volume_settings(printed: Sequence[_Printed], plate: Plate) -> Iterator[str]
     yield "</config>\n"
 
 
-def _opening(title: str) -> str:
+def _header(title: str) -> str:
     return (
         f'{_XML}<model unit="millimeter" xml:lang="en-US" '
         'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">\n'
@@ -225,7 +225,7 @@ def _opening(title: str) -> str:
     )
 
 
-def _closing(items: list[str]) -> str:
+def _footer(items: list[str]) -> str:
     return f"</resources>\n<build>\n{''.join(items)}</build>\n</model>\n"
 
 

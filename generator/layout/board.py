@@ -24,7 +24,7 @@ class Board:
 
     Bit (y + 1) stride + x + 1 is cell (y, x). Where the extent is the whole side of the array
     the margin repeats the other side; elsewhere it counts as taken. Of a large array the opened
-    corner is looked at (`opened`), which grows when nothing fits any more.
+    corner is looked at (`board_size`), which grows when nothing fits any more.
     """
 
     def __init__(self, occupancy: Occupancy, margin: int) -> None:
@@ -32,7 +32,7 @@ class Board:
         self._whole = occupancy.rows, occupancy.columns
         self._occupancy = occupancy
         self._margin = margin
-        self._resize(*opened(occupancy))
+        self._resize(*board_size(occupancy))
 
     def grow(self) -> bool:
         """Open more of the array; False if the whole of it is in sight."""
@@ -132,7 +132,7 @@ class Board:
         return known
 
 
-def opened(occupancy: Occupancy) -> tuple[int, int]:
+def board_size(occupancy: Occupancy) -> tuple[int, int]:
     """Return rows and columns of the part of an array in which objects lie.
 
     A small array is opened as a whole. Of a larger one it is a corner that grows by steps, and

@@ -52,14 +52,16 @@ def region_of(loops: Sequence[Points], clearances_mm: Sequence[Points]) -> Regio
     )
 
 
-def moved(region: Region, rotation_rad: float, x_mm: float = 0.0, y_mm: float = 0.0) -> Region:
+def move_region(
+    region: Region, rotation_rad: float, x_mm: float = 0.0, y_mm: float = 0.0
+) -> Region:
     """Return the region turned about the origin, then shifted."""
     c, s = np.cos(rotation_rad), np.sin(rotation_rad)
     turn, shift = np.array([[c, s], [-s, c]]), np.array([x_mm, y_mm])
     return Region(region.start @ turn + shift, region.end @ turn + shift, region.clearance)
 
 
-def mirrored(region: Region) -> Region:
+def mirror_region(region: Region) -> Region:
     """Return the region with x and y exchanged; edges are reversed to keep it on their left."""
     return Region(region.end[:, ::-1], region.start[:, ::-1], region.clearance)
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.layout.footprint import Region, free_grid, mirrored, moved, slack
+from generator.layout.footprint import Region, free_grid, mirror_region, move_region, slack
 from generator.layout.places import Cells, Identifies, array_cells, count_places, windows_in
 
 Points = NDArray[np.float64]
@@ -93,10 +93,10 @@ def choose_lattice(
         for candidate in sorted(found, key=lambda c: -c.cells):
             for cells in candidate.sets:
                 if any(any(_places(cells.cells, k, window, identifies)) for k in range(4)):
-                    lattice = _centred(regions, half_mm, pitch_mm, candidate.rotation, cells)
+                    lattice = _centre(regions, half_mm, pitch_mm, candidate.rotation, cells)
                     return _with_places(lattice, window, identifies)
     head = next(c for c in found if (c.worth, c.cells) == best)
-    choice = [_centred(regions, half_mm, pitch_mm, head.rotation, cells) for cells in head.sets]
+    choice = [_centre(regions, half_mm, pitch_mm, head.rotation, cells) for cells in head.sets]
     lattice = max(choice, key=lambda lattice: lattice.margin_mm)
     return _with_places(lattice, window, identifies)
 
@@ -160,9 +160,9 @@ def _best_shifts(
 
     None without cells, nor if it falls short of the best (worth, cells) so far.
     """
-    turned = [moved(region, rotation) for region in regions]
+    turned = [move_region(region, rotation) for region in regions]
     ys = _shifts(turned, half, pitch, steps)
-    xs = _shifts([mirrored(region) for region in turned], half, pitch, steps)
+    xs = _shifts([mirror_region(region) for region in turned], half, pitch, steps)
     along = np.zeros((len(ys), len(xs)), dtype=np.int64)
     across, cells = along.copy(), along.copy()
     grids: list[tuple[NDArray[np.bool_], tuple[int, int]]] = []
@@ -184,10 +184,10 @@ def _best_shifts(
     reached = int(worth.max()), int(cells.max())
     if best[0] > 0 and reached < best:
         return []
-    return [_Candidate(*reached, rotation, _different(grids, at, ys, xs))]
+    return [_Candidate(*reached, rotation, _unique_sets(grids, at, ys, xs))]
 
 
-def _different(
+def _unique_sets(
     grids: Sequence[tuple[NDArray[np.bool_], tuple[int, int]]],
     at: NDArray[np.intp],
     ys: Points,
@@ -232,7 +232,7 @@ def _lines(values: Points, shifts: Points, pitch: float) -> tuple[int, Points]:
     return first, np.arange(first, last + 1)[:, None] * pitch + shifts
 
 
-def _centred(
+def _centre(
     regions: Sequence[Region],
     half: float,
     pitch: float,
@@ -241,8 +241,8 @@ def _centred(
 ) -> Lattice:
     """Move the lattice to the middle of its play along x and y, keeping its cells."""
     cells, y, x = shown_set.cells, shown_set.y, shown_set.x
-    turned = [moved(region, rotation) for region in regions]
-    shown = [(r, mirrored(r), c) for r, c in zip(turned, cells, strict=True) if len(c)]
+    turned = [move_region(region, rotation) for region in regions]
+    shown = [(r, mirror_region(r), c) for r, c in zip(turned, cells, strict=True) if len(c)]
     margin = 0.0
     for _ in range(3):
         sides = [slack(r, half, _centres(c[:, ::-1], pitch, x, y)) for r, _, c in shown]

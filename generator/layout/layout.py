@@ -19,10 +19,17 @@ from generator.array.contract import SymbolArray
 from generator.errors import LayoutError
 from generator.layout.blank import Request, describe_blank, remedies
 from generator.layout.footprint import region_of
-from generator.layout.piece import Piece, turned
+from generator.layout.piece import Piece, turn_piece
 from generator.layout.placement import FaceLayout, Layout, Placement
 from generator.layout.places import rank_test
-from generator.layout.plan import Plan, Task, alone, faces_plan, net_piece, net_plan
+from generator.layout.plan import (
+    LayoutPlan,
+    LayoutTask,
+    face_lattice,
+    faces_plan,
+    net_piece,
+    net_plan,
+)
 from generator.layout.torus import Occupancy, Spot, place_pieces
 from generator.layout.unfold import split, unfold
 from generator.polyhedron.frame import face_polygon
@@ -109,7 +116,7 @@ def lay_out(
         for outline, clearances in zip(outlines, clearances_mm, strict=True)
     )
     request = Request(footprint_half_mm, pitch_mm, array.window, rank_test(array))
-    task = Task(polyhedron, array, request, regions, frozenset(blank_faces))
+    task = LayoutTask(polyhedron, array, request, regions, frozenset(blank_faces))
 
     plans = []
     if kind != "net":
@@ -124,7 +131,7 @@ def lay_out(
     for plan in plans:
         if plan.worth[0] < plans[0].worth[0]:
             continue  # a full array is no reason to lose a face
-        placed = _placed(task, plan, occupied)
+        placed = _place_plan(task, plan, occupied)
         if placed is not None:
             if placed[0] is not plans[0]:  # other pieces may show other faces
                 warning = _without_place(task, placed[0], allow_blank_faces)
@@ -132,7 +139,7 @@ def lay_out(
     raise _full(plans[0], occupied)
 
 
-def _without_place(task: Task, plan: Plan, allowed: bool) -> tuple[str, ...]:
+def _without_place(task: LayoutTask, plan: LayoutPlan, allowed: bool) -> tuple[str, ...]:
     """Return the warning about faces without a place; raise it unless they are allowed."""
     shown = {
         face: places
@@ -142,7 +149,7 @@ def _without_place(task: Task, plan: Plan, allowed: bool) -> tuple[str, ...]:
     faces = sorted(face for face, places in shown.items() if places == 0)
     if not faces:
         return ()
-    lattices = [alone(task, face) for face in faces]
+    lattices = [face_lattice(task, face) for face in faces]
     names = {task.polyhedron.faces[face].name: task.regions[face] for face in faces}
     cause = describe_blank(names, [len(lattice.cells[0]) for lattice in lattices], task.request)
     if allowed:
@@ -154,9 +161,9 @@ def _without_place(task: Task, plan: Plan, allowed: bool) -> tuple[str, ...]:
     raise LayoutError(cause, fix=remedies(list(names.values()), task.request))
 
 
-def _placed(
-    task: Task, plan: Plan, occupancy: Occupancy
-) -> tuple[Plan, tuple[Spot | None, ...]] | None:
+def _place_plan(
+    task: LayoutTask, plan: LayoutPlan, occupancy: Occupancy
+) -> tuple[LayoutPlan, tuple[Spot | None, ...]] | None:
     """Place a plan; pieces of a net that find no place are cut in two until they do."""
     while True:
         spots = place_pieces(occupancy, [(p.owner >= 0, p.turns) for p in plan.pieces])
@@ -169,7 +176,7 @@ def _placed(
         for k in reversed(lost):
             net = split(net, k)
         known = dict(zip(plan.net.pieces, plan.pieces, strict=True))
-        plan = Plan(
+        plan = LayoutPlan(
             plan.kind,
             tuple(known.get(faces) or net_piece(task, net, faces) for faces in net.pieces),
             net,
@@ -177,7 +184,7 @@ def _placed(
 
 
 def _layout(
-    task: Task, plan: Plan, spots: tuple[Spot | None, ...], warnings: tuple[str, ...]
+    task: LayoutTask, plan: LayoutPlan, spots: tuple[Spot | None, ...], warnings: tuple[str, ...]
 ) -> Layout:
     """Return the finished layout of a plan whose pieces have their spots."""
     none = np.empty(0, dtype=np.int64)
@@ -188,7 +195,7 @@ def _layout(
     ]
     for piece, spot in zip(plan.pieces, spots, strict=True):
         if spot is not None:
-            lying = turned(piece, spot.quarter, task.request.pitch_mm)
+            lying = turn_piece(piece, spot.quarter, task.request.pitch_mm)
             for k, face in enumerate(piece.faces):
                 if piece.places[k]:
                     faces[face] = _face_layout(task, lying, k, spot)
@@ -196,7 +203,7 @@ def _layout(
     return Layout(plan.kind, task.request.pitch_mm, tuple(faces), blank, warnings)
 
 
-def _face_layout(task: Task, piece: Piece, k: int, spot: Spot) -> FaceLayout:
+def _face_layout(task: LayoutTask, piece: Piece, k: int, spot: Spot) -> FaceLayout:
     """Return one face of a piece that has been turned and has its spot."""
     pitch, array, pose = task.request.pitch_mm, task.array, piece.poses[k]
     r, c = (index.astype(np.int64) for index in np.nonzero(piece.owner == k))
@@ -215,7 +222,7 @@ def _face_layout(task: Task, piece: Piece, k: int, spot: Spot) -> FaceLayout:
     )
 
 
-def _full(plan: Plan, occupancy: Occupancy) -> LayoutError:
+def _full(plan: LayoutPlan, occupancy: Occupancy) -> LayoutError:
     needed = -plan.worth[2]
     cause = (
         f"the array {occupancy.rows}x{occupancy.columns} is full: the object needs {needed} "

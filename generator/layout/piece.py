@@ -18,7 +18,7 @@ from generator.layout.places import Identifies, count_places
 
 
 @dataclass(frozen=True, slots=True)
-class Pose:
+class PiecePose:
     """Rigid transform of a face into the plane of a piece: u = R x + (x_mm, y_mm)."""
 
     rotation_rad: float
@@ -31,7 +31,7 @@ class Piece:
     """Cells that keep their arrangement on the array."""
 
     faces: tuple[int, ...]  #: numbers of the faces in their polyhedron
-    poses: tuple[Pose, ...]  #: T_piece_face, one per face
+    poses: tuple[PiecePose, ...]  #: T_piece_face, one per face
     owner: NDArray[np.int64]  #: (rows, columns): position in `faces`, -1 where no symbol stands
     places: tuple[int, ...]  #: identifiable places per face
     turns: tuple[int, ...]  #: quarter turns that show as many places; 0 comes first
@@ -44,7 +44,7 @@ class Piece:
 
 def piece_of(
     faces: Sequence[int],
-    poses: Sequence[Pose],
+    poses: Sequence[PiecePose],
     lattice: Lattice,
     pitch_mm: float,
     window: tuple[int, int],
@@ -65,17 +65,17 @@ def piece_of(
     """
     owner, low, high = _grid(lattice)
     lattice_poses = [
-        _turned(pose, lattice.rotation_rad, *_corner(lattice, low, high, pitch_mm))
+        _turn_pose(pose, lattice.rotation_rad, *_corner(lattice, low, high, pitch_mm))
         for pose in poses
     ]
     piece = Piece(tuple(faces), tuple(lattice_poses), owner, lattice.places, (0,))
-    piece = turned(piece, lattice.quarter, pitch_mm)
+    piece = turn_piece(piece, lattice.quarter, pitch_mm)
     return Piece(
         piece.faces, piece.poses, piece.owner, lattice.places, _turns(piece, window, identifies)
     )
 
 
-def turned(piece: Piece, quarter: int, pitch_mm: float) -> Piece:
+def turn_piece(piece: Piece, quarter: int, pitch_mm: float) -> Piece:
     """Return the piece turned counter-clockwise by quarter turns, its grid at the origin again.
 
     `places` and `turns` are kept as they are: only turns in `turns` are allowed afterwards.
@@ -84,7 +84,8 @@ def turned(piece: Piece, quarter: int, pitch_mm: float) -> Piece:
     for _ in range(quarter % 4):
         height = owner.shape[1] * pitch_mm  # of the turned grid
         poses = tuple(
-            Pose(pose.rotation_rad + np.pi / 2, -pose.y_mm, pose.x_mm - height) for pose in poses
+            PiecePose(pose.rotation_rad + np.pi / 2, -pose.y_mm, pose.x_mm - height)
+            for pose in poses
         )
         owner = np.ascontiguousarray(np.rot90(owner))
     return Piece(piece.faces, poses, owner, piece.places, piece.turns)
@@ -112,10 +113,10 @@ def _corner(
     )
 
 
-def _turned(pose: Pose, rotation: float, x: float, y: float) -> Pose:
+def _turn_pose(pose: PiecePose, rotation: float, x: float, y: float) -> PiecePose:
     """Return the pose followed by a rotation about the origin and a shift."""
     c, s = float(np.cos(rotation)), float(np.sin(rotation))
-    return Pose(
+    return PiecePose(
         pose.rotation_rad + rotation,
         c * pose.x_mm - s * pose.y_mm + x,
         s * pose.x_mm + c * pose.y_mm + y,

@@ -1,7 +1,7 @@
 """Plans: what a layout would show, before it has cells on the array.
 
-Task (object, regions, symbols) -> Plan: pieces with their lattices. `faces` gives every face a
-lattice of its own, `net` lets one lattice run through each piece of the unfolded object.
+LayoutTask (object, regions, symbols) -> LayoutPlan: pieces with their lattices. `faces` gives
+every face a lattice of its own, `net` lets one run through each piece of the unfolded object.
 Thesis 6.3.
 """
 
@@ -15,15 +15,15 @@ import numpy as np
 
 from generator.array.contract import SymbolArray
 from generator.layout.blank import Request
-from generator.layout.footprint import ROUNDING, Region, moved
+from generator.layout.footprint import ROUNDING, Region, move_region
 from generator.layout.lattice import Lattice, choose_lattice
-from generator.layout.piece import Piece, Pose, piece_of
+from generator.layout.piece import Piece, PiecePose, piece_of
 from generator.layout.unfold import Net
 from generator.polyhedron.winged import Polyhedron
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class LayoutPlan:
     """One way to lay out the object, before it has cells."""
 
     kind: str
@@ -38,7 +38,7 @@ class Plan:
 
 
 @dataclass(frozen=True, slots=True)
-class Task:
+class LayoutTask:
     """What is to be laid out."""
 
     polyhedron: Polyhedron
@@ -48,7 +48,7 @@ class Task:
     blank: frozenset[int]  #: faces that shall carry no symbols
 
 
-def faces_plan(task: Task) -> Plan:
+def faces_plan(task: LayoutTask) -> LayoutPlan:
     """Give every face a lattice of its own; faces with equal polygons share the work."""
     known: dict[bytes, Piece] = {}
     pieces = []
@@ -59,34 +59,36 @@ def faces_plan(task: Task) -> Plan:
         edges = np.column_stack([region.start, region.end, region.clearance])
         key = (np.round(edges / step) + 0.0).tobytes()
         if key not in known:
-            known[key] = _piece(task, (face,), (Pose(0.0, 0.0, 0.0),), search=True)
+            known[key] = _piece(task, (face,), (PiecePose(0.0, 0.0, 0.0),), search=True)
         pieces.append(replace(known[key], faces=(face,)))
-    return Plan("faces", tuple(pieces), None)
+    return LayoutPlan("faces", tuple(pieces), None)
 
 
-def net_plan(task: Task, net: Net) -> Plan:
+def net_plan(task: LayoutTask, net: Net) -> LayoutPlan:
     """Let one lattice run through each piece of the net."""
     pieces = tuple(net_piece(task, net, faces) for faces in net.pieces)
-    return Plan("net", pieces, net)
+    return LayoutPlan("net", pieces, net)
 
 
-def net_piece(task: Task, net: Net, faces: Sequence[int]) -> Piece:
+def net_piece(task: LayoutTask, net: Net, faces: Sequence[int]) -> Piece:
     """Return some faces of a net, on one lattice."""
     shown = tuple(face for face in faces if face not in task.blank)
     poses = tuple(
-        Pose(math.atan2(T[1, 0], T[0, 0]), float(T[0, 2]), float(T[1, 2]))
+        PiecePose(math.atan2(T[1, 0], T[0, 0]), float(T[0, 2]), float(T[1, 2]))
         for T in net.T_net_face[list(shown)]
     )
     return _piece(task, shown, poses, search=False)
 
 
-def _piece(task: Task, faces: tuple[int, ...], poses: tuple[Pose, ...], *, search: bool) -> Piece:
+def _piece(
+    task: LayoutTask, faces: tuple[int, ...], poses: tuple[PiecePose, ...], *, search: bool
+) -> Piece:
     """Choose the lattice of some faces and drop the cells of those that it does not identify."""
     request = task.request
     if not faces:
         return Piece((), (), np.empty((0, 0), dtype=np.int64), (), (0,))
     regions = [
-        moved(task.regions[face], pose.rotation_rad, pose.x_mm, pose.y_mm)
+        move_region(task.regions[face], pose.rotation_rad, pose.x_mm, pose.y_mm)
         for face, pose in zip(faces, poses, strict=True)
     ]
     lattice = choose_lattice(
@@ -105,7 +107,7 @@ def _piece(task: Task, faces: tuple[int, ...], poses: tuple[Pose, ...], *, searc
     return piece_of(faces, poses, lattice, request.pitch_mm, request.window, request.identifies)
 
 
-def alone(task: Task, face: int) -> Lattice:
+def face_lattice(task: LayoutTask, face: int) -> Lattice:
     """Return the best lattice of one face by itself."""
     request = task.request
     return choose_lattice(

@@ -130,7 +130,7 @@ def _trees(polyhedron: Polyhedron, surface: _Surface, seed: int) -> Iterator[tup
         yield roots[0], _uncut_first(_steepest(polyhedron, direction))
     random = np.random.default_rng(seed)
     for _ in range(_RANDOM_TREES):
-        yield roots[0], _ranked(random.permutation(len(polyhedron.edges)))
+        yield roots[0], _edge_order(random.permutation(len(polyhedron.edges)))
 
 
 def _uncut_first(cuts: NDArray[np.bool_]) -> Priority:
@@ -138,7 +138,7 @@ def _uncut_first(cuts: NDArray[np.bool_]) -> Priority:
     return lambda edge, depth: float(cuts[edge] * 1e6 + depth)
 
 
-def _ranked(order: NDArray[np.int64]) -> Priority:
+def _edge_order(order: NDArray[np.int64]) -> Priority:
     """Fold along edges in a given order."""
     return lambda edge, _depth: float(order[edge])
 
@@ -189,7 +189,7 @@ def _laid_flat(surface: _Surface, root: int, priority: Priority) -> Net:
             face = hinge.face
             if placed[face]:
                 continue
-            T = transforms[parent] @ _folded(surface, parent, hinge)
+            T = transforms[parent] @ _hinge_transform(surface, parent, hinge)
             triangles = surface.triangles[face] @ T[:2, :2].T + T[:2, 2]
             if overlap(triangles, lying, surface.tolerance):
                 continue
@@ -215,7 +215,7 @@ def _push(
         heapq.heappush(waiting, item)
 
 
-def _folded(surface: _Surface, parent: int, hinge: _Hinge) -> Points:
+def _hinge_transform(surface: _Surface, parent: int, hinge: _Hinge) -> Points:
     """Return T_parent_face: the neighbour laid into the parent's plane at their common edge."""
     a, b = (surface.points[parent][v] for v in (hinge.start, hinge.end))
     c, d = (surface.points[hinge.face][v] for v in (hinge.start, hinge.end))

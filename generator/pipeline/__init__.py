@@ -16,6 +16,6 @@
 """
 
 from generator.pipeline.encode import encode
-from generator.pipeline.made import Encoded, Made
+from generator.pipeline.made import Encoded, MadeObject
 
-__all__ = ["Encoded", "Made", "encode"]
+__all__ = ["Encoded", "MadeObject", "encode"]

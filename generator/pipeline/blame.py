@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from generator.errors import GeneratorError
-from generator.spec import Located, blamed
+from generator.spec import LocatedSpec, error_at
 
 
 @contextmanager
-def blaming(located: Located, path: str) -> Iterator[None]:
+def errors_at(located: LocatedSpec, path: str) -> Iterator[None]:
     """Give errors of a stage the place of the setting at `path`."""
     try:
         yield
     except GeneratorError as error:
-        raise blamed(located, error, path) from error
+        raise error_at(located, error, path) from error

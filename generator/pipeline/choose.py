@@ -15,15 +15,15 @@ from typing import Any
 from sqlalchemy import Connection
 
 from generator.array.contract import SymbolArray
-from generator.array.profiles import DEFAULT_PROFILE, PROFILES, Profile, enlarged
+from generator.array.profiles import DEFAULT_PROFILE, PROFILES, Profile, next_larger
 from generator.database.cells import occupancy
 from generator.database.read import find_object
 from generator.errors import ArrayError, GeneratorError, LayoutError
 from generator.layout.placement import Layout
-from generator.pipeline.place import NO_CELLS, laid_out
-from generator.pipeline.plan import Plan, planned
+from generator.pipeline.place import NO_CELLS, lay_out_object
+from generator.pipeline.plan import ObjectPlan, plan_object
 from generator.polyhedron import Polyhedron
-from generator.spec import Located, blamed
+from generator.spec import LocatedSpec, error_at
 from generator.spec.profile import AUTO
 from generator.spec.script import with_profile
 
@@ -35,12 +35,12 @@ LARGER = 4  #: sizes tried beyond `large`
 class Choice:
     """The specs with their array, and what the person should know about it."""
 
-    specs: tuple[Located, ...]
+    specs: tuple[LocatedSpec, ...]
     notes: tuple[str, ...] = ()
 
 
 def choose_array(
-    specs: Sequence[Located], connection: Connection | None, solid: Polyhedron | None = None
+    specs: Sequence[LocatedSpec], connection: Connection | None, solid: Polyhedron | None = None
 ) -> Choice:
     """Return the specs with a profile in place of `auto`.
 
@@ -64,7 +64,7 @@ def choose_array(
     if named:  # on the same array, or the specs would have been refused
         profile, encoding = named[0].profile, named[0].encoding
         defaults = profile if profile in PROFILES else DEFAULT_PROFILE
-        return Choice(tuple(_followed(one, profile, defaults, encoding) for one in specs))
+        return Choice(tuple(_follow(one, profile, defaults, encoding) for one in specs))
     if connection is not None:
         for one in specs:
             known = find_object(connection, one.spec.name)
@@ -128,47 +128,47 @@ def _candidates() -> Iterator[Profile]:
     yield larger
     for _ in range(LARGER):
         try:
-            larger = enlarged(larger)
+            larger = next_larger(larger)
         except ArrayError:
             return
         rows, columns = larger.encoding["rows"], larger.encoding["columns"]
         yield replace(larger, name=f"large-{rows}x{columns}")
 
 
-def _with(located: Located, profile: Profile, array: SymbolArray) -> Located:
+def _with(located: LocatedSpec, profile: Profile, array: SymbolArray) -> LocatedSpec:
     defaults = "large" if profile.name.startswith("large") else profile.name
     return with_profile(located, profile.name, defaults, array.definition())
 
 
-def _followed(
-    located: Located, profile: str, defaults: str, encoding: Mapping[str, Any]
-) -> Located:
+def _follow(
+    located: LocatedSpec, profile: str, defaults: str, encoding: Mapping[str, Any]
+) -> LocatedSpec:
     """Return a spec with the array of another one, if its own is to be chosen."""
     if located.spec.profile != AUTO:
         return located
     return with_profile(located, profile, defaults, encoding)
 
 
-def _needs(specs: Sequence[Located], solid: Polyhedron | None) -> tuple[int | None, int]:
+def _needs(specs: Sequence[LocatedSpec], solid: Polyhedron | None) -> tuple[int | None, int]:
     """Return how many cells the objects need, None if one does not fit, and their blank faces."""
     known: dict[str, tuple[int, int]] = {}
     needed = blank = 0
     for one in specs:
         key = repr(one.spec.meaning)
         if key not in known:
-            plan = planned(one, solid)
+            plan = plan_object(one, solid)
             try:
-                layout = laid_out(plan, NO_CELLS)
+                layout = lay_out_object(plan, NO_CELLS)
             except LayoutError as error:
                 if "is full" not in error.cause:
-                    raise blamed(one, error, "shape") from error
+                    raise error_at(one, error, "shape") from error
                 return None, 0
             known[key] = _counts(plan, layout)
         needed, blank = needed + known[key][0], blank + known[key][1]
     return needed, blank
 
 
-def _counts(plan: Plan, layout: Layout) -> tuple[int, int]:
+def _counts(plan: ObjectPlan, layout: Layout) -> tuple[int, int]:
     cells = sum(len(face.labels) for face in layout.faces)
     return cells, len(set(layout.blank_faces) - plan.blank_faces)
 
@@ -179,6 +179,6 @@ def _room(array: SymbolArray, connection: Connection | None) -> int:
     return max(0, int(FULL * array.rows * array.columns) - taken)
 
 
-def _names_printer(located: Located) -> bool:
+def _names_printer(located: LocatedSpec) -> bool:
     written = located.tree.value.get("print")
     return isinstance(written, dict) and written.get("printer") is not None

@@ -23,17 +23,17 @@ from generator.database.transaction import reading
 from generator.pipeline.choose import choose_array
 from generator.pipeline.faces import face_reports
 from generator.pipeline.files import parts_of
-from generator.pipeline.made import Encoded, Made, made_of
-from generator.pipeline.make import Order, made_under_lock
-from generator.pipeline.place import beside, placed, taken_by_all
-from generator.pipeline.plan import Plan, planned
-from generator.pipeline.progress import Progress, silent, within
-from generator.pipeline.sets import made_as_set, set_folder
-from generator.spec import Located
+from generator.pipeline.made import Encoded, MadeObject, describe_object
+from generator.pipeline.make import Order, make_under_lock
+from generator.pipeline.place import occupancy_of, occupancy_with, place_object
+from generator.pipeline.plan import ObjectPlan, plan_object
+from generator.pipeline.progress import Progress, no_progress, within
+from generator.pipeline.sets import make_set, set_folder
+from generator.spec import LocatedSpec
 
 
 def encode(
-    specs: Sequence[Located],
+    specs: Sequence[LocatedSpec],
     *,
     folder: Path | None = None,
     formats: Sequence[str] | None = None,
@@ -42,7 +42,7 @@ def encode(
     verify: bool = False,
     replace: bool = False,
     jobs: int | None = None,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> Encoded:
     """Make objects: files that print, and an entry in the database for each.
 
@@ -80,13 +80,13 @@ def encode(
     """
     began = time.perf_counter()
     url = database or specs[0].spec.database
-    plans: list[Plan] = []
+    plans: list[ObjectPlan] = []
     engine = open_if_there(url, writable=not dry_run)
     with reading(engine) if engine else nullcontext() as connection:
         choice = choose_array(specs, connection)
     for number, located in enumerate(choice.specs):
         progress(f"planning {located.spec.name}", 0.1 * number / len(specs))
-        plan = planned(located)
+        plan = plan_object(located)
         notes = choice.notes if number == 0 else ()
         plans.append(dataclasses.replace(plan, notes=(*plan.notes, *notes)))
     rest = within(progress, 0.1, 1.0)
@@ -101,9 +101,9 @@ def encode(
             for plan in plans
         ]
         if len(orders) == 1:
-            made = [made_under_lock(engine, orders[0], rest).made]
+            made = [make_under_lock(engine, orders[0], rest).made]
         else:
-            made, files = made_as_set(engine, url, orders, set_folder(orders, folder), jobs, rest)
+            made, files = make_set(engine, url, orders, set_folder(orders, folder), jobs, rest)
         with reading(engine) as connection:
             used = occupancy(connection, plans[0].array).used
     array = plans[0].array
@@ -111,38 +111,38 @@ def encode(
     return Encoded(tuple(made), url, array.rows, array.columns, used, seconds, files)
 
 
-def new_database(url: str, plan: Plan) -> Engine:
+def new_database(url: str, plan: ObjectPlan) -> Engine:
     """Make a database; an object that cannot be made leaves none behind."""
-    parts_of(plan, placed(None, plan, replace=False).layout)
+    parts_of(plan, place_object(None, plan, replace=False).layout)
     return open_database(url)
 
 
 def _rehearse(
-    connection: Connection | None, plans: Sequence[Plan], replace: bool, progress: Progress
-) -> tuple[list[Made], int]:
+    connection: Connection | None, plans: Sequence[ObjectPlan], replace: bool, progress: Progress
+) -> tuple[list[MadeObject], int]:
     """Return what `encode` would make, each object beside the ones before it, and cells used."""
-    made: list[Made] = []
-    taken = taken_by_all(connection, plans[0])
+    made: list[MadeObject] = []
+    taken = occupancy_of(connection, plans[0])
     used = 0
     for number, plan in enumerate(plans):
         step = within(progress, number / len(plans), (number + 1) / len(plans))
         step(f"placing {plan.spec.name}", 0.0)
-        place = placed(connection, plan, replace, taken)
+        place = place_object(connection, plan, replace, taken)
         step(f"building {plan.spec.name}", 0.5)
         parts, warnings = parts_of(plan, place.layout)
-        one = made_of(plan, place.layout, len(parts), warnings, (), reused=place.reused)
+        one = describe_object(plan, place.layout, len(parts), warnings, (), reused=place.reused)
         made.append(dataclasses.replace(one, face_reports=face_reports(plan, place.layout)))
         if not place.reused:
-            taken = beside(taken, place.layout)
+            taken = occupancy_with(taken, place.layout)
         used = place.taken + made[-1].symbols
     return made, used
 
 
-def _formats(plan: Plan, formats: Sequence[str] | None) -> tuple[str, ...]:
+def _formats(plan: ObjectPlan, formats: Sequence[str] | None) -> tuple[str, ...]:
     return tuple(formats) if formats is not None else plan.spec.formats
 
 
-def _folder(plan: Plan, folder: Path | None, objects: int) -> Path:
+def _folder(plan: ObjectPlan, folder: Path | None, objects: int) -> Path:
     if folder is None:
         return plan.spec.folder
     return folder / plan.spec.name if objects > 1 else folder

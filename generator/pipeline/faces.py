@@ -11,7 +11,7 @@ from generator.layout.footprint import region_of
 from generator.layout.placement import Layout
 from generator.layout.places import rank_test
 from generator.layout.smallest import extent_mm, smallest_mm
-from generator.pipeline.plan import Plan
+from generator.pipeline.plan import ObjectPlan
 from generator.polyhedron import face_polygon
 
 Size = tuple[float, float]  #: width and height in the face's frame, mm
@@ -29,7 +29,7 @@ class FaceReport:
     smallest_mm: Size  #: at which it would still show one, in its own proportions
 
 
-def face_reports(plan: Plan, layout: Layout) -> tuple[FaceReport, ...]:
+def face_reports(plan: ObjectPlan, layout: Layout) -> tuple[FaceReport, ...]:
     """Return a report on every face that symbols can stand on.
 
     Parameters

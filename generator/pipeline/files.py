@@ -21,8 +21,8 @@ from generator.export.step import step_chunks
 from generator.export.stl import stl_chunks
 from generator.export.threemf import print_files
 from generator.layout.placement import Layout
-from generator.pipeline.blame import blaming
-from generator.pipeline.plan import Plan
+from generator.pipeline.blame import errors_at
+from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress
 from generator.polyhedron import face_polygon
 from generator.solid import Part, panels, prove_closed, triangles, volume, whole
@@ -38,7 +38,7 @@ class Staged:
 
 
 def stage(
-    plan: Plan,
+    plan: ObjectPlan,
     layout: Layout,
     formats: Sequence[str],
     staging: Staging,
@@ -76,10 +76,10 @@ def stage(
         step = stl = None
         if "step" in formats:
             step = staging.write(f"{part.name}.step", step_chunks(part))
-            registered.append(_registered(part, "step", step))
+            registered.append(_part_entry(part, "step", step))
         if "stl" in formats:
             stl = staging.write(f"{part.name}.stl", stl_chunks(mesh))
-            registered.append(_registered(part, "stl", stl))
+            registered.append(_part_entry(part, "stl", stl))
         if verify and (step or stl):
             progress(f"verifying {part.name}", 0.1 + 0.6 * (number + 0.5) / len(parts))
             from generator.export.check import verify as read_back  # loads the CAD kernel
@@ -112,23 +112,23 @@ def stage(
     return Staged(tuple(registered), len(parts), warnings)
 
 
-def parts_of(plan: Plan, layout: Layout) -> tuple[tuple[Part, ...], tuple[str, ...]]:
+def parts_of(plan: ObjectPlan, layout: Layout) -> tuple[tuple[Part, ...], tuple[str, ...]]:
     """Return the parts of an object, panels or the whole body, and what they lack."""
     spec = plan.spec
     if spec.parts == "whole":
         return (whole(plan.polyhedron, layout, plan.outlines, spec.name),), ()
-    with blaming(plan.located, "print.wall, print, shape"):
+    with errors_at(plan.located, "print.wall, print, shape"):
         made = panels(
             plan.polyhedron, layout, plan.outlines, spec.wall_mm, plan.printer, name=spec.name
         )
     return made.parts, made.warnings
 
 
-def _registered(part: Part, kind: str, written: Written) -> RegisteredPart:
+def _part_entry(part: Part, kind: str, written: Written) -> RegisteredPart:
     return RegisteredPart(part.name, kind, str(written.path), written.sha256, part.T_object_part)
 
 
-def _array_picture(plan: Plan, layout: Layout) -> str:
+def _array_picture(plan: ObjectPlan, layout: Layout) -> str:
     faces = [
         FaceOnArray(
             plan.polyhedron.faces[face.face].name,

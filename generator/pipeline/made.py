@@ -7,11 +7,11 @@ from pathlib import Path
 
 from generator.layout.placement import Layout
 from generator.pipeline.faces import FaceReport
-from generator.pipeline.plan import Plan
+from generator.pipeline.plan import ObjectPlan
 
 
 @dataclass(frozen=True, slots=True)
-class Made:
+class MadeObject:
     """One object that was made, or would be."""
 
     name: str
@@ -41,7 +41,7 @@ class Made:
 class Encoded:
     """What one run made."""
 
-    objects: tuple[Made, ...]
+    objects: tuple[MadeObject, ...]
     database: str
     rows: int  #: of the array
     columns: int
@@ -80,8 +80,8 @@ class Encoded:
         return "\n".join(map(str, self.objects))
 
 
-def made_of(
-    plan: Plan,
+def describe_object(
+    plan: ObjectPlan,
     layout: Layout,
     parts: int,
     warnings: tuple[str, ...],
@@ -89,9 +89,9 @@ def made_of(
     *,
     reused: bool,
     skipped: bool = False,
-) -> Made:
+) -> MadeObject:
     """Return what is told of an object; a round face counts as one."""
-    return Made(
+    return MadeObject(
         name=plan.spec.name,
         faces=len({face.name.partition(".")[0] for face in plan.polyhedron.faces}),
         symbols=sum(len(face.labels) for face in layout.faces),

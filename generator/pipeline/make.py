@@ -1,8 +1,8 @@
 """One object: place, stage, commit, and let the files appear.
 
-Either under the lock of the database from beginning to end (`made_under_lock`), or with a
+Either under the lock of the database from beginning to end (`make_under_lock`), or with a
 place chosen before, so that several processes build at once and only the rows wait for
-their turn (`made_at`). Whoever chose cells that another writer took meanwhile makes his
+their turn (`make_at`). Whoever chose cells that another writer took meanwhile makes his
 object again under the lock.
 """
 
@@ -16,22 +16,22 @@ from pathlib import Path
 from sqlalchemy import Connection, Engine
 
 from generator.database.read import find_object
-from generator.database.register import Registration, register
+from generator.database.register import ObjectRecord, register
 from generator.database.transaction import LostRaceError, writing
 from generator.database.url import part_file
 from generator.export.atomic import Staging
 from generator.pipeline.files import Staged, stage
-from generator.pipeline.made import Made, made_of
-from generator.pipeline.place import Placed, placed
-from generator.pipeline.plan import Plan
-from generator.pipeline.progress import Progress, silent, within
+from generator.pipeline.made import MadeObject, describe_object
+from generator.pipeline.place import ObjectPlacement, place_object
+from generator.pipeline.plan import ObjectPlan
+from generator.pipeline.progress import Progress, no_progress, within
 
 
 @dataclass(frozen=True, slots=True)
 class Order:
     """One object to make: its plan and what is wanted of it."""
 
-    plan: Plan
+    plan: ObjectPlan
     folder: Path
     formats: tuple[str, ...]
     verify: bool = False
@@ -42,47 +42,49 @@ class Order:
 class Product:
     """What became of an order."""
 
-    made: Made
-    placed: Placed
+    made: MadeObject
+    placed: ObjectPlacement
 
 
-def made_under_lock(engine: Engine, order: Order, progress: Progress = silent) -> Product:
+def make_under_lock(engine: Engine, order: Order, progress: Progress = no_progress) -> Product:
     """Make one object; nobody else writes to the database meanwhile."""
     name = order.plan.spec.name
     with Staging(order.folder) as staging:
         with writing(engine) as connection:
             progress(f"placing {name}", 0.0)
-            place = placed(connection, order.plan, order.replace)
-            files = _staged(order, place, staging, within(progress, 0.1, 0.9))
+            place = place_object(connection, order.plan, order.replace)
+            files = _stage(order, place, staging, within(progress, 0.1, 0.9))
             progress(f"registering {name}", 0.9)
             _register(connection, order, place, files)
-        return _finished(order, place, files, staging)
+        return _finish(order, place, files, staging)
 
 
-def made_at(engine: Engine, order: Order, place: Placed, progress: Progress = silent) -> Product:
+def make_at(
+    engine: Engine, order: Order, place: ObjectPlacement, progress: Progress = no_progress
+) -> Product:
     """Make one object at a place chosen before, or anew where that was lost to another writer."""
     try:
         with Staging(order.folder) as staging:
-            files = _staged(order, place, staging, within(progress, 0.0, 0.9))
+            files = _stage(order, place, staging, within(progress, 0.0, 0.9))
             with writing(engine) as connection:
                 known = find_object(connection, order.plan.spec.name)
                 if (known is not None) != (place.reused or place.replaces):
                     raise LostRaceError("an object of this name came or went meanwhile")
                 _register(connection, order, place, files)
-            return _finished(order, place, files, staging)
+            return _finish(order, place, files, staging)
     except LostRaceError:
-        return made_under_lock(engine, order, progress)
+        return make_under_lock(engine, order, progress)
 
 
-def _staged(order: Order, place: Placed, staging: Staging, progress: Progress) -> Staged:
+def _stage(order: Order, place: ObjectPlacement, staging: Staging, progress: Progress) -> Staged:
     return stage(
         order.plan, place.layout, order.formats, staging, verify=order.verify, progress=progress
     )
 
 
-def _register(connection: Connection, order: Order, place: Placed, files: Staged) -> None:
+def _register(connection: Connection, order: Order, place: ObjectPlacement, files: Staged) -> None:
     plan, url = order.plan, connection.engine.url
-    registration = Registration(
+    registration = ObjectRecord(
         name=plan.spec.name,
         polyhedron=plan.polyhedron,
         layout=place.layout,
@@ -99,9 +101,9 @@ def _register(connection: Connection, order: Order, place: Placed, files: Staged
     register(connection, registration, replace=place.replaces)
 
 
-def _finished(order: Order, place: Placed, files: Staged, staging: Staging) -> Product:
+def _finish(order: Order, place: ObjectPlacement, files: Staged, staging: Staging) -> Product:
     written = tuple(w.path for w in staging.commit())
-    made = made_of(
+    made = describe_object(
         order.plan, place.layout, files.parts, files.warnings, written, reused=place.reused
     )
     return Product(made, place)

@@ -1,6 +1,6 @@
 """An object's place on the array: its cells in the database, or free ones.
 
-Plan + cells of others -> Placed. Thesis 6.3.
+Plan + cells of others -> ObjectPlacement. Thesis 6.3.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from generator.database.register import require_same_spec
 from generator.layout.layout import lay_out
 from generator.layout.occupancy import Cells, Occupancy
 from generator.layout.placement import Layout
-from generator.pipeline.blame import blaming
-from generator.pipeline.plan import Plan
+from generator.pipeline.blame import errors_at
+from generator.pipeline.plan import ObjectPlan
 
 NO_CELLS = (np.empty(0, np.int64), np.empty(0, np.int64))
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
+class ObjectPlacement:
     """Where an object's symbols are, and what is around them."""
 
     layout: Layout
@@ -32,9 +32,9 @@ class Placed:
     replaces: bool  #: registered before from another spec, which goes
 
 
-def placed(
-    connection: Connection | None, plan: Plan, replace: bool, taken: Occupancy | None = None
-) -> Placed:
+def place_object(
+    connection: Connection | None, plan: ObjectPlan, replace: bool, taken: Occupancy | None = None
+) -> ObjectPlacement:
     """Find the object's cells in the database, or choose free ones.
 
     Parameters
@@ -54,7 +54,7 @@ def placed(
         The array is full, no place of the object can be told, or another spec is registered
         under its name.
     """
-    others = taken_by_all(connection, plan) if taken is None else taken
+    others = occupancy_of(connection, plan) if taken is None else taken
     replaces = False
     known = None if connection is None else find_object(connection, plan.spec.name)
     if connection is not None and known is not None:
@@ -63,20 +63,22 @@ def placed(
         if not replace or known.same_spec(plan.meaning):
             require_same_spec(connection, known, plan.meaning)
             layout = read_layout(connection, plan.spec.name)
-            return Placed(layout, others.used, reused=True, replaces=False)
+            return ObjectPlacement(layout, others.used, reused=True, replaces=False)
         replaces = True
-    with blaming(plan.located, "shape"):
-        return Placed(laid_out(plan, others), others.used, reused=False, replaces=replaces)
+    with errors_at(plan.located, "shape"):
+        return ObjectPlacement(
+            lay_out_object(plan, others), others.used, reused=False, replaces=replaces
+        )
 
 
-def taken_by_all(connection: Connection | None, plan: Plan) -> Occupancy:
+def occupancy_of(connection: Connection | None, plan: ObjectPlan) -> Occupancy:
     """Return what the objects of a database hold of a plan's array."""
     if connection is None:
         return Occupancy.from_cells(*NO_CELLS, plan.array)
     return occupancy(connection, plan.array)
 
 
-def beside(taken: Occupancy, layout: Layout) -> Occupancy:
+def occupancy_with(taken: Occupancy, layout: Layout) -> Occupancy:
     """Return what is taken together with a layout."""
     return taken.with_cells(
         np.concatenate([face.rows for face in layout.faces]),
@@ -84,7 +86,7 @@ def beside(taken: Occupancy, layout: Layout) -> Occupancy:
     )
 
 
-def laid_out(plan: Plan, others: Occupancy | Cells) -> Layout:
+def lay_out_object(plan: ObjectPlan, others: Occupancy | Cells) -> Layout:
     """Lay the object out; faces too small to be told stay blank, unless all are."""
 
     def attempt(allow_blank_faces: bool) -> Layout:

@@ -19,8 +19,8 @@ from generator.alphabet.printable import check_printable
 from generator.array import SymbolArray, array_from
 from generator.errors import ArrayError
 from generator.layout.layout import Clearances, Outlines
-from generator.pipeline.blame import blaming
-from generator.pipeline.round import RoundFaces, made_whole, reach_mm, round_faces
+from generator.pipeline.blame import errors_at
+from generator.pipeline.round import RoundFaces, as_one_part, reach_mm, round_faces
 from generator.polyhedron import Polyhedron, dihedral, face_polygon
 from generator.polyhedron.front import Loop, covered_parts
 from generator.polyhedron.round import ROUND_SHAPES
@@ -29,14 +29,14 @@ from generator.printers import Printer, printer_named
 from generator.solid.frame import edge_numbers
 from generator.solid.mitre import symbol_clearance_mm
 from generator.solid.panels import top_insets_mm
-from generator.spec import Located, ObjectSpec, ShapeSpec
+from generator.spec import LocatedSpec, ObjectSpec, ShapeSpec
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class ObjectPlan:
     """One object, ready to be laid out and built."""
 
-    located: Located
+    located: LocatedSpec
     polyhedron: Polyhedron
     array: SymbolArray
     alphabet: Alphabet
@@ -65,7 +65,7 @@ class Plan:
         return meaning
 
 
-def planned(located: Located, solid: Polyhedron | None = None) -> Plan:
+def plan_object(located: LocatedSpec, solid: Polyhedron | None = None) -> ObjectPlan:
     """Return the plan of one object.
 
     Parameters
@@ -82,22 +82,22 @@ def planned(located: Located, solid: Polyhedron | None = None) -> Plan:
         alphabet, or the printer cannot make them: at the line that says so.
     """
     spec = located.spec
-    with blaming(located, "print.printer"):
+    with errors_at(located, "print.printer"):
         printer = printer_named(spec.printer)
-    with blaming(located, "shape"):
+    with errors_at(located, "shape"):
         polyhedron = _polyhedron(spec.shape) if solid is None else solid
-    located = made_whole(located, polyhedron)
+    located = as_one_part(located, polyhedron)
     spec = located.spec
-    with blaming(located, "encoding, profile"):
+    with errors_at(located, "encoding, profile"):
         array = array_from(spec.encoding)
-    with blaming(located, "symbols.alphabet, encoding.alphabet, profile"):
+    with errors_at(located, "symbols.alphabet, encoding.alphabet, profile"):
         alphabet = alphabet_named(spec.alphabet)
         _check_order(alphabet, array)
-    with blaming(located, "symbols.pitch, symbols, profile"):
+    with errors_at(located, "symbols.pitch, symbols, profile"):
         check_printable(alphabet, spec.style, printer)
         shapes = outlines(alphabet, spec.style)
         half = footprint_half_mm(alphabet, spec.style)
-    with blaming(located, "shape"):
+    with errors_at(located, "shape"):
         faces = round_faces(polyhedron, shapes, spec, printer)
     plain = [k for k in range(len(polyhedron.faces)) if k not in faces.blank]
     plain = [k for k in plain if k not in faces.developments]
@@ -105,7 +105,7 @@ def planned(located: Located, solid: Polyhedron | None = None) -> Plan:
     clearances = _clearances(polyhedron, spec, printer, faces, covered)
     outlines_of = {k: (*face_polygon(polyhedron, k), *loops) for k, loops in covered.items()}
     outlines_of |= {number: (face.outline,) for number, face in faces.developments.items()}
-    return Plan(
+    return ObjectPlan(
         located,
         polyhedron,
         array,

@@ -13,14 +13,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from generator.export.atomic import Staging
-from generator.export.bed import Plate, arranged
+from generator.export.bed import Plate, arrange_plates
 from generator.export.overview import can_draw, overview_pdf
 from generator.export.packing import Packed, packing_csv
 from generator.export.threemf import PrintFile, print_file
 from generator.layout.placement import Layout
 from generator.pipeline.files import parts_of
 from generator.pipeline.parallel import Task, Workers
-from generator.pipeline.plan import Plan
+from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress, within
 from generator.printers import printer_named
 from generator.solid import Part, box
@@ -30,7 +30,7 @@ from generator.solid import Part, box
 class SetObject:
     """One object of a set, as it was made."""
 
-    plan: Plan
+    plan: ObjectPlan
     layout: Layout
     formats: tuple[str, ...]
 
@@ -54,7 +54,7 @@ class _SetPlate:
     parts: tuple[_Measured, ...]
 
 
-def written_set(
+def write_set(
     objects: Sequence[SetObject], folder: Path, workers: Workers, progress: Progress
 ) -> tuple[Path, ...]:
     """Write the files of a set; return their paths.
@@ -68,9 +68,9 @@ def written_set(
     measured: list[_Measured] = []
     for number, one in enumerate(objects):
         progress(f"measuring {one.plan.spec.name}", 0.3 * number / len(objects))
-        measured += _measured(number, one.plan, one.layout)
+        measured += _measure(number, one.plan, one.layout)
     plates = _plates(objects, measured)
-    packed = [_packed(objects, plate, number) for number, plate in enumerate(plates, 1)]
+    packed = [_packing_rows(objects, plate, number) for number, plate in enumerate(plates, 1)]
     rows = sorted((row for some in packed for row in some), key=lambda row: row.order)
     listed = packing_csv(rows)
     with_models = any("3mf" in one.formats for one in objects)
@@ -82,7 +82,7 @@ def written_set(
     ]
     overview = [f"{name}-overview.pdf"] if can_draw() else []
     names = [f"{name}-packing.csv", *overview, *models]
-    if _unchanged(folder, names, listed):
+    if _same_files(folder, names, listed):
         return tuple(folder / each for each in names)
     with Staging(folder) as staging:
         if with_models:
@@ -111,7 +111,7 @@ def _name(objects: Sequence[SetObject]) -> str:
     return names.pop() if len(names) == 1 and all(names) else "set"
 
 
-def _measured(number: int, plan: Plan, layout: Layout) -> list[_Measured]:
+def _measure(number: int, plan: ObjectPlan, layout: Layout) -> list[_Measured]:
     """Return the parts of one object with their sizes."""
     found = []
     for part in parts_of(plan, layout)[0]:
@@ -128,12 +128,12 @@ def _plates(objects: Sequence[SetObject], parts: Sequence[_Measured]) -> list[_S
     for printer in printers:
         own = tuple(p for p in parts if objects[p.number].plan.printer.name == printer)
         sizes = [part.size_mm[:2] for part in own]
-        for plate in arranged(sizes, printer_named(printer).bed_mm):
+        for plate in arrange_plates(sizes, printer_named(printer).bed_mm):
             plates.append(_SetPlate(printer, plate, own))
     return plates
 
 
-def _packed(objects: Sequence[SetObject], plate: _SetPlate, number: int) -> list[Packed]:
+def _packing_rows(objects: Sequence[SetObject], plate: _SetPlate, number: int) -> list[Packed]:
     rows = []
     for place in plate.plate.places:
         part = plate.parts[place.part]
@@ -155,11 +155,11 @@ def _packed(objects: Sequence[SetObject], plate: _SetPlate, number: int) -> list
 
 def _plate_task(
     objects: Sequence[SetObject], title: str, plate: _SetPlate
-) -> tuple[str, list[tuple[Plan, Layout, list[str]]], Plate]:
+) -> tuple[str, list[tuple[ObjectPlan, Layout, list[str]]], Plate]:
     """Return what `_plate_files` needs: the objects on a plate, and the plate of them alone."""
     places = plate.plate.places
     numbers = dict.fromkeys(plate.parts[place.part].number for place in places)
-    wanted: list[tuple[Plan, Layout, list[str]]] = []
+    wanted: list[tuple[ObjectPlan, Layout, list[str]]] = []
     position: dict[str, int] = {}
     for number in numbers:
         names = [p.name for p in (plate.parts[q.part] for q in places) if p.number == number]
@@ -172,7 +172,7 @@ def _plate_task(
 
 
 def _plate_files(
-    title: str, objects: list[tuple[Plan, Layout, list[str]]], plate: Plate
+    title: str, objects: list[tuple[ObjectPlan, Layout, list[str]]], plate: Plate
 ) -> PrintFile:
     """Build the parts of one plate and return its 3MF files."""
     parts: list[Part] = []
@@ -182,7 +182,7 @@ def _plate_files(
     return print_file(title, parts, plate)
 
 
-def _unchanged(folder: Path, names: Sequence[str], listed: bytes) -> bool:
+def _same_files(folder: Path, names: Sequence[str], listed: bytes) -> bool:
     """Whether all files of the set are there, and the packing list is the same."""
     try:
         same = (folder / names[0]).read_bytes() == listed

@@ -7,7 +7,7 @@ from collections.abc import Callable
 Progress = Callable[[str, float], None]  #: what is being done, and the share of the run done
 
 
-def silent(_what: str, _share: float) -> None:
+def no_progress(_what: str, _share: float) -> None:
     """Tell nobody."""
 
 

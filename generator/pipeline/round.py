@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 
 from generator.alphabet.outline import Tiers
 from generator.errors import LayoutError, SolidError
-from generator.pipeline.blame import blaming
+from generator.pipeline.blame import errors_at
 from generator.polyhedron import Polyhedron
 from generator.polyhedron.development import Development, development
 from generator.polyhedron.front import covered_parts
 from generator.printers import Printer
 from generator.solid.wrap import bend_problem
-from generator.spec import Located, ObjectSpec
+from generator.spec import LocatedSpec, ObjectSpec
 
 STANDING = ("cylinder", "cone")  #: shapes that are printed standing on F1
 
@@ -37,7 +37,7 @@ def reach_mm(spec: ObjectSpec, printer: Printer) -> float:
     return 2.0 * spec.style.height_mm + printer.gap_min_mm
 
 
-def made_whole(located: Located, polyhedron: Polyhedron) -> Located:
+def as_one_part(located: LocatedSpec, polyhedron: Polyhedron) -> LocatedSpec:
     """Return the spec of an object with round faces as one that is printed whole.
 
     Raises
@@ -49,7 +49,7 @@ def made_whole(located: Located, polyhedron: Polyhedron) -> Located:
         return located
     asked = located.tree.value.get("print")
     if isinstance(asked, dict) and asked.get("parts") == "panels":
-        with blaming(located, "print.parts"):
+        with errors_at(located, "print.parts"):
             raise SolidError(
                 "a round face cannot be printed as a flat panel", fix="set parts to whole"
             )

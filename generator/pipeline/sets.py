@@ -1,7 +1,7 @@
 """Several objects that share one array: placed together, made in parallel, resumed where ended.
 
 All places are chosen first, each beside the ones before it; then every process builds and
-registers objects of its own (`make.made_at`). An object that is registered from the same
+registers objects of its own (`make.make_at`). An object that is registered from the same
 spec, with all its files in place and unchanged, is skipped: the same command again finishes
 what was interrupted.
 """
@@ -21,22 +21,22 @@ from generator.database.read import find_object, read_layout, read_parts
 from generator.database.register import require_in_use
 from generator.database.transaction import reading
 from generator.export.overview import can_draw
-from generator.pipeline.made import Made, made_of
-from generator.pipeline.make import Order, Product, made_at
+from generator.pipeline.made import MadeObject, describe_object
+from generator.pipeline.make import Order, Product, make_at
 from generator.pipeline.parallel import Engines, Task, Workers
-from generator.pipeline.place import Placed, beside, placed, taken_by_all
-from generator.pipeline.plates import SetObject, written_set
+from generator.pipeline.place import ObjectPlacement, occupancy_of, occupancy_with, place_object
+from generator.pipeline.plates import SetObject, write_set
 from generator.pipeline.progress import Progress, within
 
 
-def made_as_set(
+def make_set(
     engine: Engine,
     url: str,
     orders: Sequence[Order],
     folder: Path,
     jobs: int | None,
     progress: Progress,
-) -> tuple[list[Made], tuple[Path, ...]]:
+) -> tuple[list[MadeObject], tuple[Path, ...]]:
     """Make the objects of a set and what belongs to it as a whole.
 
     Parameters
@@ -63,7 +63,7 @@ def made_as_set(
     tasks: list[Task[Product]] = []
     numbers: list[int] = []
     with reading(engine) as connection:
-        taken = taken_by_all(connection, orders[0].plan)
+        taken = occupancy_of(connection, orders[0].plan)
         for number, order in enumerate(orders):
             name = order.plan.spec.name
             if (skipped := _intact(connection, order)) is not None:
@@ -71,9 +71,9 @@ def made_as_set(
                 progress(f"{name} is there, with all its files: skipped", 0.0)
                 continue
             progress(f"placing {name}", 0.1 * number / len(orders))
-            place = placed(connection, order.plan, order.replace, taken)
+            place = place_object(connection, order.plan, order.replace, taken)
             if not place.reused:
-                taken = beside(taken, place.layout)
+                taken = occupancy_with(taken, place.layout)
             numbers.append(number)
             tasks.append(Task(f"making {name}", _make, (url, order, place)))
     Engines.keep(url, engine)
@@ -90,7 +90,7 @@ def _together(
     folder: Path,
     workers: Workers,
     progress: Progress,
-) -> tuple[list[Made], tuple[Path, ...]]:
+) -> tuple[list[MadeObject], tuple[Path, ...]]:
     """Write what belongs to the set as a whole; return its objects in order and its files."""
     for number, product in zip(numbers, found, strict=True):
         products[number] = product
@@ -99,7 +99,7 @@ def _together(
         SetObject(order.plan, product.placed.layout, order.formats)
         for order, product in zip(orders, done, strict=True)
     ]
-    files = written_set(objects, folder, workers, within(progress, 0.8, 1.0))
+    files = write_set(objects, folder, workers, within(progress, 0.8, 1.0))
     made = [product.made for product in done]
     if not can_draw():
         notice = f"the set has no overview: matplotlib is not installed; {install_line('report')}"
@@ -117,9 +117,9 @@ def set_folder(orders: Sequence[Order], folder: Path | None) -> Path:
     return Path(os.path.relpath(common)) if common.is_relative_to(Path.cwd()) else common
 
 
-def _make(url: str, order: Order, place: Placed) -> Product:
+def _make(url: str, order: Order, place: ObjectPlacement) -> Product:
     """Make one object; runs in any process."""
-    return made_at(Engines.open(url), order, place)
+    return make_at(Engines.open(url), order, place)
 
 
 def _intact(connection: Connection, order: Order) -> Product | None:
@@ -148,7 +148,7 @@ def _intact(connection: Connection, order: Order) -> Product | None:
     if not all(os.path.isfile(other) for other in others):
         return None
     layout = read_layout(connection, plan.spec.name)
-    made = made_of(
+    made = describe_object(
         plan,
         layout,
         len({state.part.name for state in states}),
@@ -157,7 +157,7 @@ def _intact(connection: Connection, order: Order) -> Product | None:
         reused=True,
         skipped=True,
     )
-    return Product(made, Placed(layout, 0, reused=True, replaces=False))
+    return Product(made, ObjectPlacement(layout, 0, reused=True, replaces=False))
 
 
 def _literal(name: str) -> str:

@@ -10,17 +10,17 @@ from collections import defaultdict
 
 import numpy as np
 
-from generator.polyhedron.surface import LISTED, Problem, Surface, directed_edges
+from generator.polyhedron.surface import LISTED, FaceProblem, Surface, directed_edges
 
 Users = dict[tuple[int, int], list[tuple[int, bool]]]  # edge -> (face, runs upward in number)
 
 
-def number_problems(surface: Surface) -> list[Problem]:
+def number_problems(surface: Surface) -> list[FaceProblem]:
     """Return what is wrong with counts, coordinates and indices; the rest needs these right."""
     vertices, problems = surface.vertices, []
     if len(vertices) < 4 or len(surface.faces) < 4:
         problems.append(
-            Problem(
+            FaceProblem(
                 "",
                 f"{len(vertices)} vertices and {len(surface.faces)} faces: a solid has at least "
                 "4 of each",
@@ -29,16 +29,18 @@ def number_problems(surface: Surface) -> list[Problem]:
         )
     for number in np.flatnonzero(~np.isfinite(vertices).all(axis=1)):
         problems.append(
-            Problem("", f"vertex {number} is not a point: {vertices[number]}", "give three lengths")
+            FaceProblem(
+                "", f"vertex {number} is not a point: {vertices[number]}", "give three lengths"
+            )
         )
     for name, loops in zip(surface.names, surface.faces, strict=True):
         if not loops:
-            problems.append(Problem(name, "it has no vertices", "list at least 3 vertices"))
+            problems.append(FaceProblem(name, "it has no vertices", "list at least 3 vertices"))
         for loop in loops:
             outside = [v for v in loop if not 0 <= v < len(vertices)]
             if outside:
                 problems.append(
-                    Problem(
+                    FaceProblem(
                         name,
                         f"there is no vertex {outside[0]}; they are 0 to {len(vertices) - 1}",
                         "count vertices from 0",
@@ -46,12 +48,12 @@ def number_problems(surface: Surface) -> list[Problem]:
                 )
             elif len(loop) < 3:
                 problems.append(
-                    Problem(name, f"a loop of {len(loop)} vertices", "list at least 3 vertices")
+                    FaceProblem(name, f"a loop of {len(loop)} vertices", "list at least 3 vertices")
                 )
     return problems
 
 
-def edge_problems(surface: Surface) -> list[Problem]:
+def edge_problems(surface: Surface) -> list[FaceProblem]:
     """Return what is wrong with the way faces join: open, branching or reversed edges, shells."""
     users: Users = defaultdict(list)
     for face, loops in enumerate(surface.faces):
@@ -61,7 +63,7 @@ def edge_problems(surface: Surface) -> list[Problem]:
         _edge_problem(surface, edge, faces) for edge, faces in users.items() if len(faces) != 2
     ]
     problems += [
-        Problem("", f"{surface.vertex(int(v))} belongs to no face", "remove it, or use it")
+        FaceProblem("", f"{surface.vertex(int(v))} belongs to no face", "remove it, or use it")
         for v in np.setdiff1d(np.arange(len(surface.vertices)), np.unique(list(users)))
     ]
     if problems:
@@ -72,19 +74,19 @@ def edge_problems(surface: Surface) -> list[Problem]:
 
 def _edge_problem(
     surface: Surface, edge: tuple[int, int], users: list[tuple[int, bool]]
-) -> Problem:
+) -> FaceProblem:
     a, b = edge
     names = [surface.names[face] for face, _ in users]
     where = f"the edge between {surface.vertex(a)} and {surface.vertex(b)}"
     if len(users) == 1:
-        return Problem(
+        return FaceProblem(
             names[0], f"open: {where} has no second face", "add the face that is missing"
         )
     cause = f"{where} joins {len(users)} faces ({', '.join(names)}); a solid has 2 at each edge"
-    return Problem(names[0], cause, "separate them there, or leave one out")
+    return FaceProblem(names[0], cause, "separate them there, or leave one out")
 
 
-def _orientation_problems(surface: Surface, users: Users) -> list[Problem]:
+def _orientation_problems(surface: Surface, users: Users) -> list[FaceProblem]:
     """Name the faces that run against the majority of their shell."""
     neighbours: dict[int, list[tuple[int, bool]]] = defaultdict(list)
     for (f, forward), (g, same) in users.values():
@@ -105,17 +107,17 @@ def _orientation_problems(surface: Surface, users: Users) -> list[Problem]:
                     shell.append(other)
                 elif turned[other] != wanted:
                     cause = "the surface has no outside: it turns over on the way round"
-                    return [Problem(surface.names[other], cause, "correct how its faces join")]
+                    return [FaceProblem(surface.names[other], cause, "correct how its faces join")]
         minority = 2 * sum(turned[f] for f in shell) <= len(shell)
         for face in sorted(shell):
             if turned[face] == minority:
                 cause = "it runs the other way round than its neighbours"
                 fix = "reverse the order of its vertices"
-                problems.append(Problem(surface.names[face], cause, fix))
+                problems.append(FaceProblem(surface.names[face], cause, fix))
     return problems
 
 
-def _fan_problems(surface: Surface) -> list[Problem]:
+def _fan_problems(surface: Surface) -> list[FaceProblem]:
     """Faces around a vertex must form one fan: rotate from edge to edge and count."""
     turn: dict[tuple[int, int], int] = {}  # (vertex, edge towards) -> next edge around the vertex
     degree: dict[int, int] = defaultdict(int)
@@ -135,11 +137,11 @@ def _fan_problems(surface: Surface) -> list[Problem]:
             steps, other = steps + 1, turn[v, other]
         if steps != degree[v]:
             cause = f"the solid touches itself at {surface.vertex(v)}"
-            problems.append(Problem("", cause, "move the parts apart or join them by more"))
+            problems.append(FaceProblem("", cause, "move the parts apart or join them by more"))
     return problems
 
 
-def _shell_problems(surface: Surface, users: Users) -> list[Problem]:
+def _shell_problems(surface: Surface, users: Users) -> list[FaceProblem]:
     parent = list(range(len(surface.faces)))
 
     def root(face: int) -> int:
@@ -155,4 +157,4 @@ def _shell_problems(surface: Surface, users: Users) -> list[Problem]:
         return []
     starts = ", ".join(list(shells.values())[::-1][:LISTED])
     cause = f"{len(shells)} separate shells (they start at faces {starts}); one solid has one"
-    return [Problem("", cause, "give each body a file of its own, and fill inner voids")]
+    return [FaceProblem("", cause, "give each body a file of its own, and fill inner voids")]

@@ -18,8 +18,8 @@ from generator.polyhedron.polygon import (
     signed_area,
 )
 from generator.polyhedron.surface import (
+    FaceProblem,
     Loops,
-    Problem,
     Surface,
     Vertices,
     directed_edges,
@@ -30,7 +30,7 @@ PLANARITY = 1e-4  #: most a vertex may lie off its face's plane, as a share of t
 CLOSENESS = 1e-6  #: two points, or a point and an edge, nearer than this touch; same share
 
 
-def face_problems(surface: Surface) -> list[Problem]:
+def face_problems(surface: Surface) -> list[FaceProblem]:
     """Return what is wrong with single faces: repeated points, slivers, bends, crossings."""
     tolerance = CLOSENESS * surface.size
     problems = _duplicate_vertices(surface, tolerance)
@@ -41,7 +41,7 @@ def face_problems(surface: Surface) -> list[Problem]:
     return problems
 
 
-def crossing_problems(surface: Surface) -> list[Problem]:
+def crossing_problems(surface: Surface) -> list[FaceProblem]:
     """Return the faces that are cut or touched by edges and vertices that are not their own.
 
     A convex solid has no vertex in front of any face and is done after one product.
@@ -61,22 +61,24 @@ def crossing_problems(surface: Surface) -> list[Problem]:
         axes = np.stack([x, y], axis=1)
         polygon = [(vertices[list(loop)] - origin) @ axes for loop in loops]
         touching = np.flatnonzero(~own & (np.abs(height) <= tolerance))
-        for v in touching[_covered(polygon, (vertices[touching] - origin) @ axes, tolerance)]:
+        for v in touching[
+            _in_widened_polygon(polygon, (vertices[touching] - origin) @ axes, tolerance)
+        ]:
             cause = f"{surface.vertex(int(v))} of another face lies on it"
-            problems.append(Problem(name, cause, "move it away, or join the faces there"))
+            problems.append(FaceProblem(name, cause, "move it away, or join the faces there"))
         a, b = height[edges[:, 0]], height[edges[:, 1]]
         cut = np.flatnonzero((np.minimum(a, b) < -tolerance) & (np.maximum(a, b) > tolerance))
         t = a[cut] / (a[cut] - b[cut])
         start, end = vertices[edges[cut, 0]], vertices[edges[cut, 1]]
         point = start + t[:, None] * (end - start)
-        for k in np.flatnonzero(_covered(polygon, (point - origin) @ axes, tolerance)):
+        for k in np.flatnonzero(_in_widened_polygon(polygon, (point - origin) @ axes, tolerance)):
             v, w = edges[cut[k]]
             cause = f"the edge between vertices {v} and {w} runs through it at {_point(point[k])}"
-            problems.append(Problem(name, cause, "a solid must not cut through itself"))
+            problems.append(FaceProblem(name, cause, "a solid must not cut through itself"))
     return problems
 
 
-def _duplicate_vertices(surface: Surface, tolerance: float) -> list[Problem]:
+def _duplicate_vertices(surface: Surface, tolerance: float) -> list[FaceProblem]:
     vertices, problems = surface.vertices, []
     order = np.argsort(vertices[:, 0], kind="stable")
     x = vertices[order, 0]
@@ -88,16 +90,18 @@ def _duplicate_vertices(surface: Surface, tolerance: float) -> list[Problem]:
             cause = (
                 f"{surface.vertex(a)} and vertex {b} are the same point within {tolerance:.2g} mm"
             )
-            problems.append(Problem("", cause, f"use vertex {a} for both"))
+            problems.append(FaceProblem("", cause, f"use vertex {a} for both"))
     return problems
 
 
-def _loop_problems(surface: Surface, name: str, loops: Loops, tolerance: float) -> list[Problem]:
+def _loop_problems(
+    surface: Surface, name: str, loops: Loops, tolerance: float
+) -> list[FaceProblem]:
     for loop in loops:
         if len(set(loop)) < len(loop):
             twice = next(v for k, v in enumerate(loop) if v in loop[:k])
             return [
-                Problem(
+                FaceProblem(
                     name,
                     f"its loop visits {surface.vertex(twice)} twice",
                     "a loop must not touch itself; split the face there",
@@ -117,7 +121,7 @@ def _loop_problems(surface: Surface, name: str, loops: Loops, tolerance: float) 
     allowed = PLANARITY * surface.size
     if abs(height[worst]) > allowed:
         return [
-            Problem(
+            FaceProblem(
                 name,
                 f"not planar: its vertices lie up to {abs(height[worst]):.3g} mm off their plane, "
                 f"{allowed:.2g} mm is allowed; the farthest is {surface.vertex(every[worst])}",
@@ -135,35 +139,37 @@ def _loop_problems(surface: Surface, name: str, loops: Loops, tolerance: float) 
             f"its edges {_edge(edges[i])} and {_edge(edges[j])} cross or touch "
             f"near {_point(vertices[edges[i][0]])}"
         )
-        return [Problem(name, cause, "list its vertices in the order in which the edge runs")]
+        return [FaceProblem(name, cause, "list its vertices in the order in which the edge runs")]
     return _hole_problems(name, polygon)
 
 
-def _no_area(name: str, outer: Vertices, area: float, tolerance: float) -> Problem:
+def _no_area(name: str, outer: Vertices, area: float, tolerance: float) -> FaceProblem:
     """Tell a loop that crosses itself from a sliver."""
     spread = np.linalg.svd(outer - outer.mean(axis=0), compute_uv=False)
     if spread[1] > tolerance:
         fix = "list its vertices in the order in which the edge runs"
-        return Problem(
+        return FaceProblem(
             name, f"its loop crosses itself: the parts of its area cancel to {area:.2g} mm^2", fix
         )
     fix = "remove it and join its neighbours, or correct its vertices"
-    return Problem(name, f"its area is {area:.2g} mm^2: a line, not a face", fix)
+    return FaceProblem(name, f"its area is {area:.2g} mm^2: a line, not a face", fix)
 
 
-def _hole_problems(name: str, polygon: list[Vertices]) -> list[Problem]:
+def _hole_problems(name: str, polygon: list[Vertices]) -> list[FaceProblem]:
     problems = []
     for k, hole in enumerate(polygon[1:], start=1):
         others = [loop for i, loop in enumerate(polygon) if i not in (0, k)]
         if side_of_polygon(polygon[:1], hole[:1])[0] < 0:
-            problems.append(Problem(name, f"hole {k} lies outside it", "list the outer loop first"))
+            problems.append(
+                FaceProblem(name, f"hole {k} lies outside it", "list the outer loop first")
+            )
         elif any(side_of_polygon([loop], hole[:1])[0] > 0 for loop in others):
             problems.append(
-                Problem(name, f"hole {k} lies inside another hole", "make it a face of its own")
+                FaceProblem(name, f"hole {k} lies inside another hole", "make it a face of its own")
             )
         elif signed_area(hole) > 0:
             problems.append(
-                Problem(
+                FaceProblem(
                     name,
                     f"hole {k} runs counter-clockwise where the outer loop does",
                     "reverse the order of its vertices",
@@ -172,7 +178,9 @@ def _hole_problems(name: str, polygon: list[Vertices]) -> list[Problem]:
     return problems
 
 
-def _covered(polygon: list[Vertices], points: Vertices, tolerance: float) -> NDArray[np.bool_]:
+def _in_widened_polygon(
+    polygon: list[Vertices], points: Vertices, tolerance: float
+) -> NDArray[np.bool_]:
     """Whether points lie in a polygon, its boundary widened by the tolerance."""
     covered = np.zeros(len(points), dtype=bool)
     if len(points) == 0:

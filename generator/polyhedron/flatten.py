@@ -22,7 +22,9 @@ LARGEST = 3000  #: equations; beyond this the coordinates are left as given
 STEPS = 6
 
 
-def flattened(vertices: Points, faces: Sequence[Sequence[Sequence[int]]]) -> tuple[Points, float]:
+def flatten_faces(
+    vertices: Points, faces: Sequence[Sequence[Sequence[int]]]
+) -> tuple[Points, float]:
     """Return vertices (V, 3) on the planes of their faces, and how far the farthest moved, mm.
 
     Faces that are planar already are returned bit by bit as given; so is a solid that

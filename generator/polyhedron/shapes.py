@@ -117,7 +117,7 @@ def dodecahedron(side: float) -> Polyhedron:
     return polyhedron("dodecahedron", points, [_cap(points, np.array(n)) for n in towards])
 
 
-def given(vertices: ArrayLike, faces: Sequence[FaceLike]) -> Polyhedron:
+def polyhedron_of(vertices: ArrayLike, faces: Sequence[FaceLike]) -> Polyhedron:
     """Return the polyhedron of vertices [[x, y, z], ...] and faces [[0, 1, 2], ...].
 
     Vertices are counted from 0, counter-clockwise seen from outside; a face with holes is a
@@ -135,7 +135,7 @@ SHAPES: dict[str, Callable[..., Polyhedron]] = {
     "dodecahedron": dodecahedron,
     "prism": prism,
     "pyramid": pyramid,
-    "polyhedron": given,
+    "polyhedron": polyhedron_of,
 }
 
 

@@ -22,7 +22,7 @@ LISTED = 8  #: problems spelled out in one message
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
+class FaceProblem:
     """One thing that is wrong, where, and what to do about it."""
 
     place: str  #: name of a face, or "" for the solid as a whole
@@ -53,7 +53,7 @@ class Surface:
         return f"vertex {number} ({x:.6g}, {y:.6g}, {z:.6g})"
 
 
-def raise_problems(problems: Sequence[Problem]) -> None:
+def raise_problems(problems: Sequence[FaceProblem]) -> None:
     """Raise one `ShapeError` that holds all problems; nothing if there are none."""
     if not problems:
         return

@@ -18,7 +18,7 @@ from generator.errors import ShapeError
 from generator.polyhedron.check_edges import edge_problems, number_problems
 from generator.polyhedron.check_faces import crossing_problems, face_problems
 from generator.polyhedron.developable import Developable
-from generator.polyhedron.flatten import flattened
+from generator.polyhedron.flatten import flatten_faces
 from generator.polyhedron.polygon import signed_volume
 from generator.polyhedron.surface import (
     Loops,
@@ -139,7 +139,7 @@ def polyhedron(kind: str, vertices: ArrayLike, faces: Sequence[FaceLike]) -> Pol
             tuple((loop[0], *loop[:0:-1]) for loop in loops) for loops in surface.faces
         )
         notes.append("all faces pointed inward and were turned outward")
-    points, moved = flattened(points, loops_of)
+    points, moved = flatten_faces(points, loops_of)
     if moved > NOTED * surface.size:
         notes.append(f"vertices were moved by up to {moved:.2g} mm to make every face planar")
     raise_problems(crossing_problems(Surface(points, surface.names, loops_of)))

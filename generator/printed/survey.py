@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.alphabet.outline import Ring, Tiers
-from generator.alphabet.rings import distance, inside
+from generator.alphabet.rings import distance, points_inside
 from generator.printed.surface import PrintedSurface
 from generator.solid.emboss import turn
 from generator.solid.part import Embossing
@@ -174,11 +174,13 @@ def _design(tiers: Tiers, points: Floats, side: tuple[int, int], limits: SurveyL
     clear = distance(points, foot) > limits.base_clear_mm
     heights = np.zeros(len(points))
     for level in np.linspace(0.0, high, 11):
-        heights[inside(points, rings_at(tiers, float(level)))] = level
+        heights[points_inside(points, rings_at(tiers, float(level)))] = level
     return _Design(
-        footprint=inside(points, rings_at(tiers, high / 2)).reshape(side),
-        top=(inside(points, top) & (distance(points, top) > limits.top_clear_mm)).reshape(side),
-        around=(clear & ~inside(points, foot)).reshape(side),
+        footprint=points_inside(points, rings_at(tiers, high / 2)).reshape(side),
+        top=(points_inside(points, top) & (distance(points, top) > limits.top_clear_mm)).reshape(
+            side
+        ),
+        around=(clear & ~points_inside(points, foot)).reshape(side),
         heights=heights.reshape(side),
         height_mm=high,
     )

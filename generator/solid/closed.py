@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.alphabet.outline import Tiers, foot_half_mm
-from generator.alphabet.rings import crossing, inside
+from generator.alphabet.rings import edges_cross, points_inside
 from generator.errors import SolidError
 from generator.solid.emboss import to_part, turn
 from generator.solid.frame import area_vector, in_frame
@@ -97,7 +97,7 @@ def _check_shape(tiers: Tiers, place: str) -> None:
             cross = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
             if (np.abs(cross) > 1e-12 * length).any() or ((u * v).sum(axis=1) <= 0).any():
                 raise SolidError("a side of a symbol is not planar", place=place)
-    if any(crossing(rings) for rings in tiers.rings):
+    if any(edges_cross(rings) for rings in tiers.rings):
         raise SolidError("an outline of a symbol crosses itself", place=place)
 
 
@@ -112,7 +112,7 @@ def _check_inside(embossing: Embossing, corners: list[Ring], place: str) -> None
         doubtful = chosen[~inside_by(centres[chosen], half, rings)]
         for symbol in doubtful.tolist():
             foot = embossing.tiers[label].rings[0][0] + centres[symbol]
-            if not inside(foot, rings).all() or crossing([*rings, foot]):
+            if not points_inside(foot, rings).all() or edges_cross([*rings, foot]):
                 raise SolidError(
                     f"symbol {embossing.names[symbol]} reaches over the edge of its face",
                     fix="keep symbols away from edges by the printer's clearance and the "
@@ -146,7 +146,7 @@ def _check_apart(embossings: list[Embossing], place: str) -> None:
         close = (low[others, 1] <= high[one, 1]) & (low[one, 1] <= high[others, 1])
         for other in others[close].tolist():
             a, b = feet[one], feet[other]
-            if crossing([a, b]) or inside(a[:1], [b])[0] or inside(b[:1], [a])[0]:
+            if edges_cross([a, b]) or points_inside(a[:1], [b])[0] or points_inside(b[:1], [a])[0]:
                 raise SolidError(f"symbols {names[one]} and {names[other]} overlap", place=place)
 
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.alphabet.rings import crossing, edges_kept, inside, signed_area
+from generator.alphabet.rings import edges_cross, edges_kept, points_inside, signed_area
 
 Ring = NDArray[np.float64]  #: (k, 2) mm
 Insets = NDArray[np.float64]  #: (k,) mm, of edge i from corner i to i + 1
@@ -75,9 +75,11 @@ def regular(before: Sequence[Ring], after: Sequence[Ring], shortest_mm: float) -
         return False
     if not all(edges_kept(a, b, shortest_mm) for a, b in zip(before, after, strict=True)):
         return False
-    if crossing(after) or signed_area(after[0]) <= 0:
+    if edges_cross(after) or signed_area(after[0]) <= 0:
         return False
-    return all(signed_area(hole) < 0 and bool(inside(hole[:1], after[:1])[0]) for hole in after[1:])
+    return all(
+        signed_area(hole) < 0 and bool(points_inside(hole[:1], after[:1])[0]) for hole in after[1:]
+    )
 
 
 def _directions(ring: Ring) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.alphabet.outline import foot_half_mm
-from generator.alphabet.rings import inside, segments
+from generator.alphabet.rings import points_inside, segments
 from generator.solid.emboss import turn
 from generator.solid.part import Embossing
 
@@ -74,7 +74,7 @@ def squares_of(embossing: Embossing, rings: Sequence[Ring]) -> Squares | None:
 
 def inside_by(centres: Ring, half: float, rings: Sequence[Ring]) -> NDArray[np.bool_]:
     """Whether axis-parallel squares lie inside an area: no edge meets them, one point inside."""
-    free = inside(centres, rings)
+    free = points_inside(centres, rings)
     starts, ends, _, _ = segments(rings)
     for p, q in zip(starts, ends, strict=True):
         low, high = np.minimum(p, q) - half, np.maximum(p, q) + half

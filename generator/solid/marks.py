@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.alphabet.figures import BAR, FIGURES, figures_of, underlined
-from generator.alphabet.outline import Tiers, engraved
-from generator.alphabet.rings import inside, segments
+from generator.alphabet.figures import BAR, FIGURES, figures_of, needs_bar
+from generator.alphabet.outline import Tiers, engrave
+from generator.alphabet.rings import points_inside, segments
 from generator.printers import Printer
 from generator.solid.emboss import turn
 from generator.solid.part import Embossing
@@ -33,7 +33,7 @@ DEPTH = 0.4
 
 
 @dataclass(frozen=True, slots=True)
-class Mark:
+class BackMark:
     """A number and the line it stands on; `end` equal to `start` means the middle of the face."""
 
     text: str  #: digits, or F and digits
@@ -53,7 +53,7 @@ class _Pen:
         """Half width and half height of a text with its bar."""
         width = len(text) * (2 * self.unit + self.stroke) + (len(text) - 1) * self.clear
         height = 4 * self.unit + self.stroke
-        return width / 2, (height + (2 * self.stroke if underlined(text) else 0.0)) / 2
+        return width / 2, (height + (2 * self.stroke if needs_bar(text) else 0.0)) / 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ class _Box:
 
 
 def marks_on(
-    marks: Sequence[Mark],
+    marks: Sequence[BackMark],
     rings: Sequence[Ring],
     facet: int,
     T_part_facet: NDArray[np.float64],
@@ -96,24 +96,24 @@ def marks_on(
     edges = [mark for mark in marks if (mark.start != mark.end).any()]
     for size in SIZES:
         trial = _Pen(size * stroke, stroke, stroke)
-        boxes = _placed(edges, rings, trial)
+        boxes = _place_marks(edges, rings, trial)
         if len(boxes) > len(best) or not edges:
             best, pen = boxes, trial
         if len(boxes) == len(edges):
             break
     middle = [mark for mark in marks if (mark.start == mark.end).all()]
-    best = best + _placed(middle, rings, pen, best)
+    best = best + _place_marks(middle, rings, pen, best)
     done = [box.text for box in best]
     missing = [mark.text for mark in marks if mark.text not in done]
     tiers: dict[int, Tiers] = {}
     return (
-        tuple(_embossing(box, pen, depth, facet, T_part_facet, tiers) for box in best),
+        tuple(_mark_embossing(box, pen, depth, facet, T_part_facet, tiers) for box in best),
         tuple(missing),
     )
 
 
-def _placed(
-    marks: Sequence[Mark], rings: Sequence[Ring], pen: _Pen, taken: Sequence[_Box] = ()
+def _place_marks(
+    marks: Sequence[BackMark], rings: Sequence[Ring], pen: _Pen, taken: Sequence[_Box] = ()
 ) -> list[_Box]:
     """Return places for the marks that find room beside those already taken."""
     placed: list[_Box] = []
@@ -155,7 +155,7 @@ def _roomy(
     at = centres @ R
     size = np.array(half) + clear
     turned = [ring @ R for ring in rings]
-    free = inside(at, turned)
+    free = points_inside(at, turned)
     starts, ends, _, _ = segments(turned)
     for p, q in zip(starts, ends, strict=True):
         low, high = np.minimum(p, q) - size, np.maximum(p, q) + size
@@ -180,7 +180,7 @@ def _near(one: _Box, other: _Box, clear: float) -> bool:
     return True
 
 
-def _embossing(
+def _mark_embossing(
     box: _Box,
     pen: _Pen,
     depth: float,
@@ -191,7 +191,7 @@ def _embossing(
     """Return one text as an embossing: a label for each figure, then the bars."""
     step = 2 * pen.unit + pen.stroke + pen.clear
     figures = figures_of(box.text)
-    bars = underlined(box.text)
+    bars = needs_bar(box.text)
     x = (np.arange(len(figures)) - (len(figures) - 1) / 2) * step
     y = np.full(len(figures), pen.stroke if bars else 0.0)
     local = np.stack([x, y], axis=1)
@@ -204,7 +204,7 @@ def _embossing(
     used = sorted(set(figures))
     for figure in used:
         if figure not in tiers:
-            tiers[figure] = engraved(FIGURES[figure], pen.unit, pen.stroke, depth)
+            tiers[figure] = engrave(FIGURES[figure], pen.unit, pen.stroke, depth)
     return Embossing(
         facet=facet,
         face=None,

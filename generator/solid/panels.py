@@ -22,11 +22,11 @@ from generator.printers import Printer
 from generator.solid.emboss import embossing_of
 from generator.solid.frame import area_vector, edge_numbers, in_frame, plane_frame
 from generator.solid.inset import inset, regular, shared_insets
-from generator.solid.marks import Mark, marks_on
+from generator.solid.marks import BackMark, marks_on
 from generator.solid.measure import box
 from generator.solid.mitre import ASSEMBLY_GAP_MM, Mitre, mitre
 from generator.solid.part import Embossing, Facet, Part
-from generator.solid.whole import moved
+from generator.solid.whole import move_part
 
 Ring = NDArray[np.float64]
 
@@ -108,7 +108,7 @@ def panels(
         part = Part(part.name, part.vertices, part.facets, embossings, part.T_object_part)
         low, high = box(part)
         middle = (low + high) / 2
-        parts.append(moved(part, np.array([-middle[0], -middle[1], 0.0])))
+        parts.append(move_part(part, np.array([-middle[0], -middle[1], 0.0])))
     return Panels(tuple(parts), (_no_room(missing),) if missing else ())
 
 
@@ -253,9 +253,9 @@ def _numbers(
         # Seen from behind, corners run the other way: edge k of the back is edge n - 2 - k.
         for k in range(len(ring)):
             edge = edges[(len(edges) - 2 - k) % len(edges)]
-            marks.append(Mark(str(edge + 1), ring[k], ring[(k + 1) % len(ring)]))
+            marks.append(BackMark(str(edge + 1), ring[k], ring[(k + 1) % len(ring)]))
     centre = (rings[0].min(axis=0) + rings[0].max(axis=0)) / 2
-    marks.append(Mark(f"F{face + 1}", centre, centre))
+    marks.append(BackMark(f"F{face + 1}", centre, centre))
     return marks_on(marks, rings, 1, T, wall_mm, printer)
 
 

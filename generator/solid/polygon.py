@@ -19,7 +19,9 @@ Index = NDArray[np.int64]
 FLAT = 1e-9
 
 
-def triangulated(rings: Sequence[Ring], numbers: Index, name: str, flat: float = FLAT) -> Index:
+def triangulate_rings(
+    rings: Sequence[Ring], numbers: Index, name: str, flat: float = FLAT
+) -> Index:
     """Return the (m, 3) triangles of an area bounded by rings.
 
     Parameters

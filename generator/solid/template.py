@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.alphabet.outline import Tiers
-from generator.solid.polygon import triangulated
+from generator.solid.polygon import triangulate_rings
 
 Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
-class Template:
+class SymbolSolid:
     """Points in the symbol's axes, tier after tier and ring after ring, and its triangles."""
 
     points: NDArray[np.float64]  #: (k, 3) mm
@@ -24,33 +24,33 @@ class Template:
     foot: tuple[Index, ...]  #: points of each ring in the facet
 
 
-def template_of(tiers: Tiers, pitch_mm: float) -> Template:
+def template_of(tiers: Tiers, pitch_mm: float) -> SymbolSolid:
     """Return the template of a symbol on a facet.
 
     With a pitch it brings the facet inside its lattice square along, corners
     counter-clockwise from the lower left; with pitch 0 the foot is cut out of the facet.
     """
-    points, rings = _numbered(tiers)
+    points, rings = _number_points(tiers)
     base = np.zeros((0, 3), dtype=np.int64)
     if pitch_mm > 0:
         h = pitch_mm / 2
         square = np.array([[-h, -h], [h, -h], [h, h], [-h, h]])
         foot = [ring[::-1] for ring in tiers.rings[0]]
         numbers = [np.arange(4), *(4 + ring[::-1] for ring in rings[0])]
-        base = triangulated([square, *foot], np.concatenate(numbers), "a symbol's square")
+        base = triangulate_rings([square, *foot], np.concatenate(numbers), "a symbol's square")
     own = np.concatenate([_sides(rings), _top(tiers, rings)])
-    return Template(points, own, base, tuple(rings[0]))
+    return SymbolSolid(points, own, base, tuple(rings[0]))
 
 
-def closed_template(tiers: Tiers) -> Template:
+def closed_template(tiers: Tiers) -> SymbolSolid:
     """Return the template of a symbol as a solid of its own, with its foot as a bottom."""
-    points, rings = _numbered(tiers)
-    bottom = triangulated(tiers.rings[0], np.concatenate(rings[0]), "a symbol's foot")[:, ::-1]
+    points, rings = _number_points(tiers)
+    bottom = triangulate_rings(tiers.rings[0], np.concatenate(rings[0]), "a symbol's foot")[:, ::-1]
     own = np.concatenate([_sides(rings), _top(tiers, rings), bottom])
-    return Template(points, own, np.zeros((0, 3), dtype=np.int64), tuple(rings[0]))
+    return SymbolSolid(points, own, np.zeros((0, 3), dtype=np.int64), tuple(rings[0]))
 
 
-def _numbered(tiers: Tiers) -> tuple[NDArray[np.float64], list[list[Index]]]:
+def _number_points(tiers: Tiers) -> tuple[NDArray[np.float64], list[list[Index]]]:
     """Return all points, and the numbers of each tier's rings."""
     points, numbers, count = [], [], 0
     for z, rings in zip(tiers.z_mm, tiers.rings, strict=True):
@@ -75,4 +75,4 @@ def _sides(numbers: list[list[Index]]) -> Index:
 
 def _top(tiers: Tiers, numbers: list[list[Index]]) -> Index:
     """Return the triangles of the last tier."""
-    return triangulated(tiers.rings[-1], np.concatenate(numbers[-1]), "a symbol's top")
+    return triangulate_rings(tiers.rings[-1], np.concatenate(numbers[-1]), "a symbol's top")

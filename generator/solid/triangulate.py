@@ -19,8 +19,8 @@ from generator.solid.emboss import to_part, turn
 from generator.solid.frame import area_vector, in_frame, plane_frame
 from generator.solid.lattice import Squares, squares_of
 from generator.solid.part import Embossing, Facet, Part
-from generator.solid.polygon import FLAT, triangulated
-from generator.solid.template import Template, closed_template, template_of
+from generator.solid.polygon import FLAT, triangulate_rings
+from generator.solid.template import SymbolSolid, closed_template, template_of
 
 Index = NDArray[np.int64]
 
@@ -47,7 +47,7 @@ def triangles(part: Part) -> Mesh:
     SolidError
         If a facet cannot be triangulated because its loops or feet overlap.
     """
-    builder = _Builder(part)
+    builder = _MeshBuilder(part)
     for facet in range(len(part.facets)):
         builder.facet(facet)
     return builder.mesh()
@@ -70,7 +70,7 @@ def symbol_meshes(part: Part) -> tuple[Mesh, ...]:
     meshes = []
     for number, embossing in enumerate(part.embossings):
         if embossing.face is not None:
-            builder = _Builder(part, body=False)
+            builder = _MeshBuilder(part, body=False)
             builder.symbols(number, None, closed=True)
             meshes.append(builder.mesh())
     for wrapped in part.wrapped:
@@ -82,7 +82,7 @@ def symbol_meshes(part: Part) -> tuple[Mesh, ...]:
     return tuple(meshes)
 
 
-class _Builder:
+class _MeshBuilder:
     """Vertices and triangles so far."""
 
     def __init__(self, part: Part, *, body: bool = True) -> None:
@@ -90,7 +90,7 @@ class _Builder:
         self.points = [part.vertices] if body else []
         self.count = len(part.vertices) if body else 0
         self.found: list[tuple[Index, int, int, Index | None]] = []
-        self.templates: dict[tuple[int, float, bool], Template] = {}
+        self.templates: dict[tuple[int, float, bool], SymbolSolid] = {}
         self.on: dict[int, list[int]] = {}
         for number, embossing in enumerate(part.embossings):
             self.on.setdefault(embossing.facet, []).append(number)
@@ -133,7 +133,7 @@ class _Builder:
         # On a round face what was a straight line bends a little: rounding could turn triangles
         # along it that are not quite flat.
         share = BENT_FLAT if "/" in name else FLAT
-        found = triangulated(rings, np.concatenate(loops), name, share)
+        found = triangulate_rings(rings, np.concatenate(loops), name, share)
         self.found.append((found, facet, -1, None))
 
     def symbols(
@@ -192,7 +192,9 @@ class _Builder:
             ),
         )
 
-    def _template(self, embossing: Embossing, label: int, pitch: float, closed: bool) -> Template:
+    def _template(
+        self, embossing: Embossing, label: int, pitch: float, closed: bool
+    ) -> SymbolSolid:
         """Return the template of a label, made once."""
         tiers = embossing.tiers[label]
         key = (id(tiers), pitch, closed)
@@ -206,7 +208,7 @@ class _Builder:
                 raise
         return self.templates[key]
 
-    def _stamp(self, embossing: Embossing, template: Template, chosen: Index) -> Index:
+    def _stamp(self, embossing: Embossing, template: SymbolSolid, chosen: Index) -> Index:
         """Append the template's vertices at the chosen centres; return their numbers, (m, k)."""
         T = embossing.T_part_facet
         local = template.points[:, :2] @ turn(embossing.rotation_rad).T

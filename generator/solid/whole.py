@@ -63,10 +63,10 @@ def whole(polyhedron: Polyhedron, layout: Layout, tiers: tuple[Tiers, ...], name
         wrapped=tuple(body.wrapped),
     )
     low, high = box(part)
-    return moved(part, -np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]))
+    return move_part(part, -np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]))
 
 
-def moved(part: Part, by_mm: NDArray[np.float64]) -> Part:
+def move_part(part: Part, by_mm: NDArray[np.float64]) -> Part:
     """Return the part shifted by (3,) mm in its own frame; it stays where it is in the object."""
     T_new_old = np.eye(4)
     T_new_old[:3, 3] = by_mm

@@ -16,18 +16,18 @@
 
 from __future__ import annotations
 
-from generator.spec.located import Located, blamed, locate
+from generator.spec.located import LocatedSpec, error_at, locate
 from generator.spec.problem import Problem, SpecError
 from generator.spec.read import read_specs
 from generator.spec.resolved import ObjectSpec, ShapeSpec
 
 __all__ = [
-    "Located",
+    "LocatedSpec",
     "ObjectSpec",
     "Problem",
     "ShapeSpec",
     "SpecError",
-    "blamed",
+    "error_at",
     "locate",
     "read_specs",
 ]

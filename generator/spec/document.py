@@ -16,8 +16,8 @@ from typing import Any
 
 import yaml
 
-from generator.spec.problem import Mark, Problem, Source, SpecError
-from generator.spec.syntax import explained_syntax
+from generator.spec.problem import Problem, SourceMark, SpecError, SpecSource
+from generator.spec.syntax import explain_syntax
 from generator.spec.text import read_text
 
 DEPTH_MAX = 16
@@ -38,18 +38,18 @@ class Tree:
     """A value and the places of everything in it."""
 
     value: Any
-    values: Mapping[Place, Mark] = field(repr=False)  #: where each value stands
-    keys: Mapping[Place, Mark] = field(repr=False)  #: where each key stands
+    values: Mapping[Place, SourceMark] = field(repr=False)  #: where each value stands
+    keys: Mapping[Place, SourceMark] = field(repr=False)  #: where each key stands
     folder: Path  #: that file names in it are relative to
     problems: tuple[Problem, ...] = ()  #: what is wrong with the file, though it could be read
 
-    def value_mark(self, place: Place) -> Mark:
+    def value_mark(self, place: Place) -> SourceMark:
         """Return where the value at `place` stands, or the nearest thing that holds it."""
         while place and place not in self.values:
             place = place[:-1]
         return self.values[place]
 
-    def key_mark(self, place: Place) -> Mark:
+    def key_mark(self, place: Place) -> SourceMark:
         """Return where the key at `place` stands, or the nearest thing that holds it."""
         return self.keys.get(place) or self.value_mark(place)
 
@@ -65,8 +65,8 @@ class Tree:
     def parts(self) -> dict[str | int, Tree]:
         """Return the tree under each key, or under each position of a list."""
         keys = range(len(self.value)) if isinstance(self.value, list) else self.value
-        values: dict[str | int, dict[Place, Mark]] = {key: {} for key in keys}
-        names: dict[str | int, dict[Place, Mark]] = {key: {} for key in keys}
+        values: dict[str | int, dict[Place, SourceMark]] = {key: {} for key in keys}
+        names: dict[str | int, dict[Place, SourceMark]] = {key: {} for key in keys}
         for found, marks in ((values, self.values), (names, self.keys)):
             for place, mark in marks.items():
                 if place and place[0] in found:
@@ -104,23 +104,23 @@ def tree_of(text: str, name: str, folder: Path) -> Tree:
     SpecError
         As for `read_tree`.
     """
-    source = Source.of(name, text)
+    source = SpecSource.of(name, text)
     reader = _Reader(source, folder)
     try:
         return reader.tree(yaml.parse(text, Loader=yaml.SafeLoader))
     except yaml.YAMLError as error:
-        raise SpecError([*reader.problems, explained_syntax(error, source, text)]) from None
+        raise SpecError([*reader.problems, explain_syntax(error, source, text)]) from None
 
 
 class _Reader:
     """Turns the events of the YAML parser into values and marks."""
 
-    def __init__(self, source: Source, folder: Path) -> None:
+    def __init__(self, source: SpecSource, folder: Path) -> None:
         self.source = source
         self.folder = folder
         self.problems: list[Problem] = []
-        self.values: dict[Place, Mark] = {}
-        self.keys: dict[Place, Mark] = {}
+        self.values: dict[Place, SourceMark] = {}
+        self.keys: dict[Place, SourceMark] = {}
 
     def tree(self, events: Iterator[Any]) -> Tree:
         """Read one document; raises `SpecError` with all that is wrong."""
@@ -216,8 +216,8 @@ class _Reader:
             return int(text, 16)
         return float(text) if _FLOAT.match(text) else text
 
-    def _mark(self, event: Any) -> Mark:
-        return Mark(self.source, event.start_mark.line + 1, event.start_mark.column + 1)
+    def _mark(self, event: Any) -> SourceMark:
+        return SourceMark(self.source, event.start_mark.line + 1, event.start_mark.column + 1)
 
     def _refuse(self, event: Any, cause: str, fix: str) -> None:
         self.problems.append(Problem(cause, fix, self._mark(event)))

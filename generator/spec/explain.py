@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from generator.spec.document import Place, Tree
-from generator.spec.problem import Mark, Problem, did_you_mean
+from generator.spec.problem import Problem, SourceMark, did_you_mean
 from generator.spec.settings import Defaults, ObjectSettings
 from generator.spec.shape import EXAMPLES, KINDS, OTHER_NAMES
 
@@ -28,7 +28,7 @@ _TEMPLATES = {
 }
 
 
-def explained(error: ValidationError, tree: Tree, model: type[BaseModel]) -> list[Problem]:
+def explain_errors(error: ValidationError, tree: Tree, model: type[BaseModel]) -> list[Problem]:
     """Return the problems behind a validation error.
 
     Parameters
@@ -65,12 +65,12 @@ def _problem(error: Error, tree: Tree, model: type[BaseModel]) -> Problem:
     if kind == "extra_forbidden":
         return _unknown_setting(place, tree.key_mark(place), model)
     if kind == "missing":
-        return _missing(place, tree)
+        return _missing_setting(place, tree)
     cause, fix = _wrong_value(error, place, model)
     return Problem(cause, fix, tree.value_mark(place))
 
 
-def _unknown_setting(place: Place, mark: Mark, model: type[BaseModel]) -> Problem:
+def _unknown_setting(place: Place, mark: SourceMark, model: type[BaseModel]) -> Problem:
     """Explain a name that is not known where it stands."""
     word, block = str(place[-1]), place[:-1]
     known = list(_model_at(model, block).model_fields)
@@ -106,7 +106,7 @@ def _elsewhere(word: str, block: Place) -> str:
     return ""
 
 
-def _missing(place: Place, tree: Tree) -> Problem:
+def _missing_setting(place: Place, tree: Tree) -> Problem:
     """Explain a setting that must be there."""
     key, block = str(place[-1]), place[:-1]
     inside = f" in '{block[-1]}'" if block else ""
@@ -128,8 +128,8 @@ def _wrong_value(error: Error, place: Place, model: type[BaseModel]) -> tuple[st
         fix = f"did you mean '{near}'?" if near else f"choose one of {', '.join(known)}"
         single = key.removesuffix("s") if isinstance(place[-1], int) else key
         if not isinstance(value, str):
-            return f"'{single}' cannot be {_shown(value)}", fix
-        return f"unknown {single} {_shown(value)}", fix
+            return f"'{single}' cannot be {_value_text(value)}", fix
+        return f"unknown {single} {_value_text(value)}", fix
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         known = list(_model_at(model, place).model_fields)
         example = (
@@ -138,10 +138,10 @@ def _wrong_value(error: Error, place: Place, model: type[BaseModel]) -> tuple[st
             else (f"{key}: {{{known[0]}: ...}}")
         )
         if not place:
-            return f"a spec is made of settings, not {_shown(value)}", "start with: name: Cube"
-        return f"'{key}' takes settings, not {_shown(value)}", f"write {example}"
+            return f"a spec is made of settings, not {_value_text(value)}", "start with: name: Cube"
+        return f"'{key}' takes settings, not {_value_text(value)}", f"write {example}"
     if kind in ("list_type", "tuple_type"):
-        return f"'{key}' takes a list, not {_shown(value)}", "write it in brackets: [..., ...]"
+        return f"'{key}' takes a list, not {_value_text(value)}", "write it in brackets: [..., ...]"
     if kind in ("too_short", "too_long"):
         context = error["ctx"]
         limit = context.get("min_length", context.get("max_length"))
@@ -150,11 +150,11 @@ def _wrong_value(error: Error, place: Place, model: type[BaseModel]) -> tuple[st
         cause += f"{'more' if few else 'fewer'} are needed"
         return cause, "add the others" if few else "leave the others out"
     if kind == "string_type":
-        return f"'{key}' takes text, not {_shown(value)}", "put it in quotes"
+        return f"'{key}' takes text, not {_value_text(value)}", "put it in quotes"
     return f"'{key}': {error['msg']}", "see encode-object schema"
 
 
-def _shown(value: Any) -> str:
+def _value_text(value: Any) -> str:
     """Return a value as it may stand in a sentence."""
     if isinstance(value, str):
         return f"'{value if len(value) <= 40 else value[:37] + '...'}'"

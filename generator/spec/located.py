@@ -3,7 +3,7 @@
 In a later stage, with `located` at hand:
 
     except ShapeError as error:
-        raise blamed(located, error, "shape") from error
+        raise error_at(located, error, "shape") from error
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from dataclasses import dataclass, field
 
 from generator.errors import GeneratorError
 from generator.spec.document import Place, Tree
-from generator.spec.problem import Mark, Problem, SpecError
+from generator.spec.problem import Problem, SourceMark, SpecError
 from generator.spec.resolved import ObjectSpec
 
 INPUT_ERROR = 2  # exit code of errors that a spec can cause
 
 
 @dataclass(frozen=True, slots=True)
-class Located:
+class LocatedSpec:
     """An object to make, and where its settings stand."""
 
     spec: ObjectSpec
@@ -27,7 +27,7 @@ class Located:
     origin: str = ""  #: name of the file that was given, without its suffix; files of a set bear it
 
 
-def locate(located: Located, path: str = "") -> str:
+def locate(located: LocatedSpec, path: str = "") -> str:
     """Return `file:line:column` of a setting.
 
     Parameters
@@ -42,7 +42,7 @@ def locate(located: Located, path: str = "") -> str:
     return str(mark_of(located.tree, path))
 
 
-def blamed(located: Located, error: GeneratorError, path: str) -> GeneratorError:
+def error_at(located: LocatedSpec, error: GeneratorError, path: str) -> GeneratorError:
     """Return `error` with the place of the setting that it comes from.
 
     Parameters
@@ -67,7 +67,7 @@ def blamed(located: Located, error: GeneratorError, path: str) -> GeneratorError
     return SpecError([Problem(cause, error.fix, mark_of(located.tree, path))])
 
 
-def mark_of(tree: Tree, path: str) -> Mark:
+def mark_of(tree: Tree, path: str) -> SourceMark:
     """Return where a setting stands; see `locate`."""
     places = [_place(part.strip()) for part in path.split(",")]
     for place in places:
@@ -83,7 +83,7 @@ def _place(path: str) -> Place:
     return tuple(int(part) if part.isdecimal() else part for part in path.split(".") if part)
 
 
-def _value_or_key(tree: Tree, place: Place) -> Mark:
+def _value_or_key(tree: Tree, place: Place) -> SourceMark:
     """Return the mark of a plain value, or of the key of a block."""
     value = tree.value
     for part in place:

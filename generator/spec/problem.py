@@ -21,28 +21,28 @@ LINE_SHOWN = 100  # characters of a source line that are printed
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class SpecSource:
     """A file as it was read."""
 
     name: str  #: as the person named it
     lines: tuple[str, ...] = field(repr=False)
 
     @classmethod
-    def of(cls, name: str, text: str) -> Source:
+    def of(cls, name: str, text: str) -> SpecSource:
         """Return a file by its name and its text; lines end where YAML ends them."""
         return cls(name, tuple(_LINE_END.split(text)))
 
 
 @dataclass(frozen=True, slots=True)
-class Mark:
+class SourceMark:
     """A place in a file."""
 
-    source: Source
+    source: SpecSource
     line: int  #: from 1
     column: int  #: from 1
 
     @classmethod
-    def at(cls, source: Source, before: str) -> Mark:
+    def at(cls, source: SpecSource, before: str) -> SourceMark:
         """Return the place that follows the text `before`."""
         lines = _LINE_END.split(before)
         return cls(source, len(lines), len(lines[-1]) + 1)
@@ -57,7 +57,7 @@ class Problem:
 
     cause: str
     fix: str = ""
-    mark: Mark | None = None
+    mark: SourceMark | None = None
     file: str = ""  #: where there is no line to show
 
     @property
@@ -128,7 +128,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     return lowered[near[0]] if near else ""
 
 
-def _excerpt(mark: Mark) -> list[str]:
+def _excerpt(mark: SourceMark) -> list[str]:
     """Return the source line and the caret under the place; empty past the last line."""
     if not 1 <= mark.line <= len(mark.source.lines):
         return []

@@ -11,10 +11,10 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from generator.spec.document import Place, Tree, read_tree
-from generator.spec.explain import explained
-from generator.spec.located import Located, mark_of
+from generator.spec.explain import explain_errors
+from generator.spec.located import LocatedSpec, mark_of
 from generator.spec.problem import Problem, SpecError
-from generator.spec.resolve import resolved
+from generator.spec.resolve import resolve
 from generator.spec.settings import Defaults, ObjectSettings
 
 OBJECTS_MAX = 10_000
@@ -24,7 +24,7 @@ SHARED_BLOCKS = ("symbols", "print", "output")  # merged setting by setting
 
 def read_specs(
     paths: Sequence[Path | str | Tree], *, database: str | None = None
-) -> tuple[Located, ...]:
+) -> tuple[LocatedSpec, ...]:
     """Read all objects of one run.
 
     Parameters
@@ -50,28 +50,28 @@ def read_specs(
     7.0
     """
     problems: list[Problem] = []
-    found: list[Located] = []
+    found: list[LocatedSpec] = []
     for path in paths:
-        for tree in _collected(_objects(path, problems), problems):
+        for tree in _collect_trees(_objects(path, problems), problems):
             try:
                 settings = ObjectSettings.model_validate(tree.value)
                 if len(found) + settings.copies <= OBJECTS_MAX:
                     origin = "" if isinstance(path, Tree) else Path(path).stem
-                    found += [Located(spec, tree, origin) for spec in resolved(settings, tree)]
+                    found += [LocatedSpec(spec, tree, origin) for spec in resolve(settings, tree)]
                 else:
                     problems.append(_too_many(tree))
             except ValidationError as error:
-                problems += explained(error, tree, ObjectSettings)
+                problems += explain_errors(error, tree, ObjectSettings)
             except SpecError as error:
                 problems += error.problems
     if not problems:
         problems += _shared_problems(found, database)
     if problems:
-        raise SpecError(_shown(problems))
+        raise SpecError(_unique_problems(problems))
     return tuple(found)
 
 
-def _collected(trees: Iterable[Tree], problems: list[Problem]) -> list[Tree]:
+def _collect_trees(trees: Iterable[Tree], problems: list[Problem]) -> list[Tree]:
     """Return the trees; a file that cannot be read adds its problems."""
     try:
         return list(trees)
@@ -91,7 +91,7 @@ def _objects(source: Path | str | Tree, problems: list[Problem]) -> Iterable[Tre
     try:
         Defaults.model_validate(shared.value)
     except ValidationError as error:
-        problems += explained(error, tree, Defaults)
+        problems += explain_errors(error, tree, Defaults)
     entries = tree.value["objects"]
     if not isinstance(entries, list) or not entries:
         fix = "write  objects:  and below it a list of  - name: ...  or  - file.yaml"
@@ -103,13 +103,13 @@ def _objects(source: Path | str | Tree, problems: list[Problem]) -> Iterable[Tre
         entry = own.value
         if isinstance(entry, str):
             if file := _object_file(tree.folder / entry, own, problems):
-                yield _merged(shared, file)
+                yield _merge(shared, file)
         elif isinstance(entry, dict):
             if "objects" in entry:
                 fix = "list all objects in one set"
                 problems.append(Problem("a set inside a set", fix, own.key_mark(("objects",))))
             else:
-                yield _merged(shared, own)
+                yield _merge(shared, own)
         else:
             fix = "write  - name: ...  or  - file.yaml"
             cause = "an object of a set is a block of settings or a file name"
@@ -135,7 +135,7 @@ def _object_file(path: Path, entry: Tree, problems: list[Problem]) -> Tree | Non
     return tree
 
 
-def _merged(shared: Tree, own: Tree) -> Tree:
+def _merge(shared: Tree, own: Tree) -> Tree:
     """Return an object with a set's defaults where it says nothing itself."""
     if not isinstance(own.value, dict):
         return own
@@ -167,11 +167,11 @@ def _names_array(tree: Tree) -> bool:
     return any(tree.value.get(key) is not None for key in ("profile", "encoding"))
 
 
-def _shared_problems(found: Sequence[Located], database: str | None) -> list[Problem]:
+def _shared_problems(found: Sequence[LocatedSpec], database: str | None) -> list[Problem]:
     """Return what keeps the objects from standing on one array, in one database."""
     problems: list[Problem] = []
     first = found[0]
-    names: dict[str, Located] = {}
+    names: dict[str, LocatedSpec] = {}
     for located in found:
         spec = located.spec
         other = names.setdefault(spec.name.casefold(), located)
@@ -203,7 +203,7 @@ def _too_many(tree: Tree) -> Problem:
     return Problem(cause, "make them in several runs", mark_of(tree, "copies, name"))
 
 
-def _shown(problems: Sequence[Problem]) -> list[Problem]:
+def _unique_problems(problems: Sequence[Problem]) -> list[Problem]:
     """Return each problem once, in the order of files and lines, at most `PROBLEMS_SHOWN`."""
     once: dict[tuple[str, str], Problem] = {}
     for problem in problems:

@@ -42,7 +42,7 @@ from generator.spec.settings import NamedSettings, ObjectSettings
 WALL_STROKES = 2  # least wall, in narrowest strokes of the printer
 
 
-def resolved(
+def resolve(
     settings: NamedSettings, tree: Tree, solid: ShapeSpec | None = None
 ) -> tuple[ObjectSpec, ...]:
     """Return the object, or its copies, with all settings resolved.

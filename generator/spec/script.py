@@ -15,17 +15,17 @@ import yaml
 from pydantic import ValidationError
 
 from generator.spec.document import Tree, tree_of
-from generator.spec.explain import explained
-from generator.spec.located import Located
+from generator.spec.explain import explain_errors
+from generator.spec.located import LocatedSpec
 from generator.spec.problem import Problem, SpecError
-from generator.spec.resolve import resolved
+from generator.spec.resolve import resolve
 from generator.spec.resolved import ShapeSpec
 from generator.spec.settings import NamedSettings
 
 SOURCE = "encode()"  #: how messages call the script's values
 
 
-def spec_of(settings: Mapping[str, Any], shape: ShapeSpec) -> Located:
+def spec_of(settings: Mapping[str, Any], shape: ShapeSpec) -> LocatedSpec:
     """Return the spec of one object.
 
     Parameters
@@ -46,13 +46,13 @@ def spec_of(settings: Mapping[str, Any], shape: ShapeSpec) -> Located:
     try:
         read = NamedSettings.model_validate(tree.value)
     except ValidationError as error:
-        raise SpecError(explained(error, tree, NamedSettings)) from None
+        raise SpecError(explain_errors(error, tree, NamedSettings)) from None
     if read.copies != 1:
         fix = "call encode once for each copy, with a name of its own"
         raise SpecError(
             [Problem("one solid is encoded at a time", fix, tree.key_mark(("copies",)))]
         )
-    return Located(resolved(read, tree, shape)[0], tree)
+    return LocatedSpec(resolve(read, tree, shape)[0], tree)
 
 
 def tree_from(settings: Mapping[str, Any]) -> Tree:
@@ -73,8 +73,8 @@ def tree_from(settings: Mapping[str, Any]) -> Tree:
 
 
 def with_profile(
-    located: Located, name: str, defaults: str, encoding: Mapping[str, Any]
-) -> Located:
+    located: LocatedSpec, name: str, defaults: str, encoding: Mapping[str, Any]
+) -> LocatedSpec:
     """Return a spec on another array.
 
     Parameters
@@ -95,7 +95,7 @@ def with_profile(
     """
     value = {key: inner for key, inner in located.tree.value.items() if key != "shape"}
     read = NamedSettings.model_validate({**value, "profile": defaults, "copies": 1})
-    (spec,) = resolved(read, located.tree, located.spec.shape)
+    (spec,) = resolve(read, located.tree, located.spec.shape)
     own = replace(spec, name=located.spec.name, profile=name, encoding=encoding)  # of a copy
     return replace(located, spec=own)
 

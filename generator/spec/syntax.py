@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import yaml
 
-from generator.spec.problem import Mark, Problem, Source
+from generator.spec.problem import Problem, SourceMark, SpecSource
 
 _SYNTAX = (
     (r"'\t'", "a tab cannot be used here", "use spaces"),
@@ -19,10 +19,10 @@ _SYNTAX = (
 )  # fmt: skip
 
 
-def explained_syntax(error: yaml.YAMLError, source: Source, text: str) -> Problem:
+def explain_syntax(error: yaml.YAMLError, source: SpecSource, text: str) -> Problem:
     """Return the problem behind an error of the YAML parser, in plain words."""
     if isinstance(error, yaml.reader.ReaderError):
-        at = Mark.at(source, text[: error.position])
+        at = SourceMark.at(source, text[: error.position])
         cause = f"control character U+{ord(text[error.position]):04X} in the text"
         return Problem(cause, "delete it", at)
     if not isinstance(error, yaml.MarkedYAMLError):
@@ -30,7 +30,7 @@ def explained_syntax(error: yaml.YAMLError, source: Source, text: str) -> Proble
     said = error.problem or error.context or "not YAML"
     opened = error.context_mark
     where = opened if "end of stream" in said else error.problem_mark or opened
-    mark = Mark(source, where.line + 1, where.column + 1) if where else None
+    mark = SourceMark(source, where.line + 1, where.column + 1) if where else None
     for bracket, other in (("{", "}"), ("[", "]")):
         if f"expected ',' or '{other}'" in said and opened:
             cause = (

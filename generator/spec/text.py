@@ -5,7 +5,7 @@ from __future__ import annotations
 from difflib import get_close_matches
 from pathlib import Path
 
-from generator.spec.problem import Mark, Problem, Source, SpecError
+from generator.spec.problem import Problem, SourceMark, SpecError, SpecSource
 
 BYTES_MAX = 256 * 1024
 
@@ -39,8 +39,8 @@ def read_text(path: Path) -> str:
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        source = Source.of(str(path), data.decode("utf-8", errors="replace"))
-        mark = Mark.at(source, data[: error.start].decode("utf-8"))
+        source = SpecSource.of(str(path), data.decode("utf-8", errors="replace"))
+        mark = SourceMark.at(source, data[: error.start].decode("utf-8"))
         cause = f"byte 0x{data[error.start]:02x} is not UTF-8 text"
         raise SpecError([Problem(cause, "save the file as UTF-8", mark)]) from None
     return text

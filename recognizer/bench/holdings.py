@@ -9,7 +9,7 @@ from fastapi import APIRouter
 from fastapi.responses import FileResponse
 
 from generator.database.open import open_database
-from generator.database.read import existing, read_parts
+from generator.database.read import object_entry, read_parts
 from generator.database.transaction import reading
 from recognizer.bench.errors import UnknownError
 from recognizer.bench.files import part_to_send
@@ -44,7 +44,7 @@ def holdings_routes(session: Session, parts: Path | None) -> APIRouter:
     @routes.get("/objects/{name}/parts/{number}")
     def part(name: str, number: int) -> FileResponse:
         with reading(engine()) as connection:
-            known = read_parts(connection, existing(connection, name).object_id)
+            known = read_parts(connection, object_entry(connection, name).object_id)
         if not 0 <= number < len(known):
             raise UnknownError(f"{name} has no part {number}", fix=f"it has {len(known)}")
         path = part_to_send(session.database, parts, known[number])

@@ -15,8 +15,8 @@ At each number of objects it prints medians: one more cube placed and registered
 (open, taken cells, layout, rows, commit), wall time and CPU time of this process (a server's is
 its own), reading the taken cells alone, and the object and face of a 3 x 4 window of cells, on an
 open connection and with opening it. `opened` is used cells by those of the corner that placing
-has opened (`generator.layout.board.opened`: it grows when nothing fits into it any more), `array`
-by those of the array.
+has opened (`generator.layout.board.board_size`: it grows when nothing fits into it any more),
+`array` by those of the array.
 
 `--full` places the mixture, edges `--size` times as long, until none of its shapes fits anywhere,
 without a database. `--copies` chooses the places of a set of copies of a 30 mm cube.
@@ -37,22 +37,22 @@ from sqlalchemy import func, select
 
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle
-from generator.array.profiles import enlarged, profile
+from generator.array.profiles import next_larger, profile
 from generator.database import tables
 from generator.database.cells import faces_at, find_array, occupancy
 from generator.database.open import open_database
 from generator.database.race import in_turn
 from generator.database.read import list_objects, read_layout
-from generator.database.register import Registration, register
+from generator.database.register import ObjectRecord, register
 from generator.database.retire import remove
 from generator.database.transaction import reading, writing
 from generator.errors import LayoutError
-from generator.layout.board import opened
+from generator.layout.board import board_size
 from generator.layout.layout import lay_out
 from generator.layout.occupancy import Occupancy
 from generator.layout.placement import FaceLayout, Layout, Placement
 from generator.pipeline import encode
-from generator.pipeline.place import beside
+from generator.pipeline.place import occupancy_with
 from generator.polyhedron import shapes
 from generator.spec import read_specs
 
@@ -74,7 +74,7 @@ def array_of(rows):
     """Return the array of `large` and its next sizes with at least `rows` rows."""
     known = profile("large")
     while known.array().rows < rows:
-        known = enlarged(known)
+        known = next_larger(known)
     return known.array()
 
 
@@ -84,7 +84,7 @@ def laid_out(solid, array, taken):
 
 
 def registration(name, solid, layout, array):
-    return Registration(
+    return ObjectRecord(
         name, solid, layout, array, "large", alphabet_named("dense-4"), STYLE, {"name": name}, "0"
     )
 
@@ -130,7 +130,7 @@ def mixed(array, size=1.0, taken=None):
         except LayoutError:
             shapes_left.remove(solid)
             continue
-        taken = beside(taken, layout)
+        taken = occupancy_with(taken, layout)
         number += 1
         yield solid, layout
 
@@ -203,7 +203,7 @@ def measured(url, array, objects):
         for k in range(20):
             assert look(connection, k)[0][0] > 0
     opening = timed(look_opening, 20)[0]
-    high, wide = opened(held)
+    high, wide = board_size(held)
     print(
         f"{engine.dialect.name:>10} {objects:8d} {faces:8d} {held.used:9d} {placing:8.3f} "
         f"{cpu:8.3f} {1e3 * taken:9.1f} {1e3 * looking:8.2f} {1e3 * opening:9.1f} {listing:7.2f} "
@@ -239,13 +239,13 @@ def filled(array, size):
     )
 
     def told():
-        high, wide = opened(taken)
+        high, wide = board_size(taken)
         share = taken.used / (high * wide)
         spent = time.process_time() - began
         print(f"{number:8d} {taken.used:9d} {share:7.3f} {taken.density:7.3f} {spent:8.0f}")
 
     for _, layout in mixed(array, size):
-        taken = beside(taken, layout)
+        taken = occupancy_with(taken, layout)
         number += 1
         if number % 1000 == 0:
             told()

@@ -24,7 +24,7 @@ import numpy as np  # noqa: E402
 from sqlalchemy import create_engine  # noqa: E402
 
 from generator.alphabet import SymbolStyle, alphabet_named  # noqa: E402
-from generator.array import enlarged, profile  # noqa: E402
+from generator.array import next_larger, profile  # noqa: E402
 from probe.contact.contract import Touch  # noqa: E402
 from probe.sensor import SensorType  # noqa: E402
 from probe.surface.face import Face  # noqa: E402
@@ -49,7 +49,7 @@ CENTRES = np.column_stack([(C + 0.5) * 7.0 + 2.0, 58.0 - (R + 0.5) * 7.0])
 def array_4095():
     known = profile("large")
     while known.array().rows < 4095:
-        known = enlarged(known)
+        known = next_larger(known)
     return known.array()
 
 

@@ -31,18 +31,18 @@ from sqlalchemy import func, select
 
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle
-from generator.array.profiles import enlarged, profile
+from generator.array.profiles import next_larger, profile
 from generator.database import tables
-from generator.database.cells import find_array, held_cells, occupied
+from generator.database.cells import find_array, held_cells, occupied_cells
 from generator.database.open import open_database
 from generator.database.race import in_turn
 from generator.database.read import find_object, list_objects, read_layout, read_object
-from generator.database.register import Registration, register
+from generator.database.register import ObjectRecord, register
 from generator.database.transaction import reading
 from generator.layout.layout import lay_out
 from generator.polyhedron import shapes
 
-ARRAY = enlarged(profile("large")).array()  # 511 x 513
+ARRAY = next_larger(profile("large")).array()  # 511 x 513
 SOLIDS = (shapes.cube(30.0), shapes.box([44.0, 30.0, 23.0]), shapes.tetrahedron(60.0))
 STYLE = SymbolStyle()
 
@@ -65,7 +65,7 @@ def write(url: str, writer: int, names: list[str], acknowledge: int) -> None:
         early = None
         if writer % 2:  # a place chosen before our turn: somebody may take it meanwhile
             with reading(engine) as connection:
-                early = laid_out(solid, occupied(connection, find_array(connection, ARRAY)))
+                early = laid_out(solid, occupied_cells(connection, find_array(connection, ARRAY)))
             time.sleep(0.01)
         tries = []
 
@@ -75,8 +75,8 @@ def write(url: str, writer: int, names: list[str], acknowledge: int) -> None:
                 return read_layout(connection, name)
             layout = early if len(tries) == 1 and early is not None else None
             if layout is None:
-                layout = laid_out(solid, occupied(connection, find_array(connection, ARRAY)))
-            register(connection, Registration(
+                layout = laid_out(solid, occupied_cells(connection, find_array(connection, ARRAY)))
+            register(connection, ObjectRecord(
                 name, solid, layout, ARRAY, "large", alphabet_named("dense-4"), STYLE,
                 {"name": name}, "0",
             ))  # fmt: skip
@@ -185,7 +185,7 @@ def wrong(url: str, acknowledged: dict[str, str]) -> list[str]:
         cells = held_cells(connection, array_id)
         if len(np.unique(cells[:, :2], axis=0)) != len(cells):
             found.append("a cell is held twice")
-        if not np.array_equal(np.stack(occupied(connection, array_id), axis=1), cells[:, :2]):
+        if not np.array_equal(np.stack(occupied_cells(connection, array_id), axis=1), cells[:, :2]):
             found.append("the bits of taken cells are not those of the cells")
         for table in tables.metadata.sorted_tables:
             if "object_id" in table.c:

@@ -27,12 +27,12 @@ from generator.export.check import verify
 from generator.export.step import step_chunks
 from generator.export.stl import stl_chunks
 from generator.pipeline.files import parts_of
-from generator.pipeline.place import NO_CELLS, laid_out
-from generator.pipeline.plan import planned
+from generator.pipeline.place import NO_CELLS, lay_out_object
+from generator.pipeline.plan import plan_object
 from generator.polyhedron import Polyhedron
 from generator.polyhedron.random_shapes import random_convex, random_nonconvex
 from generator.solid import prove_closed, triangles, volume
-from generator.spec import Located, read_specs
+from generator.spec import LocatedSpec, read_specs
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 
@@ -78,11 +78,11 @@ def checked(path: Path) -> list[Outcome]:
         return [Outcome(path.stem, 0, 0, 0.0, 0.0, error.cause, "")]
 
 
-def outcome(located: Located) -> Outcome:
+def outcome(located: LocatedSpec) -> Outcome:
     name = located.spec.name
     try:
-        plan = planned(located)
-        layout = laid_out(plan, NO_CELLS)
+        plan = plan_object(located)
+        layout = lay_out_object(plan, NO_CELLS)
         parts, _ = parts_of(plan, layout)
     except GeneratorError as error:
         return Outcome(name, 0, 0, 0.0, 0.0, error.cause, "")

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from sqlalchemy import text
 
-from generator.database.cells import held_cells, occupied
+from generator.database.cells import held_cells, occupied_cells
 from generator.database.open import open_database
 from generator.database.read import list_objects, read_layout
 from generator.database.transaction import reading, writing
@@ -121,7 +121,7 @@ def whole_objects(url):
         orphans = "FROM cells WHERE object_id NOT IN (SELECT object_id FROM provenance)"
         assert connection.execute(text(f"SELECT count(*) {orphans}")).scalar_one() == 0
         cells = held_cells(connection, 1)[:, :2]
-        assert np.array_equal(np.stack(occupied(connection, 1), axis=1), cells)
+        assert np.array_equal(np.stack(occupied_cells(connection, 1), axis=1), cells)
     if "://" not in url:
         plain = sqlite3.connect(url)
         assert plain.execute("PRAGMA integrity_check").fetchall() == [("ok",)]

@@ -16,7 +16,7 @@ import pytest
 
 from generator.alphabet.known import alphabet_from
 from generator.alphabet.outline import outlines
-from generator.alphabet.rings import distance, inside
+from generator.alphabet.rings import distance, points_inside
 from generator.array import array_from
 from generator.database.open import open_database
 from generator.database.read import read_object
@@ -94,7 +94,7 @@ def test_the_surface_bears_the_registered_symbols_where_the_database_says(made):
     for label, centre in zip(face.labels.tolist(), face.centres_mm, strict=True):
         for q in rng.uniform(-0.35, 0.35, (4, 2)) * known.style.pitch_mm:
             top, foot = tiers[label].rings[-1], tiers[label].rings[0]
-            on, off = inside(q[None], top)[0], not inside(q[None], foot)[0]
+            on, off = points_inside(q[None], top)[0], not points_inside(q[None], foot)[0]
             near = min(distance(q[None], top)[0], distance(q[None], foot)[0])
             if near < 0.1 or on == off:
                 continue  # on a side of the symbol

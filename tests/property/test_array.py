@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from generator.array import FoldedArray, ProductArray, Sequence, array_from
 from generator.array.factor import decodes
 from generator.array.field import field_of_order
-from generator.array.notation import parsed, written
+from generator.array.notation import format_polynomial, parse_polynomial
 from generator.array.polynomial import is_primitive, mulmod, norm, powmod
 from generator.array.primitive import known_polynomials
 from generator.array.size import folds
@@ -124,7 +124,7 @@ def test_arithmetic_modulo_h_over_gf_q_and_over_its_prime_field_agree(q, data):
     if is_primitive(field, h):
         assert is_primitive(prime_field, conjugates)
         assert powmod(field, (0, 1), q**n - 1, h) == powmod(field, (0, 1), 0, h)
-    assert parsed(field, written(field, h)) == h
+    assert parse_polynomial(field, format_polynomial(field, h)) == h
 
 
 @quick

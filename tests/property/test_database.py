@@ -13,10 +13,10 @@ from generator.database.cells import held_cells
 from generator.database.open import open_database
 from generator.database.read import faces_at, list_objects, object_names, read_object
 from generator.database.register import (
-    Registration,
+    ObjectRecord,
     find_array,
     find_object,
-    occupied,
+    occupied_cells,
     register,
     remove_object,
     same_layout,
@@ -73,7 +73,7 @@ def registrations(draw):
         for name in draw(st.lists(names, unique=True, max_size=3))
     ]
     alphabet = draw(st.sampled_from(sorted(ALPHABETS)))
-    return Registration(
+    return ObjectRecord(
         draw(names), SOLID, layout, ARRAY, draw(names), ALPHABETS[alphabet], style,
         {"spec": draw(values)}, draw(names), tuple(parts),
     )  # fmt: skip
@@ -134,7 +134,7 @@ def small(name, first, count):
         0, Placement(0, first, 0.0, 0.0, 0.0), cells // 65, cells % 65,
         ARRAY.symbols(cells // 65, cells % 65), np.zeros((count, 2)), 0,
     )  # fmt: skip
-    return Registration(
+    return ObjectRecord(
         name, SOLID, Layout("faces", 7.0, (face,)), ARRAY, "one-touch", ALPHABETS["dense-4"],
         SymbolStyle(), {"first": first, "count": count}, "0",
     )  # fmt: skip
@@ -183,7 +183,7 @@ def shares_no_cell(engine, steps):
         with reading(engine) as connection:
             assert [e.name for e in list_objects(connection)] == sorted(held)
             assert object_names(connection) == tuple(sorted(held))
-            rows, columns = occupied(connection, find_array(connection, ARRAY))
+            rows, columns = occupied_cells(connection, find_array(connection, ARRAY))
             cells = (rows * 65 + columns).tolist()
             assert cells == sorted(c for cells in held.values() for c in cells)
             assert held_cells(connection, 1)[:, :2].tolist() == [

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from decoder import Likelihood, decode_exact, strength
 from decoder.element import elements_of
 from decoder.keys import Keys
-from decoder.register import eliminated
+from decoder.register import eliminate
 from generator.array import PROFILES, array_from
 from generator.array.field import field_of_order
 from generator.array.polynomial import mulmod
@@ -100,7 +100,7 @@ def test_products_agree_with_polynomials(case):
 @given(st.sampled_from([2, 3, 5, 7]), st.integers(1, 8), st.integers(1, 6), st.integers(0, 99))
 def test_elimination_says_which_combination_it_took(prime, rows, columns, seed):
     matrix = np.random.default_rng(seed).integers(0, prime, (rows, columns)).astype(float)
-    combinations, reduced, pivots = eliminated(matrix, prime)
+    combinations, reduced, pivots = eliminate(matrix, prime)
     np.testing.assert_array_equal(combinations @ matrix % prime, reduced)
     np.testing.assert_array_equal(reduced[: len(pivots), pivots], np.eye(len(pivots)))
     assert not reduced[len(pivots) :].any()

@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull
 
 from generator.array.profiles import profile
 from generator.errors import LayoutError
-from generator.layout.footprint import moved, region_of
+from generator.layout.footprint import move_region, region_of
 from generator.layout.lattice import choose_lattice
 from generator.layout.layout import lay_out
 from generator.layout.places import array_cells, count_places, count_windows
@@ -84,10 +84,10 @@ def test_footprints_lie_in_the_face_and_keep_every_clearance(face, window):
 def test_no_aligned_lattice_shows_more_places(face, rotation, shift):
     """Compare with the cells of an arbitrary lattice along the first edge, found by shapely."""
     loops, clearances = face
-    region = moved(region_of(loops, clearances), rotation)
+    region = move_region(region_of(loops, clearances), rotation)
     best = choose_lattice([region], HALF, PITCH, (3, 2))
     side = region.end[0] - region.start[0]
-    flat = moved(region, -float(np.arctan2(side[1], side[0])))
+    flat = move_region(region, -float(np.arctan2(side[1], side[0])))
     low, high = flat.start.min(axis=0), flat.start.max(axis=0)
     x, y = (np.arange(low[k] + shift % PITCH, high[k], PITCH) for k in (0, 1))
     count = [0, *np.cumsum([len(loop) for loop in loops])]

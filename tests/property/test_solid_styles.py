@@ -15,7 +15,7 @@ from generator.alphabet import (
     footprint_half_mm,
     outlines,
 )
-from generator.alphabet.rings import crossing, distance, inside, signed_area
+from generator.alphabet.rings import distance, edges_cross, points_inside, signed_area
 from generator.errors import AlphabetError, SolidError
 from generator.layout.placement import FaceLayout, Layout, Placement
 from generator.polyhedron.frame import face_polygon
@@ -58,7 +58,7 @@ def test_a_style_gives_proper_outlines_or_says_what_to_change(alphabet, style, p
     assert half < style.pitch_mm / 2
     for tiers in outlines(alphabet, style):
         for rings in tiers.rings:
-            assert not crossing(rings)
+            assert not edges_cross(rings)
             assert np.abs(np.concatenate(rings)).max() < half
         shares = [sum(signed_area(ring) for ring in rings) for rings in tiers.rings]
         assert all(a >= b for a, b in pairwise(shares))  # it gets narrower
@@ -66,7 +66,7 @@ def test_a_style_gives_proper_outlines_or_says_what_to_change(alphabet, style, p
         unit = alphabet.reach * style.pitch_mm
         for glyph, tiers in zip(alphabet.glyphs, outlines(alphabet, style), strict=True):
             nodes = unit * np.array([node for stroke in glyph.strokes for node in stroke])
-            assert inside(nodes, tiers.rings[-1]).all()
+            assert points_inside(nodes, tiers.rings[-1]).all()
             assert distance(nodes, tiers.rings[-1]).min() >= style.stroke_mm / 2 * (1 - 1e-9)
 
 
@@ -153,7 +153,7 @@ def test_inset_edges_stay_parallel_at_their_distance(polar, insets):
     angles = np.cumsum(steps) * (2 * math.pi / steps.sum())
     radii = 10 * np.array([radius for radius, _ in polar])
     ring = np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)
-    assume(not crossing([ring]))
+    assume(not edges_cross([ring]))
     each = np.array(insets[: len(ring)])
     moved = inset(ring, each)
     assume(regular([ring], [moved], 1e-3))
@@ -165,4 +165,4 @@ def test_inset_edges_stay_parallel_at_their_distance(polar, insets):
             each, abs=1e-12 * reach * 1e3
         )
     if each.min() >= 0:
-        assert inside(moved, [ring]).all() or distance(moved, [ring]).min() < 1e-9
+        assert points_inside(moved, [ring]).all() or distance(moved, [ring]).min() < 1e-9

@@ -9,7 +9,7 @@ import yaml
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from generator.spec import Located, SpecError, read_specs
+from generator.spec import LocatedSpec, SpecError, read_specs
 from generator.spec.quantity import MILLIMETRES, length_mm
 
 MUTATIONS = int(os.environ.get("SPEC_MUTATIONS", "300"))
@@ -77,7 +77,7 @@ def check(data):
             shown.encode("utf-8")
         else:
             assert found
-            assert all(isinstance(one, Located) for one in found)
+            assert all(isinstance(one, LocatedSpec) for one in found)
             assert all(0 < one.spec.style.pitch_mm < 1e4 for one in found)
         assert sorted(os.listdir()) == ["c.yaml"]
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from generator.errors import ShapeError
-from generator.polyhedron.read.merge import merged
+from generator.polyhedron.read.merge import merge_triangles
 from generator.polyhedron.read.obj import read_obj
 from generator.polyhedron.read.soup import Soup
 from generator.polyhedron.read.step import read_step
@@ -65,7 +65,7 @@ def read_shape(path: str | Path, scale: float = 1.0) -> Polyhedron:
         if suffix not in MESHES:
             solid = read_step(content, place, scale)
         else:
-            vertices, faces = merged(MESHES[suffix](content, place))
+            vertices, faces = merge_triangles(MESHES[suffix](content, place))
             solid = polyhedron("file", scale * vertices, faces)
         _check_size(solid)
         return solid

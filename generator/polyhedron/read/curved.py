@@ -62,7 +62,7 @@ def curved_faces(solid: Any, faces: list[Any], kinds: list[str]) -> dict[str, An
     """
     counts: list[int] = []
     for coarser in COARSER:
-        found = _divided(solid, faces, kinds, coarser)
+        found = _divide(solid, faces, kinds, coarser)
         counts.append(len(found.faces))
         if counts[-1] <= MOST_FACETS:
             break
@@ -90,7 +90,7 @@ def curved_faces(solid: Any, faces: list[Any], kinds: list[str]) -> dict[str, An
     }
 
 
-def _divided(solid: Any, faces: list[Any], kinds: list[str], coarser: float) -> _Found:
+def _divide(solid: Any, faces: list[Any], kinds: list[str], coarser: float) -> _Found:
     """Return all facets at so many times the chord errors."""
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.BRepTools import BRepTools
@@ -107,12 +107,12 @@ def _divided(solid: Any, faces: list[Any], kinds: list[str], coarser: float) -> 
     BRepTools.Clean_s(solid)
     BRepMesh_IncrementalMesh(solid, limits)
     divided: set[int] = set()  # straight edges whose inner points triangles need
-    while (found := _gathered(faces, kinds, divided)) is None:
+    while (found := _gather(faces, kinds, divided)) is None:
         pass  # a face fell back to triangles, so its neighbours must take its points
     return found
 
 
-def _gathered(faces: list[Any], kinds: list[str], divided: set[int]) -> _Found | None:
+def _gather(faces: list[Any], kinds: list[str], divided: set[int]) -> _Found | None:
     """Return all facets; None after `divided` has grown, so that it must be done again."""
     found = _Found()
     nodes = _Nodes(found, divided)

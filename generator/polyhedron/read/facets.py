@@ -37,7 +37,7 @@ def polyhedron_of_facets(found: dict[str, Any], kind: str) -> Polyhedron:
     ShapeError
         The facets are no solid: walls thinner than the chord errors, a damaged model.
     """
-    points, faces, kept = _welded(np.array(found["points"], dtype=np.float64), found["faces"])
+    points, faces, kept = _weld(np.array(found["points"], dtype=np.float64), found["faces"])
     named = [
         Face(found["names"][old], tuple(tuple(loop) for loop in loops))
         for old, loops in zip(kept, faces, strict=True)
@@ -45,7 +45,7 @@ def polyhedron_of_facets(found: dict[str, Any], kind: str) -> Polyhedron:
     try:
         solid = polyhedron(kind, points, named)
     except ShapeError as error:
-        raise _refused(error, found) from None
+        raise _facet_error(error, found) from None
     number = {old: new for new, old in enumerate(kept)}
     surfaces = tuple(
         developable_from(surface | {"facets": [number[k] for k in surface["facets"]]})
@@ -56,7 +56,7 @@ def polyhedron_of_facets(found: dict[str, Any], kind: str) -> Polyhedron:
     return replace(solid, notes=notes, surfaces=surfaces, blank=blank)
 
 
-def _welded(
+def _weld(
     points: NDArray[np.float64], faces: list[Loops]
 ) -> tuple[NDArray[np.float64], list[Loops], list[int]]:
     """Join near points; return points, the faces that are left and their old numbers."""
@@ -79,7 +79,7 @@ def _without_repeats(loop: list[int]) -> list[int]:
     return [v for k, v in enumerate(loop) if v != loop[k - 1]]
 
 
-def _refused(error: ShapeError, found: dict[str, Any]) -> ShapeError:
+def _facet_error(error: ShapeError, found: dict[str, Any]) -> ShapeError:
     """Say of facets what a message about vertices says of a polyhedron."""
     cause = error.cause.strip().splitlines()
     first = cause[1].strip().partition(";")[0] if len(cause) > 1 else error.cause

@@ -44,14 +44,14 @@ def _read(model: str, scale: float) -> dict[str, Any]:
             fix=f"{install_line('cad')}, or save the model as STL",
         ) from None
     try:
-        return described(_scaled(_model(model), scale))
+        return describe_shape(_scale(_model(model), scale))
     except OCP.Standard.Standard_Failure as error:
         reason = str(error).strip().splitlines()
         cause = f"the CAD kernel cannot read it: {reason[0] if reason else 'no reason given'}"
         raise ShapeError(cause, fix=AGAIN) from None
 
 
-def described(shape: Any) -> dict[str, Any]:
+def describe_shape(shape: Any) -> dict[str, Any]:
     """Return the faces of the one solid in a shape of the kernel, mm.
 
     Raises
@@ -61,22 +61,22 @@ def described(shape: Any) -> dict[str, Any]:
     """
     from OCP.TopAbs import TopAbs_SOLID
 
-    solids = [] if shape is None or shape.IsNull() else _explored(shape, TopAbs_SOLID)
+    solids = [] if shape is None or shape.IsNull() else _sub_shapes(shape, TopAbs_SOLID)
     if len(solids) != 1:
         raise ShapeError(
-            f"it holds {_held(shape, len(solids))}; one solid is needed",
+            f"it holds {_content_of(shape, len(solids))}; one solid is needed",
             fix="join them into one solid, or save each in a file of its own",
         )
     return _faces(solids[0])
 
 
-def _held(shape: Any, solids: int) -> str:
+def _content_of(shape: Any, solids: int) -> str:
     """Return what a shape holds in place of one solid."""
     from OCP.TopAbs import TopAbs_FACE
 
     if solids:
         return f"{solids} solids"
-    faces = 0 if shape is None or shape.IsNull() else len(_explored(shape, TopAbs_FACE))
+    faces = 0 if shape is None or shape.IsNull() else len(_sub_shapes(shape, TopAbs_FACE))
     if faces:
         return f"no solid, but {faces} loose {'face' if faces == 1 else 'faces'}"
     return "no faces: it may be an assembly whose parts are in other files"
@@ -93,7 +93,7 @@ def _model(model: str) -> Any:
     return reader.OneShape()
 
 
-def _scaled(shape: Any, scale: float) -> Any:
+def _scale(shape: Any, scale: float) -> Any:
     """Return a shape made larger about the origin, so that round faces are divided at that size."""
     from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
     from OCP.gp import gp_Pnt, gp_Trsf
@@ -112,7 +112,7 @@ def _faces(solid: Any) -> dict[str, Any]:
     from OCP.TopoDS import TopoDS
     from OCP.TopTools import TopTools_IndexedMapOfShape
 
-    faces = [TopoDS.Face_s(face) for face in _explored(solid, TopAbs_FACE)]
+    faces = [TopoDS.Face_s(face) for face in _sub_shapes(solid, TopAbs_FACE)]
     kinds = [_kind(face) for face in faces]
     if set(kinds) != {"plane"}:
         from generator.polyhedron.read.curved import curved_faces
@@ -146,7 +146,7 @@ def _loops(face: Any, numbers: Any) -> list[list[int]]:
     from OCP.TopoDS import TopoDS
 
     outer = BRepTools.OuterWire_s(face)
-    wires = [TopoDS.Wire_s(wire) for wire in _explored(face, TopAbs_WIRE)]
+    wires = [TopoDS.Wire_s(wire) for wire in _sub_shapes(face, TopAbs_WIRE)]
     wires.sort(key=lambda wire: not wire.IsSame(outer))
     loops = []
     for wire in wires:
@@ -182,7 +182,7 @@ def _refuse_bent(edge: Any) -> None:
         )
 
 
-def _explored(shape: Any, kind: Any) -> list[Any]:
+def _sub_shapes(shape: Any, kind: Any) -> list[Any]:
     """Return the sub-shapes of one kind, each once, in the kernel's order."""
     from OCP.TopExp import TopExp
     from OCP.TopTools import TopTools_IndexedMapOfShape

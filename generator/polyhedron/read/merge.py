@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from generator.errors import ShapeError
 from generator.polyhedron.polygon import area_vector
-from generator.polyhedron.read.soup import Soup, joined
+from generator.polyhedron.read.soup import Soup, cluster_labels
 
 DISTANCE = 1e-5  #: coplanar points lie this near to a plane, as a share of the size
 ANGLE_RAD = 1e-3  #: coplanar polygons turn by no more than this, besides the noise
@@ -27,7 +27,7 @@ Integers = NDArray[np.intp]
 Faces = list[tuple[tuple[int, ...], ...]]
 
 
-def merged(soup: Soup) -> tuple[Floats, Faces]:
+def merge_triangles(soup: Soup) -> tuple[Floats, Faces]:
     """Return vertices (V, 3) mm and faces as loops, the outer loop first, for `polyhedron`.
 
     Raises
@@ -116,7 +116,7 @@ def _coplanar_groups(soup: Soup, twin: Integers) -> Integers:
     turn = np.arctan2(cross, np.einsum("ij,ij->i", normal[large], normal[small]))
     allowed = np.maximum(ANGLE_RAD, 4.0 * soup.noise / np.maximum(width[small], soup.noise))
     flat = (off <= tolerance) & (turn <= allowed) & ~sliver[large] & ~sliver[small]
-    group = joined(np.arange(count), large[flat], small[flat])
+    group = cluster_labels(np.arange(count), large[flat], small[flat])
     group = _with_slivers(group, sliver, large, small, off, turn, tolerance)
     _check_groups(soup, group, vector, corner)
     return group

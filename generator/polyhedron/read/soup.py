@@ -116,12 +116,14 @@ def weld(
         cell = np.floor((unique - low) / step + 0.5 * np.array(shift)).astype(np.int64)
         order = np.lexsort(cell.T)
         same = (np.diff(cell[order], axis=0) == 0).all(axis=1)
-        label = joined(label, order[:-1][same], order[1:][same])
+        label = cluster_labels(label, order[:-1][same], order[1:][same])
     kept, compact = np.unique(label, return_inverse=True)
     return unique[kept], compact.ravel()[number].astype(np.intp)
 
 
-def joined(label: NDArray[np.intp], a: NDArray[np.intp], b: NDArray[np.intp]) -> NDArray[np.intp]:
+def cluster_labels(
+    label: NDArray[np.intp], a: NDArray[np.intp], b: NDArray[np.intp]
+) -> NDArray[np.intp]:
     """Return labels after joining items a and b pairwise: the least number of each cluster."""
     label = label.copy()
     while True:

@@ -16,7 +16,7 @@ import numpy as np
 from encoded_objects.errors import install_line
 from generator.errors import ShapeError
 from generator.polyhedron.read.facets import polyhedron_of_facets
-from generator.polyhedron.read.merge import merged
+from generator.polyhedron.read.merge import merge_triangles
 from generator.polyhedron.read.soup import soup_of_loops
 from generator.polyhedron.winged import Polyhedron, polyhedron
 
@@ -56,7 +56,7 @@ def polyhedron_of(found: dict[str, Any], place: str, kind: str) -> Polyhedron:
     if "surfaces" in found:
         return polyhedron_of_facets(found, kind)
     points = np.array(found["points"], dtype=np.float64).reshape(-1, 3)
-    vertices, faces = merged(soup_of_loops(points, found["faces"], place))
+    vertices, faces = merge_triangles(soup_of_loops(points, found["faces"], place))
     return polyhedron(kind, vertices, faces)
 
 

@@ -102,15 +102,15 @@ def _two_chains(sides: list[_Side]) -> tuple[list[int], list[int]] | None:
     sides = sides[starts[0] :] + sides[: starts[0]]
     runs = [(kind, list(same)) for kind, same in groupby(sides, key=lambda side: side.kind)]
     shape = [kind if kind == "circle" else f"{len(same)} {kind}" for kind, same in runs]
-    below = _joined([side.numbers for side in runs[0][1]])
+    below = _join_chains([side.numbers for side in runs[0][1]])
     if shape == ["circle", "1 line", "circle", "1 line"]:
-        return below, _joined([side.numbers for side in runs[2][1]])[::-1]
+        return below, _join_chains([side.numbers for side in runs[2][1]])[::-1]
     if shape == ["circle", "2 line"]:
         return below, [runs[1][1][0].numbers[-1]]
     return None
 
 
-def _joined(chains: list[list[int]]) -> list[int]:
+def _join_chains(chains: list[list[int]]) -> list[int]:
     """Return chains that follow each other as one."""
     return [*(number for chain in chains for number in chain[:-1]), chains[-1][-1]]
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.alphabet.rings import inside, signed_area
+from generator.alphabet.rings import points_inside, signed_area
 from generator.errors import SolidError
 
 Loop = tuple[int, ...]
@@ -54,7 +54,7 @@ def with_holes(loops: Sequence[Loop], points: NDArray[np.float64]) -> list[tuple
             continue
         corner = points[list(loops[k][:1])]
         holder = next(  # the smallest that holds it
-            (o for o in outer if inside(corner, [points[list(loops[o])]])[0]), None
+            (o for o in outer if points_inside(corner, [points[list(loops[o])]])[0]), None
         )
         if holder is None:
             raise SolidError("a hole lies outside of every outline")

@@ -80,14 +80,14 @@ def wrapped_onto(
         cuts.append(cut)
         names.append(symbol)
         firsts.append(body.count)
-        block = _lifted(strip, cut)
+        block = _lift(strip, cut)
         body.vertices.append(block)
         body.count += len(block)
     _cut_strip(body, strip, surface, cuts, firsts)
     _add_symbols(body, surface, name, names, cuts, firsts, np.asarray(layout.labels))
 
 
-def _lifted(strip: Strip, cut: Cut) -> Points:
+def _lift(strip: Strip, cut: Cut) -> Points:
     """Return the points of a symbol on the solid."""
     flat, z = np.array(cut.flat), np.array(cut.z_mm)
     facet, line = np.array(cut.facet), np.array(cut.line)
@@ -142,7 +142,7 @@ def _cut_strip(
         plain = body.facets[facet]
         pieces = _named_pieces(own, flat, plain.name)
         if pointed:
-            pieces = [tuple(_without(loop, top[1]) for loop in loops) for loops in pieces]
+            pieces = [tuple(_drop(loop, top[1]) for loop in loops) for loops in pieces]
         shown = [tuple(tuple(real.get(k, k) for k in loop) for loop in loops) for loops in pieces]
         body.facets[facet] = Facet(plain.name, shown[0])
         body.facets += [Facet(plain.name, loops) for loops in shown[1:]]
@@ -162,7 +162,7 @@ def _named_pieces(
     ]
 
 
-def _without(loop: Loop, number: int) -> Loop:
+def _drop(loop: Loop, number: int) -> Loop:
     return tuple(k for k in loop if k != number)
 
 
@@ -184,11 +184,11 @@ def _add_symbols(
         full = f"{name}/{names[symbol]}"
         for _, piece in cut.sides:
             for triangle in _fan(piece):
-                body.facets.append(Facet(f"{full}/side", (_shifted(triangle, first),)))
+                body.facets.append(Facet(f"{full}/side", (_shift(triangle, first),)))
         for _, loops in cut.tops:
-            body.facets.append(Facet(f"{full}/top", tuple(_shifted(k, first) for k in loops)))
+            body.facets.append(Facet(f"{full}/top", tuple(_shift(k, first) for k in loops)))
         for _, loops in cut.feet:
-            feet.append(Facet(full, tuple(_shifted(k, first) for k in loops)))
+            feet.append(Facet(full, tuple(_shift(k, first) for k in loops)))
         owners += [symbol] * (len(body.facets) - before)
     if not names:
         raise SolidError("a round face without symbols needs no wrapping", place=name)
@@ -212,5 +212,5 @@ def _fan(piece: Loop) -> list[Loop]:
     return [(turned[0], b, c) for b, c in pairwise(turned[1:])]
 
 
-def _shifted(loop: Loop, first: int) -> Loop:
+def _shift(loop: Loop, first: int) -> Loop:
     return tuple(first + k for k in loop)

@@ -9,9 +9,9 @@ import pytest
 import decoder.joint
 import decoder.likelihood
 from decoder import Likelihood, WindowError, decode_likelihood
-from decoder.ranked import Ranked, best_of, joined
+from decoder.ranked import Ranked, best_of, best_of_all
 from decoder.ranking import ranking_of
-from decoder.score import hard_scores, unrelated
+from decoder.score import hard_scores, unrelated_score
 from generator.array import array_from
 
 BINARY = array_from({"family": "prba", "order": 2, "degree": 8})  # 15 x 17
@@ -120,7 +120,7 @@ def test_scores_of_labels_by_hand():
     truth[0, 0, 2] = truth[1, 0, 0] = truth[1, 1, 3] = 0.0
     truth[0, 1] = 0.0
     np.testing.assert_allclose(found, truth, rtol=1e-6)
-    assert unrelated(found.reshape(1, 4, 4))[0] == pytest.approx(
+    assert unrelated_score(found.reshape(1, 4, 4))[0] == pytest.approx(
         3 * math.log((1 + 3 * math.exp(least)) / 4)
     )
     for order, bound in ((2, 0.5), (4, 0.75)):
@@ -326,7 +326,7 @@ def test_joined_parts_are_as_if_all_were_ranked_at_once(number):
         places, chosen, rest = best_of(own.astype(np.float32), number)
         rows = places.astype(np.uint64)
         parts.append(Ranked(rows, rows + np.uint64(100), chosen, rest))
-    found, source = joined(parts, number)
+    found, source = best_of_all(parts, number)
     whole = pooled(values)
     np.testing.assert_allclose(found.values, whole[:, :number], atol=1e-5)
     np.testing.assert_allclose(found.rest, np.exp(whole - whole[:, :1]).sum(axis=1) - 1, rtol=1e-4)

@@ -20,9 +20,9 @@ from generator.alphabet import (
     outlines,
 )
 from generator.alphabet.known import line
-from generator.alphabet.outline import engraved
+from generator.alphabet.outline import engrave
 from generator.alphabet.printable import gap_between_mm, gap_inside_mm
-from generator.alphabet.rings import crossing, inside, signed_area
+from generator.alphabet.rings import edges_cross, points_inside, signed_area
 from generator.errors import AlphabetError
 from generator.printers import PRINTERS
 
@@ -56,7 +56,7 @@ def test_tiers_correspond_and_their_sides_are_planar(alphabet, chamfer):
         for rings in tiers.rings:
             assert signed_area(rings[0]) > 0
             assert all(signed_area(hole) < 0 for hole in rings[1:])
-            assert not crossing(rings)
+            assert not edges_cross(rings)
         steps = zip(tiers.z_mm, tiers.rings, strict=True)
         for (z0, lower), (z1, upper) in pairwise(steps):
             for a, b in zip(lower, upper, strict=True):
@@ -169,24 +169,24 @@ def test_gaps_are_measured_on_the_outline():
 
 
 def test_engraved_walls_stand_at_45_degrees():
-    tiers = engraved(Glyph("8", line((-1, 0), (1, 0))), 0.8, 0.8, 0.32)
+    tiers = engrave(Glyph("8", line((-1, 0), (1, 0))), 0.8, 0.8, 0.32)
     (surface,), (floor,) = tiers.rings
     assert tiers.z_mm == (0.0, -0.32)
     assert np.ptp(surface, axis=0) - np.ptp(floor, axis=0) == pytest.approx([0.64] * 2)
     with pytest.raises(AlphabetError, match="collapses"):
-        engraved(Glyph("8", line((-1, 0), (1, 0))), 0.8, 0.8, 0.4)
+        engrave(Glyph("8", line((-1, 0), (1, 0))), 0.8, 0.8, 0.4)
 
 
 def test_rings_tell_crossings_and_points_inside():
     square = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
     hole = np.array([[1.0, 1.0], [1.0, 2.0], [2.0, 2.0], [2.0, 1.0]])
-    assert not crossing([square, hole])
-    assert crossing([square, hole + np.array([2.5, 0.0])])
-    assert crossing([square[[0, 2, 1, 3]]])
-    assert crossing([square, hole - np.array([1.0, 0.0])])  # touching counts
+    assert not edges_cross([square, hole])
+    assert edges_cross([square, hole + np.array([2.5, 0.0])])
+    assert edges_cross([square[[0, 2, 1, 3]]])
+    assert edges_cross([square, hole - np.array([1.0, 0.0])])  # touching counts
     points = np.array([[0.5, 0.5], [1.5, 1.5], [3.0, 3.0], [5.0, 1.0]])
-    assert inside(points, [square, hole]).tolist() == [True, False, True, False]
+    assert points_inside(points, [square, hole]).tolist() == [True, False, True, False]
     turned = np.linspace(0, 2 * math.pi, 700, endpoint=False)
     many = np.stack([np.cos(turned), np.sin(turned)], axis=1)
-    assert not crossing([many])
-    assert crossing([many, 0.5 * many + [0.7, 0.0]])
+    assert not edges_cross([many])
+    assert edges_cross([many, 0.5 * many + [0.7, 0.0]])

@@ -7,7 +7,7 @@ import pytest
 from generator.alphabet import ALPHABETS, Counts, Glyph, alphabet_from, alphabet_named, counts
 from generator.alphabet.figures import FIGURES
 from generator.alphabet.known import line
-from generator.alphabet.strokes import same_shape, turned
+from generator.alphabet.strokes import same_shape, turn_glyph
 from generator.errors import AlphabetError
 
 L, E, F, C = (2, 1), (3, 3), (3, 2), (2, 2)
@@ -56,9 +56,9 @@ def test_definition_survives_json_and_is_checked(alphabet):
 def test_turned_glyphs_are_told_apart():
     for alphabet in ALPHABETS.values():
         for glyph in alphabet.glyphs:
-            assert not any(same_shape(glyph, turned(glyph, k)) for k in (1, 2, 3))
+            assert not any(same_shape(glyph, turn_glyph(glyph, k)) for k in (1, 2, 3))
     bar = Glyph("bar", line((-1, 0), (0, 0)))
-    assert same_shape(bar, turned(bar, 2))  # a shift does not help
+    assert same_shape(bar, turn_glyph(bar, 2))  # a shift does not help
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from generator.array import (
     ProductArray,
     Sequence,
     array_from,
-    enlarged,
+    next_larger,
     profile,
 )
 from generator.array.field import field_of_order
@@ -315,7 +315,7 @@ def test_profiles_by_name():
 
 
 def test_large_and_up():
-    large = enlarged(profile("large"))
+    large = next_larger(profile("large"))
     assert (large.name, large.pitch_mm, large.alphabet) == ("large", 7.0, "dense-4")
     array = large.array()
     assert (array.rows, array.columns) == (511, 513)
@@ -323,13 +323,13 @@ def test_large_and_up():
     assert array.identifies(*block(*large.window))
     degree = 9
     while degree < 32:
-        large = enlarged(large)
+        large = next_larger(large)
         assert large.array().full_rank > degree
         degree = large.array().full_rank
     with pytest.raises(ArrayError, match=r"no array over GF\(4\) is larger"):
-        enlarged(large)
+        next_larger(large)
     with pytest.raises(ArrayError, match="not a folded array"):
-        enlarged(profile("product"))
+        next_larger(profile("product"))
 
 
 def test_distance_by_dual_equals_distance_by_listing():

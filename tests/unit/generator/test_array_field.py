@@ -8,7 +8,7 @@ import pytest
 
 from generator.array import factor, notation, polynomial, primitive
 from generator.array.field import MINIMAL_POLYNOMIALS, field_of_order
-from generator.array.residue import Powers, Residues, packed, rank_modulo
+from generator.array.residue import Powers, Residues, pack_words, rank_modulo
 from generator.errors import ArrayError
 
 ORDERS = [2, 3, 4, 5, 7, 8, 9, 11, 13, 16, 25, 27, 32, 49, 64, 81, 121, 125, 128, 169, 243, 256]
@@ -208,8 +208,8 @@ def test_orders_of_reducible_and_unsuitable_polynomials():
 )
 def test_written_polynomials(q, text, labels):
     field = field_of_order(q)
-    assert notation.parsed(field, text) == labels
-    assert notation.parsed(field, notation.written(field, labels)) == labels
+    assert notation.parse_polynomial(field, text) == labels
+    assert notation.parse_polynomial(field, notation.format_polynomial(field, labels)) == labels
 
 
 @pytest.mark.parametrize(
@@ -219,7 +219,7 @@ def test_written_polynomials(q, text, labels):
 )  # fmt: skip
 def test_polynomials_that_are_not_understood(q, text):
     with pytest.raises(ArrayError):
-        notation.parsed(field_of_order(q), text)
+        notation.parse_polynomial(field_of_order(q), text)
 
 
 @pytest.mark.parametrize(("p", "modulus"), [(2, (1, 1, 0, 0, 1)), (3, (2, 1, 1)), (5, (3, 1))])
@@ -245,5 +245,5 @@ def test_rank_and_packing():
     assert rank_modulo(np.zeros((2, 3)), 3) == 0
     bits = np.zeros((2, 64))
     bits[0, [0, 63]] = 1
-    assert packed(bits).tolist() == [2**63 + 1, 0]
-    assert packed(np.ones((1, 3))).tolist() == [7]
+    assert pack_words(bits).tolist() == [2**63 + 1, 0]
+    assert pack_words(np.ones((1, 3))).tolist() == [7]

@@ -12,11 +12,11 @@ import pytest
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle
 from generator.array.profiles import PROFILES
-from generator.database.cells import find_array, held_cells, occupied
+from generator.database.cells import find_array, held_cells, occupied_cells
 from generator.database.exchange import export_objects, import_objects
 from generator.database.open import database_exists, open_database
 from generator.database.read import find_object, list_objects, read_object
-from generator.database.register import Registration, register, same_layout
+from generator.database.register import ObjectRecord, register, same_layout
 from generator.database.registered import RegisteredPart
 from generator.database.retire import remove, restore, retire
 from generator.database.transaction import reading, writing
@@ -37,10 +37,10 @@ def make(url, name, *, profile="one-touch", solid=None, **spec):
     clearances = [[np.full(len(loop), 1.0) for loop in face.loops] for face in solid.faces]
     part = RegisteredPart("F1", "stl", "out/F1.stl", "ab" * 32, np.eye(4) / 3)
     with writing(open_database(url)) as connection:
-        taken = occupied(connection, find_array(connection, array))
+        taken = occupied_cells(connection, find_array(connection, array))
         layout = lay_out(solid, array, style.pitch_mm, 2.0, clearances, taken, "faces",
                          allow_blank_faces=True)  # fmt: skip
-        register(connection, Registration(
+        register(connection, ObjectRecord(
             name, solid, layout, array, profile, alphabet_named(ready.alphabet), style,
             {"name": name, **spec}, "0.1", (part,),
         ))  # fmt: skip
@@ -62,7 +62,7 @@ def sound(url):
         numbers = {entry.array_id for entry in list_objects(connection)}
         for number in numbers:
             cells = held_cells(connection, number)[:, :2]
-            assert np.array_equal(np.stack(occupied(connection, number), axis=1), cells)
+            assert np.array_equal(np.stack(occupied_cells(connection, number), axis=1), cells)
             assert len(np.unique(cells, axis=0)) == len(cells)
 
 
@@ -216,7 +216,7 @@ def test_a_rehearsed_import_changes_nothing(new_database, lab_url, file):
     assert import_objects(lab_url, str(file), dry_run=True).copied == ("Cube",)
     assert names(lab_url) == ["Other"]
     with reading(open_database(lab_url)) as connection:
-        assert len(occupied(connection, 2)[0]) == 0
+        assert len(occupied_cells(connection, 2)[0]) == 0
 
 
 DAMAGE = {

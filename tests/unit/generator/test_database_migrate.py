@@ -18,7 +18,7 @@ from sqlalchemy import select, text
 
 from generator.array.definition import array_from
 from generator.database import migrate, tables
-from generator.database.cells import held_cells, occupied
+from generator.database.cells import held_cells, occupied_cells
 from generator.database.migrations import v2
 from generator.database.open import database_exists, open_database
 from generator.database.read import list_objects, read_array, read_layout, read_object
@@ -76,9 +76,9 @@ def test_objects_of_the_first_version_are_all_there(first_version):
             for face in held.layout.faces:
                 np.testing.assert_array_equal(array.symbols(face.rows, face.columns), face.labels)
         for array_id in (1, 2):
-            taken = np.stack(occupied(connection, array_id), axis=1)
+            taken = np.stack(occupied_cells(connection, array_id), axis=1)
             np.testing.assert_array_equal(taken, held_cells(connection, array_id)[:, :2])
-        assert len(occupied(connection, 1)[0]) == 96 + 40 + 40
+        assert len(occupied_cells(connection, 1)[0]) == 96 + 40 + 40
         assert read_array(connection, 2).profile == "thesis"
 
 
@@ -204,7 +204,7 @@ def test_a_migration_killed_before_its_commit_leaves_the_old_version(first_versi
     assert os.WTERMSIG(status) == signal.SIGKILL
     with reading(open_database(first_version)) as connection:  # migrates at last
         assert [entry.name for entry in list_objects(connection)] == NAMES
-        assert len(occupied(connection, 1)[0]) == 176
+        assert len(occupied_cells(connection, 1)[0]) == 176
 
 
 def test_many_may_open_an_older_database_at_once(first_version, monkeypatch):

@@ -5,7 +5,7 @@ import pytest
 from sqlalchemy import func, insert, select
 
 from generator.database import tables
-from generator.database.cells import occupied
+from generator.database.cells import occupied_cells
 from generator.database.occupancy import free_cells, take_cells
 from generator.database.open import open_database
 from generator.database.transaction import reading, writing
@@ -43,8 +43,8 @@ def test_cells_come_back_sorted(engine, place):
     with writing(engine) as connection:
         take_cells(connection, 1, cells)
     with reading(engine) as connection:
-        assert listed(occupied(connection, 1)) == sorted(listed(cells))
-        assert listed(occupied(connection, 2)) == []
+        assert listed(occupied_cells(connection, 1)) == sorted(listed(cells))
+        assert listed(occupied_cells(connection, 2)) == []
 
 
 def test_cells_are_added_and_freed_one_by_one(engine):
@@ -61,7 +61,7 @@ def test_cells_are_added_and_freed_one_by_one(engine):
                 free_cells(connection, 1, tuple(some))
                 held -= cells
         with reading(engine) as connection:
-            assert listed(occupied(connection, 1)) == sorted(held)
+            assert listed(occupied_cells(connection, 1)) == sorted(held)
 
 
 def test_a_block_of_cells_is_few_rows(engine):
@@ -71,4 +71,4 @@ def test_a_block_of_cells_is_few_rows(engine):
     with reading(engine) as connection:
         count = connection.execute(select(func.count()).select_from(tables.occupancy)).scalar_one()
         assert count == 20
-        assert len(occupied(connection, 1)[0]) == 16 * TILE**2
+        assert len(occupied_cells(connection, 1)[0]) == 16 * TILE**2

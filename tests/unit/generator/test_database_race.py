@@ -9,11 +9,11 @@ from sqlalchemy import text
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle
 from generator.array.profiles import PROFILES
-from generator.database.cells import find_array, held_cells, occupied
+from generator.database.cells import find_array, held_cells, occupied_cells
 from generator.database.open import open_database
 from generator.database.race import in_turn
 from generator.database.read import find_object, list_objects
-from generator.database.register import Registration, register
+from generator.database.register import ObjectRecord, register
 from generator.database.transaction import LostRaceError, reading, writing
 from generator.errors import DatabaseError
 from generator.layout.layout import lay_out
@@ -25,12 +25,12 @@ CLEARANCES = [[np.full(len(loop), 1.0) for loop in face.loops] for face in SOLID
 
 
 def placed(connection):
-    taken = occupied(connection, find_array(connection, ARRAY))
+    taken = occupied_cells(connection, find_array(connection, ARRAY))
     return lay_out(SOLID, ARRAY, 7.0, 2.7, CLEARANCES, taken)
 
 
 def registration(name, layout, **spec):
-    return Registration(
+    return ObjectRecord(
         name, SOLID, layout, ARRAY, "one-touch", alphabet_named("dense-4"), SymbolStyle(),
         {"name": name, **spec}, "0",
     )  # fmt: skip

@@ -18,10 +18,10 @@ from generator.database.face_type import face_type
 from generator.database.open import open_database
 from generator.database.read import faces_at, list_objects, read_layout, read_object
 from generator.database.register import (
-    Registration,
+    ObjectRecord,
     find_array,
     find_object,
-    occupied,
+    occupied_cells,
     register,
     remove_object,
     same_layout,
@@ -59,7 +59,7 @@ def layout_from(first, faces=6, symbols=64):
 
 
 def cube_on(first, name="Cube", **changes):
-    registration = Registration(
+    registration = ObjectRecord(
         name=name,
         polyhedron=cube(60.0),
         layout=layout_from(first),
@@ -81,7 +81,7 @@ def register_one(engine, registration, **options):
 
 def held(engine):
     with reading(engine) as connection:
-        rows, columns = occupied(connection, find_array(connection, ARRAY))
+        rows, columns = occupied_cells(connection, find_array(connection, ARRAY))
         return sorted((rows * ARRAY.columns + columns).tolist())
 
 
@@ -278,7 +278,7 @@ def test_objects_with_other_windows_stand_on_the_same_cells(engine):
 def test_an_array_that_nobody_used_has_no_cells_taken(engine):
     with reading(engine) as connection:
         assert find_array(connection, ARRAY) is None
-        rows, columns = occupied(connection, None)
+        rows, columns = occupied_cells(connection, None)
     assert len(rows) == len(columns) == 0
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from generator.layout.footprint import moved, region_of
+from generator.layout.footprint import move_region, region_of
 from generator.layout.lattice import choose_lattice, edge_rotations
 
 HALF, PITCH = 2.7, 7.0
@@ -307,5 +307,5 @@ def test_a_face_turned_and_moved_keeps_its_cells():
     base = region(HEXAGON)
     for turn, x, y in ((0.3, 100.0, -300.0), (-1.2, -45.0, 20.0)):
         one = choose_lattice([base], HALF, PITCH, WINDOW, search=False)
-        other = choose_lattice([moved(base, turn, x, y)], HALF, PITCH, WINDOW, search=False)
+        other = choose_lattice([move_region(base, turn, x, y)], HALF, PITCH, WINDOW, search=False)
         assert (other.places, len(other.cells[0])) == (one.places, len(one.cells[0]))

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from generator.export.bed import Plate, Size, arranged
+from generator.export.bed import Plate, Size, arrange_plates
 
 BED = (250.0, 210.0)
 sides = st.floats(1.0, 205.0)
@@ -24,7 +24,7 @@ def boxes(plate: Plate, sizes: list[Size]) -> list[tuple[float, float, float, fl
 
 @given(st.lists(st.tuples(sides, sides), max_size=25), st.sampled_from([0.0, 2.5, 5.0]))
 def test_parts_keep_their_distance_and_stay_on_the_bed(sizes: list[Size], gap: float) -> None:
-    plates = arranged(sizes, BED, gap)
+    plates = arrange_plates(sizes, BED, gap)
     assert sorted(p.part for plate in plates for p in plate.places) == list(range(len(sizes)))
     for plate in plates:
         assert plate.fits
@@ -40,19 +40,19 @@ def test_parts_keep_their_distance_and_stay_on_the_bed(sizes: list[Size], gap: f
 
 
 def test_six_cube_panels_share_a_plate_and_twenty_need_two() -> None:
-    assert [len(plate.places) for plate in arranged([(60.0, 60.0)] * 6, BED)] == [6]
-    assert [len(plate.places) for plate in arranged([(60.0, 60.0)] * 20, BED)] == [9, 9, 2]
+    assert [len(plate.places) for plate in arrange_plates([(60.0, 60.0)] * 6, BED)] == [6]
+    assert [len(plate.places) for plate in arrange_plates([(60.0, 60.0)] * 20, BED)] == [9, 9, 2]
 
 
 def test_the_exact_size_of_the_bed_fits_also_turned() -> None:
-    (plate,) = arranged([(210.0, 250.0)], BED)
+    (plate,) = arrange_plates([(210.0, 250.0)], BED)
     assert plate.fits
     assert plate.places[0].turned
     assert (plate.places[0].x_mm, plate.places[0].y_mm) == pytest.approx((0.0, 0.0))
 
 
 def test_a_part_larger_than_the_bed_lies_alone_and_says_so() -> None:
-    plates = arranged([(50.0, 50.0), (100.0, 260.0), (50.0, 50.0)], BED)
+    plates = arrange_plates([(50.0, 50.0), (100.0, 260.0), (50.0, 50.0)], BED)
     assert [[p.part for p in plate.places] for plate in plates] == [[0, 2], [1]]
     assert plates[0].fits
     assert not plates[1].fits
@@ -61,4 +61,4 @@ def test_a_part_larger_than_the_bed_lies_alone_and_says_so() -> None:
 
 
 def test_no_parts_no_plates() -> None:
-    assert arranged([], BED) == ()
+    assert arrange_plates([], BED) == ()

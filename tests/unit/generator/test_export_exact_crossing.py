@@ -7,7 +7,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from generator.export.exact_crossing import crossing, cut_triangles, perhaps_folded
+from generator.export.exact_crossing import cut_triangles, perhaps_folded, triangles_cross
 from generator.polyhedron.shapes import dodecahedron
 
 BASE = ((0, 0, 0), (8, 0, 0), (0, 8, 0))
@@ -53,24 +53,24 @@ def turned(triangle):
 def test_nothing_or_what_is_shared(name: str) -> None:
     for corners in permutations(APART[name]):
         for one, other in ((BASE, corners), (corners, BASE), (turned(BASE), turned(corners))):
-            assert not crossing(one, other)
+            assert not triangles_cross(one, other)
 
 
 @pytest.mark.parametrize("name", TOGETHER)
 def test_more_than_what_is_shared(name: str) -> None:
     for corners in permutations(TOGETHER[name]):
         for one, other in ((BASE, corners), (corners, BASE), (turned(BASE), turned(corners))):
-            assert crossing(one, other)
+            assert triangles_cross(one, other)
 
 
 def test_segments_and_points_without_area() -> None:
     def segment(p, q):
         return (p, q, p)
 
-    assert crossing(segment((0, 0, 0), (4, 4, 4)), segment((0, 4, 2), (4, 0, 2)))
-    assert not crossing(segment((0, 0, 0), (4, 4, 4)), segment((0, 4, 2), (4, 0, 3)))
-    assert not crossing(segment((0, 0, 0), (4, 0, 0)), segment((4, 0, 0), (9, 0, 0)))
-    assert crossing(segment((0, 0, 0), (4, 0, 0)), segment((3, 0, 0), (9, 0, 0)))
+    assert triangles_cross(segment((0, 0, 0), (4, 4, 4)), segment((0, 4, 2), (4, 0, 2)))
+    assert not triangles_cross(segment((0, 0, 0), (4, 4, 4)), segment((0, 4, 2), (4, 0, 3)))
+    assert not triangles_cross(segment((0, 0, 0), (4, 0, 0)), segment((4, 0, 0), (9, 0, 0)))
+    assert triangles_cross(segment((0, 0, 0), (4, 0, 0)), segment((3, 0, 0), (9, 0, 0)))
 
 
 def test_the_least_step_of_a_float_decides() -> None:

@@ -12,12 +12,12 @@ from generator.export.fixed_text import (
     NUMBER,
     decimal_numbers,
     decimal_width,
-    padded,
-    stamped,
+    pad,
+    stamp,
     template_of,
     whole_numbers,
 )
-from generator.export.step_entities import Entities, listed, numbers_listed, step_string
+from generator.export.step_entities import Entities, numbers_listed, reference_list, step_string
 
 lengths = st.floats(-1e6, 1e6, allow_nan=False)
 
@@ -52,9 +52,9 @@ def test_a_template_is_stamped_with_numbers_decimals_and_names() -> None:
     text = f"#{NUMBER * 3}=P('',{DECIMAL * 6});#{NUMBER * 3}=N({NAMES[0] * 5},#{NUMBER * 3});\n"
     template = template_of(text, [0, 1, 0])
     decimals = decimal_numbers(np.array([[1.5], [-20.25]]), 6, 2)[:, :, :]
-    nothing = padded(["", ""])
-    out = stamped(
-        template, np.array([100, 107]), 3, decimals, (padded(["'ab'", "'abc'"]), nothing, nothing)
+    nothing = pad(["", ""])
+    out = stamp(
+        template, np.array([100, 107]), 3, decimals, (pad(["'ab'", "'abc'"]), nothing, nothing)
     )
     assert out.decode("ascii") == (
         "#100=P('',  1.50);#101=N('ab' ,#100);\n#107=P('',-20.25);#108=N('abc',#107);\n"
@@ -85,5 +85,5 @@ def test_entities_share_directions_and_keep_one_width() -> None:
 def test_long_lists_break_into_lines() -> None:
     numbers = np.arange(10000, 10030)
     joined = b"".join(numbers_listed(numbers, 5, block=12)).decode("ascii")
-    assert joined == listed(f"#{number}" for number in numbers.tolist())
+    assert joined == reference_list(f"#{number}" for number in numbers.tolist())
     assert joined.count("\n") == 2

@@ -6,8 +6,8 @@ import pytest
 from generator.layout.footprint import (
     blocked_intervals,
     free_grid,
-    mirrored,
-    moved,
+    mirror_region,
+    move_region,
     region_of,
     slack,
 )
@@ -76,11 +76,11 @@ def test_blocked_intervals_of_a_slanted_edge_agree_with_distances(angle):
 
 
 def test_moved_and_mirrored_keep_the_face_on_the_left():
-    region = moved(square(), np.pi / 2, 10.0, 0.0)
+    region = move_region(square(), np.pi / 2, 10.0, 0.0)
     assert np.allclose(region.start[0], (10, 0))
     x = np.array([5.0])
     assert free_grid(region, 2.0, x, x).all()
-    assert free_grid(mirrored(region), 2.0, x, x).all()
+    assert free_grid(mirror_region(region), 2.0, x, x).all()
 
 
 def test_slack_is_the_way_to_the_nearest_limits():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from generator.array.profiles import profile
-from generator.layout.footprint import moved, region_of
+from generator.layout.footprint import move_region, region_of
 from generator.layout.lattice import choose_lattice, edge_rotations
 from generator.layout.places import array_cells, count_places, count_windows, rank_test
 
@@ -45,7 +45,7 @@ def test_a_strip_is_turned_so_that_the_window_fits():
 
 
 def test_the_lattice_follows_the_first_edge():
-    region = moved(rectangle(60.0, 40.0), 0.3)
+    region = move_region(rectangle(60.0, 40.0), 0.3)
     lattice = choose_lattice([region], 2.7, 7.0, (3, 2))
     assert lattice.rotation_rad == pytest.approx(-0.3)
     assert len(lattice.cells[0]) == 8 * 5

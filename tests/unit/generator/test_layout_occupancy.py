@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from generator.layout.board import CORNER, opened
+from generator.layout.board import CORNER, board_size
 from generator.layout.occupancy import TILE, Occupancy, cells_of_tiles, tiles_of
 
 PLACES = {
@@ -66,10 +66,10 @@ def test_more_cells_change_their_own_tiles_alone():
 
 def test_what_is_opened_of_a_large_array_follows_its_objects():
     far = block(2000, 3000, 8, 8)
-    assert opened(of(4095, 4097)) == (CORNER, CORNER)
-    assert opened(of(4095, 4097, block(0, 0, 700, 700))) == (704, 704)
+    assert board_size(of(4095, 4097)) == (CORNER, CORNER)
+    assert board_size(of(4095, 4097, block(0, 0, 700, 700))) == (704, 704)
     # another lab's objects, imported from elsewhere on the array, open nothing
-    assert opened(of(4095, 4097, block(0, 0, 700, 700)).with_cells(*far)) == (704, 704)
-    assert opened(of(1023, 1025, block(0, 0, 1023, 1025))) == (1023, 1025)
-    assert opened(of(255, 257)) == (255, 257)
-    assert min(opened(of(2**32 - 1, 2**32 + 1, block(0, 0, 10, 30 * TILE)))) >= 30 * TILE
+    assert board_size(of(4095, 4097, block(0, 0, 700, 700)).with_cells(*far)) == (704, 704)
+    assert board_size(of(1023, 1025, block(0, 0, 1023, 1025))) == (1023, 1025)
+    assert board_size(of(255, 257)) == (255, 257)
+    assert min(board_size(of(2**32 - 1, 2**32 + 1, block(0, 0, 10, 30 * TILE)))) >= 30 * TILE

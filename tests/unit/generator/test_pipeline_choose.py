@@ -13,7 +13,7 @@ from generator.database.open import open_if_there
 from generator.database.transaction import reading
 from generator.pipeline import encode
 from generator.pipeline.choose import choose_array
-from generator.pipeline.plan import planned
+from generator.pipeline.plan import plan_object
 from generator.spec import SpecError, read_specs
 
 
@@ -48,7 +48,7 @@ def test_auto_takes_the_smallest_array_that_holds_the_objects(tmp_path):
     assert note.endswith("3456 cells are needed, and one-touch 63x65 has room for 3276")
     larger = choice(tmp_path, text + "200")
     assert profiles(larger) == {"large-511x513"}
-    assert planned(larger.specs[0]).array.rows == 511
+    assert plan_object(larger.specs[0]).array.rows == 511
     (note,) = larger.notes
     assert "76800 cells are needed, and large 255x257 has room for 52428" in note
     assert larger.specs[199].spec.name == "A-200"

@@ -20,11 +20,11 @@ from generator.errors import DatabaseError
 from generator.layout import occupancy
 from generator.layout.occupancy import tiles_of
 from generator.pipeline import encode
-from generator.pipeline.make import Order, made_at, made_under_lock
+from generator.pipeline.make import Order, make_at, make_under_lock
 from generator.pipeline.parallel import Task, Workers
-from generator.pipeline.place import placed
-from generator.pipeline.plan import planned
-from generator.pipeline.progress import silent
+from generator.pipeline.place import place_object
+from generator.pipeline.plan import plan_object
+from generator.pipeline.progress import no_progress
 from generator.spec import SpecError, read_specs
 
 SET = """\
@@ -185,11 +185,11 @@ def test_who_loses_his_cells_to_another_writer_places_anew(tmp_path):
     located = specs(tmp_path)
     url = f"sqlite:///{tmp_path / 'lab.db'}"
     engine = open_database(url)
-    orders = [Order(planned(one), tmp_path / one.spec.name, ("stl",)) for one in located[:2]]
+    orders = [Order(plan_object(one), tmp_path / one.spec.name, ("stl",)) for one in located[:2]]
     with reading(engine) as connection:
-        chosen = [placed(connection, order.plan, replace=False) for order in orders]
-    first = made_at(engine, orders[0], chosen[0])
-    second = made_at(engine, orders[1], chosen[1])  # both chose the same corner
+        chosen = [place_object(connection, order.plan, replace=False) for order in orders]
+    first = make_at(engine, orders[0], chosen[0])
+    second = make_at(engine, orders[1], chosen[1])  # both chose the same corner
     assert first.placed is chosen[0]
     assert second.placed is not chosen[1]
     cells = []
@@ -203,12 +203,12 @@ def test_who_loses_his_cells_to_another_writer_places_anew(tmp_path):
 def test_an_object_that_another_writer_made_meanwhile_keeps_its_cells(tmp_path):
     located = specs(tmp_path)
     engine = open_database(f"sqlite:///{tmp_path / 'lab.db'}")
-    orders = [Order(planned(one), tmp_path / one.spec.name, ("stl",)) for one in located[:2]]
-    made_under_lock(engine, orders[1])  # moves what is free
+    orders = [Order(plan_object(one), tmp_path / one.spec.name, ("stl",)) for one in located[:2]]
+    make_under_lock(engine, orders[1])  # moves what is free
     with reading(engine) as connection:
-        chosen = placed(connection, orders[0].plan, replace=False)
-    other = made_under_lock(engine, orders[0])
-    mine = made_at(engine, orders[0], chosen)
+        chosen = place_object(connection, orders[0].plan, replace=False)
+    other = make_under_lock(engine, orders[0])
+    mine = make_at(engine, orders[0], chosen)
     assert mine.made.reused
     assert mine.made.symbols == other.made.symbols
 
@@ -221,4 +221,4 @@ def test_errors_come_back_from_other_processes(tmp_path):
     tasks = [Task(str(k), int, (text,)) for k, text in enumerate(["1", "x", "3", "y"])]
     for jobs in (1, 2):
         with Workers(jobs) as workers, pytest.raises(ValueError, match="'x'"):
-            workers.done(tasks, silent)
+            workers.done(tasks, no_progress)

@@ -27,7 +27,7 @@ from generator.polyhedron import volume
 from generator.polyhedron.development import development
 from generator.polyhedron.read import curved
 from generator.polyhedron.read.facets import polyhedron_of_facets
-from generator.polyhedron.read.kernel import described
+from generator.polyhedron.read.kernel import describe_shape
 from generator.spec import SpecError
 
 
@@ -139,7 +139,7 @@ def test_a_solid_of_many_facets_is_divided_more_coarsely_and_says_so(monkeypatch
 
 def test_points_that_are_one_are_joined():
     # A cylinder whose top meets its side in points that are off by less than the tolerance.
-    found = described(BRepPrimAPI_MakeCylinder(30, 80).Shape())
+    found = describe_shape(BRepPrimAPI_MakeCylinder(30, 80).Shape())
     points = np.array(found["points"])
     top = found["faces"][found["names"].index("F2")][0]
     moved = [len(points) + k for k in range(len(top))]

@@ -9,7 +9,7 @@ import pytest
 
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
-from generator.alphabet.rings import inside
+from generator.alphabet.rings import points_inside
 from generator.printed.surface import Coverage, PrintedSurface
 from generator.printed.survey import DOUBTFUL, LOST, SURVIVES, SymbolTile, rings_at, survey_face
 from generator.solid.emboss import turn
@@ -40,7 +40,7 @@ def surface(
         at = np.stack([x, y], axis=-1) - centre - moved
         near = (np.abs(at) < 3.6).all(axis=-1)
         for z in (0.0, 0.25, 0.4, 0.475, 0.49, 0.5, 0.502, 0.51, 0.525, 0.6, 0.8, 1.0):
-            within = inside(at[near] @ turn(rotation), rings_at(TIERS[label], z))
+            within = points_inside(at[near] @ turn(rotation), rings_at(TIERS[label], z))
             heights[near] = np.where(within, high * z, heights[near])
     T = np.eye(4)
     T[2, 3] = 3.0

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from generator.alphabet.rings import crossing, inside, signed_area
+from generator.alphabet.rings import edges_cross, points_inside, signed_area
 from generator.errors import SolidError
 from generator.layout.placement import Layout
 from generator.polyhedron.frame import dihedral
@@ -18,7 +18,7 @@ from generator.solid.emboss import turn
 from generator.solid.frame import in_frame
 from generator.solid.inset import inset, regular, shared_insets
 from generator.solid.mitre import mitre
-from generator.solid.polygon import triangulated
+from generator.solid.polygon import triangulate_rings
 
 FDM = PRINTERS["fdm-0.4"]
 EMPTY = Layout("faces", 7.0, ())
@@ -159,8 +159,8 @@ def test_numbers_keep_clear_of_edges_and_each_other(side):
                     embossing.labels.tolist(), embossing.centres_mm, strict=True
                 )
             ]
-            assert not crossing([*rings, *feet])
-            assert inside(np.concatenate(feet), rings).all()
+            assert not edges_cross([*rings, *feet])
+            assert points_inside(np.concatenate(feet), rings).all()
             assert min(embossing.tiers[0].z_mm) >= -2.0 / 3
             texts[embossing.names[0].split()[0]] = embossing
         if side == 90.0:
@@ -210,7 +210,7 @@ def test_numbers_read_from_behind():
 def test_points_on_a_line_are_kept_without_flat_triangles():
     outer = np.array([[0, 0], [1, 0], [2, 0], [3, 0], [3, 1], [3, 3], [1, 3], [0, 3], [0, 1.0]])
     hole = np.array([[1, 1], [1, 2], [2, 2], [2, 1.0]])
-    found = triangulated([outer, hole], np.arange(13), "plate")
+    found = triangulate_rings([outer, hole], np.arange(13), "plate")
     p = np.concatenate([outer, hole])[found]
     u, v = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
     areas = (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
@@ -218,7 +218,7 @@ def test_points_on_a_line_are_kept_without_flat_triangles():
     assert areas.min() > 1e-3
     assert areas.sum() == pytest.approx(8.0)
     with pytest.raises(SolidError, match="plate"):
-        triangulated([outer, hole + np.array([1.5, 0.0])], np.arange(13), "plate")
+        triangulate_rings([outer, hole + np.array([1.5, 0.0])], np.arange(13), "plate")
 
 
 def test_numbers_without_room_make_one_short_warning():

@@ -12,7 +12,7 @@ from generator.array.profiles import PROFILES
 from generator.errors import DatabaseError, LayoutError, ShapeError
 from generator.polyhedron.shapes import SHAPES
 from generator.printers import PRINTERS
-from generator.spec import SpecError, blamed, locate, read_specs
+from generator.spec import SpecError, error_at, locate, read_specs
 
 FIXTURES = Path(__file__).parents[3] / "fixtures"
 CUBE = "name: Cube\nshape: {cube: 60 mm}\n"
@@ -261,15 +261,15 @@ def test_locate(path, place):
 
 def test_blame():
     (one,) = located(SEVERAL)
-    blame = blamed(one, ShapeError("not closed", fix="close it", place="face F1"), "shape")
+    blame = error_at(one, ShapeError("not closed", fix="close it", place="face F1"), "shape")
     assert str(blame) == (
         "c.yaml:2:1: error: face F1: not closed\n    2 | shape:\n      | ^\n  fix: close it"
     )
     assert isinstance(blame, SpecError)
-    assert blamed(one, blame, "print") is blame
+    assert error_at(one, blame, "print") is blame
     database = DatabaseError("cannot be opened")
-    assert blamed(one, database, "output.database") is database
-    several = blamed(one, LayoutError("two faces:\n  face F1\n  face F2"), "print.wall")
+    assert error_at(one, database, "output.database") is database
+    several = error_at(one, LayoutError("two faces:\n  face F1\n  face F2"), "print.wall")
     assert str(several).splitlines()[:3] == [
         "c.yaml:4:15: error: two faces:",
         "  face F1",
