@@ -2,15 +2,18 @@
 
 ::
 
-    signal       readings -> forces and trust        contacts   frames -> touches
+    reader       Reader(open_lab("lab.db")): read(counts), read_all(recording)
+    settings     every number that decides
+    source       recording -> touches, sensor, calibration; contacts   frames -> touches
+    signal       readings -> forces and trust
     symbols/     image -> lattices with the likelihood of every symbol in every cell
     lab          database -> the registered cells; windows   index of them by their labels
-    locate       lattice -> places of the database
-    verify       the best places again, with what the database says is there; round   on mantles
-    belief       whether the best place may be believed
+    prepare      templates and banks of lattices, once for lab and sensor
+    locate       lattice -> hypotheses: places of the database
+    verify       the best of them again, with what the database says is there; round   on mantles
+    belief       whether the best hypothesis may be believed
     pose         where the sensor stands on face and object; robot   the object in the robot's base
-    recognise    all of it, one after another; reader   what is prepared once for lab and sensor
-    recognition  the answer
+    recognise    all of it, one after another; recognition   the answer
 
 Thesis 6.3.
 """

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Connection, Engine
 
+from encoded_objects.console.output import number
 from generator.alphabet import Alphabet, SymbolStyle, alphabet_from
 from generator.array import FoldedArray, ProductArray, array_from
 from generator.database.cells import held_cells
@@ -116,7 +117,8 @@ class Lab:
         objects = {name for each in self.arrays for name in each.names.values()}
         faces = sum(len(each.faces) for each in self.arrays)
         symbols = sum(len(each.keys) for each in self.arrays)
-        return f"{self.url}: {len(objects):,} objects, {faces:,} faces, {symbols:,} symbols"
+        held = (number(len(objects), "object"), number(faces, "face"), number(symbols, "symbol"))
+        return f"{self.url}: {', '.join(held)}"
 
 
 def open_lab(database: str | Path, settings: LabSettings = DEFAULTS.lab) -> Lab:

@@ -15,14 +15,14 @@ from recognizer.touch.symbols.template import ResponseTemplate, template_of
 Prepared = tuple[EmbossedArray, ResponseTemplate, Bank]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class PreparedLab:
     """A lab as a sensor feels it, with the numbers that decide; `Reader` is one."""
 
     lab: Lab
     sensor: SensorType = field(default_factory=SensorType)
     settings: ReaderSettings = DEFAULTS
-    prepared: tuple[Prepared, ...] = field(init=False, repr=False)
+    prepared: tuple[Prepared, ...] = field(init=False)
 
     def __post_init__(self) -> None:
         settings = self.settings.template, self.settings.search
@@ -31,6 +31,9 @@ class PreparedLab:
             for each in self.lab.arrays
         )
         object.__setattr__(self, "prepared", made)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.lab}; {self.sensor.name}, {self.sensor.overlay.kind})"
 
 
 @lru_cache(maxsize=16)

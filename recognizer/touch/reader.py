@@ -20,7 +20,7 @@ from recognizer.touch.signal import Signal, signal_of
 from recognizer.touch.source import source_of
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Reader(PreparedLab):
     """What reads touches; prepared once for a lab and a sensor.
 

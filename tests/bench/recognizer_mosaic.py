@@ -56,6 +56,7 @@ from recognizer.thesis.product import product_shift
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
+from recognizer.touch.settings import SignalSettings
 from recognizer.touch.signal import Signal, signal_of
 
 SPECS = Path(__file__).parents[2] / "fixtures" / "specs"
@@ -76,6 +77,9 @@ class Scan:
     believed: list[Placed]  #: in the plane that the operator taught
     true: np.ndarray  #: (n, 3) T_face_sensor
     pitch_mm: float
+
+
+FIRM = SignalSettings(contact_n=0.1)
 
 
 def scanned(database: str, name: str, pitch_mm: float, tactels: float, counts: bool, seed: int):
@@ -101,7 +105,7 @@ def scanned(database: str, name: str, pitch_mm: float, tactels: float, counts: b
             signals.append(signal_of(read.astype(float)))
         else:
             read = np.maximum(forces * gains + rng.normal(0, 0.02, (16, 16)), 0)
-            signals.append(signal_of(read, trust=dead, floor=0.0, least=0.1, newtons=True))
+            signals.append(signal_of(read, trust=dead, floor=0.0, newtons=True, settings=FIRM))
         true.append(pose)
     back = np.linalg.inv(T_BASE_PLANE)
     believed = []

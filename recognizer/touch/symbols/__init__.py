@@ -1,7 +1,11 @@
 """Image -> symbols: one maximum-likelihood fit of pose, gain and every visible symbol.
 
-template    what the sensor feels of each symbol, through the overlay that is fitted
+template    what the sensor feels of each symbol, through the overlay; pad   pressed once
+pressing    depth of the plate -> force; gain   the image under a plane of depths
+noise       how far readings may lie from what a symbol gives
 search      coarse: all rotations and shifts of the lattice at once, one matrix product
-refine      fine: Gauss-Newton over pose and gain, labels chosen anew at every step
-fit         the two together, and the scores of every cell
+projection  what lies under the tactels: cells, templates, labels
+refine      fine: damped least squares over pose and gain, labels chosen anew at every step
+covariance  how sure the pose is
+fit         all of it, and the scores of every cell; bends   a round face by forces alone
 """
