@@ -95,7 +95,7 @@ def test_another_package_adds_a_scheme(another_package):
     assert (port.url, port.read(0.1)) == ("echo:?say=hello", b"hello!")
     with pytest.raises(PortError, match="sim:, file:, echo: or lost:"):
         open_port("http://probe")
-    with pytest.raises(PortError, match="no_such_module.*install it again"):
+    with pytest.raises(PortError, match=r"no_such_module.*install it again"):
         open_port("lost:")
 
 
