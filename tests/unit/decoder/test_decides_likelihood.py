@@ -155,8 +155,30 @@ def test_by_default_one_wrong_answer_in_two_thousand_is_allowed(turns):
     allowed = decode_likelihood(BINARY, with_doubt(4.95e-4, turns), rotations=turns)[0]
     refused = decode_likelihood(BINARY, with_doubt(5.05e-4, turns), rotations=turns)[0]
     assert allowed
+    assert allowed.candidates == ()
     assert refused.reason == "ambiguous"
     assert not decode_likelihood(BINARY, with_doubt(4.95e-4, turns), rotations=turns, doubt=4e-4)[0]
+
+
+def test_a_doubt_as_large_as_is_allowed_is_allowed():
+    scores = with_doubt(1e-3)
+    doubt = float(Likelihood(BINARY, doubt=1.0).decode(scores).doubts[0])
+    assert Likelihood(BINARY, doubt=doubt).decode(scores)[0]
+    assert not Likelihood(BINARY, doubt=doubt * (1 - 1e-12)).decode(scores)[0]
+
+
+@pytest.mark.parametrize("turns", [(0,), ALL_TURNS])
+@pytest.mark.parametrize("blank", [0.01, 0.2, 0.4])
+def test_a_surface_without_code_is_told_where_it_is_the_likelier_one(blank, turns):
+    base = drawn(BINARY, (6, 6), 11)
+    low, high = 0.05, 20.0
+    for _ in range(50):
+        middle = (low + high) / 2
+        _, _, without = bayes(BINARY, middle * base, turns, blank=blank)
+        low, high = (low, middle) if without else (middle, high)
+    for scale, reason in ((0.99 * low, "ambiguous"), (1.01 * low, "not an encoded surface")):
+        found = Likelihood(BINARY, rotations=turns, blank=blank).decode(scale * base)[0]
+        assert found.reason == reason
 
 
 @pytest.mark.parametrize("turns", [(0,), (1,), ALL_TURNS])
@@ -240,6 +262,9 @@ def test_a_prior_of_one_place_has_no_rival_but_its_turns(turns):
     if len(turns) == 1:
         assert one.margin is None
         assert one.runner_up is None
+        listed = Likelihood(BINARY, prior=[(3, 4)], doubt=1.0).decode(scores, top=5)[0]
+        assert (listed.margin, listed.runner_up) == (None, None)
+        assert [(c.row, c.column, c.score) for c in listed.candidates] == [(3, 4, 0.0)]
     else:
         assert one.margin == pytest.approx(-ranked[1][3], abs=1e-4)
 

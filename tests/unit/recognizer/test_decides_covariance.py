@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from recognizer.touch.settings import DEFAULTS
+from recognizer.touch.settings import ReaderSettings
 from recognizer.touch.symbols.covariance import covariances
 
 SHAPE = (5, 6)
@@ -27,7 +27,7 @@ def asked(normal, *, hardens, form=(0.0, 0.0, 0.0, 0.0), away=None, noise=USUAL)
     pose[:, :3] = 5.0, -9.0, 1.0  # of no importance
     pose[:, 3:] = form
     image = SimpleNamespace(
-        pressing=SimpleNamespace(hardens=hardens), shape=SHAPE, settings=DEFAULTS
+        pressing=SimpleNamespace(hardens=hardens), shape=SHAPE, settings=ReaderSettings()
     )
     left = np.zeros((count, SHAPE[0] * SHAPE[1])) if away is None else away
     return covariances(image, SimpleNamespace(pose=pose, normal=normal), left, noise)

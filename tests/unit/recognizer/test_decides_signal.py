@@ -7,11 +7,6 @@ from recognizer.touch.settings import SignalSettings
 from recognizer.touch.signal import signal_of
 
 
-def rising(least):
-    """Settings that take a rise by so much, of whatever unit, for a contact."""
-    return SignalSettings(contact_counts=least, contact_n=least)
-
-
 def rows_of(*sums, turned=False):
     """Readings (rows, 5) whose rows sum to these; transposed, their columns do."""
     image = np.zeros((len(sums), 5))
@@ -68,14 +63,15 @@ def test_a_contact_is_six_tactels_over_eight_counts_or_a_twentieth_newton(
 
 def test_the_sixth_highest_is_the_one_that_counts():
     image = np.arange(36.0).reshape(6, 6)  # the six highest: 30 ... 35
-    assert signal_of(image, floor=0.0, settings=rising(29.9)).contact
-    assert not signal_of(image, floor=0.0, settings=rising(30.0)).contact
+    assert signal_of(image, floor=0.0, settings=SignalSettings(contact_counts=29.9)).contact
+    assert not signal_of(image, floor=0.0, settings=SignalSettings(contact_counts=30.0)).contact
 
 
 @pytest.mark.parametrize("newtons", [False, True])
 def test_a_rise_that_is_given_is_taken(newtons):
-    assert signal_of(six(0.02), floor=0.0, settings=rising(0.01), newtons=newtons).contact
-    assert not signal_of(six(50.0), floor=0.0, settings=rising(60.0), newtons=newtons).contact
+    low, high = (SignalSettings(contact_counts=rise, contact_n=rise) for rise in (0.01, 60.0))
+    assert signal_of(six(0.02), floor=0.0, settings=low, newtons=newtons).contact
+    assert not signal_of(six(50.0), floor=0.0, settings=high, newtons=newtons).contact
 
 
 def test_bad_tactels_count_neither_for_the_floor_nor_for_a_contact():
@@ -101,7 +97,8 @@ def test_nothing_is_felt_where_every_tactel_is_bad():
 def test_a_single_good_tactel_is_read():
     trust = np.zeros((3, 3))
     trust[1, 1] = 1.0
-    found = signal_of(np.full((3, 3), 5.0), trust=trust, floor=2.0, settings=rising(1.0))
+    one = SignalSettings(contact_counts=1.0)
+    found = signal_of(np.full((3, 3), 5.0), trust=trust, floor=2.0, settings=one)
     assert found.forces[1, 1] == 3.0
     assert found.contact
 

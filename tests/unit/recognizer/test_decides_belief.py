@@ -1,0 +1,187 @@
+"""Whether an answer is believed: probabilities summed by hand, and each bound from both sides."""
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import recognizer.touch.belief
+from recognizer.touch.belief import (
+    Support,
+    VerifiedHypothesis,
+    null_log_likelihood,
+    symbols_to_name,
+    unworn_labels_at,
+    weigh_cells,
+)
+from recognizer.touch.locate import Hypothesis
+from recognizer.touch.settings import BeliefSettings, ReaderSettings
+
+LIMITS = BeliefSettings()
+GOOD = Support(surprise=20.0, explained=0.9, inliers=12, clear=0, plain=0, wider=0.0)
+
+
+@pytest.mark.parametrize(
+    ("changed", "believed"),
+    [
+        ({}, True),
+        # at least 3 nats over symbols of no registered place
+        ({"surprise": 3.0}, True), ({"surprise": 2.99}, False), ({"surprise": -5.0}, False),
+        # below 7 nats at least four fifths are explained
+        ({"surprise": 6.99, "explained": 0.8}, True),
+        ({"surprise": 6.99, "explained": 0.799}, False),
+        ({"surprise": 7.0, "explained": 0.799}, True),
+        # so where strokes are more than 0.09 mm wider than asked
+        ({"wider": 0.9, "explained": 0.799}, True), ({"wider": 0.91, "explained": 0.799}, False),
+        ({"wider": 0.91, "explained": 0.8}, True), ({"wider": -1.2, "explained": 0.799}, True),
+        # 72 % where fewer than 11 cells agree, 58 % where more do
+        ({"inliers": 10, "explained": 0.72}, True), ({"inliers": 10, "explained": 0.719}, False),
+        ({"inliers": 11, "explained": 0.58}, True), ({"inliers": 11, "explained": 0.579}, False),
+        ({"inliers": 0, "explained": 0.72}, True),  # too few symbols is another reason
+        # one cell may speak clearly for another symbol, none plainly
+        ({"clear": 1}, True), ({"clear": 2}, False), ({"clear": 1, "plain": 1}, False),
+    ],
+)  # fmt: skip
+def test_each_bound_of_belief_from_both_sides(changed, believed):
+    assert replace(GOOD, **changed).holds(LIMITS) is believed
+
+
+def test_the_bounds_are_those_that_are_given():
+    strict = BeliefSettings(surprise=30.0)
+    assert not GOOD.holds(strict)
+    assert replace(GOOD, surprise=30.0).holds(strict)
+
+
+def one_cell(small, scores, seen=20.0, held=2, order=4):
+    """What a cell says of a place that holds label `held` there; None: no symbol."""
+    cells = {(5, 5): (0, held)} if held is not None else {(0, 0): (0, 1)}
+    lab = small.Lab(cells, order=order)
+    fit = small.fit_of([(0, 0)], [scores], seen)
+    found = weigh_cells(lab.embossed, fit, Hypothesis(0, 5, 5, 0, 0.0), LIMITS)
+    return bool(found.worn[0]), bool(found.seen[0]), bool(found.agree[0]), float(found.against[0])
+
+
+@pytest.mark.parametrize(
+    ("scores", "seen", "held", "truth"),
+    [
+        ([-9, -9, 0, -9, -9], 20, 2, (False, True, True, 0.0)),
+        ([-9, -9, 0, -9, -9], 6.0, 2, (False, True, True, 0.0)),
+        ([-9, -9, 0, -9, -9], 5.99, 2, (False, False, False, 0.0)),
+        # none is likelier than the symbol: it is worn, and speaks for no other one
+        ([-2, -9, -3, -9, 0], 20, 2, (True, True, False, 0.0)),
+        ([-9, -9, 0, -9, 0], 20, 2, (False, True, False, 0.0)),
+        # another symbol is likelier
+        ([0, -9, -4.5, -9, -9], 20, 2, (False, True, False, 4.5)),
+        ([0, -9, -4.5, -9, -4.4], 20, 2, (True, True, False, 0.0)),
+        # no symbol is registered: what speaks against it is the likeliest one
+        ([-1, -9, -2, -9, 0], 20, None, (False, True, False, -1.0)),
+        ([0, -9, -2, -9, -7.5], 20, None, (False, True, False, 7.5)),
+    ],
+)
+def test_what_one_cell_says(small, scores, seen, held, truth):
+    worn, seen_, agree, against = one_cell(small, scores, seen, held)
+    assert (worn, seen_, agree) == truth[:3]
+    assert against == pytest.approx(truth[3])
+
+
+@pytest.mark.parametrize(("share", "agrees"), [(0.51, True), (0.49, False)])
+def test_a_cell_agrees_whose_symbol_is_likelier_than_all_else_together(small, share, agrees):
+    others = np.log(np.array([0.1, 0.2, 0.3, 0.4]) * (1 - share))
+    scores = [others[0], others[1], math.log(share), others[2], others[3]]
+    assert one_cell(small, scores - np.max(scores))[2] is agrees
+
+
+def test_labels_that_a_place_shows_where_they_are_not_worn_away(small):
+    lab = small.two_faces()
+    place = Hypothesis(0, 4, 4, 0, 0.0)
+    cells = np.array([[(i, j) for i in range(-3, 5)] for j in range(-3, 4)])
+    worn = np.array([(0, 0), (1, -2), (0, 3)])
+    found = unworn_labels_at(lab.embossed, place, worn, cells)
+    assert found.shape == cells.shape[:2]
+    shown = lab.shows(4, 4, 0, cells.reshape(-1, 2).tolist())
+    gone = {tuple(cell) for cell in worn.tolist()}
+    truth = [
+        -1 if label == 4 or tuple(cell) in gone else label
+        for cell, label in zip(cells.reshape(-1, 2).tolist(), shown, strict=True)
+    ]
+    assert found.ravel().tolist() == truth
+    none = unworn_labels_at(lab.embossed, place, worn[:0], cells).ravel()
+    assert none.tolist() == [-1 if label == 4 else label for label in shown]
+
+
+@pytest.mark.parametrize(
+    ("keys", "order", "symbols"),
+    [(1, 4, 0), (2, 4, 1), (4, 4, 1), (5, 4, 2), (16, 4, 2), (17, 4, 3), (64, 2, 6), (65, 2, 7)],
+)
+def test_how_many_symbols_name_one_of_so_many_cells(small, keys, order, symbols):
+    held = {(r, c): (0, 0) for r in range(9) for c in range(10)}
+    lab = small.Lab(dict(list(held.items())[:keys]), order=order)
+    assert symbols_to_name(lab.embossed) == symbols
+
+
+def test_an_image_of_no_registered_place_shows_anything_with_the_same_probability(small):
+    lab = small.two_faces()  # 48 registered cells
+    scores = np.random.default_rng(1).normal(size=(3, 5)) * 3
+    fit = small.fit_of([(0, 0), (1, 0), (0, 1)], scores, value=-77.0)
+    mean = 1.0
+    for cell in scores:
+        mean *= sum(math.exp(one) for one in cell) / 5
+    # a place has the prior 1 / 48: in nats over one place
+    assert null_log_likelihood(lab.embossed, fit) == pytest.approx(math.log(mean * 48) - 77.0)
+
+
+def verified(small, fit, place, score=0.0, lab=None):
+    lab = lab or small.two_faces()
+    image = SimpleNamespace(settings=ReaderSettings())
+    return VerifiedHypothesis(image, None, lab.embossed, place, fit, score)
+
+
+def test_what_speaks_for_a_place(small, monkeypatch):
+    lab = small.two_faces()
+    place = Hypothesis(0, 5, 3, 0, 0.0)
+    cells = [(i, j) for j in range(4) for i in range(4)]
+    labels = lab.shows(5, 3, 0, cells)
+    assert 4 not in labels
+    scores = small.sure_of(labels)
+    for n, against in ((0, 7.9), (1, 8.0), (2, 8.1), (3, 15.9), (4, 16.0), (5, 16.1), (6, 30.0)):
+        scores[n] = -40.0
+        scores[n, labels[n]], scores[n, (labels[n] + 1) % 4] = -against, 0.0
+    scores[7] = [-20.0] * 4 + [0.0]  # worn
+    seen = np.full(16, 20.0)
+    seen[[6, 15]] = 5.0  # hardly in view
+    fit = small.fit_of(cells, scores, seen, nuisance=np.array([0.7, 0.1, 0.2, 0.3]), value=-5.0)
+    asked = []
+
+    def share(image, template, pose, gain, shown):
+        asked.append(shown(np.array([cells])))
+        return 0.77
+
+    monkeypatch.setattr(recognizer.touch.belief, "explained_share", share)
+    one = verified(small, fit, place, score=-4.0, lab=lab)
+    found = one.support()
+    assert found.explained == 0.77
+    assert (found.clear, found.plain) == (4, 1)  # 8.1, 15.9, 16.0 and 16.1; 16.1
+    assert found.inliers == 7  # of sixteen: one is worn, seven speak otherwise, one is hardly seen
+    assert found.wider == 0.7
+    each = np.log(np.exp(scores).sum(axis=1) / 5)
+    assert found.surprise == pytest.approx(-4.0 - (each.sum() - 5.0 + math.log(48)))
+    assert asked[0][0].tolist() == [-1 if n == 7 else label for n, label in enumerate(labels)]
+
+
+def test_two_hypotheses_are_one_place_up_to_a_cell(small):
+    lab = small.two_faces()
+
+    def of(place, lab=lab, **moved):
+        return verified(small, small.fit_of([(0, 0)], [[0.0] * 5], **moved), place, lab=lab)
+
+    here = Hypothesis(0, 5, 4, 0, 0.0)
+    one = of(here)
+    assert one.index == (5, 4)
+    assert one.same_place(of(replace(here, fit=3, row=6, column=3, score=-9.0)))
+    assert not one.same_place(of(replace(here, row=7)))
+    assert not one.same_place(of(replace(here, face=1)))
+    assert not one.same_place(of(here, lab=small.two_faces()))
+    assert one.same_place(of(replace(here, row=7), y_mm=8.0))  # (5, 4) is still under the centre
+    assert not one.same_place(of(here, x_mm=15.0))

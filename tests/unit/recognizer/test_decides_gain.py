@@ -1,0 +1,165 @@
+"""Depths and forces by the law written out again, number by number."""
+
+import math
+
+import numpy as np
+import pytest
+
+from recognizer.touch.settings import ReaderSettings
+from recognizer.touch.symbols.gain import (
+    Image,
+    bounded_gain,
+    first_gain,
+    normalize_image,
+    tilted_gain,
+)
+from recognizer.touch.symbols.pressing import Pressing
+
+SIDE = 16
+HALF = SIDE / 2 - 0.5
+SYMBOL, SCALE = 0.35, 2.5
+
+
+def force(depth, hardens=True):
+    """F of a tab (neo-Hookean, straight on beyond 0.8), or of a pad."""
+    if depth <= 0:
+        return 0.0
+    if not hardens:
+        return 3.0 * depth
+    u = min(depth, 0.8)
+    return (1 - u) ** -2 - (1 - u) + max(depth - 0.8, 0.0) * (2 * (1 - u) ** -3 + 1)
+
+
+def slope(depth):
+    return 2 * (1 - depth) ** -3 + 1
+
+
+def image(forces, *, hardens=True, newtons=True, trust=None, falls=None):
+    y, x = np.indices((SIDE, SIDE)).reshape(2, -1)
+    points = np.column_stack([x - HALF, HALF - y]).astype(float)
+    return Image(
+        points_mm=points,
+        forces=np.asarray(forces, float).ravel(),
+        trust=np.ones(SIDE * SIDE) if trust is None else np.asarray(trust, float).ravel(),
+        shape=(SIDE, SIDE),
+        pressing=Pressing(
+            hardens=hardens, symbol=SYMBOL, deepest=ReaderSettings().gain.deepest, scale=SCALE
+        ),
+        newtons=newtons,
+        plane=np.column_stack([np.ones(len(points)), points / HALF]),
+        falls=falls,
+        settings=ReaderSettings(),
+    )
+
+
+def depths(gain):
+    y, x = np.indices((SIDE, SIDE)).reshape(2, -1)
+    return gain[1] + gain[2] * (x - HALF) / HALF + gain[3] * (HALF - y) / HALF
+
+
+@pytest.mark.parametrize(
+    ("gain", "steepest", "truth"),
+    [
+        ([0.3, 0.2, 0.1, -0.1], 1.7, [0.3, 0.2, 0.1, -0.1]),
+        ([0.3, 0.2, 0.3, -0.2], 1.7, [0.3, 0.2, 0.204, -0.136]),  # 0.5 becomes 0.34
+        ([0.3, 0.2, -0.3, 0.2], 0.9, [0.3, 0.2, -0.108, 0.072]),
+        ([-9.0, 0.5, 0.0, 0.0], 0.9, [-9.0, 0.5, 0.0, 0.0]),
+        ([1.0, 0.2, 0.2, -0.14], 1.7, [1.0, 0.2, 0.2, -0.14]),
+    ],
+)
+def test_slopes_are_at_most_so_many_depths(gain, steepest, truth):
+    np.testing.assert_allclose(bounded_gain(np.array([gain, gain]), steepest), [truth, truth])
+
+
+@pytest.mark.parametrize("newtons", [True, False])
+def test_symbols_all_over_give_the_plane_that_pressed_them(newtons):
+    ink, plane = 0.4, (2.0, 0.3, -0.2)
+    x, y = (np.indices((SIDE, SIDE))[axis] for axis in (1, 0))
+    forces = ink * (plane[0] + plane[1] * (x - HALF) / HALF + plane[2] * (HALF - y) / HALF)
+    trust = np.ones((SIDE, SIDE))
+    forces[3, 4], trust[3, 4] = 900.0, 0.0  # a bad tactel
+    found = first_gain(image(forces, newtons=newtons, trust=trust), ink)
+    scale = SCALE if newtons else plane[0] / force(0.25)
+    assert found[0] == pytest.approx(math.log(scale))
+    assert force(found[1]) * scale == pytest.approx(plane[0], rel=1e-3)
+    if not newtons:
+        assert found[1] == pytest.approx(0.25, abs=1e-4)
+    steep = scale * slope(found[1])
+    assert found[2:] == pytest.approx([plane[1] / steep, plane[2] / steep], rel=1e-3)
+
+
+def test_the_first_guess_is_not_steeper_than_nine_tenths_of_its_depth():
+    x = (np.arange(SIDE) - HALF) / HALF
+    found = first_gain(image(np.tile(2.0 + 6.0 * x, (SIDE, 1))), 0.5)
+    assert found[2] == pytest.approx(0.9 * found[1])
+    assert found[3] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_where_nothing_presses_there_is_no_gain():
+    assert first_gain(image(np.zeros((SIDE, SIDE))), 0.5) is None
+    assert first_gain(image(-np.ones((SIDE, SIDE))), 0.5) is None
+
+
+def psi(response):
+    return math.log(1 + 3 * max(response, 0.0)) / math.log(4)
+
+
+@pytest.mark.parametrize("hardens", [True, False])
+@pytest.mark.parametrize("fallen", [False, True])
+def test_an_image_under_gains_tactel_by_tactel(hardens, fallen):
+    rng = np.random.default_rng(2)
+    forces, trust = rng.uniform(0, 9, SIDE**2), rng.uniform(0, 1, SIDE**2)
+    gains = np.array([[0.4, 0.5, 0.3, -0.1], [1.1, 0.25, -0.3, 0.1]])
+    falls = rng.uniform(0, 0.3, (2, SIDE**2)) if fallen else None
+    found = normalize_image(image(forces, hardens=hardens, trust=trust, falls=falls), gains)
+    for b, gain in enumerate(gains):
+        depth = depths(gain) - (falls[b] if fallen else 0.0)
+        plain = [force(one, hardens) for one in depth]
+        lower = [force(one - SYMBOL, hardens) for one in depth]
+        least = 0.12 * max(plain)
+        measure = 0.0
+        for n in range(SIDE**2):
+            share = max(plain[n], least)
+            plateau = math.exp(gain[0]) * share
+            measure -= trust[n] * math.log(plateau + 3 * forces[n])
+            truth = {
+                "depth": depth[n],
+                "plain": plain[n],
+                "lower": lower[n],
+                "plateau": plateau,
+                "psi": psi(forces[n] / plateau),
+                "press": min(max(depth[n] / (0.5 * gain[1]), 0.2), 1.0),
+                "bare": lower[n] / share,
+                "contact": min(plain[n] / least, 1.0),
+            }
+            for name, value in truth.items():
+                assert getattr(found, name)[b, n] == pytest.approx(value, rel=1e-6), name
+        assert found.measure[b] == pytest.approx(measure)
+    np.testing.assert_array_equal(found.trust, trust)
+
+
+def tilted(gain):
+    """Forces of a plate that comes down on the bare face on the left, on symbols on the right."""
+    depth = depths(gain).reshape(SIDE, SIDE)
+    y, x = np.indices((SIDE, SIDE))
+    left = x < SIDE / 2
+    tops = ~left & (x % 2 == 1) & (y % 2 == 0)
+    forces = [
+        math.exp(gain[0]) * (force(u - SYMBOL) if on_face else force(u) if top else 0.0)
+        for u, on_face, top in zip(depth.ravel(), left.ravel(), tops.ravel(), strict=True)
+    ]
+    return np.array(forces).reshape(SIDE, SIDE)
+
+
+def test_a_plate_that_comes_down_on_the_bare_face_gives_its_tilt():
+    gain = np.array([math.log(SCALE), 0.45, -0.3, 0.02])
+    found = tilted_gain(image(tilted(gain)))
+    np.testing.assert_allclose(found, gain, atol=2e-3)
+
+
+def test_it_needs_ten_tactels_of_either_kind():
+    gain = np.array([math.log(SCALE), 0.45, -0.3, 0.02])
+    forces = tilted(gain)
+    assert tilted_gain(image(np.where(np.arange(SIDE) < 8, forces, 0.0))) is None
+    assert tilted_gain(image(np.where(np.arange(SIDE) < 8, 0.0, forces))) is None
+    assert tilted_gain(image(np.zeros((SIDE, SIDE)))) is None

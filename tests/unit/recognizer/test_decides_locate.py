@@ -1,0 +1,404 @@
+"""Places of the database: against a walk over every place, and costs worked by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from recognizer.touch.locate import (
+    Hypothesis,
+    find_hypotheses,
+    find_rivals,
+    labels_at,
+    log_likelihood,
+    neighbours,
+    shown_at,
+    under_centre,
+)
+from recognizer.touch.settings import HypothesisSettings
+
+USUAL = HypothesisSettings()
+ALL = replace(USUAL, kept=10**6)
+SQUARE = [(i, j) for j in range(4) for i in range(4)]
+APART = [(0, 0), (2, 0), (0, 2), (2, 2), (4, 1)]  # no two in a window
+
+
+def at(row, column, face=0, fit=0):
+    return Hypothesis(fit, row, column, face, 0.0)
+
+
+def where(found):
+    return {(one.row, one.column, one.face) for one in found}
+
+
+def cost(scores, seen, label):
+    """What a cell costs a place that shows a label there, nats.
+
+    A registered symbol that is not felt costs 4 more than none; no cell more than 8, one of
+    which less than 8 tactels are seen the same share of that.
+    """
+    none = scores[-1]
+    own = none if label == len(scores) - 1 else max(scores[label], none - 4.0)
+    return max(own, -8.0 * min(1.0, seen / 8.0))
+
+
+def by_hand(lab, fit, place):
+    row, column, face = place
+    labels = lab.shows(row, column, face, fit.cells.tolist())
+    return sum(cost(*one) for one in zip(fit.scores, fit.seen, labels, strict=True)) + fit.value
+
+
+def soft(lab, place, cells, small, seed, spread=2.0, least=-9.0):
+    """A fit at a place, blurred."""
+    labels = lab.shows(*place, cells)
+    rng = np.random.default_rng(seed)
+    scores = small.sure_of(labels, least=least) + spread * rng.normal(size=(len(cells), 5))
+    scores -= scores.max(axis=1, keepdims=True)
+    return small.fit_of(cells, scores, rng.uniform(1.0, 30.0, len(cells)), value=-123.0)
+
+
+@pytest.mark.parametrize(
+    ("scores", "seen", "label", "nats"),
+    [
+        ([0, -3, -9, -9, -5], 20, 0, 0.0),
+        ([0, -3, -9, -9, -5], 20, 1, -3.0),
+        ([0, -3, -9, -9, -5], 20, 4, -5.0),
+        ([-20, -20, -20, -20, 0], 20, 2, -4.0),  # registered, and worn away
+        ([-1, -20, -20, -20, 0], 20, 0, -1.0),
+        ([0, -20, -20, -20, -2], 20, 3, -6.0),  # as if worn: 4 less than none
+        ([0, -20, -20, -20, -20], 20, 3, -8.0),  # no cell costs more
+        ([0, -20, -20, -20, -20], 20, 4, -8.0),
+        ([0, -20, -20, -20, -20], 8, 4, -8.0),
+        ([0, -20, -20, -20, -20], 6, 4, -6.0),  # a corner tells less
+        ([0, -20, -20, -20, -20], 1, 3, -1.0),
+        ([-20, -20, -20, -20, 0], 2, 2, -2.0),
+    ],
+)
+def test_what_a_cell_costs(small, scores, seen, label, nats):
+    held = {(5, 5): (0, label)} if label < 4 else {(0, 0): (0, 1)}
+    lab = small.Lab(held)
+    fit = small.fit_of([(0, 0)], [scores], seen, value=-50.0)
+    assert log_likelihood(lab.embossed, fit, at(5, 5), USUAL) == pytest.approx(nats - 50.0)
+    assert cost(np.array(scores, float), seen, label) == nats
+
+
+@pytest.mark.parametrize("dense", [False, True])
+def test_what_cells_show_at_a_place(small, dense):
+    lab = small.two_faces(dense)
+    cells = [(i, j) for i in range(-7, 8) for j in range(-7, 8)]
+    for place in ((4, 4, 0), (10, 12, 1), (0, 0, 1), (0, 0, 0), (6, 2, 0)):
+        truth = lab.shows(*place, cells)
+        assert labels_at(lab.embossed, at(*place), np.array(cells)).tolist() == truth
+    places = [at(4, 4, 0), at(10, 12, 1)]
+    shown = shown_at(lab.embossed, places)(np.array([cells, cells]))
+    for one, own in zip(places, shown.tolist(), strict=True):
+        labels = lab.shows(one.row, one.column, one.face, cells)
+        assert own == [-1 if label == 4 else label for label in labels]
+
+
+@pytest.mark.parametrize(
+    ("cells", "place"),
+    [(SQUARE, place) for place in ((5, 3, 0), (3, 4, 0), (0, 11, 1), (10, 12, 1), (6, 7, 0))]
+    + [(APART, (5, 3, 0)), (APART, (3, 4, 0))],
+)
+def test_the_place_of_a_clear_touch_is_found_with_its_likelihood(small, cells, place):
+    lab = small.two_faces()
+    for seed in range(4):
+        fit = soft(lab, place, cells, small, seed, spread=0.5)
+        found = find_hypotheses(lab.embossed, (fit,), USUAL)
+        every = sorted(((by_hand(lab, fit, one), one) for one in lab.places(cells)), reverse=True)
+        assert (found[0].row, found[0].column, found[0].face) == every[0][1]
+        for one in found:
+            score = by_hand(lab, fit, (one.row, one.column, one.face))
+            assert one.score == pytest.approx(score)
+            assert log_likelihood(lab.embossed, fit, one, USUAL) == pytest.approx(score)
+        assert [one.score for one in found] == sorted((one.score for one in found), reverse=True)
+
+
+def anchored(lab, fit, scores, symbol, anchors):
+    """Places at which one of the surest cells is registered with a label that may be."""
+    order = np.argsort(-np.array(symbol), kind="stable")[:anchors]
+    return {
+        ((r + fit.cells[n, 1]) % lab.rows, (c - fit.cells[n, 0]) % lab.columns, face)
+        for n in order
+        if symbol[n] > 0
+        for (r, c), (face, label) in lab.held.items()
+        if scores[n][label] > -8.0
+    }
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_where_no_window_is_whole_three_cells_are_tried_in_turn_as_registered_ones(small, seed):
+    lab = small.two_faces()
+    fit = soft(lab, (4, 3, 0), APART, small, seed, spread=3.0, least=-3.0)
+    bounded = np.array(
+        [
+            [cost(own, seen, label) for label in range(5)]
+            for own, seen in zip(fit.scores, fit.seen, strict=True)
+        ]
+    )
+    symbol = [max(own[:4]) - own[4] for own in bounded]
+    truth = anchored(lab, fit, bounded, symbol, 3)
+    assert truth != anchored(lab, fit, bounded, symbol, 2)
+    found = find_hypotheses(lab.embossed, (fit,), ALL)
+    assert where(found) == truth
+    assert len(found) == len(truth)  # each once
+    for one in found:
+        assert one.score == pytest.approx(by_hand(lab, fit, (one.row, one.column, one.face)))
+
+
+def test_a_cell_that_shows_rather_no_symbol_is_no_anchor(small):
+    lab = small.two_faces()
+    scores = [[-1, -1, -1, -1, 0.0]] * 4 + [[-0.1, -5, -5, -5, -0.2]]
+    fit = small.fit_of(APART, scores)
+    places = where(find_hypotheses(lab.embossed, (fit,), ALL))
+    assert places == {
+        ((r + 1) % 11, (c - 4) % 13, face) for (r, c), (face, label) in lab.held.items()
+    }
+    none = small.fit_of(APART, [[-1, -1, -1, -1, 0.0]] * 4 + [[0.0, 0, 0, 0, 0.0]])
+    assert find_hypotheses(lab.embossed, (none,), ALL) == []
+
+
+def test_a_symbol_that_costs_as_much_as_any_cell_can_is_not_tried(small):
+    lab = small.two_faces()
+    for least, labels in ((-7.9, {0, 1}), (-8.1, {0})):
+        fit = small.fit_of([(0, 0)], [[0.0, least, -30.0, -30.0, -30.0]])
+        found = find_hypotheses(lab.embossed, (fit,), ALL)
+        assert {lab.held[one.row, one.column][1] for one in found} == labels
+
+
+def test_eight_places_of_each_fit_are_kept_and_know_which_fit_they_are_of(small):
+    lab = small.two_faces()
+    fits = tuple(soft(lab, (4, 3, 0), APART, small, seed, 3.0, -3.0) for seed in range(3))
+    found = find_hypotheses(lab.embossed, fits, USUAL)
+    assert [sum(one.fit == number for one in found) for number in range(3)] == [8, 8, 8]
+    assert [one.score for one in found] == sorted((one.score for one in found), reverse=True)
+    for number, fit in enumerate(fits):
+        every = sorted(one.score for one in find_hypotheses(lab.embossed, (fit,), ALL))[-8:]
+        assert sorted(one.score for one in found if one.fit == number) == pytest.approx(every)
+
+
+def strip(small, length=12):
+    """Two rows of registered cells, no 2 x 2 labels twice and none of them alike."""
+    labels = np.array([[0, 1, 2, 0, 2, 1, 0, 1, 1, 2, 0, 0], [1, 2, 0, 0, 1, 0, 2, 2, 1, 0, 2, 1]])
+    held = {(4 + r, c): (0, int(labels[r, c])) for r in range(2) for c in range(length)}
+    return small.Lab(held, columns=17), labels
+
+
+def window(labels, left, width, small, gap=12.0):
+    """A fit of two rows of the strip: cell (i, j) is column left + i of row 4 - j."""
+    cells = [(i, -r) for r in range(2) for i in range(width)]
+    shown = [labels[r][left + i] for r in range(2) for i in range(width)]
+    return cells, shown, small.sure_of(shown, least=-gap)
+
+
+@pytest.mark.parametrize(("gap", "looked_up"), [(6.1, True), (5.9, False)])
+@pytest.mark.parametrize("against", ["symbol", "none"])
+def test_windows_are_looked_up_whose_every_cell_is_sure_by_six_nats(small, gap, looked_up, against):
+    lab, _ = strip(small)
+    cells, _, scores = window(np.array([[3, 3], [1, 1]]), 0, 2, small)
+    scores[2:, 4 if against == "none" else 0] = -gap
+    found = find_hypotheses(lab.embossed, (small.fit_of(cells, scores),), USUAL)
+    assert bool(found) is not looked_up  # the window is nowhere (no 3 is); label 1 is
+
+
+def test_of_a_window_the_weakest_cell_may_be_read_wrong(small):
+    lab, labels = strip(small)
+    for weak in range(6):
+        for wrong in range(6):
+            cells, shown, scores = window(labels, 3, 3, small)
+            own = shown[wrong]
+            other = (own + 1) % 3
+            scores[wrong] = -20.0
+            scores[wrong, other], scores[wrong, own] = 0.0, -9.0
+            scores[weak, 4] = -7.0  # the least sure
+            found = find_hypotheses(lab.embossed, (small.fit_of(cells, scores),), USUAL)
+            assert ((4, 3, 0) in where(found)) is (weak == wrong)
+
+
+def test_smaller_windows_are_not_looked_up_beside_larger_ones(small):
+    lab, labels = strip(small)
+    cells, _, scores = window(labels, 3, 2, small)
+    assert where(find_hypotheses(lab.embossed, (small.fit_of(cells, scores),), USUAL)) == {
+        (4, 3, 0)
+    }
+    cells, _, scores = window(labels, 3, 3, small)
+    for wrong in (2, 5):  # both of the third column
+        scores[wrong] = np.where(np.arange(5) == 3, 0.0, -12.0)
+    assert find_hypotheses(lab.embossed, (small.fit_of(cells, scores),), USUAL) == []
+
+
+def test_upright_windows_are_looked_up_as_level_ones_are(small):
+    labels = np.random.default_rng(5).integers(0, 4, (5, 2))
+    held = {(2 + r, 3 + c): (0, int(labels[r, c])) for r in range(5) for c in range(2)}
+    lab = small.Lab(held)
+    cells = [(i, -r) for r in range(3) for i in range(2)]
+    fit = small.fit_of(cells, small.sure_of([labels[1 + r][i] for r in range(3) for i in range(2)]))
+    assert where(find_hypotheses(lab.embossed, (fit,), USUAL)) == {(3, 3, 0)}
+
+
+@pytest.mark.parametrize(("rank", "found"), [(3, True), (4, True), (5, False)])
+def test_the_four_surest_windows_are_looked_up(small, rank, found):
+    lab, labels = strip(small)
+    cells, shown, scores = window(labels, 2, 7, small)
+    for column in (2, 3):  # so that of the five windows the last alone is right
+        for row in (0, 1):
+            n = row * 7 + column
+            shown[n] = 3
+            scores[n] = np.where(np.arange(5) == 3, 0.0, -12.0)
+    # how sure the window that begins at each column is: by its first cell, or the last one's last
+    for column in range(4):
+        scores[column, 4] = -(7.0 + 0.1 * column)
+    least = {3: 7.15, 4: 7.05, 5: 6.95}[rank]
+    scores[6, 4] = -least
+    places = where(find_hypotheses(lab.embossed, (small.fit_of(cells, scores),), USUAL))
+    assert ((4, 2, 0) in places) is found
+
+
+def line(small, zeros, columns=20_000):
+    """One row, most cells of it with label 1, those of `zeros` with label 0."""
+    marked = set(zeros)
+    held = {(0, c): (0, 0 if c in marked else 1) for c in range(columns)}
+    return small.Lab(held, rows=1, columns=columns)
+
+
+def pair_of_zeros(small, far=2):
+    """Two cells that show label 0, `far` apart."""
+    scores = [[0.0, -30, -30, -30, -30], [0.0, -30, -30, -30, -30]]
+    return small.fit_of([(0, 0), (far, 0)], scores)
+
+
+@pytest.mark.parametrize(("pairs", "single", "count"), [(2, 509, 1024), (1, 511, 1)])
+def test_of_more_than_1024_candidates_those_count_that_two_windows_agree_on(
+    small, pairs, single, count
+):
+    # each zero alone is two candidates, each pair three, of which one has both
+    zeros = [10 * n for n in range(single)] + [10_000 + 10 * n for n in range(pairs)]
+    zeros += [10_002 + 10 * n for n in range(pairs)]
+    lab = line(small, zeros)
+    found = find_hypotheses(lab.embossed, (pair_of_zeros(small),), ALL)
+    assert len(found) == count
+    assert sum(one.score == 0.0 for one in found) == pairs
+
+
+def test_if_no_two_agree_all_of_many_candidates_stay(small):
+    lab = line(small, [10 * n for n in range(600)])
+    assert len(find_hypotheses(lab.embossed, (pair_of_zeros(small),), ALL)) == 1200
+
+
+@pytest.mark.parametrize(
+    ("cells", "zeros", "finite"), [(7, 513, 512), (6, 513, 513), (7, 512, 512)]
+)
+def test_after_six_cells_512_candidates_go_on(small, cells, zeros, finite):
+    lab = line(small, [10 * n for n in range(zeros)])
+    scores = [[0.0, -30, -30, -30, -30]] + [[-1, 0.0, -1, -1, -1]] * (cells - 1)
+    fit = small.fit_of([(i, 0) for i in range(cells)], scores)
+    one = replace(ALL, anchors=1)
+    found = find_hypotheses(lab.embossed, (fit,), one)
+    assert sum(np.isfinite(place.score) for place in found) == finite
+    assert len(found) == zeros
+
+
+def test_the_surest_and_most_seen_cells_come_first(small):
+    # three candidates; the two best after two cells go on
+    lab = line(small, [0, 100, 200], columns=300)
+    lab.held[0, 101] = (0, 2)  # wrong at the second cell
+    lab.held[0, 202] = (0, 2)  # wrong at the third
+    lab = small.Lab(lab.held, rows=1, columns=300)
+    anchor = [0.0, -30, -30, -30, -30]
+    for second, third, dropped in (
+        ((5.0, 12.0), (4.0, 12.0), 100),
+        ((4.0, 12.0), (5.0, 12.0), 200),
+        ((4.0, 12.0), (5.0, 9.0), 100),
+        ((4.0, 12.0), (5.0, 9.9), 200),
+        ((4.0, 40.0), (5.0, 12.0), 200),  # more than twelve tactels tell no more
+        ((4.0, 12.0), (3.0, 40.0), 100),
+    ):
+        scores = [anchor] + [[-by, 0.0, -by, -by, -by] for by, _ in (second, third)]
+        fit = small.fit_of([(0, 0), (1, 0), (2, 0)], scores, [40.0, second[1], third[1]])
+        few = replace(ALL, anchors=1, first=2, followed=2)
+        found = find_hypotheses(lab.embossed, (fit,), few)
+        assert {one.column for one in found if not np.isfinite(one.score)} == {dropped}
+
+
+@pytest.mark.parametrize(("cells", "places"), [(1 << 18, 1), ((1 << 18) + 1, 0)])
+def test_in_a_lab_of_more_than_2_to_the_18_cells_a_window_must_be_whole(small, cells, places):
+    lab = small.Lab({(0, 0): (0, 0)}, rows=1, columns=1 << 19)
+    large = replace(
+        lab.embossed,
+        keys=np.arange(cells, dtype=np.uint64),
+        owners=np.append(np.zeros(cells), -1).astype(np.int32),
+        labels=np.append(np.arange(cells) != 77, -1).astype(np.int8),
+    )
+    fit = small.fit_of([(0, 0)], [[0.0, -30, -30, -30, -30]])
+    found = find_hypotheses(large, (fit,), USUAL)
+    assert [one.column for one in found] == [77] * places
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_rivals_are_sought_from_two_cells_that_the_best_place_holds(small, seed):
+    lab = small.two_faces()
+    best = (5, 5, 0)
+    cells = [(i, j) for i in range(5) for j in range(3)]  # columns 8 and on hold nothing there
+    fit = soft(lab, best, cells, small, seed, spread=3.0, least=-3.0)
+    bounded = np.array(
+        [
+            [cost(own, seen, label) for label in range(5)]
+            for own, seen in zip(fit.scores, fit.seen, strict=True)
+        ]
+    )
+    held = lab.shows(*best, cells)
+    sure = [
+        max(own) - own[4] if label < 4 else 0.0 for own, label in zip(bounded, held, strict=True)
+    ]
+    truth = anchored(lab, fit, bounded, sure, 2) - {best}
+    found = find_rivals(lab.embossed, fit, at(*best), 9, ALL)
+    assert where(found) == truth
+    assert {one.fit for one in found} == {9}
+    for one in found:
+        assert one.score == pytest.approx(by_hand(lab, fit, (one.row, one.column, one.face)))
+    few = find_rivals(lab.embossed, fit, at(*best), 9, replace(USUAL, kept=3))
+    kept = (
+        3
+        if best in anchored(lab, fit, bounded, sure, 2)
+        and by_hand(lab, fit, best) >= found[2].score
+        else 4
+    )
+    assert [one.score for one in few] == pytest.approx([one.score for one in found[:kept]])
+
+
+def test_a_place_of_the_same_cell_on_another_face_is_a_rival(small):
+    # two faces side by side: a lattice over both is a place of either
+    held = {(3, c): (int(c > 4), c % 3) for c in range(2, 8)}
+    lab = small.Lab(held)
+    cells = [(i, 0) for i in (3, 0, 1, 2, 4, 5)]
+    fit = small.fit_of(cells, small.sure_of([(i + 2) % 3 for i, _ in cells]))
+    found = find_hypotheses(lab.embossed, (fit,), ALL)
+    assert {(3, 2, 0), (3, 2, 1)} <= where(found)
+    rivals = find_rivals(lab.embossed, fit, at(3, 2, 0), 0, ALL)
+    assert (3, 2, 0) not in where(rivals)
+
+
+def test_the_cell_under_the_centre(small):
+    lab = small.two_faces()
+    for x, y, cell in (
+        (3.0, 3.0, (9, 12)),
+        (-0.1, 3.0, (9, 11)),
+        (7.1, 3.0, (9, 0)),  # the array goes round
+        (3.0, -0.1, (10, 12)),
+        (3.0, -7.1, (0, 12)),
+        (3.0, 7.1, (8, 12)),
+    ):
+        fit = small.fit_of([(0, 0)], [[0.0] * 5], x_mm=x, y_mm=y)
+        assert under_centre(lab.embossed, fit, at(9, 12, 1)) == cell
+
+
+def test_neighbours_are_cells_at_most_one_apart_round_the_array(small):
+    embossed = small.two_faces().embossed  # 11 x 13
+    for a, b, near in (
+        ((5, 5), (5, 5), True), ((5, 5), (6, 6), True), ((5, 5), (4, 6), True),
+        ((5, 5), (7, 5), False), ((5, 5), (3, 5), False), ((5, 5), (5, 7), False),
+        ((5, 5), (5, 3), False), ((0, 0), (10, 12), True), ((10, 12), (0, 0), True),
+        ((0, 0), (9, 0), False), ((0, 0), (0, 11), False), ((5, 5), (7, 7), False),
+    ):  # fmt: skip
+        assert neighbours(embossed, a, b) is near

@@ -1,0 +1,77 @@
+"""What a tactel costs: each number by hand."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from recognizer.touch.settings import NoiseSettings
+from recognizer.touch.symbols.noise import log_likelihoods
+
+
+def psi(response):
+    return math.log(1 + 3 * response) / math.log(4)
+
+
+def by_hand(seen, table, press, bare, trust, noise):
+    """Log-likelihoods of the symbols at one tactel, and of none, nats."""
+    found = []
+    for value, by_x, by_y in table:
+        width = math.sqrt(0.8**2 + value**2 + by_x**2 + by_y**2)
+        away = (seen - value) / (width * noise / press)
+        found.append(trust * (-min(away**2 / 2, 8.0) - math.log(width)))
+    none = []
+    for value in (0.0, psi(bare)):  # beyond the edge of the face, or over it
+        width = math.hypot(0.8, value)
+        away = (seen - value) / (width * noise / press)
+        none.append(trust * (-min(away**2 / 2, 8.0) - math.log(width)))
+    return [*found, max(none)]
+
+
+def asked(seen, tables, press, bare, trust, noise):
+    b, n, q = len(seen), len(trust), len(tables[0][0])
+    every = np.zeros((b, n, q, 6), np.float32)
+    every[..., :3] = tables
+    every[..., 3:] = 9.0  # what is fitted of the form is no noise
+    felt = SimpleNamespace(
+        psi=np.array(seen), press=np.array(press), bare=np.array(bare),
+        trust=np.array(trust), settings=NoiseSettings(),
+    )  # fmt: skip
+    return log_likelihoods(felt, every, np.array(noise))
+
+
+def test_every_tactel_under_every_plane():
+    rng = np.random.default_rng(1)
+    b, n, q = 2, 40, 3
+    seen, press = rng.uniform(0, 1.3, (b, n)), rng.uniform(0.2, 1.0, (b, n))
+    bare = np.where(rng.random((b, n)) < 0.5, 0.0, rng.uniform(0, 0.9, (b, n)))
+    trust = rng.uniform(0, 1, n)
+    tables = rng.normal(size=(b, n, q, 3)) * [0.5, 0.4, 0.7] + [0.5, 0.0, 0.0]
+    noise = np.array([0.12, 0.3])
+    found = asked(seen, tables, press, bare, trust, noise)
+    assert found.shape == (b, n, q + 1)
+    for i in range(b):
+        for k in range(n):
+            truth = by_hand(seen[i, k], tables[i, k], press[i, k], bare[i, k], trust[k], noise[i])
+            np.testing.assert_allclose(found[i, k], truth, rtol=2e-5, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("seen", "value", "nats"),
+    [
+        (0.0, 0.0, -math.log(0.8)),
+        (0.6, 0.6, 0.0),  # 0.8 and 0.6 make 1
+        (0.75, 0.6, -0.5),  # one standard deviation
+        (0.3, 0.6, -2.0),
+        (9.0, 0.6, -8.0),  # a spike costs 8 nats
+        (-9.0, 0.6, -8.0),
+    ],
+)
+def test_a_tactel_by_hand(seen, value, nats):
+    found = asked([[seen]], [[[(value, 0.0, 0.0)]]], [[1.0]], [[0.0]], [1.0], [0.15])
+    assert found[0, 0, 0] == pytest.approx(nats, abs=1e-5)
+    hung = asked([[seen]], [[[(value, 0.0, 0.0)]]], [[0.0]], [[0.0]], [1.0], [0.15])
+    width = math.hypot(0.8, value)
+    away = (seen - value) * 1e-3 / 0.15 / width  # where nothing presses hardly anything is told
+    assert hung[0, 0, 0] == pytest.approx(-min(away**2 / 2, 8) - math.log(width), abs=1e-5)

@@ -1,0 +1,237 @@
+"""Which touches are answered, and why others are not: each bound from both sides."""
+
+import math
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import recognizer.touch.recognise
+from recognizer.touch.belief import Support
+from recognizer.touch.locate import Hypothesis
+from recognizer.touch.recognise import recognise, recognise_with_hypothesis
+from recognizer.touch.recognition import (
+    AMBIGUOUS,
+    NO_CONTACT,
+    NOT_ENCODED,
+    OUTSIDE,
+    TOO_FEW,
+)
+from recognizer.touch.settings import ReaderSettings
+
+TOUCHED = SimpleNamespace(contact=True)
+READER = SimpleNamespace(settings=ReaderSettings())
+SURE = Support(surprise=20.0, explained=0.95, inliers=16, clear=0, plain=0, wider=0.0)
+T_OBJECT_FACE = np.array([[0.0, 0, 1, 5], [1, 0, 0, 6], [0, 1, 0, 7], [0, 0, 0, 1]])
+
+
+@dataclass
+class Found:
+    """What verification hands over; places are as they are named."""
+
+    embossed: object
+    place: str
+    score: float
+    fit: object
+    speaks: Support = SURE
+    face: int = 0
+    index: tuple = (3, 4)
+
+    @property
+    def hypothesis(self):
+        return Hypothesis(0, 6, 2, self.face, self.score)
+
+    def same_place(self, other):
+        return self.place == other.place
+
+    def support(self):
+        return self.speaks
+
+
+@pytest.fixture
+def lab(small):
+    """Two faces of 42 x 42 mm; cell (6, 2) of the array is at the origin of the first."""
+    made = small.two_faces().embossed
+    for number, name in enumerate(("F1", "F2")):
+        made.known[number] = SimpleNamespace(
+            object="Thing", face=name, round=None, T_object_face=T_OBJECT_FACE,
+            polygon_mm=(np.array([(0, 0), (42, 0), (42, 42), (0, 42)], float),),
+            rows=np.array([6]), columns=np.array([2]), rotation_rad=0.0,
+            centres_mm=np.array([[3.5, 3.5]]),
+        )  # fmt: skip
+    return made
+
+
+@pytest.fixture
+def reads(small, lab, monkeypatch):
+    """Return a function that reads a touch of which the two tries find what is given."""
+    centre = small.fit_of(
+        [(0, 0)], [[0.0] * 5], x_mm=17.0, y_mm=10.0, theta_rad=0.3, noise=0.07,
+        covariance=np.diag([1.0, 2.0, 3.0]),
+    )  # fmt: skip
+
+    def read(first, second=None, signal=TOUCHED, **fit):
+        tries = []
+
+        def found(reader, given, effort):
+            assert reader is READER
+            assert given is signal
+            tries.append(effort)
+            return first if len(tries) == 1 else second
+
+        monkeypatch.setattr(recognizer.touch.recognise, "verify_hypotheses", found)
+        answer, judged = recognise_with_hypothesis(READER, signal, 7)
+        assert answer.seq == 7
+        assert tries == [READER.settings.first, READER.settings.thorough][: len(tries)]
+        tries.clear()
+        assert recognise(READER, signal, 7).reason == answer.reason
+        return answer, judged, len(tries)
+
+    def one(place="here", score=0.0, inliers=16, embossed=lab, face=0, index=(3, 4), **changed):
+        fit = {name: changed.pop(name) for name in ("x_mm", "y_mm") if name in changed}
+        speaks = replace(SURE, inliers=inliers, **changed)
+        return Found(embossed, place, score, replace(centre, **fit), speaks, face, index)
+
+    return SimpleNamespace(read=read, one=one, lab=lab)
+
+
+def test_without_contact_nothing_is_tried(reads):
+    answer, judged, tries = reads.read([], signal=SimpleNamespace(contact=False))
+    assert (answer.reason, judged, tries) == (NO_CONTACT, None, 0)
+    assert answer.object is None
+
+
+def test_where_nothing_is_found_there_are_too_few_symbols(reads):
+    answer, judged, tries = reads.read([], [])
+    assert (answer.reason, judged, tries) == (TOO_FEW, None, 2)
+    assert (answer.margin, answer.runner_up) == (None, None)
+
+
+def test_an_answer_that_many_cells_speak_for_is_given_at_once(reads):
+    best = reads.one(inliers=11)
+    answer, judged, tries = reads.read([best])
+    assert tries == 1
+    assert judged is best
+    assert (answer.object, answer.face, answer.reason) == ("Thing", "F1", "")
+    assert answer.margin == math.inf
+    assert answer.runner_up is None
+    assert answer.index == (5, 4)  # 17 and 10 mm are column 2 and row 1 of the lattice
+    c, s = math.cos(0.3), math.sin(0.3)
+    pose = np.array([[c, -s, 0, 17.0], [s, c, 0, 10.0], [0, 0, 1, 1.2], [0, 0, 0, 1]])
+    np.testing.assert_allclose(answer.T_face_probe, pose)
+    np.testing.assert_allclose(answer.T_object_probe, T_OBJECT_FACE @ pose)
+    np.testing.assert_allclose(answer.covariance, np.diag([1.0, 2.0, 3.0]))
+    assert answer.noise == 0.07
+
+
+def test_an_answer_that_few_cells_speak_for_is_looked_at_again(reads):
+    first, second = reads.one(inliers=10), reads.one(inliers=10)
+    answer, judged, tries = reads.read([first], [second])
+    assert (tries, judged is second, bool(answer)) == (2, True, True)
+
+
+@pytest.mark.parametrize("inliers", [10, 16])
+def test_if_the_second_try_says_another_place_neither_is_believed(reads, inliers):
+    first = [reads.one(inliers=10), reads.one("rival", -30.0, face=1, index=(9, 12))]
+    second = [reads.one("there", inliers=inliers)]
+    answer, judged, _ = reads.read(first, second)
+    assert (answer.reason, answer.margin) == (AMBIGUOUS, 0.0)
+    assert (answer.runner_up.face, answer.runner_up.index) == ("F2", (9, 12))
+    assert judged is second[0]
+
+
+def test_what_the_first_try_refuses_the_second_may_answer(reads):
+    first = [reads.one(explained=0.1)]
+    answer, judged, _ = reads.read(first, [reads.one("there")])
+    assert answer
+    assert judged.place == "there"
+
+
+def test_what_the_second_try_refuses_is_refused(reads):
+    answer, judged, _ = reads.read([reads.one(inliers=10)], [reads.one("there", explained=0.1)])
+    assert answer.reason == NOT_ENCODED
+    assert judged.place == "there"
+    answer, judged, _ = reads.read([reads.one(inliers=10)], [])
+    assert (answer.reason, judged) == (TOO_FEW, None)
+
+
+@pytest.mark.parametrize(("margin", "reason"), [(10.0, ""), (9.99, AMBIGUOUS)])
+def test_the_best_is_ten_nats_before_the_best_other_place(reads, margin, reason):
+    found = [
+        reads.one(),
+        reads.one(score=-1.0),  # the same place again
+        reads.one("rival", -margin, face=1, index=(9, 12)),
+        reads.one("other", -margin - 1.0),
+    ]
+    answer, _, tries = reads.read(found, found)
+    assert answer.reason == reason
+    assert tries == (2 if reason else 1)
+    assert answer.margin == pytest.approx(margin)
+    runner_up = answer.runner_up
+    assert (runner_up.object, runner_up.face, runner_up.index) == ("Thing", "F2", (9, 12))
+
+
+@pytest.mark.parametrize(
+    ("inliers", "margin", "reason"),
+    [
+        (10, 14.0, ""),
+        (10, 13.99, AMBIGUOUS),
+        (11, 13.99, ""),
+        (11, 10.0, ""),
+    ],
+)
+def test_where_fewer_than_eleven_cells_speak_it_is_fourteen(reads, inliers, margin, reason):
+    found = [reads.one(inliers=inliers), reads.one("rival", -margin)]
+    answer, judged, _ = reads.read(found, found)
+    assert answer.reason == reason
+    assert answer.margin == pytest.approx(margin)
+    assert answer.runner_up.face == "F1"
+    assert judged is found[0]
+
+
+@pytest.mark.parametrize(("inliers", "reason"), [(3, TOO_FEW), (4, ""), (5, "")])
+def test_four_cells_speak_at_least(reads, inliers, reason):
+    found = [reads.one(inliers=inliers)]
+    answer, _, _ = reads.read(found, found)
+    assert answer.reason == reason
+
+
+@pytest.mark.parametrize(("inliers", "reason"), [(5, TOO_FEW), (6, "")])
+def test_so_many_cells_speak_that_they_can_name_a_place(small, reads, inliers, reason):
+    # 48 registered cells of an array of two symbols: 2^5 < 48 <= 2^6
+    binary = replace(
+        reads.lab, array=SimpleNamespace(rows=11, columns=13, order=2), known=reads.lab.known
+    )
+    found = [reads.one(inliers=inliers, embossed=binary)]
+    answer, _, _ = reads.read(found, found)
+    assert answer.reason == reason
+    assert answer.margin == math.inf
+
+
+@pytest.mark.parametrize(
+    ("changed", "reason"),
+    [
+        ({"surprise": 2.0}, NOT_ENCODED),
+        ({"surprise": 2.0, "inliers": 2}, NOT_ENCODED),  # that it is none weighs more
+        ({"inliers": 2}, TOO_FEW),
+    ],
+)
+def test_a_surface_that_is_not_believed_is_none_of_the_lab(reads, changed, reason):
+    found = [reads.one(**changed), reads.one("rival", -1.0)]
+    answer, _, _ = reads.read(found, found)
+    assert answer.reason == reason
+    assert answer.margin == pytest.approx(1.0)
+    assert answer.runner_up is not None
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "reason"),
+    [(20.0, -1.99, ""), (20.0, -2.01, OUTSIDE), (43.99, 20.0, ""), (44.01, 20.0, OUTSIDE)],
+)
+def test_the_centre_lies_at_most_two_mm_beyond_the_face(reads, x, y, reason):
+    found = [reads.one(x_mm=x, y_mm=y), reads.one("rival", -40.0)]
+    answer, _, _ = reads.read(found, found)
+    assert answer.reason == reason
+    assert answer.margin == 40.0
+    assert answer.runner_up.face == "F1"
