@@ -57,10 +57,12 @@ class Watched:
 
     module: str
     tests: tuple[str, ...]
+    within: tuple[str, ...] = ()  #: classes and functions that decide; all if none is named
 
     def mutants(self) -> list[Mutant]:
         """Return every change of it."""
-        return list(mutants_of((ROOT / self.module).read_text()))
+        every = mutants_of((ROOT / self.module).read_text())
+        return [m for m in every if not self.within or m.place.split(".")[0] in self.within]
 
     def state(self) -> str:
         """Return a digest of the tests: with other ones a survivor is tried again."""
@@ -302,7 +304,10 @@ def main() -> int:
     asked = parser.parse_args()
     os.nice(10)
     plan = tomllib.loads((HERE / "plan.toml").read_text())
-    watched = [Watched(entry["module"], tuple(entry["tests"])) for entry in plan["watch"]]
+    watched = [
+        Watched(entry["module"], tuple(entry["tests"]), tuple(entry.get("within", ())))
+        for entry in plan["watch"]
+    ]
     watched = [one for one in watched if not asked.modules or one.module in asked.modules]
     if not asked.report:
         for name in LOADED:

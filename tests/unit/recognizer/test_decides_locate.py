@@ -367,6 +367,15 @@ def test_rivals_are_sought_from_two_cells_that_the_best_place_holds(small, seed)
     assert [one.score for one in few] == pytest.approx([one.score for one in found[:kept]])
 
 
+def test_a_cell_that_the_best_place_does_not_hold_is_no_anchor(small):
+    lab = small.two_faces()
+    cells = [(0, 0), (5, 0), (6, 0)]  # from (3, 7) on the last column: the others are beyond
+    scores = [[-0.5, -0.5, -0.5, -0.5, -0.7], *small.sure_of([1, 2]).tolist()]
+    fit = small.fit_of(cells, scores)
+    truth = {(r, c, face) for (r, c), (face, _) in lab.held.items()} - {(3, 7, 0)}
+    assert where(find_rivals(lab.embossed, fit, at(3, 7), 0, ALL)) == truth
+
+
 def test_a_place_of_the_same_cell_on_another_face_is_a_rival(small):
     # two faces side by side: a lattice over both is a place of either
     held = {(3, c): (int(c > 4), c % 3) for c in range(2, 8)}
@@ -399,6 +408,7 @@ def test_neighbours_are_cells_at_most_one_apart_round_the_array(small):
         ((5, 5), (5, 5), True), ((5, 5), (6, 6), True), ((5, 5), (4, 6), True),
         ((5, 5), (7, 5), False), ((5, 5), (3, 5), False), ((5, 5), (5, 7), False),
         ((5, 5), (5, 3), False), ((0, 0), (10, 12), True), ((10, 12), (0, 0), True),
+        ((2, 9), (3, 8), True), ((2, 9), (4, 9), False), ((2, 9), (2, 7), False),
         ((0, 0), (9, 0), False), ((0, 0), (0, 11), False), ((5, 5), (7, 7), False),
     ):  # fmt: skip
         assert neighbours(embossed, a, b) is near
