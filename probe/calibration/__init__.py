@@ -12,20 +12,20 @@ drift      whether a calibration still holds
 """
 
 from probe.calibration.apply import Calibrated, calibrated, expected_counts
-from probe.calibration.condition import Thresholds
+from probe.calibration.condition import ConditionThresholds
 from probe.calibration.drift import Drift, drift_of
 from probe.calibration.file import calibration_hash, read_calibration, write_calibration
 from probe.calibration.fit import calibration_from
-from probe.calibration.load import Load, even_load, known_load
+from probe.calibration.load import CalibrationLoad, even_load, known_load
 from probe.calibration.value import Calibration, Condition
 
 __all__ = [
     "Calibrated",
     "Calibration",
+    "CalibrationLoad",
     "Condition",
+    "ConditionThresholds",
     "Drift",
-    "Load",
-    "Thresholds",
     "calibrated",
     "calibration_from",
     "calibration_hash",

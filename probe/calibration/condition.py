@@ -22,7 +22,7 @@ SHOWN = 6  # tactels that a message lists
 
 
 @dataclass(frozen=True, slots=True)
-class Thresholds:
+class ConditionThresholds:
     """When a tactel is unsound, and what a law needs."""
 
     felt_n: float = 0.2  #: N, from here every sound tactel responds
@@ -42,7 +42,7 @@ def common_bias(rest: Average) -> float:
     return float(np.median(rest.mean))
 
 
-def raised(rest: Average, full: int, thresholds: Thresholds) -> NDArray[np.bool_]:
+def raised(rest: Average, full: int, thresholds: ConditionThresholds) -> NDArray[np.bool_]:
     """Say which tactels read more than the common bias at rest."""
     least = np.maximum(thresholds.raised_counts, thresholds.sigmas * rest.sigma)
     high: NDArray[np.bool_] = (rest.mean - common_bias(rest) > least) | (rest.highest >= full)
@@ -55,7 +55,7 @@ def judged(
     sigma_s: Array,
     high: NDArray[np.bool_],
     saturated: NDArray[np.bool_],
-    thresholds: Thresholds,
+    thresholds: ConditionThresholds,
 ) -> NDArray[np.uint8]:
     """Judge every tactel.
 
@@ -104,27 +104,27 @@ def judged(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Felt:
+class UnloadedCheck:
     """What loads a tactel felt clearly."""
 
     levels: NDArray[np.int64]  #: (rows, columns) different forces
     lowest_n: Array  #: (rows, columns) inf if none
     highest_n: Array  #: (rows, columns) 0 if none
 
-    def few(self, thresholds: Thresholds) -> NDArray[np.bool_]:
+    def few(self, thresholds: ConditionThresholds) -> NDArray[np.bool_]:
         """Say where they are too few for a law."""
         return self.levels < thresholds.levels
 
-    def near(self, thresholds: Thresholds) -> NDArray[np.bool_]:
+    def near(self, thresholds: ConditionThresholds) -> NDArray[np.bool_]:
         """Say where they lie too near each other."""
         return ~(self.highest_n >= thresholds.ratio * self.lowest_n)
 
 
-def felt(force_n: Array, firm: NDArray[np.bool_]) -> Felt:
+def felt(force_n: Array, firm: NDArray[np.bool_]) -> UnloadedCheck:
     """Sum up the loads (L, rows, columns) that are `firm`."""
     ordered = np.sort(np.where(firm, force_n, np.nan), axis=0)  # nan last
     steps = ordered[1:] > 1.05 * ordered[:-1]
-    return Felt(
+    return UnloadedCheck(
         steps.sum(axis=0) + firm.any(axis=0),
         np.where(firm, force_n, np.inf).min(axis=0),
         np.where(firm, force_n, 0.0).max(axis=0),
@@ -132,11 +132,11 @@ def felt(force_n: Array, firm: NDArray[np.bool_]) -> Felt:
 
 
 def demanded(
-    known: Felt,
+    known: UnloadedCheck,
     force_n: Array,
     saturated: NDArray[np.bool_],
     live: NDArray[np.bool_],
-    thresholds: Thresholds,
+    thresholds: ConditionThresholds,
 ) -> None:
     """See that the loads that every live tactel feels determine its law.
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from probe.calibration.apply import calibrated
 from probe.calibration.average import averaged
 from probe.calibration.condition import named
-from probe.calibration.load import Load
+from probe.calibration.load import CalibrationLoad
 from probe.calibration.value import Calibration, Image
 from probe.errors import CalibrationError
 
@@ -33,7 +33,9 @@ class Drift:
     warning: str  #: empty while the calibration holds
 
 
-def drift_of(calibration: Calibration, rest_counts: ArrayLike, loads: Sequence[Load] = ()) -> Drift:
+def drift_of(
+    calibration: Calibration, rest_counts: ArrayLike, loads: Sequence[CalibrationLoad] = ()
+) -> Drift:
     """Compare a sensor with its calibration.
 
     Parameters
@@ -70,7 +72,7 @@ def drift_of(calibration: Calibration, rest_counts: ArrayLike, loads: Sequence[L
     return Drift(shift, gain, "; ".join([*said, "calibrate again"]) if said else "")
 
 
-def _ratios(calibration: Calibration, load: Load) -> Image:
+def _ratios(calibration: Calibration, load: CalibrationLoad) -> Image:
     """Return measured over known force, of the tactels that tell it well."""
     read = calibrated(load.read.mean, calibration)
     well = ~read.bad & (load.forces_n > 0) & (read.values > 5.0 * read.sigma)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from probe.calibration.average import Average, averaged
 from probe.calibration.condition import (
-    Thresholds,
+    ConditionThresholds,
     common_bias,
     demanded,
     felt,
@@ -22,7 +22,7 @@ from probe.calibration.condition import (
     raised,
 )
 from probe.calibration.law import fitted
-from probe.calibration.load import Load
+from probe.calibration.load import CalibrationLoad
 from probe.calibration.pooled import pooled
 from probe.calibration.value import Calibration, Condition, Image
 from probe.circuit import Electronics, inverted
@@ -33,13 +33,13 @@ _UPPER = np.triu_indices(3)
 
 def calibration_from(
     rest_counts: ArrayLike,
-    loads: Sequence[Load],
+    loads: Sequence[CalibrationLoad],
     *,
     sensor: str,
     made: str = "",
     board: Electronics | None = None,
     full: int = 1023,
-    thresholds: Thresholds | None = None,
+    thresholds: ConditionThresholds | None = None,
 ) -> Calibration:
     """Calibrate a sensor.
 
@@ -66,7 +66,7 @@ def calibration_from(
     CalibrationError
         If the loads do not tell, or do not determine, the law of a tactel that is alive.
     """
-    t = thresholds or Thresholds()
+    t = thresholds or ConditionThresholds()
     rest = averaged(rest_counts, "rest")
     for load in loads:
         if load.read.mean.shape != rest.mean.shape:

@@ -24,7 +24,7 @@ _TINY_N = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fitted:
+class FittedLaw:
     """Laws of T tactels."""
 
     gain_s: Array  #: (T,) S at 1 N above the break force
@@ -42,7 +42,7 @@ def law_s(force_n: Array, gain_s: Array, exponent: Array, break_n: Array) -> Arr
 
 
 def fitted(force_n: Array, read_s: Array, error_s: Array, used: NDArray[np.bool_],
-           preloaded: NDArray[np.bool_]) -> Fitted:  # fmt: skip
+           preloaded: NDArray[np.bool_]) -> FittedLaw:  # fmt: skip
     """Fit the law of every tactel.
 
     Parameters
@@ -80,7 +80,7 @@ def fitted(force_n: Array, read_s: Array, error_s: Array, used: NDArray[np.bool_
     freedom = np.maximum(used.sum(axis=0) - 3, 1)
     scatter = np.sqrt((residual[:-1] ** 2).sum(axis=0) / freedom)
     covariance = np.linalg.inv(normal) * np.maximum(scatter, 1.0)[:, None, None] ** 2
-    return Fitted(np.exp(theta[:, 0]), theta[:, 1], theta[:, 2], covariance, scatter)
+    return FittedLaw(np.exp(theta[:, 0]), theta[:, 1], theta[:, 2], covariance, scatter)
 
 
 def _started(force: Array, read: Array, weight: Array, firm: NDArray[np.bool_], least: Array,

@@ -15,7 +15,7 @@ from probe.errors import CalibrationError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Load:
+class CalibrationLoad:
     """Frames under one steady load."""
 
     name: str
@@ -23,7 +23,7 @@ class Load:
     forces_n: NDArray[np.float64]  #: (rows, columns) N on each tactel
 
 
-def known_load(counts: ArrayLike, forces_n: ArrayLike, name: str = "") -> Load:
+def known_load(counts: ArrayLike, forces_n: ArrayLike, name: str = "") -> CalibrationLoad:
     """Return a load whose force on each tactel is known.
 
     Parameters
@@ -49,12 +49,12 @@ def known_load(counts: ArrayLike, forces_n: ArrayLike, name: str = "") -> Load:
             "below 0, or no numbers",
             fix="give the force on every tactel, N",
         )
-    return Load(label, read, forces)
+    return CalibrationLoad(label, read, forces)
 
 
 def even_load(
     counts: ArrayLike, total_n: float, footprint: ArrayLike | None = None, name: str = ""
-) -> Load:
+) -> CalibrationLoad:
     """Return a load of known total force, even over its footprint.
 
     Parameters

@@ -13,14 +13,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.calibration.law import EXPONENTS, Fitted
+from probe.calibration.law import EXPONENTS, FittedLaw
 
 TACTELS = 24  #: least number that tells a spread
 _FLOOR = np.array([0.02, 0.005, 0.001])  # ln gain, exponent, N: no sensor is more even
 _OUTLYING = 4.0  # robust deviations; what lies farther out is not pooled
 
 
-def pooled(law: Fitted, alike: NDArray[np.bool_]) -> Fitted:
+def pooled(law: FittedLaw, alike: NDArray[np.bool_]) -> FittedLaw:
     """Draw laws together as far as their own loads leave open.
 
     Parameters

@@ -11,7 +11,7 @@ inverse      counts -> conductances, and what is lost
 """
 
 from probe.circuit.electronics import QUIET, Electronics, Noise, Readout
-from probe.circuit.fsr import Fsr, State, conductances, fsr_of
+from probe.circuit.fsr import FilmState, Fsr, conductances, fsr_of
 from probe.circuit.inverse import Inverted, inverted
 from probe.circuit.network import effective_resistances, transconductances
 from probe.circuit.reading import read_counts, read_sequence
@@ -22,12 +22,12 @@ __all__ = [
     "MEASURED",
     "QUIET",
     "Electronics",
+    "FilmState",
     "Fsr",
     "Inverted",
     "Noise",
     "Readout",
     "Spread",
-    "State",
     "conductances",
     "drawn",
     "effective_resistances",

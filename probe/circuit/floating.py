@@ -40,7 +40,7 @@ _HALVINGS = 40
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Solved:
+class FloatingSolution:
     """A network found from its resistances."""
 
     conductance_s: Image  #: (rows, columns) S, 0 or more
@@ -49,7 +49,7 @@ class Solved:
     steps: int
 
 
-def solved(resistance_ohm: Image, tolerance: float = 1e-9) -> Solved:
+def solved(resistance_ohm: Image, tolerance: float = 1e-9) -> FloatingSolution:
     """Find the conductances of a network from all its resistances.
 
     Parameters
@@ -83,7 +83,7 @@ def solved(resistance_ohm: Image, tolerance: float = 1e-9) -> Solved:
         misfit = float(np.abs(gradient[free]).max(initial=0.0))
         if (np.abs(move) <= tolerance * y).all() or misfit <= 64 * EPSILON:
             conductance = y.reshape(shape) / measured / scale
-            return Solved(conductance, y.reshape(shape), hessian, steps)
+            return FloatingSolution(conductance, y.reshape(shape), hessian, steps)
         y, network = _searched(y, move, gradient, network, measured)
     raise CircuitError(
         f"the network did not settle in {STEPS} steps; misfit {misfit:.1e}",

@@ -3,7 +3,7 @@
 Above a break force the conductance rises with a power of the force; a series resistance
 bounds it. On the way back a tactel reads higher than on the way up (rate independent
 hysteresis: a play operator that widens with the force), and under a load it creeps by a
-share per decade of time. Both are in `State`, a value that goes in and comes out.
+share per decade of time. Both are in `FilmState`, a value that goes in and comes out.
 
     g0 = gain (e - break)^exponent (1 + drift log10(1 + age / 1 s)),  e in N,
     g  = leak + 1 / (1 / g0 + series),
@@ -76,7 +76,7 @@ class Fsr:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class State:
+class FilmState:
     """What the tactels remember from one frame to the next; shape of the forces."""
 
     effective_n: Image  #: N, the force that the film shows (play operator)
@@ -91,8 +91,8 @@ def fsr_of(rows: int = 16, columns: int = 16) -> Fsr:
 
 
 def conductances(
-    fsr: Fsr, forces_n: ArrayLike, state: State | None = None, elapsed_s: float = 0.0
-) -> tuple[Image, State]:
+    fsr: Fsr, forces_n: ArrayLike, state: FilmState | None = None, elapsed_s: float = 0.0
+) -> tuple[Image, FilmState]:
     """Return the conductance of every tactel, and what it remembers.
 
     Parameters
@@ -118,7 +118,7 @@ def conductances(
     force = checked_forces(fsr, forces_n) + fsr.preload_n
     if state is None:
         nothing = np.zeros(force.shape)
-        state = State(nothing, nothing, nothing)
+        state = FilmState(nothing, nothing, nothing)
     elif state.effective_n.shape != force.shape:
         raise CircuitError(
             f"the state has shape {state.effective_n.shape}, the forces {force.shape}",
@@ -132,7 +132,7 @@ def conductances(
     film = film_conductances(fsr, effective) * crept
     shown = np.where(fsr.dead, fsr.leak_s, fsr.leak_s + film / (1.0 + film * fsr.series_ohm))
     shown = np.where(fsr.stuck_s > 0, fsr.stuck_s, shown)
-    return shown, State(effective, age, state.flutter)
+    return shown, FilmState(effective, age, state.flutter)
 
 
 def film_conductances(fsr: Fsr, effective_n: Image) -> Image:

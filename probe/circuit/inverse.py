@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from probe.circuit.electronics import Electronics
-from probe.circuit.floating import Solved, solved
+from probe.circuit.floating import FloatingSolution, solved
 from probe.circuit.fsr import Image
 from probe.circuit.network import transconductances, transfers
 from probe.circuit.readout import unscanned
@@ -196,7 +196,9 @@ def _floating(share: Image, spread: Image, e: Electronics) -> Inverted:
     return Inverted(g, sigma, lost, rank)
 
 
-def _determined(found: Solved, relative: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
+def _determined(
+    found: FloatingSolution, relative: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], int]:
     """Return the deviation of y = gR, and how many of its directions the readings determine.
 
     Readings with relative errors `relative` and the bounds 0 <= y <= 1 (as an even prior,

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from probe.circuit.electronics import Electronics
-from probe.circuit.fsr import Fsr, Image, State, checked_forces, conductances
+from probe.circuit.fsr import FilmState, Fsr, Image, checked_forces, conductances
 from probe.circuit.readout import scanned, shares
 from probe.errors import CircuitError
 
@@ -25,10 +25,10 @@ def read_counts(
     forces_n: ArrayLike,
     electronics: Electronics,
     fsr: Fsr,
-    state: State | None,
+    state: FilmState | None,
     rng: np.random.Generator,
     elapsed_s: float | None = None,
-) -> tuple[Counts, State]:
+) -> tuple[Counts, FilmState]:
     """Read a frame.
 
     Parameters
@@ -68,16 +68,16 @@ def read_counts(
     flutter = _fluttered(now.flutter, electronics, fresh, passed, rng)
     offered = scanned(shares(conductance, electronics), electronics) * electronics.full
     counts = _sampled(offered, flutter, electronics, rng)
-    return counts, State(now.effective_n, now.age_s, flutter)
+    return counts, FilmState(now.effective_n, now.age_s, flutter)
 
 
 def read_sequence(
     forces_n: ArrayLike,
     electronics: Electronics,
     fsr: Fsr,
-    state: State | None,
+    state: FilmState | None,
     rng: np.random.Generator,
-) -> tuple[Counts, State]:
+) -> tuple[Counts, FilmState]:
     """Read frames that follow each other at the board's frame time; see `read_counts`.
 
     Parameters

@@ -31,7 +31,7 @@ _NUMBERS, _TIMES = 1 << 16, 1 << 32
 _SLACK = 64  #: frames by which number and time may disagree
 
 
-class Order:
+class FrameOrder:
     """State between packets. Call `take` for every packet, `fail` for every failed block."""
 
     def __init__(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from probe.client.order import Order
+from probe.client.order import FrameOrder
 from probe.client.statistics import ClientStatistics
 from probe.frame import Frame
 from probe.protocol import (
@@ -27,7 +27,7 @@ class Receiver:
         self.packets = 0
         self.torn = False  #: whether the last block was no packet
         self.frames = 0
-        self._order = Order()
+        self._order = FrameOrder()
         self._times_ns: deque[int] = deque(maxlen=64)
         self.reopened()
 

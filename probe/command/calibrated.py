@@ -21,7 +21,7 @@ from probe.calibration import (
     write_calibration,
 )
 from probe.calibration.average import averaged
-from probe.calibration.condition import Thresholds, common_bias, raised
+from probe.calibration.condition import ConditionThresholds, common_bias, raised
 from probe.circuit import Electronics
 from probe.command.laws import condition_map, described, places
 from probe.command.listen import Counts, frames_of
@@ -43,7 +43,7 @@ def report_bias(
     """Say what an unloaded sensor reads; returns the exit code."""
     counts, name = frames_of(source, sensor, seconds)
     rest = averaged(counts, source)
-    high = raised(rest, _FULL, Thresholds())
+    high = raised(rest, _FULL, ConditionThresholds())
     values: dict[str, Any] = {
         "source": source,
         "sensor": name,

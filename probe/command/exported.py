@@ -17,7 +17,7 @@ from probe.recording.read import Recording
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class PictureView:
     """Which image a picture shows, and how."""
 
     frame: int = 0
@@ -31,7 +31,7 @@ def export_files(
     csv: Path | None,
     npy: Path | None,
     png: Path | None,
-    view: View,
+    view: PictureView,
     *,
     calibration: Path | None,
     live: bool,
@@ -97,7 +97,7 @@ def calibration_for(path: Path, recording: Recording) -> Calibration:
     return known
 
 
-def _picture(recording: Recording, out: Path, view: View, known: Calibration | None) -> None:
+def _picture(recording: Recording, out: Path, view: PictureView, known: Calibration | None) -> None:
     from probe.plot.frame import frame_picture
 
     if view.frame >= len(recording):

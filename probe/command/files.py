@@ -45,13 +45,13 @@ def export(
     """Write a recording as a table, as an array, or one of its images as a picture."""
 
     def action() -> int:
-        from probe.command.exported import View, export_files
+        from probe.command.exported import PictureView, export_files
 
         if csv is None and npy is None and png is None:
             raise typer.BadParameter("nothing to write: give --csv, --npy or --png")
         if calibration is not None and csv is not None:
             raise typer.BadParameter("--csv holds counts; --calibration is for --npy and --png")
-        view = View(frame, median, azimuth, elevation)
+        view = PictureView(frame, median, azimuth, elevation)
         return export_files(
             recording, csv, npy, png, view, calibration=calibration, live=live, replace=replace,
             as_json=as_json,

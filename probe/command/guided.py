@@ -32,7 +32,7 @@ _STEADY = 0.05  # share by which a load may change while it is read
 
 
 @dataclass(frozen=True, slots=True)
-class Bench:
+class CalibrationBench:
     """What the steps share."""
 
     url: str
@@ -68,7 +68,7 @@ def guide(
     folder.mkdir(parents=True, exist_ok=True)
     refuse_taken(folder / LIST, ".csv", replace=replace)
     with Stream(url, sensor=sensor) as stream:
-        bench = Bench(url, stream, folder, seconds, name_of(stream.ident(), url))
+        bench = CalibrationBench(url, stream, folder, seconds, name_of(stream.ident(), url))
         message(f"{bench.sensor or url}; recordings go to {folder}")
         given: list[Given] = []
         rest: Counts | None = None
@@ -91,7 +91,7 @@ def guide(
 
 
 def _step(
-    bench: Bench, force: float, rest: Counts | None, done: int, steps: int
+    bench: CalibrationBench, force: float, rest: Counts | None, done: int, steps: int
 ) -> tuple[Given, Counts]:
     """Have one load put on, record it, and say how it was felt; again if the operator wants."""
     what = f"put {force:g} N on the whole sensor, evenly" if force else "unload the sensor"
@@ -104,7 +104,7 @@ def _step(
             return Given(path, force), counts
 
 
-def _recorded(bench: Bench, path: Path) -> Counts:
+def _recorded(bench: CalibrationBench, path: Path) -> Counts:
     """Record what is on the sensor now."""
     stream, frames = bench.stream, list[Frame]()
     while stream.take(0.0):

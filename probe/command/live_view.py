@@ -34,7 +34,7 @@ BOLD, DIM, YELLOW, RED = map(Style.parse, ("bold", "dim", "yellow", "bold red"))
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
+class LivePicture:
     """Lines of pieces of text; cheaper to draw than tables."""
 
     lines: list[list[Segment]]
@@ -54,7 +54,7 @@ def rendered(
     *,
     height: int,
     colours: bool,
-) -> Picture:
+) -> LivePicture:
     """Return the whole view.
 
     Parameters
@@ -81,7 +81,7 @@ def rendered(
         lines.append([*left, Segment(" " * GAP), *(numbers[i] if i < len(numbers) else ())])
     lines += [_legend(state, colours), [Segment(KEYS, DIM)]]
     lines += [[Segment(text, YELLOW)] for text in wrap(state.notice, len(KEYS))]
-    return Picture(lines)
+    return LivePicture(lines)
 
 
 def heat_map(share: NDArray[np.float64], *, small: bool, colours: bool) -> list[list[Segment]]:

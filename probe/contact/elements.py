@@ -25,7 +25,7 @@ from probe.contact.elements_seen import heights_at, refuse_unseen
 from probe.contact.elements_unilateral import rest, tips
 from probe.errors import ContactError
 from probe.sensor import SensorType
-from probe.surface.contract import Surface
+from probe.surface.contract import HeightMap
 
 STEEPEST_RAD = 0.35  #: tilts beyond are not small
 KEPT = 2  #: condensed pads
@@ -38,7 +38,7 @@ FINER = 1.6  #: elements get thinner towards the top, by this power
 
 
 def elements(
-    surface: Surface,
+    surface: HeightMap,
     sensor: SensorType,
     touch: Touch,
     *,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from probe.contact.contract import Touch
 from probe.contact.elements_line import Array
 from probe.errors import ContactError
-from probe.surface.contract import Surface
+from probe.surface.contract import HeightMap
 
 Value = TypeVar("Value", np.float64, np.bool_)
 
@@ -25,7 +25,7 @@ LINES = 70  #: each way, at most
 COVERED = 0.25  #: of the place of a node that bears alone: less is not the node's to bear
 
 
-def heights_at(surface: Surface, touch: Touch, points: Array) -> Array:
+def heights_at(surface: HeightMap, touch: Touch, points: Array) -> Array:
     """Return heights (n,) at points (n, 2) of the sensor frame.
 
     Raises
@@ -43,7 +43,7 @@ def heights_at(surface: Surface, touch: Touch, points: Array) -> Array:
 
 
 def refuse_unseen(
-    surface: Surface,
+    surface: HeightMap,
     touch: Touch,
     lines: tuple[Array, Array],
     heights_mm: Array,

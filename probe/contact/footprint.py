@@ -12,18 +12,18 @@ import math
 import numpy as np
 
 from probe.contact.contract import Contact, Touch
-from probe.contact.plate import Pose, checked_load, load_of
+from probe.contact.plate import PlatePose, checked_load, load_of
 from probe.contact.tabs import asked
 from probe.contact.tips import Tips, tip_points
 from probe.errors import ContactError
 from probe.sensor import SensorType
-from probe.surface.contract import Surface
+from probe.surface.contract import HeightMap
 
 DEPTH = 0.25  #: of the overlay's height, down to which the surface counts as touched
 
 
 def footprint(
-    surface: Surface,
+    surface: HeightMap,
     sensor: SensorType,
     touch: Touch,
     tips: Tips | None = None,
@@ -67,7 +67,7 @@ def footprint(
     if not 0 <= depth < math.inf:
         raise ContactError(f"a depth of {depth:g} mm", fix="give a finite depth >= 0")
     points, drop = tip_points(sensor, tips or _PLAIN)
-    unloaded = Pose(0.0, touch.tilt_x_rad, touch.tilt_y_rad)
+    unloaded = PlatePose(0.0, touch.tilt_x_rad, touch.tilt_y_rad)
     level = asked(surface, touch, points) - drop - unloaded.heights_mm(points)
     highest = float(level.max())
     cover = (level >= highest - depth).mean(axis=1)

@@ -22,13 +22,13 @@ from probe.contact.layer_descent import descended
 from probe.contact.layer_influence import Influence, influence
 from probe.contact.layer_kernel import layer_compliance
 from probe.contact.layer_levels import Levels, Look, leveled
-from probe.contact.layer_patch import Patch, centres_mm, patch_under
+from probe.contact.layer_patch import LayerPatch, centres_mm, patch_under
 from probe.contact.layer_solve import plate_of
 from probe.contact.neo_hooke import Linear
-from probe.contact.plate import Pose, load_of, rest
+from probe.contact.plate import PlatePose, load_of, rest
 from probe.errors import ContactError
 from probe.sensor import SensorType
-from probe.surface.contract import Surface
+from probe.surface.contract import HeightMap
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ _HELD_RAD = 1e-4  # the same for the last, where the plate was held
 
 
 def layer(
-    surface: Surface,
+    surface: HeightMap,
     sensor: SensorType,
     touch: Touch,
     *,
@@ -85,7 +85,7 @@ def layer(
     return press_patch(patch, touch)
 
 
-def press_patch(patch: Patch, touch: Touch) -> Contact:
+def press_patch(patch: LayerPatch, touch: Touch) -> Contact:
     """Press the pad on a patch; x, y and theta of the touch are those of the patch.
 
     Parameters, returned value and errors as for `layer`.
@@ -111,7 +111,7 @@ def press_patch(patch: Patch, touch: Touch) -> Contact:
     )
 
 
-def _settled(patch: Patch, grid: Influence, touch: Touch) -> tuple[Pressed, Pose]:
+def _settled(patch: LayerPatch, grid: Influence, touch: Touch) -> tuple[Pressed, PlatePose]:
     """Return the contact and the plate at rest.
 
     Cells and points far below the foreseen plate are left out. Those that turn out to be run
@@ -131,8 +131,8 @@ def _settled(patch: Patch, grid: Influence, touch: Touch) -> tuple[Pressed, Pose
         pressed, held = _pressed(levels, touch)
         turn = float(np.abs(pressed.plate[1:]).max()) / levels.reach_mm
         b = min(1.0, FARTHEST_RAD / max(turn, 1e-300)) * pressed.plate
-        moved = Pose(float(b[0]), float(b[1]) / levels.reach_mm, float(b[2]) / levels.reach_mm)
-        pose = Pose(
+        moved = PlatePose(float(b[0]), float(b[1]) / levels.reach_mm, float(b[2]) / levels.reach_mm)
+        pose = PlatePose(
             pose.z_mm + moved.z_mm,
             pose.tilt_x_rad + moved.tilt_x_rad,
             pose.tilt_y_rad + moved.tilt_y_rad,
@@ -166,7 +166,7 @@ def _pressed(levels: Levels, touch: Touch) -> tuple[Pressed, bool]:
     return descended(pressed, plate.held(levels.reach_mm)), True
 
 
-def _foreseen(patch: Patch, touch: Touch) -> tuple[Pose, float]:
+def _foreseen(patch: LayerPatch, touch: Touch) -> tuple[PlatePose, float]:
     """Return about where the plate comes to rest, and how deep (mm) it stands in the pad.
 
     The plate is put on springs that do not know of each other: about what a stroke of one
@@ -186,11 +186,11 @@ def _foreseen(patch: Patch, touch: Touch) -> tuple[Pose, float]:
     return pose, float((heights - pose.heights_mm(points)).max())
 
 
-def _turn(pose: Pose) -> float:
+def _turn(pose: PlatePose) -> float:
     return max(abs(pose.tilt_x_rad), abs(pose.tilt_y_rad))
 
 
-def _refuse_steep(pose: Pose) -> None:
+def _refuse_steep(pose: PlatePose) -> None:
     turn = _turn(pose)
     if turn > STEEPEST_RAD:
         raise ContactError(
@@ -219,7 +219,7 @@ def _refuse_deep(pressed: Pressed, sunk_mm: Array, deepest_mm: float, touch: Tou
         )
 
 
-def _refuse_thin(patch: Patch, pose: Pose, sunk_mm: Array) -> None:
+def _refuse_thin(patch: LayerPatch, pose: PlatePose, sunk_mm: Array) -> None:
     """Refuse strokes whose cover is chance: met by one point of a cell here and there.
 
     Counted are cells in touch, and on a step: points of theirs stand out by more than points

@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.contact.layer_levels import Levels
-from probe.contact.layer_solve import Plate, glued, solved
+from probe.contact.layer_solve import RigidPlate, glued, solved
 
 Array = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ class Pressed:
     converged: bool
 
 
-def equilibrium(levels: Levels, plate: Plate) -> Pressed:
+def equilibrium(levels: Levels, plate: RigidPlate) -> Pressed:
     """Return the contact in equilibrium, or the last iterate if the sets come again.
 
     Parameters

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from probe.contact.layer_active_set import Pressed, deep_mm
 from probe.contact.layer_levels import Levels
-from probe.contact.layer_solve import Plate, answers, glued, pseudo_inverse
+from probe.contact.layer_solve import RigidPlate, answers, glued, pseudo_inverse
 from probe.errors import ContactError
 
 Array = NDArray[np.float64]
@@ -93,7 +93,7 @@ class _Springs:
         raise _no_rest()
 
 
-def descended(begun: Pressed, plate: Plate) -> Pressed:
+def descended(begun: Pressed, plate: RigidPlate) -> Pressed:
     """Return the contact in equilibrium, begun at the plane of the levels.
 
     Raises

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.contact.layer_influence import Influence
-from probe.contact.layer_patch import Cells, Patch, centres_mm, lattice
-from probe.contact.plate import Pose
+from probe.contact.layer_patch import Cells, LayerPatch, centres_mm, lattice
+from probe.contact.plate import PlatePose
 
 Array = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ class Levels:
     """Depths are seen from a plane: the height of the surface minus the height of the plane."""
 
     grid: Influence
-    plane: Pose
+    plane: PlatePose
     cells: Cells  #: (n,) cells of the grid that meet matter, flat numbers, ascending
     levers: Array  #: (3, n) R = [1, y/L, -x/L] at their centres
     shares: Array  #: (levels, n) of the bell, their sum is at most 1
@@ -59,10 +59,10 @@ class Levels:
 class Look:
     """What was looked at: matter that stands over a plane that lies deeper by the floor."""
 
-    plane: Pose  #: about where the plate comes to rest
+    plane: PlatePose  #: about where the plate comes to rest
     floor_mm: float  #: seen from the plane, <= 0
 
-    def depths_mm(self, patch: Patch) -> Array:
+    def depths_mm(self, patch: LayerPatch) -> Array:
         """Return how high the points (samples, cells) of a patch stand over the plane."""
         plane = self.plane
         depths = patch.heights_mm - plane.heights_mm(patch.centres_mm[patch.cells])
@@ -70,7 +70,7 @@ class Look:
         return depths
 
 
-def leveled(patch: Patch, grid: Influence, look: Look, earlier: Sequence[Look] = ()) -> Levels:
+def leveled(patch: LayerPatch, grid: Influence, look: Look, earlier: Sequence[Look] = ()) -> Levels:
     """Return the levels of the cells of a patch that were sampled in full.
 
     Parameters

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from probe.contact.contract import Touch
 from probe.errors import ContactError
 from probe.sensor import SensorType
-from probe.surface.contract import Surface
+from probe.surface.contract import HeightMap
 
 Array = NDArray[np.float64]
 Cells = NDArray[np.intp]
@@ -33,10 +33,10 @@ _SEARCH_LINES = 16  # across the matrix, each way
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Patch:
+class LayerPatch:
     """What lies under the matrix: cells in flat numbers, row * columns + column, row 0 on top."""
 
-    surface: Surface
+    surface: HeightMap
     sensor: SensorType
     touch: Touch  #: its x, y and theta; force, tilt and wrist have no meaning here
     cells_per_tactel: int
@@ -63,7 +63,7 @@ class Patch:
         """Centres (all cells, 2) of the cells, sensor frame."""
         return centres_mm(*self.shape, self.dx_mm)
 
-    def with_cells(self, cells: Cells) -> Patch:
+    def with_cells(self, cells: Cells) -> LayerPatch:
         """Return the patch with these cells sampled as well."""
         new = np.setdiff1d(cells, self.cells, assume_unique=True)
         if not len(new):
@@ -85,13 +85,13 @@ class Patch:
 
 
 def patch_under(
-    surface: Surface,
+    surface: HeightMap,
     sensor: SensorType,
     touch: Touch,
     *,
     cells_per_tactel: int = 4,
     samples: int = 16,
-) -> Patch:
+) -> LayerPatch:
     """Return the first look at what lies under the matrix; no cell is sampled in full yet.
 
     Parameters
@@ -123,7 +123,7 @@ def patch_under(
     high = _spread(highest.reshape(shape), np.maximum)
     low = _spread(coarse.min(axis=0).reshape(shape), np.minimum)
     _refuse_hidden(surface, sensor, touch, high, low, dx / samples)
-    return Patch(
+    return LayerPatch(
         surface=surface,
         sensor=sensor,
         touch=touch,
@@ -161,7 +161,7 @@ def lattice(samples: int) -> Array:
     return (np.stack([i, best], axis=-1) + 0.5) / samples - 0.5
 
 
-def _heights(surface: Surface, touch: Touch, points: Array) -> Array:
+def _heights(surface: HeightMap, touch: Touch, points: Array) -> Array:
     """Return heights (...) at points (..., 2) of the sensor frame."""
     asked = touch.on_surface(points.reshape(-1, 2))
     heights = np.asarray(surface.heights_mm(asked), np.float64)
@@ -174,7 +174,7 @@ def _heights(surface: Surface, touch: Touch, points: Array) -> Array:
 
 
 def _refuse_hidden(
-    surface: Surface, sensor: SensorType, touch: Touch, high: Array, low: Array, finest_mm: float
+    surface: HeightMap, sensor: SensorType, touch: Touch, high: Array, low: Array, finest_mm: float
 ) -> None:
     """Refuse a surface whose top is under the matrix and was seen by no point.
 

@@ -34,7 +34,7 @@ _SINGULAR = 1e-13  # eigenvalue of the plate's scaled system, of the largest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Plate:
+class RigidPlate:
     """How the wrist holds the plate, seen from the plane of `Levels`; turns times the reach."""
 
     force_n: float
@@ -51,13 +51,13 @@ class Plate:
         """(3,) K with 0 where the plate is held fast."""
         return np.where(self.free, self.stiffness, 0.0)
 
-    def held(self, by_mm: float) -> Plate:
+    def held(self, by_mm: float) -> RigidPlate:
         """Return the plate held to the plane as well: by its force, where it is `by_mm` off."""
         whole = self.stiffness + np.array([0.0, 1.0, 1.0]) * (self.force_n / by_mm)
         start = self.start.copy()
         turns = np.flatnonzero(self.free)[1:]
         start[turns] *= self.stiffness[turns] / whole[turns]
-        return Plate(self.force_n, start, whole)
+        return RigidPlate(self.force_n, start, whole)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,13 +85,13 @@ class Glued:
         return sunk
 
 
-def plate_of(touch: Touch, levels: Levels) -> Plate:
+def plate_of(touch: Touch, levels: Levels) -> RigidPlate:
     """Return what holds the plate of a touch."""
     plane, reach = levels.plane, levels.reach_mm
     turns = touch.tilt_x_rad - plane.tilt_x_rad, touch.tilt_y_rad - plane.tilt_y_rad
     stiffness = np.array([0.0, touch.wrist.tilt_x_nmm_rad, touch.wrist.tilt_y_nmm_rad])
     start = np.array([0.0, turns[0] * reach, turns[1] * reach])
-    return Plate(touch.force_n, start, stiffness / reach**2)
+    return RigidPlate(touch.force_n, start, stiffness / reach**2)
 
 
 def glued(levels: Levels, touching: NDArray[np.bool_]) -> Glued:
@@ -106,7 +106,7 @@ def glued(levels: Levels, touching: NDArray[np.bool_]) -> Glued:
 
 
 def solved(
-    system: Glued, plate: Plate, pressures: Array, b: Array, tolerance: float
+    system: Glued, plate: RigidPlate, pressures: Array, b: Array, tolerance: float
 ) -> tuple[Array, Array]:
     """Return pressures (of all cells of the levels,) and plate (3,) in balance.
 

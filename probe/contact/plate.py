@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.neo_hooke import Law
-from probe.contact.plate_newton import MOST_STEPS, Columns, Problem, newton
+from probe.contact.plate_newton import MOST_STEPS, Columns, PlateProblem, newton
 from probe.errors import ContactError
 
 Array = NDArray[np.float64]
@@ -40,7 +40,7 @@ _SLACK = 1e-12  # of the half width, by which a centre of pressure may miss the 
 
 
 @dataclass(frozen=True, slots=True)
-class Load:
+class PlateLoad:
     """What acts on the plate at the centre of its frame."""
 
     force_n: float  #: along -z
@@ -52,7 +52,7 @@ class Load:
 
 
 @dataclass(frozen=True, slots=True)
-class Pose:
+class PlatePose:
     """Where the plate stands."""
 
     z_mm: float  #: height of its centre over the surface frame
@@ -67,29 +67,29 @@ class Pose:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rest:
+class PlateRest:
     """The plate at rest."""
 
-    pose: Pose
+    pose: PlatePose
     forces_n: Array  #: (n,) at every point
     iterations: int
 
 
-def load_of(touch: Touch) -> Load:
+def load_of(touch: Touch) -> PlateLoad:
     """Return what a touch asks of the plate."""
-    return Load(touch.force_n, touch.wrist, touch.tilt_x_rad, touch.tilt_y_rad)
+    return PlateLoad(touch.force_n, touch.wrist, touch.tilt_x_rad, touch.tilt_y_rad)
 
 
 def rest(
     points_mm: Array,
     heights_mm: Array,
     law: Law,
-    load: Load,
+    load: PlateLoad,
     *,
     columns: Columns | None = None,
-    foreseen: Pose | None = None,
+    foreseen: PlatePose | None = None,
     tolerance: float = 1e-12,
-) -> Rest:
+) -> PlateRest:
     """Return where the plate comes to rest.
 
     Parameters
@@ -119,8 +119,8 @@ def rest(
     """
     checked_load(load)
     if load.force_n == 0:
-        free = Pose(math.inf, load.tilt_x_rad, load.tilt_y_rad)
-        return Rest(free, np.zeros(heights_mm.shape), 0)
+        free = PlatePose(math.inf, load.tilt_x_rad, load.tilt_y_rad)
+        return PlateRest(free, np.zeros(heights_mm.shape), 0)
     if not heights_mm.max(initial=-math.inf) > -math.inf:
         raise ContactError(
             f"there is nothing under the plate to bear {load.force_n:g} N",
@@ -131,17 +131,17 @@ def rest(
     a = np.zeros(3)
     a[problem.free] = state.a
     half = problem.half_mm
-    pose = Pose(
+    pose = PlatePose(
         z_mm=problem.datum_mm - float(a[0]),
         tilt_x_rad=load.tilt_x_rad - float(a[1]) / half,
         tilt_y_rad=load.tilt_y_rad - float(a[2]) / half,
     )
     if iterations is None:
         raise _restless(pose, load)
-    return Rest(pose, state.force, iterations)
+    return PlateRest(pose, state.force, iterations)
 
 
-def _restless(pose: Pose, load: Load) -> ContactError:
+def _restless(pose: PlatePose, load: PlateLoad) -> ContactError:
     turned = math.hypot(pose.tilt_x_rad - load.tilt_x_rad, pose.tilt_y_rad - load.tilt_y_rad)
     if turned > _FAR_TURNED_RAD:
         return ContactError(
@@ -154,7 +154,7 @@ def _restless(pose: Pose, load: Load) -> ContactError:
     )
 
 
-def checked_load(load: Load) -> None:
+def checked_load(load: PlateLoad) -> None:
     """Refuse a load that is no number, presses upward, or is held by less than nothing."""
     given = (load.force_n, load.tilt_x_rad, load.tilt_y_rad, load.moment_x_nmm, load.moment_y_nmm)
     if not all(map(math.isfinite, given)) or load.force_n < 0:
@@ -177,7 +177,9 @@ def checked_load(load: Load) -> None:
         )
 
 
-def _posed(points: Array, heights: Array, law: Law, columns: Columns | None, load: Load) -> Problem:
+def _posed(
+    points: Array, heights: Array, law: Law, columns: Columns | None, load: PlateLoad
+) -> PlateProblem:
     x, y = points.T
     half = float(np.abs(points).max()) or 1.0
     stiffness = np.array([0.0, load.wrist.tilt_x_nmm_rad, load.wrist.tilt_y_nmm_rad])
@@ -191,7 +193,7 @@ def _posed(points: Array, heights: Array, law: Law, columns: Columns | None, loa
     rows[0] = 1.0
     np.divide(y, half, out=rows[1])
     np.divide(x, -half, out=rows[2])
-    return Problem(
+    return PlateProblem(
         rows=rows if len(free) == 3 else rows[free],
         heights=level - datum,
         law=law,
@@ -236,7 +238,7 @@ def _within_hull(points: Array, at: Array, slack: float) -> bool:
     return bool(gaps.max() <= math.pi + 1e-9)
 
 
-def _unknowns(problem: Problem, load: Load, pose: Pose | None) -> Array:
+def _unknowns(problem: PlateProblem, load: PlateLoad, pose: PlatePose | None) -> Array:
     """Return the unknowns of a pose, by default first touch."""
     if pose is None:
         return np.zeros(len(problem.f))

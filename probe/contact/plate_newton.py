@@ -42,7 +42,7 @@ class Columns:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Problem:
+class PlateProblem:
     """A plate, its tips and its load, in scaled unknowns."""
 
     rows: Array  # transpose of R, (m, n), m <= 3 free unknowns
@@ -57,7 +57,7 @@ class Problem:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class State:
+class NewtonState:
     """Where the plate and the columns stand, and how far from balance."""
 
     a: Array  # (m,)
@@ -70,7 +70,7 @@ class State:
     unbalance: Array  # (g,) gradient of Phi by v
 
 
-def newton(problem: Problem, a: Array, tolerance: float) -> tuple[State, int | None]:
+def newton(problem: PlateProblem, a: Array, tolerance: float) -> tuple[NewtonState, int | None]:
     """Return the state at rest, begun at unknowns `a`, and the steps taken; None: no rest."""
     state = _begun(problem, a)
     for iteration in range(MOST_STEPS + 1):
@@ -80,7 +80,7 @@ def newton(problem: Problem, a: Array, tolerance: float) -> tuple[State, int | N
     return state, None
 
 
-def _begun(problem: Problem, a: Array) -> State:
+def _begun(problem: PlateProblem, a: Array) -> NewtonState:
     """Return the state to begin with: the unknowns, withdrawn to within the laws' limits."""
     columns, limit = problem.columns, problem.law.limit_mm
     whole = limit if columns is None else limit + columns.law.limit_mm
@@ -97,7 +97,7 @@ def _begun(problem: Problem, a: Array) -> State:
     return _at(problem, a, np.minimum(v, _NEAR_LIMIT * columns.law.limit_mm))
 
 
-def _at(problem: Problem, a: Array, v: Array) -> State:
+def _at(problem: PlateProblem, a: Array, v: Array) -> NewtonState:
     """Evaluate forces, tangents and gradient."""
     columns = problem.columns
     compression = a @ problem.rows
@@ -108,13 +108,13 @@ def _at(problem: Problem, a: Array, v: Array) -> State:
     tangent = tangent * (compression > 0)
     gradient = problem.rows @ force + problem.K * a - problem.f
     if columns is None:
-        return State(a, v, compression, force, tangent, _NONE, gradient, _NONE)
+        return NewtonState(a, v, compression, force, tangent, _NONE, gradient, _NONE)
     unbalance, behind = columns.law(v)
     unbalance -= np.add.reduceat(force, columns.starts)
-    return State(a, v, compression, force, tangent, behind, gradient, unbalance)
+    return NewtonState(a, v, compression, force, tangent, behind, gradient, unbalance)
 
 
-def _resting(problem: Problem, state: State, tolerance: float) -> bool:
+def _resting(problem: PlateProblem, state: NewtonState, tolerance: float) -> bool:
     """Tell whether what is left of the forces is below tolerance or rounding."""
     # Three numbers are sooner done without arrays.
     moved: list[float] = [abs(a) for a in state.a.tolist()]
@@ -129,7 +129,7 @@ def _resting(problem: Problem, state: State, tolerance: float) -> bool:
     return float(np.abs(state.unbalance).max(initial=0.0)) <= allowed
 
 
-def _step(problem: Problem, state: State) -> tuple[Array, Array]:
+def _step(problem: PlateProblem, state: NewtonState) -> tuple[Array, Array]:
     """Return Newton's step, or the way down the null space of a singular system."""
     columns = problem.columns
     weighted = problem.rows * state.tangent
@@ -185,7 +185,7 @@ def _eliminated(system: list[list[float]], right: list[float]) -> list[float] | 
     return right
 
 
-def _searched(problem: Problem, state: State, da: Array, dv: Array) -> State:
+def _searched(problem: PlateProblem, state: NewtonState, da: Array, dv: Array) -> NewtonState:
     """Return the state along a step where the slope has all but vanished."""
     rate = da @ problem.rows
     if problem.columns is not None:
@@ -212,7 +212,7 @@ def _searched(problem: Problem, state: State, da: Array, dv: Array) -> State:
     return found
 
 
-def _end(problem: Problem, state: State, rate: Array, dv: Array) -> float:
+def _end(problem: PlateProblem, state: NewtonState, rate: Array, dv: Array) -> float:
     """Return how far along a step the laws' limits lie."""
     fastest = 0.0
     limit = problem.law.limit_mm

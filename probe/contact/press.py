@@ -24,7 +24,7 @@ from importlib import resources
 from probe.contact.contract import Contact, Touch
 from probe.errors import ContactError
 from probe.sensor import SensorType
-from probe.surface.contract import Surface
+from probe.surface.contract import HeightMap
 
 #: "auto", the name of a level, or the largest error of an image.
 Accuracy = str | float
@@ -47,7 +47,7 @@ class Measured:
 
 
 def press(
-    surface: Surface, sensor: SensorType, touch: Touch, *, accuracy: Accuracy = "auto"
+    surface: HeightMap, sensor: SensorType, touch: Touch, *, accuracy: Accuracy = "auto"
 ) -> Contact:
     """Press the sensor on a surface.
 
@@ -136,32 +136,32 @@ def table() -> dict[str, tuple[Measured, ...]]:
     }
 
 
-def _footprint(surface: Surface, sensor: SensorType, touch: Touch) -> Contact:
+def _footprint(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
     from probe.contact.footprint import footprint
 
     return footprint(surface, sensor, touch)
 
 
-def _tabs(points: int, surface: Surface, sensor: SensorType, touch: Touch) -> Contact:
+def _tabs(points: int, surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
     from probe.contact.tabs import tabs
     from probe.contact.tips import Tips
 
     return tabs(surface, sensor, touch, Tips(points))
 
 
-def _layer(cells: int, surface: Surface, sensor: SensorType, touch: Touch) -> Contact:
+def _layer(cells: int, surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
     from probe.contact.layer import layer
 
     return layer(surface, sensor, touch, cells_per_tactel=cells)
 
 
-def _elements(surface: Surface, sensor: SensorType, touch: Touch) -> Contact:
+def _elements(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
     from probe.contact.elements import elements
 
     return elements(surface, sensor, touch)
 
 
-_MODELS: dict[str, Callable[[Surface, SensorType, Touch], Contact]] = {
+_MODELS: dict[str, Callable[[HeightMap, SensorType, Touch], Contact]] = {
     "footprint": _footprint,
     **{f"tabs-{points}": partial(_tabs, points) for points in (7, 19, 61)},
     **{f"layer-{cells}": partial(_layer, cells) for cells in (2, 4, 8, 16)},

@@ -21,14 +21,14 @@ from numpy.typing import NDArray
 
 from probe.contact.contract import Contact, Touch
 from probe.contact.neo_hooke import Linear
-from probe.contact.plate import Load, Pose, Rest, checked_load, load_of, rest
+from probe.contact.plate import PlateLoad, PlatePose, PlateRest, checked_load, load_of, rest
 from probe.contact.plate_newton import Columns
 from probe.contact.tab_law import checked_tabs, tip_laws
 from probe.contact.tabs_foreseen import columns_foreseen, foreseen_pose
 from probe.contact.tips import Tips, tip_points
 from probe.errors import ContactError
 from probe.sensor import Overlay, SensorType
-from probe.surface.contract import Surface
+from probe.surface.contract import HeightMap
 
 Array = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ TOLERANCE = 1e-6  #: of the force
 STEEPEST_RAD = 0.35  #: tilts beyond are not small
 
 
-def tabs(surface: Surface, sensor: SensorType, touch: Touch, tips: Tips | None = None) -> Contact:
+def tabs(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips | None = None) -> Contact:
     """Press separate tabs on a surface.
 
     Parameters
@@ -101,7 +101,7 @@ def tabs(surface: Surface, sensor: SensorType, touch: Touch, tips: Tips | None =
     )
 
 
-def _standing(pose: Pose, steepest_rad: float) -> None:
+def _standing(pose: PlatePose, steepest_rad: float) -> None:
     tilt = max(abs(pose.tilt_x_rad), abs(pose.tilt_y_rad))
     if tilt > steepest_rad:
         raise ContactError(
@@ -126,7 +126,7 @@ def _met_by_chance(heights_mm: Array, forces_n: Array, overlay: Overlay) -> int:
     return few if few > max(1, _MOST * np.count_nonzero(near < q)) else 0
 
 
-def asked(surface: Surface, touch: Touch, points_mm: Array) -> Array:
+def asked(surface: HeightMap, touch: Touch, points_mm: Array) -> Array:
     """Return the heights under points (..., 2) of the sensor.
 
     Refused where they are no numbers, or nothing at all lies under the points.
@@ -148,8 +148,8 @@ def asked(surface: Surface, touch: Touch, points_mm: Array) -> Array:
 
 
 def settled(
-    points_mm: Array, heights_mm: Array, overlay: Overlay, load: Load
-) -> tuple[Rest, Array]:
+    points_mm: Array, heights_mm: Array, overlay: Overlay, load: PlateLoad
+) -> tuple[PlateRest, Array]:
     """Return the plate at rest and the force (n,) of each tab; what hangs free is left out.
 
     The plate's rest is foreseen, and points of (n, q) that lie well below it are not computed.

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.contact.neo_hooke import NeoHooke
-from probe.contact.plate import Load, Pose, rest
+from probe.contact.plate import PlateLoad, PlatePose, rest
 from probe.contact.tab_law import BETA
 from probe.sensor import Overlay
 
@@ -24,8 +24,8 @@ _SAMPLED = 8  # every eighth point of a tip foresees the pose
 
 
 def foreseen_pose(
-    points_mm: Array, heights_mm: Array, overlay: Overlay, load: Load
-) -> tuple[Pose, float]:
+    points_mm: Array, heights_mm: Array, overlay: Overlay, load: PlateLoad
+) -> tuple[PlatePose, float]:
     """Return about where the plate comes to rest, and how deep the tabs are pressed.
 
     Some points of each tip stand for all, each a neo-Hookean column of its own, stiffened as
@@ -34,7 +34,7 @@ def foreseen_pose(
     q = heights_mm.shape[1]
     level = heights_mm
     if load.tilt_x_rad or load.tilt_y_rad:
-        unloaded = Pose(0.0, load.tilt_x_rad, load.tilt_y_rad)
+        unloaded = PlatePose(0.0, load.tilt_x_rad, load.tilt_y_rad)
         level = heights_mm - unloaded.heights_mm(points_mm)
     high = level > level.max() - overlay.height_mm / 4
     share = high.astype(np.float64) @ np.full(q, 1 / q)
@@ -49,7 +49,7 @@ def foreseen_pose(
     area *= len(heights_mm) / heights.size
     law = NeoHooke(overlay.young_mpa * area / overlay.height_mm, overlay.height_mm)
     z = level.max() - _level_depth(-np.sort(-level[:, some], axis=None), law, load.force_n)
-    start = Pose(float(z), load.tilt_x_rad, load.tilt_y_rad)
+    start = PlatePose(float(z), load.tilt_x_rad, load.tilt_y_rad)
     found = rest(points, heights, law, load, foreseen=start, tolerance=0.02)
     return found.pose, max(float((heights - found.pose.heights_mm(points)).max()), 0.0)
 

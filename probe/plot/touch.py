@@ -22,7 +22,7 @@ from probe.contact.contract import Touch
 from probe.plot.canvas import HEAT, in_mm, page
 from probe.plot.frame import UNITS
 from probe.sensor import SensorType
-from probe.surface.contract import Surface
+from probe.surface.contract import HeightMap
 
 Array = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ _BESIDE = 1.05  # of the sensor's reach is shown
 
 
 def touch_picture(
-    surface: Surface,
+    surface: HeightMap,
     sensor: SensorType,
     touch: Touch,
     forces_n: ArrayLike,
@@ -81,7 +81,9 @@ def touch_picture(
                              linewidths=0.8, linestyles="solid")  # fmt: skip
 
 
-def _patch(figure: Figure, axes: Axes, surface: Surface, sensor: SensorType, touch: Touch) -> float:
+def _patch(
+    figure: Figure, axes: Axes, surface: HeightMap, sensor: SensorType, touch: Touch
+) -> float:
     """Draw the surface about the sensor, and the sensor; returns the surface's top there."""
     reach = _BESIDE * sensor.reach_mm
     x = np.linspace(touch.x_mm - reach, touch.x_mm + reach, ACROSS)
@@ -107,7 +109,9 @@ def _patch(figure: Figure, axes: Axes, surface: Surface, sensor: SensorType, tou
     return top
 
 
-def _under(surface: Surface, sensor: SensorType, touch: Touch) -> tuple[tuple[Array, Array], Array]:
+def _under(
+    surface: HeightMap, sensor: SensorType, touch: Touch
+) -> tuple[tuple[Array, Array], Array]:
     """Return x and y (n,), sensor frame, and the finite heights (n, n) under the sensor."""
     half_x, half_y = sensor.half_mm
     x, y = np.linspace(-half_x, half_x, ACROSS), np.linspace(-half_y, half_y, ACROSS)

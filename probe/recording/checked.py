@@ -19,8 +19,8 @@ from probe.recording.layout import (
     FORMAT,
     FORMAT_VERSION,
     NOMINAL_HZ,
-    Block,
-    Origin,
+    FrameBlock,
+    RecordingOrigin,
 )
 from probe.recording.opened import explained, opened
 
@@ -31,10 +31,10 @@ _IMPORT = "import the array that holds the images (N, 16, 16)"
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class CheckedFile:
     """What a file says about itself."""
 
-    origin: Origin
+    origin: RecordingOrigin
     own: bool  #: written by this programme
     tool_version: str
     piece: int  #: number in its series
@@ -43,7 +43,7 @@ class Seen:
     poses: bool  #: there is a dataset of poses
 
 
-def look(path: Path, *, live: bool = False) -> Seen:
+def look(path: Path, *, live: bool = False) -> CheckedFile:
     """Check that a file is a recording, without reading its frames.
 
     Raises
@@ -60,7 +60,7 @@ def look(path: Path, *, live: bool = False) -> Seen:
     return seen
 
 
-def look_at(file: h5py.File, path: Path) -> Seen:
+def look_at(file: h5py.File, path: Path) -> CheckedFile:
     """Check that an open file is a recording; see `look`."""
     with explained(path, "read"):
         attributes = {name: _plain(value) for name, value in file.attrs.items()}
@@ -80,13 +80,13 @@ def look_at(file: h5py.File, path: Path) -> Seen:
         )
     lengths = [_length(file, path, name) for name in names]
     ours = {name: attributes.pop(name, None) for name in _OURS} if own else {}
-    origin = Origin(
+    origin = RecordingOrigin(
         str(attributes.pop("sensor", "")),
         str(attributes.pop("calibration", "")),
         str(attributes.pop("units", "counts")),
         MappingProxyType(attributes),
     )
-    return Seen(
+    return CheckedFile(
         origin,
         own,
         tool_version=str(ours.get("tool_version", "")),
@@ -97,7 +97,7 @@ def look_at(file: h5py.File, path: Path) -> Seen:
     )
 
 
-def read_block(file: h5py.File, path: Path, start: int, stop: int) -> Block:
+def read_block(file: h5py.File, path: Path, start: int, stop: int) -> FrameBlock:
     """Read and check frames `start` ... `stop` - 1 of an open file that `look` accepted.
 
     Raises
@@ -124,7 +124,7 @@ def read_block(file: h5py.File, path: Path, start: int, stop: int) -> Block:
                 place=str(path),
             )
         values[name] = array.astype(dtype.newbyteorder("="))
-    return Block(
+    return FrameBlock(
         values["frames"], values["t_ns"], values["seq"], values["wrist"], values.get("pose")
     ).frozen()
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from probe.errors import RecordingError
 from probe.frame import WRIST
 from probe.recording.arrays import Found, arrays_of
-from probe.recording.layout import NOMINAL_HZ, Block, Origin
+from probe.recording.layout import NOMINAL_HZ, FrameBlock, RecordingOrigin
 from probe.recording.names import check_name, final_name, part_of, unless_it_fails
 from probe.recording.read import Recording
 from probe.recording.write import FileWriter
@@ -82,7 +82,7 @@ def import_array(
         if scale:
             more |= {"scale": scale.scale, "scale_offset": scale.offset}
         units = "scaled" if scale else "counts"
-        origin = Origin(sensor, calibration, units, MappingProxyType(more))
+        origin = RecordingOrigin(sensor, calibration, units, MappingProxyType(more))
         with unless_it_fails(part_of(out)) as part, FileWriter(part, origin) as writer:
             for first, images in _images(found):
                 writer.write(_block(images, first, scale, 1e9 / rate_hz))
@@ -138,11 +138,11 @@ def _scale(path: Path, found: Found) -> Scale | None:
     return Scale(least, scale)
 
 
-def _block(images: NDArray[Any], first: int, scale: Scale | None, period_ns: float) -> Block:
+def _block(images: NDArray[Any], first: int, scale: Scale | None, period_ns: float) -> FrameBlock:
     if scale:
         images = np.rint(images / scale.scale - scale.offset / scale.scale).clip(0, _FULL)
     number = np.arange(first, first + len(images))
-    return Block(
+    return FrameBlock(
         images.astype(np.uint16),
         np.rint(number * period_ns).astype(np.int64),
         number,

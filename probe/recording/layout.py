@@ -48,7 +48,7 @@ OPTIONAL: Final = ("pose",)
 
 
 @dataclass(frozen=True, slots=True)
-class Origin:
+class RecordingOrigin:
     """Where the frames of a recording come from."""
 
     sensor: str = ""  #: ident of the probe, or what was simulated
@@ -58,7 +58,7 @@ class Origin:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Block:
+class FrameBlock:
     """Consecutive frames of a recording; arrays are read-only."""
 
     counts: NDArray[np.uint16]  #: (n, 16, 16)
@@ -71,7 +71,7 @@ class Block:
         return len(self.counts)
 
     @classmethod
-    def empty(cls) -> Block:
+    def empty(cls) -> FrameBlock:
         """Return a block without frames."""
         images, readings = np.empty((0, ROWS, COLUMNS), np.uint16), np.empty((0, WRIST), np.uint16)
         return cls(images, np.empty(0, np.int64), np.empty(0, np.int64), readings, None)
@@ -86,7 +86,7 @@ class Block:
             "pose": self.pose,
         }
 
-    def frozen(self) -> Block:
+    def frozen(self) -> FrameBlock:
         """Make the arrays read-only, and return the block."""
         for array in self.datasets().values():
             if array is not None:

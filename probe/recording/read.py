@@ -15,7 +15,7 @@ import numpy as np
 
 from probe.frame import Frame
 from probe.recording.checked import look, read_block
-from probe.recording.layout import Block, Origin
+from probe.recording.layout import FrameBlock, RecordingOrigin
 from probe.recording.names import part_of, series_of
 from probe.recording.opened import is_blank, opened
 
@@ -66,7 +66,7 @@ class Recording:
     path: Path | str
     live: bool = field(default=False, kw_only=True)
     files: tuple[File, ...] = field(init=False, repr=False)
-    origin: Origin = field(init=False, repr=False)  #: of the first file
+    origin: RecordingOrigin = field(init=False, repr=False)  #: of the first file
     tool_version: str = field(init=False, repr=False)  #: that wrote it; empty: not this programme
 
     def __post_init__(self) -> None:
@@ -91,7 +91,7 @@ class Recording:
 
     def blocks(
         self, start: int = 0, stop: int | None = None, size: int = _AT_ONCE
-    ) -> Iterator[Block]:
+    ) -> Iterator[FrameBlock]:
         """Yield frames `start` ... `stop` - 1 as blocks of at most `size` frames.
 
         Raises
@@ -108,7 +108,7 @@ class Recording:
                         yield read_block(source, file.path, first, end)
             start, stop = max(0, start - file.frames), stop - file.frames
 
-    def block(self, start: int = 0, stop: int | None = None) -> Block:
+    def block(self, start: int = 0, stop: int | None = None) -> FrameBlock:
         """Return frames `start` ... `stop` - 1 at once."""
         return _joined(list(self.blocks(start, stop)))
 
@@ -135,9 +135,9 @@ def _files_of(path: Path, live: bool) -> list[Path]:
     return series or [path]
 
 
-def _joined(blocks: list[Block]) -> Block:
+def _joined(blocks: list[FrameBlock]) -> FrameBlock:
     if len(blocks) < 2:
-        return blocks[0] if blocks else Block.empty()
+        return blocks[0] if blocks else FrameBlock.empty()
     pose = None
     if any(block.pose is not None for block in blocks):
         pose = np.concatenate(
@@ -146,7 +146,7 @@ def _joined(blocks: list[Block]) -> Block:
                 for block in blocks
             ]
         )
-    return Block(
+    return FrameBlock(
         np.concatenate([block.counts for block in blocks]),
         np.concatenate([block.t_ns for block in blocks]),
         np.concatenate([block.seq for block in blocks]),

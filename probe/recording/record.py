@@ -17,7 +17,7 @@ import numpy as np
 
 from probe.errors import RecordingError
 from probe.frame import Frame
-from probe.recording.layout import CHUNK, Block, Origin
+from probe.recording.layout import CHUNK, FrameBlock, RecordingOrigin
 from probe.recording.names import check_name, final_name, part_of
 from probe.recording.write import FileWriter
 
@@ -79,7 +79,9 @@ class Recorder:
         self.path = Path(path)
         self.files: list[Path] = []  #: closed files, in order
         self.frames = 0  #: handed in so far
-        self._origin = Origin(sensor, calibration, units, MappingProxyType(dict(attributes or {})))
+        self._origin = RecordingOrigin(
+            sensor, calibration, units, MappingProxyType(dict(attributes or {}))
+        )
         self._flush_ns = flush_s * 1e9
         self._roll_over_ns = roll_over_s * 1e9
         self._replace = replace
@@ -177,11 +179,11 @@ class Recorder:
         ) from error
 
 
-def _block(frames: list[Frame]) -> Block:
+def _block(frames: list[Frame]) -> FrameBlock:
     pose = None
     if any(frame.pose is not None for frame in frames):
         pose = np.stack([_NO_POSE if frame.pose is None else frame.pose for frame in frames])
-    return Block(
+    return FrameBlock(
         np.stack([frame.counts for frame in frames]),
         np.array([frame.t_ns for frame in frames], np.int64),
         np.array([frame.seq for frame in frames], np.int64),

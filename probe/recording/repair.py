@@ -15,8 +15,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from probe.errors import RecordingError
-from probe.recording.checked import Seen, look_at, read_block
-from probe.recording.layout import CHUNK, Block
+from probe.recording.checked import CheckedFile, look_at, read_block
+from probe.recording.layout import CHUNK, FrameBlock
 from probe.recording.lock import is_locked
 from probe.recording.names import final_of, is_part, part_of, piece_of, series_of
 from probe.recording.opened import explained, opened_anyhow
@@ -82,7 +82,7 @@ def repair(path: Path | str) -> Repaired:
     return Repaired(target, frames, lost, changed=True)
 
 
-def _copy(source: h5py.File, path: Path, seen: Seen, copy: Path) -> int:
+def _copy(source: h5py.File, path: Path, seen: CheckedFile, copy: Path) -> int:
     """Write every block that can be read to a new file; return the number of frames."""
     lost, origin = seen.frames - _readable(source, path, seen), seen.origin
     if lost:
@@ -94,11 +94,11 @@ def _copy(source: h5py.File, path: Path, seen: Seen, copy: Path) -> int:
     return writer.frames
 
 
-def _readable(source: h5py.File, path: Path, seen: Seen) -> int:
+def _readable(source: h5py.File, path: Path, seen: CheckedFile) -> int:
     return sum(len(block) for block in _blocks(source, path, seen))
 
 
-def _blocks(source: h5py.File, path: Path, seen: Seen) -> Iterator[Block]:
+def _blocks(source: h5py.File, path: Path, seen: CheckedFile) -> Iterator[FrameBlock]:
     """Yield the blocks that can be read, one for each that was compressed."""
     for start in range(0, seen.frames, CHUNK):
         try:
@@ -107,14 +107,14 @@ def _blocks(source: h5py.File, path: Path, seen: Seen) -> Iterator[Block]:
             continue
 
 
-def _renamed(path: Path, target: Path, seen: Seen) -> Repaired:
+def _renamed(path: Path, target: Path, seen: CheckedFile) -> Repaired:
     if path != target:
         with explained(path, "rename"):
             os.rename(path, target)
     return Repaired(target, seen.frames, 0, changed=path != target)
 
 
-def _free_name(part: Path, seen: Seen) -> Path:
+def _free_name(part: Path, seen: CheckedFile) -> Path:
     """Return the name that a part file would have got, had it been closed."""
     path = final_of(part)
     if seen.piece == 1 and not path.exists() and not series_of(path):

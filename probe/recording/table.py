@@ -13,7 +13,7 @@ from typing import TextIO
 import numpy as np
 
 from probe.frame import COLUMNS, ROWS, WRIST
-from probe.recording.layout import Block
+from probe.recording.layout import FrameBlock
 from probe.recording.opened import explained
 from probe.recording.read import Recording
 
@@ -62,7 +62,7 @@ def _header(poses: bool) -> list[str]:
     return ["seq", "t_ns", *images, *wrist, *pose]
 
 
-def _lines(block: Block, poses: bool) -> list[str]:
+def _lines(block: FrameBlock, poses: bool) -> list[str]:
     n = len(block)
     numbers = np.hstack(
         [block.seq[:, None], block.t_ns[:, None], block.counts.reshape(n, -1), block.wrist]

@@ -24,8 +24,8 @@ from probe.recording.layout import (
     FORMAT,
     FORMAT_VERSION,
     OPTIONAL,
-    Block,
-    Origin,
+    FrameBlock,
+    RecordingOrigin,
 )
 from probe.recording.lock import is_locked, take_lock
 from probe.recording.opened import explained
@@ -57,7 +57,7 @@ class FileWriter:
         The name is taken, the folder cannot be written, the disk is full.
     """
 
-    def __init__(self, path: Path, origin: Origin, piece: int = 1) -> None:
+    def __init__(self, path: Path, origin: RecordingOrigin, piece: int = 1) -> None:
         import h5py
 
         self.path = path
@@ -78,7 +78,7 @@ class FileWriter:
             path.unlink(missing_ok=True)
             raise
 
-    def write(self, block: Block) -> None:
+    def write(self, block: FrameBlock) -> None:
         """Append frames; when this returns, they are safe.
 
         Raises
@@ -170,7 +170,7 @@ def _made(path: Path) -> int:
     return descriptor
 
 
-def _attributes(origin: Origin, piece: int) -> dict[str, Any]:
+def _attributes(origin: RecordingOrigin, piece: int) -> dict[str, Any]:
     return {
         **origin.more,
         "format": FORMAT,

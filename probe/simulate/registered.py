@@ -24,12 +24,12 @@ from generator.database.transaction import reading
 from probe.errors import SurfaceError
 from probe.simulate.round import round_scene
 from probe.simulate.scene import Scene
-from probe.surface.face import Face
-from probe.surface.lattice import Lattice, listed
-from probe.surface.mesh import Mesh, mesh
+from probe.surface.face import FaceSurface
+from probe.surface.lattice import LatticeSurface, listed
+from probe.surface.mesh import MeshSurface, mesh
 from probe.surface.polygon import polygon
 from probe.surface.solids import filled, symbol_triangles
-from probe.surface.symbols import Relief, Symbols, embossed
+from probe.surface.symbols import Relief, SymbolReliefs, embossed
 from probe.surface.template import template
 
 Array = NDArray[np.float64]
@@ -135,7 +135,7 @@ def face_of(held: RegisteredObject, name: str = "") -> RegisteredFace:
     )
 
 
-def _surface(held: RegisteredObject, face: RegisteredFace) -> Face:
+def _surface(held: RegisteredObject, face: RegisteredFace) -> FaceSurface:
     symbols = _symbols(held)
     lattice = None
     cells = held.layout.faces[face.face_id]
@@ -144,17 +144,17 @@ def _surface(held: RegisteredObject, face: RegisteredFace) -> Face:
         c, s = math.cos(place.rotation_rad), math.sin(place.rotation_rad)
         at = cells.centres_mm @ np.array([[c, s], [-s, c]]) + (place.x_mm, place.y_mm)
         columns, rows = np.rint(at / (pitch, -pitch) - 0.5).T
-        lattice = Lattice(
+        lattice = LatticeSurface(
             template(symbols, pitch),
             listed(rows, columns, cells.labels),
             place.rotation_rad,
             place.x_mm,
             place.y_mm,
         )
-    return Face(lattice, polygon(face.polygon_mm), _around(held, face, symbols))
+    return FaceSurface(lattice, polygon(face.polygon_mm), _around(held, face, symbols))
 
 
-def _symbols(held: RegisteredObject) -> Symbols:
+def _symbols(held: RegisteredObject) -> SymbolReliefs:
     """Return the symbols of an object's alphabet in its relief."""
     style = held.style
     relief = Relief(style.height_mm, style.stroke_mm, style.draft_rad, style.chamfer_mm)
@@ -165,7 +165,9 @@ def _symbols(held: RegisteredObject) -> Symbols:
     return embossed(glyphs, definition["reach"] * style.pitch_mm, relief)
 
 
-def _around(held: RegisteredObject, face: RegisteredFace, symbols: Symbols) -> Mesh | None:
+def _around(
+    held: RegisteredObject, face: RegisteredFace, symbols: SymbolReliefs
+) -> MeshSurface | None:
     """Return all other faces that are seen from above, with symbols near this face."""
     T_face_object = np.linalg.inv(face.T_object_face)
     eps = _FLAT * float(np.ptp(held.polyhedron.vertices, axis=0).max())

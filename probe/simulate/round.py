@@ -19,9 +19,9 @@ from generator.database.url import normal_url, part_path
 from probe.contact.contract import Touch
 from probe.errors import SurfaceError
 from probe.simulate.scene import Scene
-from probe.surface.indenters import Plate
+from probe.surface.indenters import FlatPlate
 from probe.surface.mesh import mesh
-from probe.surface.polygon import Polygon, polygon
+from probe.surface.polygon import FaceRegion, polygon
 from probe.surface.stl import read_stl
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ class RoundPart:
     low_mm: Array  #: (n, 3) least coordinates of each triangle
     high_mm: Array  #: (n, 3) greatest
     face: RegisteredFace
-    region: Polygon  #: the unrolled face: where touches may have their centre
+    region: FaceRegion  #: the unrolled face: where touches may have their centre
     name: str
     object_name: str
 
@@ -69,7 +69,7 @@ class RoundPart:
 
     def scene(self) -> Scene:
         """Return the face, as a touch of its middle meets it."""
-        x, y = Scene(Plate(), self.region, self.name).centre_mm().tolist()
+        x, y = Scene(FlatPlate(), self.region, self.name).centre_mm().tolist()
         return self.under(Touch(x, y, 0.0, 0.0))
 
     def tangent(self, x: float, y: float) -> Array:

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.contact.contract import Touch
-from probe.surface.contract import Surface
-from probe.surface.polygon import Polygon
+from probe.surface.contract import HeightMap
+from probe.surface.polygon import FaceRegion
 
 _GRID = 64
 
@@ -24,8 +24,8 @@ _GRID = 64
 class Scene:
     """A surface with its region and its name."""
 
-    surface: Surface
-    region: Polygon  #: where touches may have their centre, surface frame
+    surface: HeightMap
+    region: FaceRegion  #: where touches may have their centre, surface frame
     name: str  #: as messages and recordings name it
     object_name: str = ""  #: empty: not known
     face: str = ""  #: empty: not known

@@ -19,8 +19,8 @@ from probe.contact.press import Accuracy, press
 from probe.errors import SurfaceError
 from probe.frame import Frame, frame_from
 from probe.sensor import SensorType
-from probe.surface.contract import Surface
-from probe.surface.polygon import Polygon
+from probe.surface.contract import HeightMap
+from probe.surface.polygon import FaceRegion
 
 _TRIES = 16_000  # draws for one touch: a region that fills 0.1 % of its box is still found
 _DRAWN = 16  # at once
@@ -37,7 +37,7 @@ class Touches:
 
 
 def simulate(
-    surface: Surface,
+    surface: HeightMap,
     sensor: SensorType,
     touch: Touch,
     electronics: Electronics,
@@ -69,7 +69,7 @@ def simulate(
 
 
 def random_touches(
-    region: Polygon, rng: np.random.Generator, ranges: Touches | None = None
+    region: FaceRegion, rng: np.random.Generator, ranges: Touches | None = None
 ) -> Iterator[Touch]:
     """Yield touches without end, their centres uniform over a region.
 
@@ -126,7 +126,7 @@ def pose_of(touch: Touch, contact: Contact) -> NDArray[np.float64]:
     return T_surface_sensor
 
 
-def _place(region: Polygon, rng: np.random.Generator, margin_mm: float) -> tuple[float, float]:
+def _place(region: FaceRegion, rng: np.random.Generator, margin_mm: float) -> tuple[float, float]:
     """Draw a point of a region, uniform in what lies a margin inside its edges."""
     low, high = region.box_mm
     for _ in range(_TRIES // _DRAWN):

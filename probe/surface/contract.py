@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-class Surface(Protocol):
+class HeightMap(Protocol):
     """A height field. Asking costs what is asked: n points, not the whole face."""
 
     @property

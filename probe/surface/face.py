@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from probe.surface.contract import Surface
-from probe.surface.lattice import Index, LabelAt, Lattice, computed, repeated
-from probe.surface.polygon import Polygon
+from probe.surface.contract import HeightMap
+from probe.surface.lattice import Index, LabelAt, LatticeSurface, computed, repeated
+from probe.surface.polygon import FaceRegion
 from probe.surface.symbols import Relief, Strokes, embossed
 from probe.surface.template import template
 
@@ -23,12 +23,12 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Face:
+class FaceSurface:
     """A flat face; blank without a lattice, endless without an outline."""
 
-    lattice: Lattice | None
-    outline: Polygon | None = None
-    around: Surface | None = None  #: neighbouring faces, face frame; None: nothing there
+    lattice: LatticeSurface | None
+    outline: FaceRegion | None = None
+    around: HeightMap | None = None  #: neighbouring faces, face frame; None: nothing there
 
     @property
     def top_mm(self) -> float:
@@ -63,7 +63,7 @@ def endless(
     pitch_mm: float = 7.0,
     unit_mm: float = 1.82,
     relief: Relief | None = None,
-) -> Face:
+) -> FaceSurface:
     """Return an endless face that carries an array.
 
     Parameters
@@ -85,4 +85,4 @@ def endless(
     """
     symbols = embossed(tuple(glyphs), unit_mm, relief or Relief())
     label_at: LabelAt = computed(labels) if callable(labels) else repeated(labels)
-    return Face(Lattice(template(symbols, pitch_mm), label_at))
+    return FaceSurface(LatticeSurface(template(symbols, pitch_mm), label_at))

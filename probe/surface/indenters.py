@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Plate:
+class FlatPlate:
     """An endless flat plate."""
 
     height_mm: float = 0.0
@@ -56,7 +56,7 @@ class TiltedPlane:
 
 
 @dataclass(frozen=True, slots=True)
-class Strip:
+class RaisedStrip:
     """A straight bar along y, with a flat top."""
 
     width_mm: float = 2.0

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from probe.errors import SurfaceError
-from probe.surface.template import Template
+from probe.surface.template import HeightTemplate
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -31,10 +31,10 @@ LabelAt = Callable[[Index, Index], Index]
 
 
 @dataclass(frozen=True, eq=False)
-class Lattice:
+class LatticeSurface:
     """Where symbols stand on a plane."""
 
-    template: Template
+    template: HeightTemplate
     label_at: LabelAt
     rotation_rad: float = 0.0  #: turns the face's x into the array's (columns)
     x_mm: float = 0.0

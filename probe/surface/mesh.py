@@ -27,7 +27,7 @@ _PAIRS = 1 << 25  # of bins and triangles at most
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class MeshSurface:
     """A height field of triangles.
 
     Corners of a triangle are in rising order (x, then y), so that a shared edge has the same
@@ -88,7 +88,7 @@ class Mesh:
         return _binned(self.corners)
 
 
-def part_mesh(file: str | os.PathLike[str], T_surface_part: ArrayLike | None = None) -> Mesh:
+def part_mesh(file: str | os.PathLike[str], T_surface_part: ArrayLike | None = None) -> MeshSurface:
     """Return the height field of a written part.
 
     Parameters
@@ -109,7 +109,7 @@ def part_mesh(file: str | os.PathLike[str], T_surface_part: ArrayLike | None = N
 
 def mesh(
     triangles_mm: ArrayLike, T_surface_part: ArrayLike | None = None, *, place: str = ""
-) -> Mesh:
+) -> MeshSurface:
     """Return the height field of triangles.
 
     Parameters
@@ -146,7 +146,7 @@ def mesh(
             place=place,
         )
     order = np.lexsort((corners[:, :, 1], corners[:, :, 0]), axis=1)
-    return Mesh(np.take_along_axis(corners, order[:, :, None], axis=1))
+    return MeshSurface(np.take_along_axis(corners, order[:, :, None], axis=1))
 
 
 def _outward(corners: Array) -> NDArray[np.bool_]:

@@ -22,7 +22,7 @@ _BLOCK = 1 << 20  # pairs of points and edges looked at together
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Polygon:
+class FaceRegion:
     """A region of the plane bounded by straight edges."""
 
     starts: Array  #: (e, 2) mm
@@ -77,7 +77,7 @@ class Polygon:
         return edged
 
 
-def polygon(loops_mm: Sequence[ArrayLike]) -> Polygon:
+def polygon(loops_mm: Sequence[ArrayLike]) -> FaceRegion:
     """Return the region inside the first loop and outside the others.
 
     Parameters
@@ -112,4 +112,4 @@ def polygon(loops_mm: Sequence[ArrayLike]) -> Polygon:
     turns = before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0]
     angles = np.arctan2(turns, np.einsum("ij,ij->i", before, along))
     convex = len(rings) == 1 and bool((turns >= 0).all()) and abs(angles.sum() - 2 * np.pi) < 1e-6
-    return Polygon(starts, ends, convex)
+    return FaceRegion(starts, ends, convex)

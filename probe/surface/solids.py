@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.errors import SurfaceError
-from probe.surface.symbols import Symbols
+from probe.surface.symbols import SymbolReliefs
 
 Array = NDArray[np.float64]
 
 
-def symbol_triangles(symbols: Symbols, label: int) -> Array:
+def symbol_triangles(symbols: SymbolReliefs, label: int) -> Array:
     """Return the sides and the top of a symbol, (m, 3, 3) mm; z from the face."""
     away, heights = symbols.relief.profile()
     if heights[-1] > 0:  # an upright wall down to the face

@@ -1,6 +1,6 @@
 """How high an embossed symbol stands over its face, exactly. Thesis 6.1, 6.2.
 
-Stroke graphs + relief -> `Symbols`: for each label the edges of its outline. The symbol is
+Stroke graphs + relief -> `SymbolReliefs`: for each label the edges of its outline. The symbol is
 flat on top; every edge of the outline carries one side, and how far a point lies outside
 the edge's line tells its height by one profile: draft from the foot up, and at the top a
 chamfer of 45 degrees. Corner lines between two sides run straight, so a side is a plane and
@@ -51,7 +51,7 @@ class Relief:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Symbols:
+class SymbolReliefs:
     """The symbols of an alphabet, in the order of their labels.
 
     Shorter outlines are filled up with edges far away.
@@ -123,7 +123,7 @@ class Symbols:
 
 
 @lru_cache(maxsize=32)
-def embossed(glyphs: tuple[Strokes, ...], unit_mm: float, relief: Relief) -> Symbols:
+def embossed(glyphs: tuple[Strokes, ...], unit_mm: float, relief: Relief) -> SymbolReliefs:
     """Return the symbols of an alphabet.
 
     Parameters
@@ -151,7 +151,7 @@ def embossed(glyphs: tuple[Strokes, ...], unit_mm: float, relief: Relief) -> Sym
     packed[2] = _FAR
     for label, columns in enumerate(edges):
         packed[:, label, : len(columns[0])] = columns
-    return Symbols(relief, rings, packed[:2], packed[2], packed[3:7], packed[7:])
+    return SymbolReliefs(relief, rings, packed[:2], packed[2], packed[3:7], packed[7:])
 
 
 def _edges(rings: Sequence[Ring], relief: Relief) -> Array:

@@ -2,7 +2,7 @@
 
 One cell of the lattice is cut into fine square bins. A bin that no edge of the symbol
 crosses lies under one planar piece; the table names that piece, and the height is its
-plane's, exact. The few bins that an edge crosses ask `Symbols`. No interpolation anywhere.
+plane's, exact. The few bins that an edge crosses ask `SymbolReliefs`. No interpolation anywhere.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.errors import SurfaceError
-from probe.surface.symbols import Symbols
+from probe.surface.symbols import SymbolReliefs
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -24,10 +24,10 @@ _CROSSED = -1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Template:
+class HeightTemplate:
     """All symbols of an alphabet on cells of one pitch. Label -1 is a cell without a symbol."""
 
-    symbols: Symbols
+    symbols: SymbolReliefs
     pitch_mm: float
     table: NDArray[np.int16]  #: [label, bin down, bin right] -> line of `planes`, -1: crossed
     planes: Array  #: (n, 3) z = a + b x + c y, symbol's axes
@@ -64,7 +64,7 @@ class Template:
 
 
 @lru_cache(maxsize=32)
-def template(symbols: Symbols, pitch_mm: float) -> Template:
+def template(symbols: SymbolReliefs, pitch_mm: float) -> HeightTemplate:
     """Return the table of an alphabet's symbols.
 
     Raises
@@ -93,10 +93,10 @@ def template(symbols: Symbols, pitch_mm: float) -> Template:
         table[label].ravel()[ask] = np.where(piece > 1, piece + first, piece)
         table[label][crossed] = _CROSSED
     table.setflags(write=False)
-    return Template(symbols, pitch_mm, table, np.concatenate(planes))
+    return HeightTemplate(symbols, pitch_mm, table, np.concatenate(planes))
 
 
-def _crossed(symbols: Symbols, label: int, pitch_mm: float) -> NDArray[np.bool_]:
+def _crossed(symbols: SymbolReliefs, label: int, pitch_mm: float) -> NDArray[np.bool_]:
     """Return which bins of a cell an edge between two pieces may cross."""
     away = symbols.relief.profile()[0]
     found = np.zeros((BINS, BINS), dtype=bool)

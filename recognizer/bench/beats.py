@@ -15,7 +15,7 @@ from itertools import count
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.circuit import QUIET, Electronics, Noise, State, fsr_of, read_counts
+from probe.circuit import QUIET, Electronics, FilmState, Noise, fsr_of, read_counts
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.frame import Frame, frame_from
@@ -91,7 +91,7 @@ class Beats:
         """Yield frames without end, numbered and timed from 0."""
         rng = np.random.default_rng(self.manner.seed)
         fsr = fsr_of(self.sensor.rows, self.sensor.columns)
-        state: State | None = None
+        state: FilmState | None = None
         for seq in count():
             counts, state = read_counts(self._beat(), self._board, fsr, state, rng)
             yield frame_from(counts, t_ns=round(seq * 1e9 / self.manner.rate), seq=seq)

@@ -17,7 +17,7 @@ import numpy as np
 from probe.calibration import Calibration, calibration_hash, read_calibration
 from probe.errors import CalibrationError, RecordingError
 from probe.frame import Frame
-from probe.recording.layout import Origin
+from probe.recording.layout import RecordingOrigin
 from probe.recording.read import Recording
 from probe.sensor import Overlay, SensorType
 from recognizer.touch.contacts import TouchImage, cut_touches, every_frame
@@ -99,7 +99,7 @@ def with_overlay(sensor: SensorType, kind: str) -> SensorType:
     return replace(sensor, overlay=Overlay(kind="pad")) if kind == "pad" else sensor
 
 
-def _together(origin: Origin, path: Path) -> int:
+def _together(origin: RecordingOrigin, path: Path) -> int:
     """Return how many frames follow each other at one place; 0 if the recording does not tell."""
     told: Any = origin.more.get("frames_per_touch", 0)
     if not isinstance(told, int) or told < 0:
@@ -112,7 +112,7 @@ def _together(origin: Origin, path: Path) -> int:
 
 
 def _calibration_for(
-    origin: Origin, given: Path | None, folder: Path
+    origin: RecordingOrigin, given: Path | None, folder: Path
 ) -> tuple[Calibration | None, str]:
     """Return the calibration of a recording, the one given or the one it names, and a notice."""
     named = origin.calibration

@@ -19,8 +19,8 @@ from probe.sensor import Overlay, SensorType
 from probe.simulate.registered import registered_surface
 from probe.simulate.scene import Scene
 from probe.simulate.touch import Touches, random_touches
-from probe.surface.contract import Surface
-from probe.surface.face import Face
+from probe.surface.contract import HeightMap
+from probe.surface.face import FaceSurface
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.reader import Reader
 from recognizer.validation.levels import LEVELS, read_sensor
@@ -55,7 +55,7 @@ class TouchPlan:
 class DrawnTouch:
     """What is touched, and what the sensor reads."""
 
-    surface: Surface
+    surface: HeightMap
     scene: Scene | None  #: None for a foreign surface
     touch: Touch
     counts: NDArray[np.uint16]
@@ -69,7 +69,7 @@ def draw_touch(plan: TouchPlan, number: int, reader: Reader) -> DrawnTouch:
     encoding = reader.lab.arrays[int(rng.integers(len(reader.lab.arrays)))]
     while True:
         scene: Scene | None = None
-        surface: Surface
+        surface: HeightMap
         if plan.kind in FOREIGN:
             surface = FOREIGN[plan.kind](encoding, rng)
             touch = _anywhere(rng, ranges)
@@ -79,7 +79,7 @@ def draw_touch(plan: TouchPlan, number: int, reader: Reader) -> DrawnTouch:
             most = _inmost(plan.database, face.object, face.face, plan.files)
             touch = _on(scene, plan.kind, most, rng, ranges)
             surface = scene.under(touch).surface
-            if plan.kind == "worn" and isinstance(surface, Face):
+            if plan.kind == "worn" and isinstance(surface, FaceSurface):
                 surface = wear_face(surface, plan.worn, rng)
             elif plan.kind == "worn":
                 pitch = encoding.style.pitch_mm

@@ -19,8 +19,8 @@ from probe.contact.contract import Touch, WristStiffness
 from probe.contact.press import press
 from probe.errors import ProbeError
 from probe.sensor import Overlay, SensorType
-from probe.surface.contract import Surface
-from probe.surface.indenters import Cross, Plate, Rough, Strip, TiltedPlane
+from probe.surface.contract import HeightMap
+from probe.surface.indenters import Cross, FlatPlate, RaisedStrip, Rough, TiltedPlane
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.signal import signal_of
@@ -39,7 +39,7 @@ class Scene:
     """What is pressed, and what must come of it."""
 
     name: str
-    surface: Surface
+    surface: HeightMap
     touch: Touch = _HERE
     expected: str = FINITE
     overlay: Callable[[Overlay], Overlay] = lambda overlay: overlay
@@ -78,15 +78,15 @@ SCENES: tuple[Scene, ...] = (
     Scene("overlay 20 mm thick", _CROSS, overlay=_height(20.0)),
     Scene("wrist free to turn", _CROSS, replace(_HERE, wrist=_FREE)),
     Scene("wrist 1e9 N mm/rad", _CROSS, replace(_HERE, wrist=WristStiffness(1e9, 1e9))),
-    Scene("tilt 20 degrees on a plate", Plate(), replace(_HERE, tilt_x_rad=math.radians(20))),
+    Scene("tilt 20 degrees on a plate", FlatPlate(), replace(_HERE, tilt_x_rad=math.radians(20))),
     Scene("plane that rises 1 mm a mm", TiltedPlane(1.0, 0.0), expected=EITHER),
-    Scene("stroke of 0.02 mm", Strip(0.02), replace(_HERE, force_n=1.0)),
-    Scene("cliff through the centre", Strip(200.0), replace(_HERE, x_mm=100.0)),
+    Scene("stroke of 0.02 mm", RaisedStrip(0.02), replace(_HERE, force_n=1.0)),
+    Scene("cliff through the centre", RaisedStrip(200.0), replace(_HERE, x_mm=100.0)),
     Scene("rough, 0.5 mm", Rough(1, 0.5, 4.0)),
-    Scene("1,000 km away", Plate(), replace(_HERE, x_mm=1e9)),
-    Scene("tips: centre beyond the edge, wrist free", Strip(200.0),
+    Scene("1,000 km away", FlatPlate(), replace(_HERE, x_mm=1e9)),
+    Scene("tips: centre beyond the edge, wrist free", RaisedStrip(200.0),
           replace(_HERE, x_mm=110.0, wrist=_FREE), REFUSED),
-    Scene("nothing under the sensor", Strip(2.0), replace(_HERE, x_mm=100.0), REFUSED),
+    Scene("nothing under the sensor", RaisedStrip(2.0), replace(_HERE, x_mm=100.0), REFUSED),
     Scene("heights that are no numbers", _NoNumber(), expected=REFUSED),
     Scene("force that is no number", _CROSS, replace(_HERE, force_n=math.nan), REFUSED),
     Scene("negative force", _CROSS, replace(_HERE, force_n=-1.0), REFUSED),

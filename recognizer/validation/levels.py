@@ -20,7 +20,7 @@ from probe.contact.press import press
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.sensor import SensorType
-from probe.surface.contract import Surface
+from probe.surface.contract import HeightMap
 
 Array = NDArray[np.float64]
 
@@ -68,7 +68,7 @@ LEVELS = {level.name: level for level in (LOW, TYPICAL, HARD, MISMATCH)}
 class PrintedSurface:
     """A surface as a printer leaves it: everything wider by a stroke's excess, and scaled."""
 
-    surface: Surface
+    surface: HeightMap
     wider_mm: float
     scale: float
     about_mm: tuple[float, float]  #: point that the scale leaves where it is
@@ -92,7 +92,7 @@ class PrintedSurface:
 
 
 def read_sensor(
-    surface: Surface, sensor: SensorType, touch: Touch, level: Level, rng: np.random.Generator
+    surface: HeightMap, sensor: SensorType, touch: Touch, level: Level, rng: np.random.Generator
 ) -> tuple[NDArray[np.uint16], Contact]:
     """Return the counts (rows, columns) of a sensor drawn from a level, and the contact.
 

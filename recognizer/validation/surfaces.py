@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from generator.alphabet import alphabet_named
 from generator.array import profile
-from probe.surface.contract import Surface
+from probe.surface.contract import HeightMap
 from probe.surface.face import endless
-from probe.surface.indenters import Plate, Rough
+from probe.surface.indenters import FlatPlate, Rough
 from probe.surface.symbols import Relief
 from recognizer.touch.lab import EmbossedArray
 
@@ -63,12 +63,12 @@ class Dots:
         return np.where(inside, self.height_mm, 0.0)
 
 
-def blank(_encoding: EmbossedArray, _rng: np.random.Generator) -> Surface:
+def blank(_encoding: EmbossedArray, _rng: np.random.Generator) -> HeightMap:
     """Return a flat face."""
-    return Plate()
+    return FlatPlate()
 
 
-def ridges(encoding: EmbossedArray, rng: np.random.Generator) -> Surface:
+def ridges(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
     """Return ridges as wide as strokes, or up to twice that, often at the pitch of the symbols."""
     pitch, stroke = encoding.style.pitch_mm, encoding.style.stroke_mm
     period = pitch * rng.choice([0.25, 1 / 3, 0.5, 1.0, rng.uniform(0.3, 1.2)])
@@ -76,23 +76,23 @@ def ridges(encoding: EmbossedArray, rng: np.random.Generator) -> Surface:
     return Ridges(max(period, 1.5 * width), width, rng.uniform(0, math.pi))
 
 
-def dots(encoding: EmbossedArray, rng: np.random.Generator) -> Surface:
+def dots(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
     """Return dots on a grid, often at a part of the pitch of the symbols."""
     period = encoding.style.pitch_mm * rng.choice([0.5, 1.0, rng.uniform(0.4, 1.2)])
     return Dots(period, period * rng.uniform(0.3, 0.7))
 
 
-def rough(_encoding: EmbossedArray, rng: np.random.Generator) -> Surface:
+def rough(_encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
     """Return a random surface."""
     return Rough(int(rng.integers(1 << 31)), rng.uniform(0.1, 0.5), rng.uniform(2.0, 8.0))
 
 
-def random_symbols(encoding: EmbossedArray, rng: np.random.Generator) -> Surface:
+def random_symbols(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
     """Return symbols of the same alphabet at the same pitch, drawn at random."""
     return _of(encoding, rng.integers(encoding.array.order, size=(64, 64)))
 
 
-def other_lab(encoding: EmbossedArray, rng: np.random.Generator) -> Surface:
+def other_lab(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
     """Return another array in the same alphabet, at the same pitch."""
     sizes = (encoding.array.rows, encoding.array.columns)
     names = ("one-touch", "large") if encoding.array.order == 4 else ("thesis",)
@@ -107,7 +107,7 @@ def other_lab(encoding: EmbossedArray, rng: np.random.Generator) -> Surface:
     )
 
 
-def text(encoding: EmbossedArray, rng: np.random.Generator) -> Surface:
+def text(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
     """Return letters as high and as thick as the symbols."""
     letters = alphabet_named("letters-4")
     style = encoding.style
@@ -125,7 +125,7 @@ def text(encoding: EmbossedArray, rng: np.random.Generator) -> Surface:
 
 
 #: Surfaces of no database.
-FOREIGN: dict[str, Callable[[EmbossedArray, np.random.Generator], Surface]] = {
+FOREIGN: dict[str, Callable[[EmbossedArray, np.random.Generator], HeightMap]] = {
     "blank": blank,
     "ridges": ridges,
     "dots": dots,
@@ -136,7 +136,7 @@ FOREIGN: dict[str, Callable[[EmbossedArray, np.random.Generator], Surface]] = {
 }
 
 
-def _of(encoding: EmbossedArray, labels: NDArray[np.int64]) -> Surface:
+def _of(encoding: EmbossedArray, labels: NDArray[np.int64]) -> HeightMap:
     style, alphabet = encoding.style, encoding.alphabet
     return endless(
         labels,

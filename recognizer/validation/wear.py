@@ -7,15 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.surface.contract import Surface
-from probe.surface.face import Face
+from probe.surface.contract import HeightMap
+from probe.surface.face import FaceSurface
 from recognizer.touch.lab import EncodedFace
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def wear_face(face: Face, share: float, rng: np.random.Generator) -> Face:
+def wear_face(face: FaceSurface, share: float, rng: np.random.Generator) -> FaceSurface:
     """Return a face of which a share of the symbols is worn away."""
     lattice = face.lattice
     if lattice is None:
@@ -36,7 +36,7 @@ def wear_face(face: Face, share: float, rng: np.random.Generator) -> Face:
 class WornAway:
     """A surface on which some symbols are worn down to the face."""
 
-    surface: Surface
+    surface: HeightMap
     centres_mm: Array  #: (n, 2) of the worn symbols, surface frame
     rotation_rad: float  #: turns the surface's x axis into the array's
     pitch_mm: float
@@ -60,7 +60,7 @@ class WornAway:
 
 
 def wear_part(
-    surface: Surface,
+    surface: HeightMap,
     face: EncodedFace,
     pitch_mm: float,
     share: float,

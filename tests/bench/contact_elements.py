@@ -1,6 +1,6 @@
 """Finite elements of a touch: error against run time, and the layer held against them.
 
-    OPENBLAS_NUM_THREADS=1 python tests/bench/contact_elements.py [washer tab space held-out] [-o F]
+    PYTHONPATH=tests python tests/bench/contact_elements.py [washer tab space held-out] [-o F]
 
 washer    the washer of 15/7 mm with 80 N on a pad of 2 mm by the section through its axis:
           error against unknowns and processor time; the reference is the first line
@@ -23,16 +23,16 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from reference.elements_axisymmetric import section
+from reference.elements_round import indented, washer_pad
+from reference.elements_tab import Tab, compressed, partly_covered
 
 from probe.contact.contract import Contact, Touch, WristStiffness
 from probe.contact.elements import condensed_pad, elements
-from probe.contact.elements_axisymmetric import section
-from probe.contact.elements_round import indented, washer_pad
-from probe.contact.elements_tab import Tab, compressed, partly_covered
 from probe.contact.layer import layer
 from probe.sensor import Overlay, SensorType
-from probe.surface.contract import Surface
-from probe.surface.indenters import Cross, Paraboloid, Plate, Sphere, Strip
+from probe.surface.contract import HeightMap
+from probe.surface.indenters import Cross, FlatPlate, Paraboloid, RaisedStrip, Sphere
 
 PAD = SensorType(overlay=Overlay(kind="pad"))
 INNER, OUTER, FORCE = 3.5, 7.5, 80.0
@@ -44,11 +44,11 @@ INNER_TACTELS = np.s_[1:-1, 1:-1]  #: the outermost feel what the endless layer 
 Walls = tuple[tuple[float, ...], tuple[float, ...]]
 
 #: name, surface, touch, walls in the sensor frame
-HELD_OUT: tuple[tuple[str, Surface, Touch, Walls], ...] = (
-    ("strip 2.3 x 14 mm", Strip(2.3, 14.0), Touch(0.0, 0.0, 0.0, 20.0), ((1.15,), (7.0,))),
+HELD_OUT: tuple[tuple[str, HeightMap, Touch, Walls], ...] = (
+    ("strip 2.3 x 14 mm", RaisedStrip(2.3, 14.0), Touch(0.0, 0.0, 0.0, 20.0), ((1.15,), (7.0,))),
     (
         "strip 1.4 x 9 mm, aside",
-        Strip(1.4 + TINY, 9.0 + TINY),
+        RaisedStrip(1.4 + TINY, 9.0 + TINY),
         Touch(-3.0, -2.0, 0.0, 8.0),
         ((2.3, 3.7), (2.5, 6.5)),
     ),
@@ -57,11 +57,16 @@ HELD_OUT: tuple[tuple[str, Surface, Touch, Walls], ...] = (
     ("cross 8 mm, bars 1.6 mm", Cross(1.6, 8.0), Touch(0.0, 0.0, 0.0, 25.0), ((0.8, 4.0),) * 2),
     (
         "strip 2 x 12 mm, pad's edge",
-        Strip(2.0 + TINY, 12.0 + TINY),
+        RaisedStrip(2.0 + TINY, 12.0 + TINY),
         Touch(-11.7, 0.0, 0.0, 8.0),
         ((10.7,), (6.0,)),
     ),
-    ("plate, wrist at 3 degrees", Plate(), Touch(0, 0, 0, 30.0, np.radians(3.0), 0.02), ((), ())),
+    (
+        "plate, wrist at 3 degrees",
+        FlatPlate(),
+        Touch(0, 0, 0, 30.0, np.radians(3.0), 0.02),
+        ((), ()),
+    ),
 )
 
 
@@ -228,7 +233,7 @@ def rms(found: np.ndarray, truth: np.ndarray) -> float:
     return float(np.sqrt(((found - truth) ** 2).mean() / (truth**2).mean()))
 
 
-def depth_error(found: Contact, truth: Contact, surface: Surface) -> float:
+def depth_error(found: Contact, truth: Contact, surface: HeightMap) -> float:
     return (surface.top_mm - found.z_mm) / (surface.top_mm - truth.z_mm) - 1
 
 

@@ -34,10 +34,18 @@ from probe.contact.layer_influence import influence
 from probe.contact.layer_levels import Look, leveled
 from probe.contact.layer_patch import patch_under
 from probe.contact.layer_solve import glued, plate_of, solved
-from probe.contact.plate import Pose
+from probe.contact.plate import PlatePose
 from probe.errors import ContactError
 from probe.sensor import Overlay, SensorType
-from probe.surface.indenters import Cross, HalfPlane, Rough, Sphere, Strip, TiltedPlane, Washer
+from probe.surface.indenters import (
+    Cross,
+    HalfPlane,
+    RaisedStrip,
+    Rough,
+    Sphere,
+    TiltedPlane,
+    Washer,
+)
 
 PAD = SensorType(overlay=Overlay("pad"))
 CELLS = (2, 4, 8)
@@ -95,7 +103,7 @@ def left_out(given):
                 lambda c=cells, s=surface, t=touch: layer(s, PAD, t, cells_per_tactel=c),
                 given.repeat,
             )
-            plane = Pose(contact.z_mm, contact.tilt_x_rad, contact.tilt_y_rad)
+            plane = PlatePose(contact.z_mm, contact.tilt_x_rad, contact.tilt_y_rad)
 
             def seen(few, s=surface, t=touch, c=cells, grid=grid, plane=plane):
                 patch = patch_under(s, PAD, t, cells_per_tactel=c)
@@ -154,10 +162,10 @@ def scenes(given):
             young * height * 10 ** rng.uniform(-3, 1.2))  # fmt: skip
         stiffness = 3e3 * 10 ** rng.uniform(-6, 6) * (rng.random() < 0.7)
         wrist = WristStiffness(stiffness, stiffness * 10 ** rng.uniform(-1, 1))
-        surface = (Washer(), Strip(rng.uniform(0.01, 3)), Sphere(10 ** rng.uniform(0, 3)),
+        surface = (Washer(), RaisedStrip(rng.uniform(0.01, 3)), Sphere(10 ** rng.uniform(0, 3)),
                    Cross(rng.uniform(0.3, 3), 15.0), TiltedPlane(*rng.uniform(-0.15, 0.15, 2)),
                    Rough(int(rng.integers(100)), 10 ** rng.uniform(-4, 0)), HalfPlane(),
-                   HalfPlane(-0.6), Strip(1.0, 10.0, -0.5))[rng.integers(9)]  # fmt: skip
+                   HalfPlane(-0.6), RaisedStrip(1.0, 10.0, -0.5))[rng.integers(9)]  # fmt: skip
         tilt_x, tilt_y = rng.uniform(-0.17, 0.17, 2) * (rng.random() < 0.6)
         x, y = rng.uniform(-9, 9, 2)
         touch = Touch(x, y, rng.uniform(0, 6.3), force, tilt_x, tilt_y, wrist)

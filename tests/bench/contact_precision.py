@@ -1,7 +1,7 @@
 """Error against run time of every contact level, and the table that `press` picks from.
 
-    OPENBLAS_NUM_THREADS=1 python tests/bench/contact_precision.py            # the table
-    OPENBLAS_NUM_THREADS=1 python tests/bench/contact_precision.py --write    # and its files
+    PYTHONPATH=tests python tests/bench/contact_precision.py            # the table
+    PYTHONPATH=tests python tests/bench/contact_precision.py --write    # and its files
 
 Five indenters at some places each. The error of an image is the norm of its deviation over
 the norm of the reference, root mean square over the places. References:
@@ -29,10 +29,10 @@ import time
 from pathlib import Path
 
 import numpy as np
+from reference.elements_axisymmetric import section
+from reference.elements_round import indented, washer_pad
 
 from probe.contact.contract import Touch, WristStiffness
-from probe.contact.elements_axisymmetric import section
-from probe.contact.elements_round import indented, washer_pad
 from probe.contact.layer import layer
 from probe.contact.press import LEVELS, press
 from probe.contact.tabs import tabs
@@ -40,7 +40,7 @@ from probe.contact.tips import Tips
 from probe.errors import ContactError
 from probe.sensor import Overlay, SensorType
 from probe.surface.face import endless
-from probe.surface.indenters import Sphere, Strip, TiltedPlane, Washer
+from probe.surface.indenters import RaisedStrip, Sphere, TiltedPlane, Washer
 
 ROOT = Path(__file__).parents[2]
 TABLE = ROOT / "probe" / "contact" / "precision.json"
@@ -65,7 +65,7 @@ def cases(rng):
     labels = rng.integers(0, 4, (16, 16))
     return {
         "washer": (Washer(), 80.0, 80.0, STIFF),
-        "strip": (Strip(2.0), 40.0, 40.0, STIFF),
+        "strip": (RaisedStrip(2.0), 40.0, 40.0, STIFF),
         "sphere": (Sphere(BALL_MM), 40.0, 40.0, STIFF),
         "patch": (endless(labels, GLYPHS), 80.0, 80.0, STIFF),
         "tilt": (TiltedPlane(0.02, 0.01), 60.0, 60.0, WristStiffness()),

@@ -28,7 +28,7 @@ from probe.contact.contract import Touch, WristStiffness
 from probe.contact.press import press
 from probe.errors import ContactError
 from probe.sensor import Overlay, SensorType
-from probe.surface.indenters import HalfPlane, Plate, Sphere, Strip, Washer
+from probe.surface.indenters import FlatPlate, HalfPlane, RaisedStrip, Sphere, Washer
 from probe.surface.mesh import mesh
 
 LEVELS = {"tab": ("footprint", "tabs-19"), "pad": ("layer-2", "layer-4", "elements")}
@@ -58,7 +58,7 @@ def scenes():
     yield "edge, free wrist", HalfPlane(), Touch(5.0, 0.0, 0.3, 20.0, wrist=FREE), {}
     yield "corner, 1 N", corner, Touch(0.4, 0.3, 0.2, 1.0), {}
     yield "corner, 100 N", corner, Touch(0.4, 0.3, 0.2, 100.0), {}
-    yield "10 degrees", Plate(), Touch(0, 0, 0, 20.0, TEN), {}
+    yield "10 degrees", FlatPlate(), Touch(0, 0, 0, 20.0, TEN), {}
     for force in (1e-9, 1e-3, 1e3, 1e6, 1e9):
         yield f"{force:g} N", Washer(), Touch(0.3, 0.2, 0.4, force), {}
     for height in (0.05, 0.5, 20.0):
@@ -66,9 +66,9 @@ def scenes():
     for poisson in (0.0, 0.5):
         yield f"nu = {poisson:g}", Washer(), Touch(0.3, 0.2, 0.4, 20.0), {"poisson": poisson}
     for width in (0.01, 0.1):
-        yield f"stroke {width:g} mm", Strip(width), Touch(0.31, 0, 0.02, 1.0), {}
+        yield f"stroke {width:g} mm", RaisedStrip(width), Touch(0.31, 0, 0.02, 1.0), {}
         name = f"stroke {width:g}, floor"
-        yield name, Strip(width, floor_mm=-0.8), Touch(0.31, 0, 0.02, 1.0), {}
+        yield name, RaisedStrip(width, floor_mm=-0.8), Touch(0.31, 0, 0.02, 1.0), {}
 
 
 def extreme(only) -> bool:

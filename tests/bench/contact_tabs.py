@@ -28,7 +28,7 @@ from probe.contact.tabs import TOLERANCE, asked, settled, tabs
 from probe.contact.tips import Tips, tip_points
 from probe.sensor import SensorType
 from probe.surface.face import endless
-from probe.surface.indenters import Cross, HalfPlane, Sphere, Strip, Washer
+from probe.surface.indenters import Cross, HalfPlane, RaisedStrip, Sphere, Washer
 
 SENSOR = SensorType()
 POINTS = (7, 19, 37, 61, 127)
@@ -53,7 +53,7 @@ def main() -> None:
         "face, tilt 2 deg": (face, 200.0, 0.035),
         "washer": (Washer(), 3.0, 0.0),
         "cross": (Cross(), 3.0, 0.0),
-        "strip 2 mm": (Strip(), 3.0, 0.0),
+        "strip 2 mm": (RaisedStrip(), 3.0, 0.0),
         "sphere 40 mm": (Sphere(40.0), 3.0, 0.0),
         "half a face": (HalfPlane(), 6.0, 0.0),
     }

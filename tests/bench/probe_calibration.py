@@ -24,7 +24,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from probe.calibration import Calibration, Condition, Load, calibrated, calibration_from, known_load
+from probe.calibration import (
+    Calibration,
+    CalibrationLoad,
+    Condition,
+    calibrated,
+    calibration_from,
+    known_load,
+)
 from probe.circuit import (
     DATASHEET,
     MEASURED,
@@ -117,7 +124,9 @@ def recorded(
     return read_sequence(steady, board, fsr, None, rng)[0]
 
 
-def fitted_in(rest: np.ndarray, loads: list[Load], board: Electronics) -> tuple[Calibration, float]:
+def fitted_in(
+    rest: np.ndarray, loads: list[CalibrationLoad], board: Electronics
+) -> tuple[Calibration, float]:
     spent = []
     for _ in range(3):
         start = time.process_time()

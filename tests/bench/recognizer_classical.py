@@ -32,7 +32,7 @@ from probe.scan.places import surface_to_sensor, touch_at
 from probe.scan.raster import raster
 from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
-from probe.surface.face import Face
+from probe.surface.face import FaceSurface
 from probe.surface.polygon import polygon
 from recognizer.scan.mosaic.planar import between, moved
 from recognizer.thesis.edges.find import classical_edges, outline
@@ -115,7 +115,7 @@ def matched(edges, angle, offset):
 
 
 def bench_edges(number, seed):
-    face = Face(None, polygon([SQUARE]))
+    face = FaceSurface(None, polygon([SQUARE]))
     print(f"{'noise':9}{'view':8}{'way':10}{'seen':>6}{'found':>7}{'median':>8}{'rms':>7}"
           f"{'95 %':>7}{'max mm':>8}{'rms deg':>9}{'in 95 %':>9}{'ms':>7}")  # fmt: skip
     for level, view in itertools.product(LEVELS, ("edge", "corner")):

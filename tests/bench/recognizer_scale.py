@@ -27,8 +27,8 @@ from generator.alphabet import SymbolStyle, alphabet_named  # noqa: E402
 from generator.array import next_larger, profile  # noqa: E402
 from probe.contact.contract import Touch  # noqa: E402
 from probe.sensor import SensorType  # noqa: E402
-from probe.surface.face import Face  # noqa: E402
-from probe.surface.lattice import Lattice, listed  # noqa: E402
+from probe.surface.face import FaceSurface  # noqa: E402
+from probe.surface.lattice import LatticeSurface, listed  # noqa: E402
 from probe.surface.polygon import polygon  # noqa: E402
 from probe.surface.symbols import Relief, embossed  # noqa: E402
 from probe.surface.template import template  # noqa: E402
@@ -107,10 +107,12 @@ def measured(faces: int, touches: int) -> str:
     for _ in range(touches):
         number = int(rng.integers(faces))
         held = encoding.known[number]
-        lattice = Lattice(drawn, listed(R, C, held.labels), 0.0, -2.0, -58.0)
+        lattice = LatticeSurface(drawn, listed(R, C, held.labels), 0.0, -2.0, -58.0)
         x, y = rng.uniform(12, 48, 2)
         touch = Touch(x, y, rng.uniform(-math.pi, math.pi), rng.uniform(20, 120))
-        image, _ = read_sensor(Face(lattice, polygon([SQUARE])), SensorType(), touch, TYPICAL, rng)
+        image, _ = read_sensor(
+            FaceSurface(lattice, polygon([SQUARE])), SensorType(), touch, TYPICAL, rng
+        )
         start = time.process_time()
         found = recognise(reader, signal_of(image.astype(float)))
         ms.append(1e3 * (time.process_time() - start))

@@ -32,7 +32,6 @@ from probe.simulate.source import frames_of
 from probe.simulate.touch import Touches, random_touches, simulate
 from probe.surface.face import endless
 from probe.surface.indenters import Rough, Sphere, Washer
-from probe.surface.raster import Raster
 
 SPEC = """
 objects:
@@ -120,23 +119,17 @@ def report(folder, given):
         ("cube of 180 mm, registered", lambda: registered_surface(other, "Large", "F1")),
     ):
         asked(name, lambda make=make: make().surface, places, points)
-    raster = asked("raster of the panel", lambda: Raster(mesh), places, points)
     asked("array, as a table", lambda: endless(grid, STEPS), places, points)
     asked("array, as a function", lambda: endless(lambda r, c: (r * r + c) % 2, STEPS),
           places, points)  # fmt: skip
     for body in (Washer(), Sphere(), Rough()):
         asked(type(body).__name__.lower(), lambda body=body: body, places, points)
-    off = np.abs(raster.heights_mm(places[0].on_surface(points))
-                 - mesh.heights_mm(places[0].on_surface(points)))  # fmt: skip
-    print(f"raster of the panel: rms {off.std():.4f} mm, largest {off.max():.3f} mm, "
-          f"{raster.stored_bytes / 1e6:.0f} MB")  # fmt: skip
 
     print(f"\n{'a touch, median of CPU ms':<34}{'all':>12}{'press':>12}{'counts':>12}")
     some = places[: max(10, given.touches // 4)]
     for level in ("footprint", "tabs-7", "tabs-19", "tabs-61"):
         touched(f"{level} on the registered face", face, SensorType(), places, level)
     touched("tabs-19 on the panel's STL", mesh, SensorType(), places, "tabs-19")
-    touched("tabs-19 on its raster", raster, SensorType(), places, "tabs-19")
     pad = SensorType(overlay=Overlay(kind="pad"))
     for level in ("layer-2", "layer-4"):
         touched(f"{level} on the registered face", face, pad, some, level)

@@ -24,7 +24,7 @@ from probe.contact.tabs import tabs
 from probe.errors import ContactError
 from probe.sensor import Overlay, SensorType
 from probe.surface.face import endless
-from probe.surface.indenters import HalfPlane, Plate, Strip
+from probe.surface.indenters import FlatPlate, HalfPlane, RaisedStrip
 from probe.surface.polygon import polygon
 from recognizer.scan.mosaic.pair import registered
 from recognizer.scan.mosaic.patch import patch_of
@@ -49,7 +49,7 @@ EVERY_LEVEL = [
 def test_case_5_no_force_is_no_image_and_a_free_plate_off_its_ground_tips(kind, level):
     """Matter under x <= -2 mm alone: the centre of pressure lies outside the hull."""
     sensor = SENSORS[kind]
-    assert not press(Plate(), sensor, Touch(0, 0, 0, 0.0), accuracy=level).forces_n.any()
+    assert not press(FlatPlate(), sensor, Touch(0, 0, 0, 0.0), accuracy=level).forces_n.any()
     if level == "footprint":  # knows of no moments
         return
     free = Touch(2.0, 0, 0, 5.0, wrist=WristStiffness(0.0, 0.0))
@@ -67,7 +67,7 @@ def test_case_6_thin_strokes_are_felt_or_refused_at_every_level(kind, level, wid
     lost = {"footprint": 1.0, "tabs-7": 0.1, "tabs-19": 0.02, "tabs-61": 0.02, "layer-2": 0.02}
     for floor in (-math.inf, -0.8)[: 1 + (width > lost.get(level, 0.0))]:
         for x in (P / 2, 0.31):
-            surface, touch = Strip(width, floor_mm=floor), Touch(x, 0, 0.02, 1.0)
+            surface, touch = RaisedStrip(width, floor_mm=floor), Touch(x, 0, 0.02, 1.0)
             try:
                 found = press(surface, SENSORS[kind], touch, accuracy=level)
             except ContactError:

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from reference.elements_axisymmetric import DEGREES, apparent_modulus, section
+from reference.elements_round import indented, washer_pad
+from reference.elements_tab import Tab, compressed, partly_covered
 
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.elements import elements
-from probe.contact.elements_axisymmetric import DEGREES, apparent_modulus, section
-from probe.contact.elements_round import indented, washer_pad
-from probe.contact.elements_tab import Tab, compressed, partly_covered
 from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import Sphere
 

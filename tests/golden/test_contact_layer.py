@@ -5,9 +5,9 @@ import math
 import mpmath
 import numpy as np
 import pytest
+from reference.elements_round import indented, washer_pad
 
 from probe.contact.contract import Touch, WristStiffness
-from probe.contact.elements_round import indented, washer_pad
 from probe.contact.layer import layer
 from probe.contact.layer_influence import influence
 from probe.contact.layer_kernel import (
@@ -18,7 +18,7 @@ from probe.contact.layer_kernel import (
     layer_compliance,
 )
 from probe.sensor import Overlay, SensorType
-from probe.surface.indenters import Paraboloid, Strip, Washer
+from probe.surface.indenters import Paraboloid, RaisedStrip, Washer
 
 POISSON = (0.0, 0.3, 0.45, 0.49, 0.499, 0.4999, 0.49999, 0.5 - 2**-40, 0.5)
 S = [*10.0 ** np.linspace(-8, 2, 41), 0.999999, 1.0, 1.000001, 10.5, 19.7, 200.0, 400.0]
@@ -182,11 +182,11 @@ def test_washer_of_figure_4_10(washer, cells, samples, tactels, depth):
 def test_strokes_thinner_than_a_cell_are_felt_alike_at_every_place():
     """The force is where a fine grid has it; the depth is felt by the stroke's width, roughly."""
     sensor, width = pad(), 0.25  # a cell of 4 per tactel is 0.4 wide
-    wide = layer(Strip(2 * width), sensor, Touch(0, 0, 0.1, 12.0, wrist=HELD)).z_mm
+    wide = layer(RaisedStrip(2 * width), sensor, Touch(0, 0, 0.1, 12.0, wrist=HELD)).z_mm
     for x in (0.0, 0.13, 0.29):
         touch = Touch(x, 0.0, 0.1, 12.0, wrist=HELD)
-        fine = layer(Strip(width), sensor, touch, cells_per_tactel=16)
-        found = layer(Strip(width), sensor, touch)
+        fine = layer(RaisedStrip(width), sensor, touch, cells_per_tactel=16)
+        found = layer(RaisedStrip(width), sensor, touch)
         error = np.linalg.norm(found.forces_n - fine.forces_n) / np.linalg.norm(fine.forces_n)
         assert error <= 0.03
         assert 1 <= found.z_mm / fine.z_mm <= 1.25

@@ -8,7 +8,7 @@ import pytest
 
 from probe.contact.contract import WristStiffness
 from probe.contact.neo_hooke import Linear, NeoHooke
-from probe.contact.plate import Load, rest
+from probe.contact.plate import PlateLoad, rest
 from probe.sensor import SensorType
 
 POINTS = SensorType().centres_mm().reshape(-1, 2)
@@ -41,7 +41,9 @@ def drawn(rng, number):
     k = 10 ** rng.uniform(-spread, spread, len(some))
     force = 10 ** rng.uniform(-6, 6)
     wrist = WristStiffness(*[10 ** rng.uniform(-6, 6) * HALF**2] * 2)
-    load = Load(force, wrist, moment_x_nmm=-0.3 * force * HALF, moment_y_nmm=0.2 * force * HALF)
+    load = PlateLoad(
+        force, wrist, moment_x_nmm=-0.3 * force * HALF, moment_y_nmm=0.2 * force * HALF
+    )
     return POINTS[some], heights, k, load
 
 

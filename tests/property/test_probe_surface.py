@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from shapely.geometry import MultiPoint
 
 from probe.errors import SurfaceError
-from probe.surface.lattice import Lattice, listed
+from probe.surface.lattice import LatticeSurface, listed
 from probe.surface.mesh import mesh
 from probe.surface.outline import outline
 from probe.surface.polygon import polygon
@@ -88,7 +88,7 @@ def test_lattice_gives_the_heights_of_every_symbol_by_itself(alphabet, turn, see
     cells = np.unique(random.integers(-3, 3, (12, 2)), axis=0)
     labels = random.integers(0, len(alphabet), len(cells))
     shift = random.uniform(-9, 9, 2)
-    lattice = Lattice(known, listed(cells[:, 0], cells[:, 1], labels), turn, *shift)
+    lattice = LatticeSurface(known, listed(cells[:, 0], cells[:, 1], labels), turn, *shift)
     points = random.uniform(-30, 30, (1500, 2))
     c, s = math.cos(turn), math.sin(turn)
     at = points @ np.array([[c, s], [-s, c]]) + shift

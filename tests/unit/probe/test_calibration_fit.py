@@ -7,7 +7,7 @@ import pytest
 
 from probe.calibration import (
     Condition,
-    Thresholds,
+    ConditionThresholds,
     calibrated,
     calibration_from,
     even_load,
@@ -15,7 +15,7 @@ from probe.calibration import (
     known_load,
 )
 from probe.calibration.average import averaged
-from probe.calibration.law import Fitted, fitted, law_s
+from probe.calibration.law import FittedLaw, fitted, law_s
 from probe.calibration.pooled import pooled
 from probe.circuit import (
     DATASHEET,
@@ -196,7 +196,7 @@ def test_frames_that_are_none_are_refused():
 
 
 def test_a_stricter_law_needs_more_loads():
-    refused("a law needs 5", thresholds=Thresholds(levels=5))
+    refused("a law needs 5", thresholds=ConditionThresholds(levels=5))
 
 
 def test_the_reading_expected_of_a_force_is_the_reading_that_comes():
@@ -224,7 +224,7 @@ def test_tactels_that_are_alike_help_each_other_where_loads_are_few():
 
 def test_few_or_unlike_tactels_are_left_as_they_are():
     rng = np.random.default_rng(3)
-    law = Fitted(
+    law = FittedLaw(
         np.exp(rng.normal(size=40)), 1 + 0.1 * rng.normal(size=40), 0.1 * rng.random(40),
         np.broadcast_to(1e-4 * np.eye(3), (40, 3, 3)), np.ones(40),
     )  # fmt: skip

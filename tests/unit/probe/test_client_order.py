@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from probe.client.order import Order
+from probe.client.order import FrameOrder
 from probe.protocol import FramePacket, IdentPacket, StatisticsPacket
 
 STEP_US = 10_000
@@ -20,7 +20,7 @@ def ident(seq: int, t_us: int, boot: int = 0) -> IdentPacket:
     return IdentPacket(seq, t_us, boot=boot)
 
 
-def run(order: Order, packets: list, now_ns: int = 0) -> list[tuple[int, int]]:
+def run(order: FrameOrder, packets: list, now_ns: int = 0) -> list[tuple[int, int]]:
     """Return number and time (us) of the frames that come out; a number is a failed block."""
     out = []
     for p in packets:
@@ -33,12 +33,12 @@ def run(order: Order, packets: list, now_ns: int = 0) -> list[tuple[int, int]]:
     return out
 
 
-def numbers(order: Order, packets: list) -> list[int]:
+def numbers(order: FrameOrder, packets: list) -> list[int]:
     return [seq for seq, _ in run(order, packets)]
 
 
 def test_a_frame_waits_for_its_neighbour():
-    order = Order()
+    order = FrameOrder()
     assert order.take(packet(0), 0) is None
     assert order.holds
     assert order.take(packet(1), 0).seq == 0
@@ -48,15 +48,15 @@ def test_a_frame_waits_for_its_neighbour():
 
 
 def test_packets_that_are_no_frames_confirm_too():
-    order = Order()
+    order = FrameOrder()
     assert numbers(order, [packet(0), ident(1, 5000), packet(1), packet(2)]) == [0, 1, 2]
-    order = Order()
+    order = FrameOrder()
     assert numbers(order, [packet(0), StatisticsPacket(1, 0, 1, 0, 0, 0), packet(7)]) == [0, 7]
     assert (order.lost, order.doubtful) == (6, 0)
 
 
 def test_failed_blocks_account_for_a_gap():
-    order = Order()
+    order = FrameOrder()
     assert numbers(order, [packet(0), 20, packet(2), 530, 9, packet(5), 1060, packet(8)]) == [
         0,
         2,
@@ -68,20 +68,20 @@ def test_failed_blocks_account_for_a_gap():
 
 def test_bytes_that_vanish_without_a_failed_block_make_the_frame_doubtful():
     # Head of 1 and tail of 2, with a check sum that is right by chance.
-    order = Order()
+    order = FrameOrder()
     assert numbers(order, [packet(0), packet(1), packet(3), packet(4)]) == [0, 3, 4]
     assert (order.lost, order.doubtful) == (2, 1)
 
 
 def test_more_lost_than_failed_makes_the_frame_doubtful():
-    order = Order()
+    order = FrameOrder()
     assert numbers(order, [packet(0), 530, packet(3), packet(4)]) == [3, 4]
     assert order.doubtful == 1
 
 
 @pytest.mark.parametrize("wrong", [packet(40_000, 2 * STEP_US), packet(2, 3_000_000_000)])
 def test_a_wrong_number_or_time_is_not_handed_on(wrong):
-    order = Order()
+    order = FrameOrder()
     seen = numbers(order, [packet(0), packet(1), wrong, packet(3), packet(4)])
     assert seen == [0, 3, 4]
     assert order.doubtful == 2
@@ -90,7 +90,7 @@ def test_a_wrong_number_or_time_is_not_handed_on(wrong):
 
 def test_numbers_and_times_unwrap():
     first = 2**32 // STEP_US - 3  # the clock wraps after three frames, the number later
-    order = Order()
+    order = FrameOrder()
     seen = run(order, [packet(i, i * STEP_US) for i in range(first, first + 70_000)])
     assert len(seen) == 70_000
     assert seen[0] == (first % 65536, first * STEP_US)
@@ -101,7 +101,7 @@ def test_numbers_and_times_unwrap():
 
 @pytest.mark.parametrize("gap", [1, 300, 40_000, 65_536, 65_537, 200_000])
 def test_gaps_of_any_length_are_counted(gap):
-    order = Order()
+    order = FrameOrder()
     packets = [packet(i) for i in range(10)]
     order.lost, out = 0, run(order, packets)
     out += run(order, [packet(i + gap) for i in range(10, 20)])
@@ -111,7 +111,7 @@ def test_gaps_of_any_length_are_counted(gap):
 
 
 def test_a_reboot_with_its_ident_starts_the_numbers_anew():
-    order = Order()
+    order = FrameOrder()
     before = [ident(0, 0, boot=7), *(packet(i) for i in range(1000))]
     assert len(run(order, before, now_ns=0)) == 1000
     after = run(order, [ident(0, 50, boot=8), packet(0, 100), packet(1, 100 + STEP_US)],
@@ -122,7 +122,7 @@ def test_a_reboot_with_its_ident_starts_the_numbers_anew():
 
 
 def test_a_reboot_before_the_first_frame_is_counted_once():
-    order = Order()
+    order = FrameOrder()
     assert numbers(order, [ident(0, 5, boot=1), ident(0, 5, boot=2), packet(0), packet(1)]) == [
         0,
         1,
@@ -132,7 +132,7 @@ def test_a_reboot_before_the_first_frame_is_counted_once():
 
 @pytest.mark.parametrize("later_ns", [0, 700_000_000])
 def test_a_reboot_without_its_ident_is_told_by_the_clock(later_ns):
-    order = Order()
+    order = FrameOrder()
     run(order, [packet(i) for i in range(1000)])
     after = run(order, [packet(0, 300), packet(1, 300 + STEP_US)], now_ns=later_ns)
     assert [seq for seq, _ in after] == [0, 1]
@@ -142,7 +142,7 @@ def test_a_reboot_without_its_ident_is_told_by_the_clock(later_ns):
 
 
 def test_a_number_that_goes_back_while_the_clock_goes_on_is_a_start_too():
-    order = Order()
+    order = FrameOrder()
     run(order, [packet(i) for i in range(1000)])
     after = run(order, [packet(i, (1000 + i) * STEP_US) for i in range(3)])
     assert after == [(i, (1000 + i) * STEP_US) for i in range(3)]
@@ -150,7 +150,7 @@ def test_a_number_that_goes_back_while_the_clock_goes_on_is_a_start_too():
 
 
 def test_one_stray_frame_is_no_reboot():
-    order = Order()
+    order = FrameOrder()
     seen = numbers(order, [packet(500), packet(501), packet(3, 30), packet(503), packet(504)])
     assert seen == [500, 503, 504]
     assert order.reboots == 0

@@ -8,7 +8,7 @@ from probe.contact.elements import condensed_pad, elements
 from probe.contact.press import press
 from probe.errors import ContactError
 from probe.sensor import Overlay, SensorType
-from probe.surface.indenters import Cross, Paraboloid, Plate, Sphere, Strip, TiltedPlane
+from probe.surface.indenters import Cross, FlatPlate, Paraboloid, RaisedStrip, Sphere, TiltedPlane
 
 SMALL = {"rows": 8, "columns": 8}
 PAD = SensorType(**SMALL, overlay=Overlay(kind="pad"))
@@ -34,13 +34,13 @@ def test_no_force_is_an_exactly_zero_image():
     ("surface", "at", "overlay"),
     [
         (BALL, touch(1e-9), {}),
-        (Plate(), touch(), {}),
-        (Plate(), touch(tilt_x_rad=np.radians(10)), {}),
-        (Plate(), touch(tilt_x_rad=np.radians(10), wrist=FREE), {}),
+        (FlatPlate(), touch(), {}),
+        (FlatPlate(), touch(tilt_x_rad=np.radians(10)), {}),
+        (FlatPlate(), touch(tilt_x_rad=np.radians(10), wrist=FREE), {}),
         (TiltedPlane(0.1, -0.05), touch(), {}),
         (Sphere(2.0), touch(1.0, 6.3, 6.3), {}),
         (Cross(1.4, 9.0), touch(theta=0.3), {}),
-        (Strip(1.4), touch(x=0.3, theta=0.5), {}),
+        (RaisedStrip(1.4), touch(x=0.3, theta=0.5), {}),
         (BALL, touch(x=3.0, wrist=WristStiffness(1e12, 1e12)), {}),
         (BALL, touch(x=3.0, wrist=WristStiffness(1e-6, 1e-6)), {}),
         (BALL, touch(5.0), {"height_mm": 0.05}),
@@ -61,12 +61,12 @@ def test_extreme_scenes_have_a_finite_answer_that_bears_the_force(surface, at, o
     ("surface", "at", "cause"),
     [
         (BALL, touch(1e9), "into a pad"),
-        (Plate(), touch(1e9), "into a pad"),
-        (Plate(), touch(1e300), "into a pad"),
-        (Plate(), touch(np.nan), "force is nan"),
-        (Plate(), touch(-1.0), "force is -1"),
-        (Plate(), touch(x=np.inf), "pose"),
-        (Plate(np.nan), touch(), "no numbers"),
+        (FlatPlate(), touch(1e9), "into a pad"),
+        (FlatPlate(), touch(1e300), "into a pad"),
+        (FlatPlate(), touch(np.nan), "force is nan"),
+        (FlatPlate(), touch(-1.0), "force is -1"),
+        (FlatPlate(), touch(x=np.inf), "pose"),
+        (FlatPlate(np.nan), touch(), "no numbers"),
         (Sphere(2.0), touch(x=100.0), "nothing lies under"),
         (Sphere(2.0), touch(1.0, 6.3, 6.3, wrist=FREE), "tips"),
     ],
@@ -81,7 +81,7 @@ def test_scenes_without_an_answer_are_refused(surface, at, cause):
 @pytest.mark.parametrize(("width", "x"), [(0.3, 0.3), (0.01, 0.3), (0.01, 0.0)])
 def test_strokes_thinner_than_the_mesh_are_refused_never_lost(floor, width, x):
     with pytest.raises(ContactError, match="too thin") as caught:
-        pressed(Strip(width, floor_mm=floor), touch(x=x))
+        pressed(RaisedStrip(width, floor_mm=floor), touch(x=x))
     assert "walls_mm" in caught.value.fix
 
 
@@ -89,7 +89,7 @@ def test_strokes_thinner_than_the_mesh_are_refused_never_lost(floor, width, x):
 @pytest.mark.parametrize("theta", [0.1, 0.5, np.pi / 4])
 def test_thin_strokes_across_the_mesh_are_refused(floor, theta):
     with pytest.raises(ContactError, match="too thin"):
-        pressed(Strip(0.1, floor_mm=floor), touch(5.0, x=0.2, theta=theta))
+        pressed(RaisedStrip(0.1, floor_mm=floor), touch(5.0, x=0.2, theta=theta))
 
 
 @pytest.mark.parametrize("force", [1.0, 10.0])
@@ -100,7 +100,7 @@ def test_strokes_as_wide_as_printed_pass_at_any_turn(theta, force):
 
 
 def test_lines_at_the_walls_let_a_thin_stroke_through():
-    strip = Strip(0.3 + 1e-9)
+    strip = RaisedStrip(0.3 + 1e-9)
     found = pressed(strip, touch(5.0), walls_mm=((0.15,), ()))
     assert found.forces_n.sum() == pytest.approx(5.0, rel=1e-5)
     assert found.forces_n[:, 3:5].sum() > 0.6 * 5.0
@@ -120,7 +120,7 @@ def test_image_turns_and_mirrors_with_the_touch():
 
 def test_far_side_of_the_pad_bears_what_its_edge_leaves():
     # Beside a free side the pad gives way more: the plate sinks deeper than on one that goes on.
-    strip, at = Strip(1.5875 + 1e-9, 6.35 + 1e-9), touch(5.0, -5.55625)
+    strip, at = RaisedStrip(1.5875 + 1e-9, 6.35 + 1e-9), touch(5.0, -5.55625)
     walls = ((4.7625,), (3.175,))
     free = pressed(strip, at, walls_mm=walls)
     wide = pressed(strip, at, walls_mm=walls, margin_mm=6.0)

@@ -10,7 +10,7 @@ from probe.contact.footprint import footprint
 from probe.contact.tips import Tips
 from probe.errors import ContactError
 from probe.sensor import Overlay, SensorType
-from probe.surface.indenters import HalfPlane, Plate, Sphere, Strip, TiltedPlane
+from probe.surface.indenters import FlatPlate, HalfPlane, RaisedStrip, Sphere, TiltedPlane
 
 SENSOR = SensorType()
 PAD = SensorType(overlay=Overlay(kind="pad"))
@@ -25,7 +25,7 @@ def test_half_a_face_bears_on_half_the_tactels():
 
 @pytest.mark.parametrize(("points", "within"), [(19, 0.05), (127, 0.015)])
 def test_shares_are_those_of_the_area(points, within):
-    strip = Strip(width_mm=1.5875 * 3.5)
+    strip = RaisedStrip(width_mm=1.5875 * 3.5)
     found = footprint(strip, PAD, Touch(0.0, 0.0, 0.0, 1.0), Tips(points))
     columns = found.forces_n.sum(axis=0)
     exact = np.clip(3.5 / 2 - np.abs(np.arange(16) - 7.5) + 0.5, 0, 1)
@@ -51,7 +51,7 @@ def test_a_tilt_is_measured_against_the_plate():
 
 
 def test_no_force_is_an_exactly_zero_image():
-    found = footprint(Plate(), SENSOR, Touch(0.0, 0.0, 0.0, 0.0))
+    found = footprint(FlatPlate(), SENSOR, Touch(0.0, 0.0, 0.0, 0.0))
     assert not found.forces_n.any()
     assert found.z_mm == math.inf
 
@@ -59,11 +59,11 @@ def test_no_force_is_an_exactly_zero_image():
 @pytest.mark.parametrize(
     ("surface", "force", "named", "message"),
     [
-        (Plate(-math.inf), 1.0, {}, "nothing under the sensor"),
-        (Plate(math.nan), 1.0, {}, "no numbers"),
-        (Plate(), -1.0, {}, "not negative"),
-        (Plate(), math.nan, {}, "finite"),
-        (Plate(), 1.0, {"depth_mm": -1.0}, "depth of -1 mm"),
+        (FlatPlate(-math.inf), 1.0, {}, "nothing under the sensor"),
+        (FlatPlate(math.nan), 1.0, {}, "no numbers"),
+        (FlatPlate(), -1.0, {}, "not negative"),
+        (FlatPlate(), math.nan, {}, "finite"),
+        (FlatPlate(), 1.0, {"depth_mm": -1.0}, "depth of -1 mm"),
     ],
 )
 def test_what_gives_no_image_is_refused(surface, force, named, message):

@@ -13,18 +13,18 @@ from probe.contact.layer_influence import influence
 from probe.contact.layer_levels import COUNT, Look, leveled
 from probe.contact.layer_patch import patch_under
 from probe.contact.layer_solve import plate_of
-from probe.contact.plate import Pose
+from probe.contact.plate import PlatePose
 from probe.contact.press import press
 from probe.errors import ContactError
 from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import (
     Cross,
+    FlatPlate,
     HalfPlane,
     Paraboloid,
-    Plate,
+    RaisedStrip,
     Rough,
     Sphere,
-    Strip,
     TiltedPlane,
     Washer,
 )
@@ -49,7 +49,7 @@ def posed(surface, sensor, touch, cells=2, plane=None, floor=-1.0):
     grid = influence(sensor, cells)
     patch = patch_under(surface, sensor, touch, cells_per_tactel=cells)
     patch = patch.with_cells(np.arange(grid.rows * grid.columns)[: patch.coarse_mm.size])
-    levels = leveled(patch, grid, Look(plane or Pose(0.0, 0.0, 0.0), floor))
+    levels = leveled(patch, grid, Look(plane or PlatePose(0.0, 0.0, 0.0), floor))
     return levels, plate_of(touch, levels)
 
 
@@ -57,9 +57,12 @@ SCENES = {
     "washer": (Washer(6.0, 2.0), Touch(0.3, -0.2, 0.4, 6.0)),
     "off the middle": (Sphere(20.0), Touch(1.0, 0.7, 0.0, 3.0, 0.02, -0.03)),
     "held fast": (Cross(1.3, 7.0), Touch(0.2, 0.1, 0.3, 5.0, 0.01, 0.0, HELD)),
-    "free": (Plate(), Touch(0.0, 0.0, 0.0, 10.0, wrist=FREE)),
+    "free": (FlatPlate(), Touch(0.0, 0.0, 0.0, 10.0, wrist=FREE)),
     "rough": (Rough(3, 0.05, 1.0), Touch(0.0, 0.0, 0.0, 4.0)),
-    "one wrist axis": (Strip(2.0), Touch(0.4, 0, 0.2, 4.0, 0, 0.01, WristStiffness(0.0, math.inf))),
+    "one wrist axis": (
+        RaisedStrip(2.0),
+        Touch(0.4, 0, 0.2, 4.0, 0, 0.01, WristStiffness(0.0, math.inf)),
+    ),
 }
 
 
@@ -145,7 +148,7 @@ def test_an_independent_solver_finds_the_same(scene, poisson):
     assert np.linalg.norm(images[0] - images[1]) <= 1e-5 * np.linalg.norm(images[1])
 
 
-SURFACES = (Washer(), Strip(1.3), Sphere(30.0), Cross(1.6, 15.0), TiltedPlane(0.05, -0.08),
+SURFACES = (Washer(), RaisedStrip(1.3), Sphere(30.0), Cross(1.6, 15.0), TiltedPlane(0.05, -0.08),
             Rough(1, 0.1, 1.5), HalfPlane(), HalfPlane(-0.6), Paraboloid(200.0))  # fmt: skip
 
 
@@ -212,7 +215,7 @@ def test_edge_of_a_face_and_ten_degrees():
     assert edge.forces_n[:, :7].sum() > 0.97 * 30  # matter where x <= -3 mm: 6.1 columns
     assert edge.forces_n[:, 9:].sum() < 0.01 * 30
     tilted = layer(
-        Plate(),
+        FlatPlate(),
         sensor,
         Touch(0, 0, 0, 10.0, ten, 0.0, WristStiffness(1e9, 1e9)),
         cells_per_tactel=4,
@@ -230,7 +233,9 @@ def test_thin_strokes_are_felt_or_refused_never_lost(width):
     sensor = pad()
     for theta in (0.0, 0.3):
         for floor in (-math.inf, -0.5):
-            found, why = attempt(Strip(width, floor_mm=floor), sensor, Touch(0.1, 0, theta, 2.0))
+            found, why = attempt(
+                RaisedStrip(width, floor_mm=floor), sensor, Touch(0.1, 0, theta, 2.0)
+            )
             if found is None:
                 assert "thin" in why or "strokes" in why
             else:

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.neo_hooke import Linear, NeoHooke
-from probe.contact.plate import Load, load_of, rest
+from probe.contact.plate import PlateLoad, load_of, rest
 from probe.errors import ContactError
 from probe.sensor import SensorType
 
@@ -19,7 +19,7 @@ RIGID = WristStiffness(math.inf, math.inf)
 
 
 def test_level_springs_share_the_force():
-    found = rest(POINTS, np.full(256, 3.0), Linear(2.0), Load(51.2))
+    found = rest(POINTS, np.full(256, 3.0), Linear(2.0), PlateLoad(51.2))
     assert found.pose.z_mm == pytest.approx(3.0 - 51.2 / (256 * 2.0), rel=1e-12)
     assert abs(found.pose.tilt_x_rad) + abs(found.pose.tilt_y_rad) < 1e-15
     np.testing.assert_allclose(found.forces_n, 0.2, rtol=1e-12)
@@ -27,7 +27,7 @@ def test_level_springs_share_the_force():
 
 def test_one_tip_off_the_centre_turns_the_plate_against_the_wrist():
     at, force = np.array([[4.0, -3.0]]), 5.0
-    found = rest(at, np.zeros(1), Linear(10.0), Load(force, WristStiffness(3000.0, 2000.0)))
+    found = rest(at, np.zeros(1), Linear(10.0), PlateLoad(force, WristStiffness(3000.0, 2000.0)))
     assert found.pose.tilt_x_rad == pytest.approx(force * -3.0 / 3000, rel=1e-12)
     assert found.pose.tilt_y_rad == pytest.approx(-force * 4.0 / 2000, rel=1e-12)
     # The tip alone is pressed by F/k; there the plate stands that much below the surface.
@@ -36,20 +36,20 @@ def test_one_tip_off_the_centre_turns_the_plate_against_the_wrist():
 
 def test_a_stiff_arm_keeps_its_tilt_and_a_soft_one_gives_way():
     tilted = {"tilt_x_rad": 0.02, "tilt_y_rad": -0.01}
-    held = rest(POINTS, np.zeros(256), Linear(1.0), Load(80.0, RIGID, **tilted)).pose
+    held = rest(POINTS, np.zeros(256), Linear(1.0), PlateLoad(80.0, RIGID, **tilted)).pose
     assert (held.tilt_x_rad, held.tilt_y_rad) == (0.02, -0.01)
     nearly = rest(
-        POINTS, np.zeros(256), Linear(1.0), Load(80.0, WristStiffness(1e12, 1e12), **tilted)
+        POINTS, np.zeros(256), Linear(1.0), PlateLoad(80.0, WristStiffness(1e12, 1e12), **tilted)
     ).pose
     assert nearly.z_mm == pytest.approx(held.z_mm, rel=1e-6)
     soft = rest(
-        POINTS, np.zeros(256), Linear(1.0), Load(80.0, WristStiffness(1e-3, 1e-3), **tilted)
+        POINTS, np.zeros(256), Linear(1.0), PlateLoad(80.0, WristStiffness(1e-3, 1e-3), **tilted)
     ).pose
     assert math.hypot(soft.tilt_x_rad, soft.tilt_y_rad) < 1e-6
 
 
 def test_moments_move_the_centre_of_pressure():
-    load = Load(10.0, FREE, moment_x_nmm=-20.0, moment_y_nmm=30.0)
+    load = PlateLoad(10.0, FREE, moment_x_nmm=-20.0, moment_y_nmm=30.0)
     found = rest(POINTS, np.zeros(256), Linear(1.0), load)
     centre = found.forces_n @ POINTS / found.forces_n.sum()
     np.testing.assert_allclose(centre, [3.0, 2.0], rtol=1e-9)
@@ -57,7 +57,7 @@ def test_moments_move_the_centre_of_pressure():
 
 @pytest.mark.parametrize("force", [1e-9, 1e-3, 1.0, 80.0, 1e6, 1e9])
 def test_a_crushed_column_answers_by_its_law(force):
-    found = rest(np.zeros((1, 2)), np.array([0.5]), NeoHooke(0.6, 2.0), Load(force, FREE))
+    found = rest(np.zeros((1, 2)), np.array([0.5]), NeoHooke(0.6, 2.0), PlateLoad(force, FREE))
     stretch = 1 - (0.5 - found.pose.z_mm) / 2.0
     assert 0 < stretch < 1
     law = 0.6 * 2.0 / 3 * (1 - stretch) * (1 + stretch + stretch**2) / stretch**2
@@ -85,7 +85,7 @@ def test_an_interior_point_solver_finds_the_same_rest():
         heights = rng.random(n)
         k = 10 ** rng.uniform(-2, 2, n)
         wrist = WristStiffness(*(10 ** rng.uniform(1, 5, 2)))
-        load = Load(10 ** rng.uniform(-1, 2), wrist, *rng.uniform(-0.05, 0.05, 2))
+        load = PlateLoad(10 ** rng.uniform(-1, 2), wrist, *rng.uniform(-0.05, 0.05, 2))
         found = rest(points, heights, Linear(k), load)
         z, turn_x, turn_y = _oracle(points, heights, k, load)
         assert found.pose.z_mm == pytest.approx(z, abs=1e-6)
@@ -117,7 +117,7 @@ def _oracle(points, heights, k, load):
     ("moment_y", "stands"), [(0.0, True), (11.8, True), (12.0, False), (-12.0, False), (1e9, False)]
 )
 def test_a_free_plate_tips_where_the_centre_of_pressure_leaves_the_hull(moment_y, stands):
-    load = Load(1.0, FREE, moment_y_nmm=moment_y)
+    load = PlateLoad(1.0, FREE, moment_y_nmm=moment_y)
     heights = np.full(256, -1.0)
     heights[[37, 200]] = 0.0
     if stands:
@@ -133,43 +133,43 @@ def test_a_free_plate_tips_where_the_centre_of_pressure_leaves_the_hull(moment_y
 
 def test_a_free_plate_on_one_tip_stands_under_it_alone():
     at = np.array([[2.0, 1.0]])
-    under = Load(1.0, FREE, moment_x_nmm=-1.0, moment_y_nmm=2.0)
+    under = PlateLoad(1.0, FREE, moment_x_nmm=-1.0, moment_y_nmm=2.0)
     assert rest(at, np.zeros(1), Linear(1.0), under).forces_n == pytest.approx(1.0)
     with pytest.raises(ContactError, match="tips"):
-        rest(at, np.zeros(1), Linear(1.0), Load(1.0, FREE))
+        rest(at, np.zeros(1), Linear(1.0), PlateLoad(1.0, FREE))
 
 
 def test_a_wrist_that_is_free_about_one_axis_needs_the_hull_along_it_alone():
     at = np.array([[2.0, 1.0], [2.0, -1.0]])
-    about_y_held = Load(1.0, WristStiffness(0.0, 100.0))
+    about_y_held = PlateLoad(1.0, WristStiffness(0.0, 100.0))
     assert rest(at, np.zeros(2), Linear(1.0), about_y_held).forces_n.sum() == pytest.approx(1.0)
     with pytest.raises(ContactError, match="tips"):
-        rest(at, np.zeros(2), Linear(1.0), Load(1.0, WristStiffness(100.0, 0.0)))
+        rest(at, np.zeros(2), Linear(1.0), PlateLoad(1.0, WristStiffness(100.0, 0.0)))
 
 
 def test_no_force_is_no_contact():
-    found = rest(POINTS, np.zeros(256), Linear(1.0), Load(0.0, tilt_x_rad=0.1))
+    found = rest(POINTS, np.zeros(256), Linear(1.0), PlateLoad(0.0, tilt_x_rad=0.1))
     assert not found.forces_n.any()
     assert found.pose.z_mm == math.inf
     assert found.pose.tilt_x_rad == 0.1
 
 
 def test_far_from_the_origin_nothing_is_lost():
-    near = rest(POINTS, np.zeros(256), NeoHooke(0.6, 2.0), Load(80.0))
-    far = rest(POINTS, np.full(256, 2.0**20), NeoHooke(0.6, 2.0), Load(80.0))
+    near = rest(POINTS, np.zeros(256), NeoHooke(0.6, 2.0), PlateLoad(80.0))
+    far = rest(POINTS, np.full(256, 2.0**20), NeoHooke(0.6, 2.0), PlateLoad(80.0))
     np.testing.assert_array_equal(far.forces_n, near.forces_n)
 
 
 @pytest.mark.parametrize(
     "load",
     [
-        Load(-1.0),
-        Load(math.nan),
-        Load(math.inf),
-        Load(1.0, tilt_x_rad=math.nan),
-        Load(1.0, WristStiffness(-1.0, 0.0)),
-        Load(1.0, WristStiffness(math.nan, 1.0)),
-        Load(0.0, moment_x_nmm=1.0),
+        PlateLoad(-1.0),
+        PlateLoad(math.nan),
+        PlateLoad(math.inf),
+        PlateLoad(1.0, tilt_x_rad=math.nan),
+        PlateLoad(1.0, WristStiffness(-1.0, 0.0)),
+        PlateLoad(1.0, WristStiffness(math.nan, 1.0)),
+        PlateLoad(0.0, moment_x_nmm=1.0),
     ],
 )
 def test_loads_that_are_none_are_refused(load):
@@ -179,9 +179,9 @@ def test_loads_that_are_none_are_refused(load):
 
 def test_nothing_under_the_plate_is_refused():
     with pytest.raises(ContactError, match="nothing under the plate to bear 5 N"):
-        rest(POINTS, np.full(256, -math.inf), Linear(1.0), Load(5.0))
+        rest(POINTS, np.full(256, -math.inf), Linear(1.0), PlateLoad(5.0))
 
 
 def test_a_touch_is_a_load():
     touch = Touch(1.0, 2.0, 0.3, 40.0, 0.01, 0.02, WristStiffness(5.0, 6.0))
-    assert load_of(touch) == Load(40.0, WristStiffness(5.0, 6.0), 0.01, 0.02)
+    assert load_of(touch) == PlateLoad(40.0, WristStiffness(5.0, 6.0), 0.01, 0.02)

@@ -8,7 +8,7 @@ import pytest
 
 from probe.contact import tabs as tabs_module
 from probe.contact.contract import Touch, WristStiffness
-from probe.contact.plate import Pose, load_of, rest
+from probe.contact.plate import PlatePose, load_of, rest
 from probe.contact.plate_newton import Columns
 from probe.contact.tab_law import BETA, tip_laws
 from probe.contact.tabs import asked, settled, tabs
@@ -17,11 +17,11 @@ from probe.errors import ContactError
 from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import (
     Cross,
+    FlatPlate,
     HalfPlane,
-    Plate,
+    RaisedStrip,
     Rough,
     Sphere,
-    Strip,
     TiltedPlane,
     Washer,
 )
@@ -50,7 +50,7 @@ def pressed(surface, force=80.0, sensor=SENSOR, tips=None, **where):
 
 @pytest.mark.parametrize("force", [1e-6, 1.0, 80.0, 300.0, 1e5])
 def test_covered_wholly_a_tab_is_the_neo_hookean_column(force):
-    found = pressed(Plate(1.0), force)
+    found = pressed(FlatPlate(1.0), force)
     np.testing.assert_allclose(found.forces_n, force / 256, rtol=1e-5)
     stretch = 1 - (1.0 - found.z_mm) / 2.0
     stress = (1 / 3) * (1 - stretch) * (1 + stretch + stretch**2) / stretch**2
@@ -73,7 +73,7 @@ def test_a_tip_covered_in_part_bears_more_than_its_share(points, edge_mm):
     tiny = 1e-6
     touch = Touch(-edge_mm, 0.0, 0.0, tiny, wrist=RIGID)
     part = tabs(HalfPlane(), ONE_TAB, touch, tips)
-    whole = tabs(Plate(), ONE_TAB, touch, tips)
+    whole = tabs(FlatPlate(), ONE_TAB, touch, tips)
     ratio = whole.z_mm / part.z_mm
     assert ratio == pytest.approx(share * (1 + BETA) / (1 + BETA * share), rel=1e-4)
     assert abs(ratio - share * (1 + 0.59 * (1 - share))) < 0.022
@@ -122,7 +122,7 @@ def test_two_heights_under_one_tip_agree_with_the_column_solved_alone():
 SCENES = {
     "washer": Washer(),
     "cross": Cross(),
-    "strip": Strip(),
+    "strip": RaisedStrip(),
     "sphere": Sphere(40.0),
     "half": HalfPlane(),
     "step": HalfPlane(floor_mm=-0.3),
@@ -168,7 +168,7 @@ def test_points_that_were_not_foreseen_to_touch_are_taken_in(monkeypatch):
         return rest(*args, **named)
 
     def too_high(points_mm, heights_mm, overlay, load):
-        return Pose(-1e-3, 0.0, 0.0), 1e-3
+        return PlatePose(-1e-3, 0.0, 0.0), 1e-3
 
     touch = Touch(0.0, 0.0, 0.0, 200.0)
     right = tabs(HalfPlane(floor_mm=-0.3), SENSOR, touch)
@@ -182,13 +182,13 @@ def test_points_that_were_not_foreseen_to_touch_are_taken_in(monkeypatch):
 
 def test_a_symmetric_scene_gives_a_symmetric_image_but_for_the_points():
     for points, within in ((19, 0.06), (127, 0.02)):
-        image = pressed(Strip(width_mm=3.3), tips=Tips(points)).forces_n
+        image = pressed(RaisedStrip(width_mm=3.3), tips=Tips(points)).forces_n
         assert np.linalg.norm(image - image[:, ::-1]) < within * np.linalg.norm(image)
 
 
 def test_half_a_turn_about_a_symmetric_body_is_the_same_touch():
-    one = pressed(Strip(width_mm=3.3), theta_rad=0.2, x_mm=0.1)
-    other = pressed(Strip(width_mm=3.3), theta_rad=0.2 + math.pi, x_mm=-0.1)
+    one = pressed(RaisedStrip(width_mm=3.3), theta_rad=0.2, x_mm=0.1)
+    other = pressed(RaisedStrip(width_mm=3.3), theta_rad=0.2 + math.pi, x_mm=-0.1)
     np.testing.assert_allclose(other.forces_n, one.forces_n, rtol=1e-6, atol=1e-9)
 
 
@@ -227,7 +227,7 @@ def test_no_force_is_an_exactly_zero_image():
 @pytest.mark.parametrize("scene", ["flat", "needle", "corner", "sphere", "step", "tilt", "edge"])
 def test_extreme_scenes_give_a_finite_image_or_a_clear_refusal(force, scene):
     surface, where = {
-        "flat": (Plate(), {}),
+        "flat": (FlatPlate(), {}),
         "needle": (
             Lambda(lambda x, y: np.where(np.hypot(x - 8.73, y - 0.79) < 0.3, 0, -np.inf)),
             {},
@@ -270,11 +270,11 @@ def test_a_free_plate_finds_its_own_tilt():
 def test_a_longer_tab_bears_more_and_a_domed_one_gives_way():
     lengths = np.zeros((16, 16))
     lengths[3, 5] = 0.1
-    found = pressed(Plate(), tips=Tips(lengths_mm=lengths))
+    found = pressed(FlatPlate(), tips=Tips(lengths_mm=lengths))
     rest_of_them = np.delete(found.forces_n.ravel(), 3 * 16 + 5)
     assert found.forces_n[3, 5] > 1.2 * rest_of_them.max()
-    domed = pressed(Plate(), tips=Tips(dome_mm=0.2))
-    plain = pressed(Plate())
+    domed = pressed(FlatPlate(), tips=Tips(dome_mm=0.2))
+    plain = pressed(FlatPlate())
     assert domed.z_mm < plain.z_mm
     np.testing.assert_allclose(domed.forces_n, 80 / 256, rtol=1e-3)
 
@@ -290,18 +290,21 @@ def test_tabs_that_all_stand_off_by_the_same_are_a_sensor_moved():
     ("call", "message"),
     [
         (
-            lambda: pressed(Plate(), sensor=SensorType(overlay=Overlay(kind="pad"))),
+            lambda: pressed(FlatPlate(), sensor=SensorType(overlay=Overlay(kind="pad"))),
             "overlay is a pad",
         ),
-        (lambda: pressed(Plate(), sensor=SensorType(overlay=Overlay(young_mpa=0.0))), "modulus 0"),
-        (lambda: pressed(Plate(-math.inf)), "nothing under the sensor to bear 80 N"),
-        (lambda: pressed(Plate(math.nan)), "no numbers"),
-        (lambda: pressed(Plate(math.inf)), "no numbers"),
-        (lambda: pressed(Plate(), -1.0), "force not negative"),
-        (lambda: pressed(Plate(), math.nan), "finite"),
-        (lambda: pressed(Plate(), math.inf), "finite"),
-        (lambda: pressed(Plate(), tips=Tips(8)), "patterns have 7, 19"),
-        (lambda: pressed(Plate(), tips=Tips(lengths_mm=np.zeros(3))), "lengths have shape"),
+        (
+            lambda: pressed(FlatPlate(), sensor=SensorType(overlay=Overlay(young_mpa=0.0))),
+            "modulus 0",
+        ),
+        (lambda: pressed(FlatPlate(-math.inf)), "nothing under the sensor to bear 80 N"),
+        (lambda: pressed(FlatPlate(math.nan)), "no numbers"),
+        (lambda: pressed(FlatPlate(math.inf)), "no numbers"),
+        (lambda: pressed(FlatPlate(), -1.0), "force not negative"),
+        (lambda: pressed(FlatPlate(), math.nan), "finite"),
+        (lambda: pressed(FlatPlate(), math.inf), "finite"),
+        (lambda: pressed(FlatPlate(), tips=Tips(8)), "patterns have 7, 19"),
+        (lambda: pressed(FlatPlate(), tips=Tips(lengths_mm=np.zeros(3))), "lengths have shape"),
     ],
 )
 def test_what_gives_no_touch_is_refused(call, message):

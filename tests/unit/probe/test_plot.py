@@ -11,7 +11,7 @@ from probe.plot.canvas import HEAT
 from probe.plot.frame import HEIGHT, WIDTH, frame_picture, frames_picture
 from probe.plot.touch import MARK, OUTLINE, touch_picture
 from probe.sensor import SensorType
-from probe.surface.indenters import Plate, Washer
+from probe.surface.indenters import FlatPlate, Washer
 
 SENSOR = SensorType()
 
@@ -78,7 +78,7 @@ def test_a_touch_shows_surface_force_and_reading(tmp_path):
         assert near(panel, OUTLINE, 40) > 60, "the outline of the washer"
 
 
-@pytest.mark.parametrize("surface", [Plate(), Washer()])
+@pytest.mark.parametrize("surface", [FlatPlate(), Washer()])
 def test_a_flat_surface_and_none_at_all(tmp_path, surface):
     touch = Touch(500.0, 0.0, 0.0, 0.0)
     nothing = np.zeros((16, 16))

@@ -9,9 +9,9 @@ from probe.errors import SurfaceError
 from probe.surface import indenters
 
 ALL = [
-    indenters.Plate(),
+    indenters.FlatPlate(),
     indenters.TiltedPlane(0.05, -0.1),
-    indenters.Strip(),
+    indenters.RaisedStrip(),
     indenters.Cross(),
     indenters.Washer(),
     indenters.Sphere(),
@@ -35,7 +35,7 @@ def test_no_height_exceeds_the_top_and_none_is_nan(surface):
     ("surface", "inside", "outside"),
     [
         (indenters.Washer(), [(7.5, 0), (3.5, 0), (0, -5)], [(7.51, 0), (3.49, 0), (0, 0)]),
-        (indenters.Strip(2.0, 10.0), [(1, 5), (-1, -5), (0, 0)], [(1.01, 0), (0, 5.01)]),
+        (indenters.RaisedStrip(2.0, 10.0), [(1, 5), (-1, -5), (0, 0)], [(1.01, 0), (0, 5.01)]),
         (indenters.Cross(2.0, 20.0), [(10, 1), (-1, 10), (0, 0)], [(10.1, 0), (1.1, 1.1)]),
         (indenters.HalfPlane(), [(0, 99), (-5, 0)], [(1e-9, 0)]),
     ],

@@ -1,4 +1,4 @@
-"""Triangles, polygons, files and rasters as height fields."""
+"""Triangles, polygons and files as height fields."""
 
 import struct
 
@@ -7,11 +7,10 @@ import pytest
 import shapely
 
 from probe.errors import SurfaceError
-from probe.surface.face import Face
-from probe.surface.indenters import Plate, Sphere, TiltedPlane
+from probe.surface.face import FaceSurface
+from probe.surface.indenters import FlatPlate, TiltedPlane
 from probe.surface.mesh import mesh, part_mesh
 from probe.surface.polygon import polygon
-from probe.surface.raster import Raster
 from probe.surface.solids import filled
 from probe.surface.stl import read_stl
 
@@ -139,13 +138,13 @@ def test_filled_loops_cover_their_area_once():
 
 
 def test_face_sees_its_surroundings_beyond_its_edges_and_above_itself():
-    low = Face(None, polygon([SQUARE, HOLE]), TiltedPlane(-0.1, 0.0))
+    low = FaceSurface(None, polygon([SQUARE, HOLE]), TiltedPlane(-0.1, 0.0))
     at = np.array([[5.0, 1], [5, 5], [20, 0], [-20, 0]])
     assert low.heights_mm(at).tolist() == [0.0, -0.5, -2.0, 2.0]
     assert low.top_mm == pytest.approx(10.0)
-    alone = Face(None, polygon([SQUARE]))
+    alone = FaceSurface(None, polygon([SQUARE]))
     assert alone.heights_mm(at).tolist() == [0.0, 0.0, -np.inf, -np.inf]
-    over = Face(None, polygon([SQUARE]), Plate(3.0))
+    over = FaceSurface(None, polygon([SQUARE]), FlatPlate(3.0))
     assert (over.heights_mm(at) == 3.0).all()
 
 
@@ -191,34 +190,3 @@ def test_missing_files_and_folders_are_refused(tmp_path):
     for path in (tmp_path / "none.stl", tmp_path):
         with pytest.raises(SurfaceError, match="cannot be read"):
             read_stl(path)
-
-
-def test_raster_keeps_what_it_saw_within_its_stated_error():
-    asked = []
-
-    class Counted:
-        top_mm = 0.0
-
-        def heights_mm(self, points):
-            asked.append(len(points))
-            return Sphere(15.0).heights_mm(points)
-
-    raster = Raster(Counted(), 0.05)
-    points = np.random.default_rng(0).uniform(-4, 4, (3000, 2))
-    first = raster.heights_mm(points)
-    steepest = 4 * np.sqrt(2) / np.sqrt(15**2 - 32)
-    exact = Sphere(15.0).heights_mm(points)
-    assert 0 < np.abs(first - exact).max() <= steepest * 0.05 / np.sqrt(2) + 1e-6
-    count = len(asked)
-    assert np.array_equal(raster.heights_mm(points), first)
-    assert len(asked) == count == 4  # tiles of 6.4 mm
-    assert raster.stored_bytes == 4 * 128 * 128 * 4
-
-
-def test_raster_keeps_edges_of_the_world_and_refuses_what_lies_beyond_it():
-    raster = Raster(Sphere(2.0), 0.1)
-    assert raster.heights_mm(np.array([[5.0, 5.0]]))[0] == -np.inf
-    with pytest.raises(SurfaceError, match="larger cells"):
-        raster.heights_mm(np.array([[1e4, 0.0]]))
-    with pytest.raises(SurfaceError, match="cells"):
-        Raster(Sphere(2.0), 0.0)

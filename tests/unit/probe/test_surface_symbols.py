@@ -9,7 +9,7 @@ from shapely.geometry import MultiPoint
 
 from probe.errors import SurfaceError
 from probe.surface.face import endless
-from probe.surface.lattice import Lattice, computed, listed, repeated
+from probe.surface.lattice import LatticeSurface, computed, listed, repeated
 from probe.surface.outline import outline
 from probe.surface.solids import symbol_triangles
 from probe.surface.symbols import Relief, embossed
@@ -141,8 +141,10 @@ def test_lattice_puts_each_label_into_its_cell():
     grid = np.random.default_rng(0).integers(-1, 3, (4, 5))
     rows, columns = np.nonzero(grid >= 0)
     x, y = np.random.default_rng(1).uniform(-3.49, 3.49, (2, 500))
-    finite = Lattice(template(symbols, PITCH), listed(rows - 7, columns + 2, grid[rows, columns]))
-    endless_ = Lattice(template(symbols, PITCH), repeated(grid))
+    finite = LatticeSurface(
+        template(symbols, PITCH), listed(rows - 7, columns + 2, grid[rows, columns])
+    )
+    endless_ = LatticeSurface(template(symbols, PITCH), repeated(grid))
     for r, c in np.ndindex(4, 5):
         label = grid[r, c]
         want = symbols.heights_mm(np.full(500, label), x, y) if label >= 0 else np.zeros(500)
@@ -158,10 +160,10 @@ def test_turned_lattice_is_the_turned_surface():
     grid = np.random.default_rng(0).integers(0, 3, (9, 9))
     points = np.random.default_rng(1).uniform(-30, 30, (2000, 2))
     turn, x, y = 0.7, 3.3, -1.2
-    turned = Lattice(template(symbols, PITCH), repeated(grid), turn, x, y)
+    turned = LatticeSurface(template(symbols, PITCH), repeated(grid), turn, x, y)
     c, s = math.cos(turn), math.sin(turn)
     there = points @ np.array([[c, s], [-s, c]]) + (x, y)
-    straight = Lattice(template(symbols, PITCH), repeated(grid))
+    straight = LatticeSurface(template(symbols, PITCH), repeated(grid))
     close = np.abs(turned.heights_mm(points) - straight.heights_mm(there))
     assert np.sort(close)[-3] < 1e-9  # upright steps excepted: a point may fall on either side
 

@@ -10,7 +10,7 @@ from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.sensor import Overlay, SensorType
-from probe.surface.face import Face
+from probe.surface.face import FaceSurface
 from probe.surface.polygon import polygon
 from recognizer.thesis.edges.find import Finding, classical_edges, face_edges, outline
 from recognizer.thesis.edges.hough import segments
@@ -172,7 +172,7 @@ def test_response_rises_from_nothing_to_all(kind):
 
 def touches(loop, places, rng, gain=0.1, noise=0.02, length=0.03):
     """Readings of a sensor with defects on a blank face."""
-    face = Face(None, polygon([np.asarray(loop, float)]))
+    face = FaceSurface(None, polygon([np.asarray(loop, float)]))
     for x, y in places:
         touch = Touch(x, y, rng.uniform(-math.pi, math.pi), rng.uniform(30, 110),
                       *rng.normal(0, 0.01, 2))  # fmt: skip

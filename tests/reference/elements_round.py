@@ -18,10 +18,10 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 from numpy.typing import NDArray
 
-from probe.contact.elements_axisymmetric import Kind, Section, section
 from probe.contact.elements_line import Array
 from probe.errors import ContactError
 from probe.sensor import SensorType
+from reference.elements_axisymmetric import Kind, Section, section
 
 STEPS = 60
 EVEN = 24  #: Gauss points along a tactel
