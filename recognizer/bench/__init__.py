@@ -2,24 +2,23 @@
 
 ::
 
-    command     open-bench: options, and what an error means for the exit code
-    serve       from the options to a server that runs
-    app         the routes: page, live line;  work   what is done;  holdings   what is registered
-    guard       who may ask: host, origin, token, sizes, and what the page may load
-    session     one probe and all that is done with it; shared by every page
-    feed        frames of a probe that may go and come back;  replay   those of a recording
-    meaning     what counts mean now: calibration, bias
-    simulated   a probe over registered parts that comes down where it is told
-    beats       what that probe feels, beat by beat;  line   its serial line
-    images      a frame through the filters
-    watch       when a touch is worth reading
-    reading     touch -> answer -> mosaic, in a thread of its own
-    telling     answers, mosaics and states as the page gets them
-    guided      calibration, a load at a time
-    bulletin    the newest of every topic, for any number of pages
-    message     frames and mosaics as bytes
-    scenes      registered objects, arrays and alphabets as JSON
-    files       recordings, calibrations and printed parts: what may be read
+    command             open-bench: its options
+    serve               from the options to a server that runs;  settings  its limits
+    app                 the routes: page, live line;  control, lab  what is done, registered
+    guard               who may ask: host, origin, token, sizes, and what the page may load
+    session             one probe and all that is done with it; shared by every page
+    frames              what is done with each frame: recorded, calibrated, shown, offered
+    feed                frames of a probe that may go and come back;  replay  those of a recording
+    calibration_state   what counts mean now: calibration, bias
+    calibration_guide   a calibration, a load at a time
+    simulated           a probe over registered parts that comes down where it is told
+    press_sequence      what that probe feels, frame by frame;  serial_line  how it is plugged in
+    read_trigger        when a touch is worth reading
+    recognition_thread  touch -> answer -> mosaic
+    images              a frame through the filters
+    broker              the newest of every topic, for any number of pages
+    answers, lab_json   answers and registered things as JSON;  message  frames and mosaics as bytes
+    files               recordings, calibrations and printed parts: what may be read
 
 The page is TypeScript in `web/`; `npm ci && npm run build` there writes `static/`, which is
 shipped. Thesis 4.2 (the display programme), 4.3, 6.3.

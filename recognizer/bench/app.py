@@ -29,42 +29,41 @@ from fastapi.staticfiles import StaticFiles
 from starlette.middleware.gzip import GZipMiddleware
 
 from encoded_objects.errors import EncodedObjectsError
-from recognizer.bench.bulletin import Bulletin, Reader
-from recognizer.bench.holdings import holdings_routes
+from recognizer.bench.broker import Broker, Subscriber
+from recognizer.bench.control import control_routes
 from recognizer.bench.images import FILTERS
+from recognizer.bench.lab import lab_routes
 from recognizer.bench.session import Session
-from recognizer.bench.work import work_routes
+from recognizer.bench.settings import PAGE
 
-PAGES = 64  #: open at once
-WISH = 1024  #: bytes of a message from a page
 _BAD, _FULL = 1008, 1013  # codes of a line that is closed
 
 
 @dataclass(frozen=True, slots=True)
-class Bench:
+class BenchContext:
     """What the routes work on."""
 
     session: Session
-    bulletin: Bulletin
+    broker: Broker
     parts: Path | None  #: folder of the files that may be downloaded
     ports: tuple[tuple[str, str], ...]  #: URLs and labels that are always offered
 
 
-def app_for(bench: Bench) -> FastAPI:
+def app_for(bench: BenchContext) -> FastAPI:
     """Return the application."""
 
     @contextlib.asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
-        bench.bulletin.attach(asyncio.get_running_loop())
+        bench.broker.attach(asyncio.get_running_loop())
         yield
-        bench.bulletin.attach(None)
+        bench.broker.attach(None)
 
     app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None, lifespan=lifespan)
     app.add_middleware(GZipMiddleware, minimum_size=4096)
-    app.add_exception_handler(EncodedObjectsError, _refused)
-    app.add_exception_handler(RequestValidationError, _malformed)
-    app.include_router(work_routes(bench.session, bench.ports))
-    app.include_router(holdings_routes(bench.session, bench.parts))
+    app.add_exception_handler(EncodedObjectsError, _error_response)
+    app.add_exception_handler(RequestValidationError, _invalid_response)
+    app.include_router(control_routes(bench.session, bench.ports))
+    app.include_router(lab_routes(bench.session, bench.parts))
     page = Path(str(resources.files("recognizer.bench").joinpath("static")))
     app.mount("/static", StaticFiles(directory=page), name="static")
 
@@ -75,28 +74,28 @@ def app_for(bench: Bench) -> FastAPI:
     @app.websocket("/live")
     async def live(line: WebSocket) -> None:
         await line.accept()
-        if len(bench.bulletin.readers) >= PAGES:
-            await line.close(_FULL, f"{PAGES} pages are open already")
+        if len(bench.broker.subscribers) >= PAGE.pages:
+            await line.close(_FULL, f"{PAGE.pages} pages are open already")
             return
-        await _serve(line, bench.bulletin)
+        await _serve(line, bench.broker)
 
     return app
 
 
-async def _serve(line: WebSocket, bulletin: Bulletin) -> None:
+async def _serve(line: WebSocket, broker: Broker) -> None:
     """Tell a page the news until it leaves."""
-    reader = Reader()
-    reader.news.set()
-    bulletin.readers.add(reader)
-    listening = asyncio.create_task(_listen(line, reader))
-    listening.add_done_callback(lambda _: reader.news.set())
+    subscriber = Subscriber()
+    subscriber.news.set()
+    broker.subscribers.add(subscriber)
+    listening = asyncio.create_task(_listen(line, subscriber))
+    listening.add_done_callback(lambda _: subscriber.news.set())
     try:
         while True:
-            await reader.news.wait()
-            reader.news.clear()
+            await subscriber.news.wait()
+            subscriber.news.clear()
             if listening.done():
                 break
-            for message in bulletin.news(reader):
+            for message in broker.news(subscriber):
                 if isinstance(message, bytes):
                     await line.send_bytes(message)
                 else:
@@ -104,49 +103,53 @@ async def _serve(line: WebSocket, bulletin: Bulletin) -> None:
     except (WebSocketDisconnect, RuntimeError):  # it left while it was being told
         pass
     finally:
-        bulletin.readers.discard(reader)
+        broker.subscribers.discard(subscriber)
         listening.cancel()
 
 
-async def _listen(line: WebSocket, reader: Reader) -> None:
-    """Take a page's wishes; end when it leaves or talks nonsense."""
+async def _listen(line: WebSocket, subscriber: Subscriber) -> None:
+    """Take a page's filters; end when it leaves or talks nonsense."""
     while True:
         try:
             text = await line.receive_text()
         except (WebSocketDisconnect, KeyError):  # KeyError: bytes
             return
-        wish = _wish(text)
-        if wish is None:
+        name = _filter_name(text)
+        if name is None:
             await line.close(_BAD, f"give a filter: {', '.join(FILTERS)}")
             return
-        reader.wish = wish
-        reader.seen.pop("frame", None)
-        reader.news.set()
+        subscriber.filter_name = name
+        subscriber.seen.pop("frame", None)
+        subscriber.news.set()
 
 
-def _wish(text: str) -> str | None:
-    if len(text) > WISH:
+def _filter_name(text: str) -> str | None:
+    if len(text) > PAGE.message:
         return None
     try:
         said = json.loads(text)
     except ValueError:
         return None
-    wish = said.get("filter") if isinstance(said, dict) else None
-    return wish if wish in FILTERS else None
+    name = said.get("filter") if isinstance(said, dict) else None
+    return name if name in FILTERS else None
 
 
-async def _refused(_request: Request, error: Exception) -> JSONResponse:
-    told: dict[str, Any] = {
+async def _error_response(_request: Request, error: Exception) -> JSONResponse:
+    values: dict[str, Any] = {
         "cause": getattr(error, "cause", str(error)),
         "fix": getattr(error, "fix", ""),
         "place": getattr(error, "place", ""),
     }
-    return JSONResponse({"error": told}, status_code=getattr(error, "status", 400))
+    return JSONResponse({"error": values}, status_code=getattr(error, "status", 400))
 
 
-async def _malformed(_request: Request, error: Exception) -> JSONResponse:
+async def _invalid_response(_request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, RequestValidationError)
     first = error.errors()[0]
     where = ".".join(str(part) for part in first["loc"][1:])
-    told = {"cause": f"{where}: {first['msg']}", "fix": "see recognizer.bench.work", "place": ""}
-    return JSONResponse({"error": told}, status_code=422)
+    values = {
+        "cause": f"{where}: {first['msg']}",
+        "fix": "see recognizer.bench.control",
+        "place": "",
+    }
+    return JSONResponse({"error": values}, status_code=422)

@@ -67,9 +67,9 @@ def bench(
 
     def action() -> int:
         require("fastapi", "uvicorn", "websockets", extra="bench", purpose="open-bench")
-        from recognizer.bench.serve import Asked, serve
+        from recognizer.bench.serve import BenchOptions, serve
 
-        return serve(Asked(port, database, web_port, host, token, folder, parts, overlay))
+        return serve(BenchOptions(port, database, web_port, host, token, folder, parts, overlay))
 
     return action
 

@@ -14,9 +14,7 @@ from probe.errors import ProbeError
 from probe.frame import Frame
 from probe.protocol import IdentPacket
 from recognizer.bench.errors import BenchError
-
-RETRY_S = 1.0  #: after a probe went away for good
-SILENT_S = 0.6  #: without a frame a probe is gone
+from recognizer.bench.settings import SESSION
 
 
 class Feed(Protocol):
@@ -28,7 +26,7 @@ class Feed(Protocol):
         """Return the frames that wait, or wait for one."""
         ...
 
-    def told(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the state for the page: state, cause, fix, and the time line if there is one."""
         ...
 
@@ -51,7 +49,7 @@ class NoFeed:
         time.sleep(timeout_s)
         return []
 
-    def told(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return that there is nothing."""
         return {"state": "none"}
 
@@ -96,7 +94,7 @@ class ProbeFeed:
             time.sleep(max(0.0, min(timeout_s, began_s + timeout_s - time.monotonic())))
         return frames
 
-    def told(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the state, and what the client counted."""
         stream = self._stream
         if stream is not None:
@@ -138,7 +136,7 @@ class ProbeFeed:
             self._stream.__exit__(None, None, None)
 
     def _opened(self, now_s: float) -> Stream | None:
-        if self._stream is None and not self._closed and now_s - self._tried_s > RETRY_S:
+        if self._stream is None and not self._closed and now_s - self._tried_s > SESSION.retry_s:
             self._tried_s = now_s
             self._stream = Stream(self.url, sensor=self._sensor)
         return self._stream
@@ -160,7 +158,7 @@ class ProbeFeed:
                 self._notices.append("the probe is back")
             self._state = "live"
             self._cause = self._fix = ""
-        elif self._state == "live" and now_s - self._heard_s > SILENT_S:
+        elif self._state == "live" and now_s - self._heard_s > SESSION.silent_s:
             self._notices.append("the probe is gone")
             self._state, self._fix = "gone", "plug it in again; it is looked for all the time"
             self._cause = "no frame comes any more"

@@ -15,13 +15,12 @@ from generator.database.url import normal_url, part_path
 from probe.errors import RecordingError
 from probe.recording.read import Recording
 from recognizer.bench.errors import BenchError, UnknownError
-
-LISTED = 200  #: files of a kind that are offered
+from recognizer.bench.settings import PAGE
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}")
 
 
-def named(folder: Path, name: str, suffix: str) -> Path:
+def find_file(folder: Path, name: str, suffix: str) -> Path:
     """Return a file of the folder.
 
     Raises
@@ -51,7 +50,7 @@ def checked_name(name: str, suffix: str) -> str:
     return name
 
 
-def listed(folder: Path, suffix: str) -> list[str]:
+def list_files(folder: Path, suffix: str) -> list[str]:
     """Return the names of the newest files with this ending, newest first."""
     if not folder.is_dir():
         return []
@@ -61,10 +60,10 @@ def listed(folder: Path, suffix: str) -> list[str]:
         if path.suffix == suffix and not path.stem.endswith(".part") and _NAME.fullmatch(path.name)
     ]
     dated = sorted((-path.stat().st_mtime, path.name) for path in found)
-    return [name for _, name in dated[:LISTED]]
+    return [name for _, name in dated[: PAGE.listed]]
 
 
-def kept(folder: Path, name: str, content: bytes) -> int:
+def store_recording(folder: Path, name: str, content: bytes) -> int:
     """Keep a recording that was sent in, if it is one; returns its frames.
 
     Raises

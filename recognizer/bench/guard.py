@@ -4,54 +4,51 @@ Local by default: on a loopback address only names of this machine are answered,
 foreign name can be led here; elsewhere every request needs the token. Whatever changes
 something, and the live line, must come from the page itself (`Origin`). Bodies are bounded,
 and the page may load nothing from anywhere else.
+
+Requests and answers are those of starlette. The rules stand here because no library holds
+them: its `TrustedHostMiddleware` answers in plain text and, in versions that fastapi still
+admits, cuts a host at its first colon ([::1] becomes [); its CORS answers what a browser asks
+but refuses no request; and neither starlette nor uvicorn bounds a body.
 """
 
 from __future__ import annotations
 
 import hmac
 import ipaddress
-import json
-from collections.abc import Awaitable, Callable, Iterable, MutableMapping
 from dataclasses import dataclass
-from http.cookies import CookieError, SimpleCookie
-from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import urlsplit
 
-from starlette.requests import ClientDisconnect
-
-Scope = MutableMapping[str, Any]
-Message = MutableMapping[str, Any]
-Receive = Callable[[], Awaitable[Message]]
-Send = Callable[[Message], Awaitable[None]]
-App = Callable[[Scope, Receive, Send], Awaitable[None]]
+from starlette.datastructures import MutableHeaders
+from starlette.requests import ClientDisconnect, HTTPConnection
+from starlette.responses import JSONResponse, RedirectResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.websockets import WebSocketClose
 
 COOKIE = "open-bench"
-BODY = 64 * 1024  #: bytes of a request
-UPLOAD = 64 * 1024 * 1024  #: bytes of a recording that is sent in
 UPLOADS = "/api/recordings"
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-HEADERS = (
-    (b"content-security-policy", POLICY.encode()),
-    (b"x-content-type-options", b"nosniff"),
-    (b"referrer-policy", b"no-referrer"),
-    (b"cross-origin-opener-policy", b"same-origin"),
-    (b"cross-origin-resource-policy", b"same-origin"),
-    (b"cache-control", b"no-cache"),
-)
+HEADERS = {
+    "content-security-policy": POLICY,
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "no-referrer",
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+    "cache-control": "no-cache",
+}
 _SAFE = ("GET", "HEAD")
 
 
 @dataclass(frozen=True, slots=True)
-class Rules:
+class AccessRules:
     """What is let in."""
 
     hosts: frozenset[str]  #: names that a request may be for; empty: any (a token guards)
     token: str = ""  #: empty: none is asked for
-    body: int = BODY
-    upload: int = UPLOAD
+    body: int = 64 * 1024  #: bytes of a request
+    upload: int = 64 * 1024 * 1024  #: bytes of a recording that is sent in
 
 
 def is_loopback(host: str) -> bool:
@@ -64,17 +61,17 @@ def is_loopback(host: str) -> bool:
         return False
 
 
-def rules_for(host: str, token: str) -> Rules:
+def access_rules(host: str, token: str) -> AccessRules:
     """Return the rules of a server that listens on this address."""
     if is_loopback(host):
-        return Rules(frozenset({"localhost", "127.0.0.1", "::1", host}), token)
-    return Rules(frozenset(), token)
+        return AccessRules(frozenset({"localhost", "127.0.0.1", "::1", host}), token)
+    return AccessRules(frozenset(), token)
 
 
-class Guard:
+class RequestGuard:
     """The rules before an application (ASGI)."""
 
-    def __init__(self, app: App, rules: Rules) -> None:
+    def __init__(self, app: ASGIApp, rules: AccessRules) -> None:
         self._app, self._rules = app, rules
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -82,65 +79,63 @@ class Guard:
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
-        headers = {name: value.decode("latin-1") for name, value in scope["headers"]}
-        refusal = self._refusal(scope, headers)
-        if refusal is not None:
-            status, cause, fix = refusal
-            if scope["type"] == "websocket":
-                await send({"type": "websocket.close", "code": 1008, "reason": cause})
-            else:
-                await _say(send, status, cause, fix)
-            return
+        asker = HTTPConnection(scope)
+        refusal = self._refusal(asker)
+        token = self._given_in_address(asker)
         if scope["type"] == "websocket":
-            await self._app(scope, receive, send)
-            return
-        token = self._given_in_address(scope)
-        if token:
-            await _let_in(send, token)
-            return
-        bounded = _Bounded(receive, send, self._limit(scope))
-        try:
-            await self._app(scope, bounded.receive, bounded.send)
-        except ClientDisconnect:
-            if not bounded.refused:
-                raise
+            if refusal is not None:
+                await WebSocketClose(1008, refusal[1])(scope, receive, send)
+            else:
+                await self._app(scope, receive, send)
+        elif refusal is not None:
+            await _refuse(*refusal)(scope, receive, send)
+        elif token:
+            await _let_in(token)(scope, receive, send)
+        else:
+            bounded = _Bounded(scope, receive, send, self._limit(scope))
+            try:
+                await self._app(scope, bounded.receive, bounded.send)
+            except ClientDisconnect:
+                if not bounded.refused:
+                    raise
 
-    def _refusal(self, scope: Scope, headers: dict[bytes, str]) -> tuple[int, str, str] | None:
-        host = headers.get(b"host", "")
+    def _refusal(self, asker: HTTPConnection) -> tuple[int, str, str] | None:
+        """Return status, cause and fix of what is refused."""
+        headers = asker.headers
+        host = headers.get("host", "")
         name = urlsplit(f"//{host}").hostname if _is_host(host) else None
         if not name or (self._rules.hosts and name not in self._rules.hosts):
             return 421, "this server has another name", "open it by its own address"
-        live = scope["type"] == "websocket"
-        origin = headers.get(b"origin")
+        live = asker.scope["type"] == "websocket"
+        origin = headers.get("origin")
         foreign = origin is not None and urlsplit(origin).netloc != host
         if foreign or (live and origin is None):
             return 403, "a request from another page", "open the bench's own page"
-        if not live and scope["method"] not in _SAFE and headers.get(b"sec-fetch-site") in (
+        if not live and asker.scope["method"] not in _SAFE and headers.get("sec-fetch-site") in (
             "cross-site", "same-site",
         ):  # fmt: skip
             return 403, "a request from another page", "open the bench's own page"
-        if not self._known(scope, headers):
+        if not self._known(asker):
             return 401, "the token is missing or wrong", "open the address that open-bench printed"
-        if not live and _length(headers) > self._limit(scope):
-            return 413, f"more than {self._limit(scope):,} bytes", "send less"
+        if not live and _length(headers.get("content-length", "0")) > self._limit(asker.scope):
+            return _too_long(self._limit(asker.scope))
         return None
 
-    def _known(self, scope: Scope, headers: dict[bytes, str]) -> bool:
+    def _known(self, asker: HTTPConnection) -> bool:
         wanted = self._rules.token
         if not wanted:
             return True
-        scheme, _, bearer = headers.get(b"authorization", "").partition(" ")
+        scheme, _, bearer = asker.headers.get("authorization", "").partition(" ")
         given = [bearer] if scheme.lower() == "bearer" else []
-        given += list(_cookies(headers))
-        given += [self._given_in_address(scope)]
+        given += [asker.cookies.get(COOKIE, ""), self._given_in_address(asker)]
         return any(hmac.compare_digest(one.encode(), wanted.encode()) for one in given)
 
-    def _given_in_address(self, scope: Scope) -> str:
+    def _given_in_address(self, asker: HTTPConnection) -> str:
         """Return the token of the address that open-bench prints; the cookie takes its place."""
+        scope = asker.scope
         if not self._rules.token or scope["type"] != "http" or scope["path"] != "/":
             return ""
-        query = parse_qs(bytes(scope["query_string"]).decode("latin-1"))
-        return query.get("token", [""])[0]
+        return asker.query_params.get("token", "")
 
     def _limit(self, scope: Scope) -> int:
         uploading = scope["method"] == "POST" and scope["path"] == UPLOADS
@@ -150,8 +145,9 @@ class Guard:
 class _Bounded:
     """A conversation whose body ends where its limit is, with the headers of every answer."""
 
-    def __init__(self, receive: Receive, send: Send, limit: int) -> None:
-        self._receive, self._send, self._limit, self._came = receive, send, limit, 0
+    def __init__(self, scope: Scope, receive: Receive, send: Send, limit: int) -> None:
+        self._scope, self._receive, self._send = scope, receive, send
+        self._limit, self._came = limit, 0
         self.refused = False
 
     async def receive(self) -> Message:
@@ -159,16 +155,16 @@ class _Bounded:
         self._came += len(message.get("body", b""))
         if self._came > self._limit and not self.refused:
             self.refused = True
-            await _say(self._send, 413, f"more than {self._limit:,} bytes", "send less")
+            await _refuse(*_too_long(self._limit))(self._scope, self._receive, self._send)
         return {"type": "http.disconnect"} if self.refused else message
 
     async def send(self, message: Message) -> None:
         if self.refused:
             return
         if message["type"] == "http.response.start":
-            there = {name.lower() for name, _ in message.get("headers", [])}
-            more = [pair for pair in HEADERS if pair[0] not in there]
-            message["headers"] = [*message.get("headers", []), *more]
+            headers = MutableHeaders(scope=message)
+            for name, value in HEADERS.items():
+                headers.setdefault(name, value)
         await self._send(message)
 
 
@@ -176,30 +172,20 @@ def _is_host(host: str) -> bool:
     return bool(host) and not set(host) & set("/\\@ ?#")
 
 
-def _length(headers: dict[bytes, str]) -> int:
-    given = headers.get(b"content-length", "0")
+def _length(given: str) -> int:
     return int(given) if given.isascii() and given.isdecimal() and len(given) < 19 else 2**63
 
 
-def _cookies(headers: dict[bytes, str]) -> Iterable[str]:
-    jar: SimpleCookie = SimpleCookie()
-    try:
-        jar.load(headers.get(b"cookie", ""))
-    except CookieError:
-        return []
-    return [jar[COOKIE].value] if COOKIE in jar else []
+def _too_long(limit: int) -> tuple[int, str, str]:
+    return 413, f"more than {limit:,} bytes", "send less"
 
 
-async def _say(send: Send, status: int, cause: str, fix: str) -> None:
-    body = json.dumps({"error": {"cause": cause, "fix": fix}}).encode()
-    headers = [(b"content-type", b"application/json"), *HEADERS]
-    await send({"type": "http.response.start", "status": status, "headers": headers})
-    await send({"type": "http.response.body", "body": body})
+def _refuse(status: int, cause: str, fix: str) -> JSONResponse:
+    return JSONResponse({"error": {"cause": cause, "fix": fix}}, status, headers=HEADERS)
 
 
-async def _let_in(send: Send, token: str) -> None:
+def _let_in(token: str) -> RedirectResponse:
     """Keep the token in a cookie that only this page gets, and take it off the address."""
-    cookie = f"{COOKIE}={token}; Path=/; HttpOnly; SameSite=Strict"
-    headers = [(b"location", b"/"), (b"set-cookie", cookie.encode()), *HEADERS]
-    await send({"type": "http.response.start", "status": 303, "headers": headers})
-    await send({"type": "http.response.body", "body": b""})
+    answer = RedirectResponse("/", 303, headers=HEADERS)
+    answer.set_cookie(COOKIE, token, httponly=True, samesite="strict")
+    return answer

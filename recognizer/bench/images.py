@@ -16,14 +16,16 @@ Array = NDArray[np.float64]
 FILTERS = ("raw", "bias-free", "median", "sobel")
 
 
-def filtered(readings: Array, sensor: SensorType, wish: str, bias: Array | None = None) -> Array:
+def filter_image(
+    readings: Array, sensor: SensorType, filter_name: str, bias: Array | None = None
+) -> Array:
     """Return an image through a filter.
 
     Parameters
     ----------
     readings
         (rows, columns) counts or newtons.
-    wish
+    filter_name
         One of `FILTERS`.
     bias
         (rows, columns) reading at rest; the lowest twentieth of the image if not given.
@@ -32,12 +34,12 @@ def filtered(readings: Array, sensor: SensorType, wish: str, bias: Array | None 
     -------
     (rows, columns) in the same unit; Sobel: its slope per mm.
     """
-    if wish == "raw":
+    if filter_name == "raw":
         return readings
     image = unbiased(touch_image(sensor, readings), bias)
-    if wish == "bias-free":
+    if filter_name == "bias-free":
         return image.values
     image = median(image)
-    if wish == "median":
+    if filter_name == "median":
         return image.values
     return np.hypot(*sobel(image))

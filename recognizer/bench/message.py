@@ -17,18 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import SensorType
-from recognizer.bench.images import FILTERS, filtered
+from recognizer.bench.images import FILTERS, filter_image
+from recognizer.bench.settings import PAGE
 from recognizer.scan.mosaic.image import GlobalImage
 
 Array = NDArray[np.float64]
 
-LARGEST = 512  #: rows or columns of a mosaic that is sent; beyond, cells are left out
 _FRAME = struct.Struct("<cBBBIddff")
 _MOSAIC = struct.Struct("<cBBBIIIffff")
 
 
 @dataclass(slots=True, eq=False)
-class FramePicture:
+class FrameMessage:
     """A frame for the pages; each filter is computed when the first page asks for it."""
 
     readings: Array  #: (16, 16) counts or N
@@ -40,39 +40,39 @@ class FramePicture:
     received_ms: float
     _made: dict[str, bytes] = field(default_factory=dict)
 
-    def as_bytes(self, wish: str, /) -> bytes:
+    def as_bytes(self, filter_name: str, /) -> bytes:
         """Return the message with the image through a filter."""
-        if wish not in self._made:
-            values = filtered(self.readings, self.sensor, wish, self.bias)
-            over = values if wish == "bias-free" else filtered(
+        if filter_name not in self._made:
+            values = filter_image(self.readings, self.sensor, filter_name, self.bias)
+            over = values if filter_name == "bias-free" else filter_image(
                 self.readings, self.sensor, "bias-free", self.bias
             )  # fmt: skip
             head = _FRAME.pack(
-                b"F", self.newtons, FILTERS.index(wish), 0, self.seq % 2**32, self.t_s,
+                b"F", self.newtons, FILTERS.index(filter_name), 0, self.seq % 2**32, self.t_s,
                 self.received_ms, float(values.max()), float(over.sum()),
             )  # fmt: skip
-            self._made[wish] = head + values.astype("<f4").tobytes()
-        return self._made[wish]
+            self._made[filter_name] = head + values.astype("<f4").tobytes()
+        return self._made[filter_name]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MosaicPicture:
+class MosaicMessage:
     """A mosaic for the pages."""
 
     made: bytes
 
-    def as_bytes(self, _wish: str, /) -> bytes:
+    def as_bytes(self, _filter_name: str, /) -> bytes:
         """Return the message, the same for every page."""
         return self.made
 
 
-def mosaic_picture(image: GlobalImage, touches: int) -> MosaicPicture:
+def mosaic_message(image: GlobalImage, touches: int) -> MosaicMessage:
     """Return a mosaic's image, thinned where it is large."""
-    thin = max(1, -(-max(image.values.shape, default=0) // LARGEST))
+    thin = max(1, -(-max(image.values.shape, default=0) // PAGE.mosaic))
     values, known = image.values[::thin, ::thin], image.known[::thin, ::thin]
     top = float(values.max(initial=0.0))
     scaled = np.clip(np.rint(values * (254 / top if top > 0 else 0.0)), 0, 254).astype(np.uint8)
     head = _MOSAIC.pack(
         b"M", 0, 0, 0, *values.shape, touches, image.step_mm * thin, *image.corner_mm, top
     )
-    return MosaicPicture(head + np.where(known, scaled + 1, 0).astype(np.uint8).tobytes())
+    return MosaicMessage(head + np.where(known, scaled + 1, 0).astype(np.uint8).tobytes())

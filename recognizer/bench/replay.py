@@ -18,12 +18,7 @@ from numpy.typing import NDArray
 from probe.frame import Frame
 from probe.recording.read import Recording
 from recognizer.bench.errors import BenchError
-
-AT_ONCE = 512  #: frames taken at a time
-POINTS = 800  #: of the time line's picture
-LONGEST = 2_000_000  #: frames of a recording that is played
-FAINT = 2048.0  #: counts of all tactels; a recording of noise alone shall look like one
-JUMP_S = 0.5  #: longer pauses in a recording are shortened to it
+from recognizer.bench.settings import REPLAY
 
 
 class ReplayFeed:
@@ -32,14 +27,14 @@ class ReplayFeed:
     def __init__(self, url: str, recording: Recording) -> None:
         self.url = url
         self.recording = recording
-        if len(recording) > LONGEST:
+        if len(recording) > REPLAY.most_frames:
             raise BenchError(
-                f"a recording of {len(recording):,} frames, {LONGEST:,} can be played",
+                f"a recording of {len(recording):,} frames, {REPLAY.most_frames:,} can be played",
                 fix="play a part of it",
             )
         self._turn = threading.Lock()
-        t_ns, self.strength = _read(recording)
-        pauses = np.clip(np.diff(t_ns, prepend=t_ns[:1]) * 1e-9, 0.0, JUMP_S)
+        t_ns, self.strength = _times_and_strengths(recording)
+        pauses = np.clip(np.diff(t_ns, prepend=t_ns[:1]) * 1e-9, 0.0, REPLAY.jump_s)
         self._at_s = np.cumsum(pauses)
         self.seconds = float(self._at_s[-1]) if len(t_ns) else 0.0
         self._playing, self._speed = bool(len(t_ns)), 1.0
@@ -86,7 +81,7 @@ class ReplayFeed:
             self._playing = self._playing if playing is None else playing
             self._playing = self._playing and bool(len(self._at_s))
 
-    def told(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the place on the time line."""
         with self._turn:
             place_s = self._advance()
@@ -108,11 +103,11 @@ class ReplayFeed:
         """Return how strong the touches are along the time line, at even places, 0 ... 1."""
         if not len(self._at_s):
             return []
-        bins = min(POINTS, len(self._at_s))
+        bins = min(REPLAY.points, len(self._at_s))
         place = np.minimum(self._at_s / max(self.seconds, 1e-9) * bins, bins - 1).astype(int)
         top = np.zeros(bins)
         np.maximum.at(top, place, self.strength)
-        return [round(float(v), 3) for v in top / max(float(top.max()), FAINT)]
+        return [round(float(v), 3) for v in top / max(float(top.max()), REPLAY.faint)]
 
     def close(self) -> None:
         """Pause."""
@@ -131,7 +126,7 @@ class ReplayFeed:
 
     def _between(self, first: int, last: int) -> list[Frame]:
         """Return frames `first` ... `last` - 1, the newest of them if there are many."""
-        first = max(first, last - AT_ONCE)
+        first = max(first, last - REPLAY.at_once)
         if first >= last:
             return []
         if self._there != first:
@@ -140,7 +135,7 @@ class ReplayFeed:
         return list(islice(self._frames, last - first))
 
 
-def _read(recording: Recording) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _times_and_strengths(recording: Recording) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return times (ns) and strengths of all frames, a block at a time."""
     times, strengths = [np.zeros(0, np.int64)], [np.zeros(0)]
     for block in recording.blocks():

@@ -18,11 +18,11 @@ from generator.database import DatabaseError
 from generator.database.open import database_exists
 from probe.errors import ProbeError
 from probe.sensor import Overlay, SensorType
-from recognizer.bench.app import Bench, app_for
-from recognizer.bench.bulletin import Bulletin
+from recognizer.bench.app import BenchContext, app_for
+from recognizer.bench.broker import Broker
 from recognizer.bench.errors import BenchError
 from recognizer.bench.files import part_folder
-from recognizer.bench.guard import Guard, is_loopback, rules_for
+from recognizer.bench.guard import RequestGuard, access_rules, is_loopback
 from recognizer.bench.session import Session
 
 SOFTWARE = ("touch:", "Simulated probe: click on the part")
@@ -33,7 +33,7 @@ _TOKEN = re.compile(r"[A-Za-z0-9_-]{12,200}")
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class BenchOptions:
     """The options of `open-bench`."""
 
     port: str
@@ -46,7 +46,7 @@ class Asked:
     overlay: str
 
 
-def serve(asked: Asked) -> int:
+def serve(options: BenchOptions) -> int:
     """Serve until interrupted; returns the exit code.
 
     Raises
@@ -54,32 +54,34 @@ def serve(asked: Asked) -> int:
     BenchError, DatabaseError, ProbeError
         When an option cannot be met.
     """
-    if asked.overlay not in ("tab", "pad"):
-        raise BenchError(f"an overlay {asked.overlay!r}", fix="give tab or pad")
-    if asked.token and not _TOKEN.fullmatch(asked.token):
+    if options.overlay not in ("tab", "pad"):
+        raise BenchError(f"an overlay {options.overlay!r}", fix="give tab or pad")
+    if options.token and not _TOKEN.fullmatch(options.token):
         raise BenchError(
             "this token can be guessed, or cannot stand in an address",
             fix="give 12 or more of letters, digits, - and _, or none: one is made",
         )
-    database = _database(asked.database)
-    token = asked.token or ("" if is_loopback(asked.host) else secrets.token_urlsafe(18))
-    line = _listening(asked.host, asked.web_port)
+    database = _database(options.database)
+    token = options.token or ("" if is_loopback(options.host) else secrets.token_urlsafe(18))
+    line = _open_socket(options.host, options.web_port)
     before = signal.signal(signal.SIGTERM, _end)
-    bulletin = Bulletin()
-    sensor = SensorType(overlay=Overlay(kind="pad" if asked.overlay == "pad" else "tab"))
-    session = Session(database, asked.folder, sensor, bulletin)
+    broker = Broker()
+    sensor = SensorType(overlay=Overlay(kind="pad" if options.overlay == "pad" else "tab"))
+    session = Session(database, options.folder, sensor, broker)
     try:
-        _begin(session, asked.port)
-        parts = asked.parts if asked.parts or not database else part_folder(database)
-        bench = Bench(session, bulletin, parts and parts.resolve(), _ports(asked.port, database))
+        _begin(session, options.port)
+        parts = options.parts if options.parts or not database else part_folder(database)
+        bench = BenchContext(
+            session, broker, parts and parts.resolve(), _ports(options.port, database)
+        )
         config = uvicorn.Config(
-            Guard(app_for(bench), rules_for(asked.host, token)),
+            RequestGuard(app_for(bench), access_rules(options.host, token)),
             log_level="warning", access_log=False, server_header=False,
             ws_max_size=4096, ws_per_message_deflate=False, ws_ping_interval=20.0,
             timeout_graceful_shutdown=2, limit_concurrency=512,
         )  # fmt: skip
         server = uvicorn.Server(config)
-        sys.stdout.write(_address(asked.host, line.getsockname()[1], token) + "\n")
+        sys.stdout.write(_address(options.host, line.getsockname()[1], token) + "\n")
         sys.stdout.flush()
         server.run(sockets=[line])
     except KeyboardInterrupt:  # how it is ended
@@ -125,7 +127,7 @@ def _ports(port: str, database: str) -> tuple[tuple[str, str], ...]:
     return ((port, port), *always, PATTERN) if port and port != "touch:" else (*always, PATTERN)
 
 
-def _listening(host: str, port: int) -> socket.socket:
+def _open_socket(host: str, port: int) -> socket.socket:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     line = socket.socket(family, socket.SOCK_STREAM)
     line.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -1,7 +1,7 @@
 """One probe and all that is done with it. Every page sees and works the same session.
 
-A thread takes the frames of the feed: it records them, calibrates with them, shows them, and
-offers them to the reader. Requests come from other threads, one at a time.
+A thread takes the frames of the feed and hands them on (`frames`). Requests come from other
+threads, one at a time.
 """
 
 from __future__ import annotations
@@ -18,31 +18,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.calibration import calibration_hash, read_calibration, write_calibration
+from probe.calibration import read_calibration
 from probe.circuit import Electronics
-from probe.errors import ProbeError
 from probe.frame import Frame
 from probe.port.url import address_of
-from probe.recording.names import next_free
 from probe.recording.read import Recording
-from probe.recording.record import Recorder
 from probe.sensor import SensorType
-from recognizer.bench.bulletin import Bulletin
+from recognizer.bench.broker import Broker
+from recognizer.bench.calibration_guide import CalibrationGuide, forces_given
+from recognizer.bench.calibration_state import CalibrationState
 from recognizer.bench.errors import BenchError, BusyError
 from recognizer.bench.feed import Feed, NoFeed, ProbeFeed
-from recognizer.bench.files import listed, named
-from recognizer.bench.guided import Guide, condition_told, forces_given
-from recognizer.bench.meaning import Meaning, safe_values
-from recognizer.bench.message import FramePicture
-from recognizer.bench.reading import Offered, Reading
+from recognizer.bench.files import find_file, list_files
+from recognizer.bench.frames import FrameHandler
+from recognizer.bench.recognition_thread import RecognitionThread
 from recognizer.bench.replay import ReplayFeed
+from recognizer.bench.settings import SESSION
 from recognizer.bench.simulated import SCHEME, TouchProbe
 
 Array = NDArray[np.float64]
-
-WAIT_S = 0.05  #: of the thread for a frame
-STATUS_S = 0.25  #: between two reports
-NOTICES = 40
 
 
 class Session:
@@ -56,24 +50,21 @@ class Session:
         For recordings and calibrations; made when something is written.
     sensor
         What the probe is.
-    bulletin
-        Where everything is told.
+    broker
+        Where everything is published.
     """
 
-    def __init__(self, database: str, folder: Path, sensor: SensorType, bulletin: Bulletin) -> None:
+    def __init__(self, database: str, folder: Path, sensor: SensorType, broker: Broker) -> None:
         self.database, self.folder, self.sensor = database, folder, sensor
-        self.reading = Reading(database, sensor, bulletin)
+        self.recognition = RecognitionThread(database, sensor, broker)
         self.simulation: TouchProbe | None = None
-        self._bulletin = bulletin
+        self._broker = broker
         self._turn = threading.RLock()
         self._feed: Feed = NoFeed()
         self._url = ""
-        self._newest: Frame | None = None
-        self._meaning = Meaning()
-        self._recorder: Recorder | None = None
-        self._guide: Guide | None = None
-        self._notices: deque[tuple[int, str]] = deque(maxlen=NOTICES)
-        self._told = 0
+        self._frames = FrameHandler(sensor, broker, self.recognition, self._note)
+        self._notices: deque[tuple[int, str]] = deque(maxlen=SESSION.notices)
+        self._noted = 0
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="bench", daemon=True)
         self._thread.start()
@@ -84,7 +75,7 @@ class Session:
         self._thread.join()
         with self._turn:
             self._leave()
-        self.reading.close()
+        self.recognition.close()
 
     # What the page asks for.
 
@@ -112,7 +103,7 @@ class Session:
 
     def replay(self, name: str) -> None:
         """Play a recording of the folder."""
-        path = named(self.folder, name, ".h5")
+        path = find_file(self.folder, name, ".h5")
         self.open(f"file:{path}")
 
     def timeline(self) -> ReplayFeed:
@@ -134,7 +125,7 @@ class Session:
             if not isinstance(self._feed, ProbeFeed):
                 raise BusyError("no probe is connected", fix="choose a port first")
             self._feed.select(sensor)
-            self._meaning = Meaning()
+            self._frames.state = CalibrationState()
             self._report()
 
     def simulated(self) -> TouchProbe:
@@ -155,7 +146,7 @@ class Session:
     def bias(self, *, on: bool) -> None:
         """Take the bias of the unloaded sensor, or do without it."""
         with self._turn:
-            self._note(self._meaning.switch_bias(on=on))
+            self._note(self._frames.state.switch_bias(on=on))
             self._report()
 
     def record(self, *, on: bool) -> None:
@@ -168,35 +159,29 @@ class Session:
         """
         with self._turn:
             if not on:
-                self._end_recording()
-            elif self._recorder is None:
-                if not isinstance(self._feed, ProbeFeed):
-                    raise BusyError("no probe is connected", fix="choose a port first")
-                self.folder.mkdir(parents=True, exist_ok=True)
-                known = self._meaning.calibration
-                path = next_free(self.folder, "touch", ".h5")
-                self._recorder = Recorder(
-                    path, sensor=self._sensor_name(), attributes={"url": self._url},
-                    calibration=calibration_hash(known) if known else "",
-                )  # fmt: skip
-                self._note(f"recording {path.name}")
+                self._frames.end_recording()
+            elif not isinstance(self._feed, ProbeFeed):
+                raise BusyError("no probe is connected", fix="choose a port first")
+            else:
+                self._frames.start_recording(self.folder, self._sensor_name(), self._url)
             self._report()
 
     def calibrate(self, forces_n: list[float], seconds: float, *, simulated_board: bool) -> None:
         """Begin a calibration."""
-        if not 0.2 <= seconds <= 60:
-            raise BenchError(f"{seconds:g} s for a load", fix="give 0.2 to 60 s")
+        low, high = SESSION.calibration_s
+        if not low <= seconds <= high:
+            raise BenchError(f"{seconds:g} s for a load", fix=f"give {low:g} to {high:g} s")
         now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
         board = Electronics() if simulated_board else None
         with self._turn:
             if not isinstance(self._feed, ProbeFeed):
                 raise BusyError("no probe is connected", fix="choose a port first")
             forces = forces_given(forces_n)
-            self._guide = Guide(self._sensor_name(), forces, seconds, board, now)
+            self._frames.guide = CalibrationGuide(self._sensor_name(), forces, seconds, board, now)
             self._report()
 
     @contextmanager
-    def guide(self) -> Iterator[Guide]:
+    def guide(self) -> Iterator[CalibrationGuide]:
         """Work on the calibration that is being made.
 
         Raises
@@ -205,26 +190,20 @@ class Session:
             When none is.
         """
         with self._turn:
-            if self._guide is None:
+            if self._frames.guide is None:
                 raise BusyError("no calibration is being made", fix="begin one first")
-            yield self._guide
+            yield self._frames.guide
             self._report()
 
     def finish_calibration(self) -> dict[str, Any]:
         """Fit the laws, write and use them; returns what they say of the sensor."""
         with self.guide() as guide:
-            found = guide.calibration()
-            self.folder.mkdir(parents=True, exist_ok=True)
-            path = next_free(self.folder, "calibration", ".json")
-            write_calibration(found, path)
-            self._guide = None
-            self._note(self._meaning.use(found, path.name))
-            return {"name": path.name, **condition_told(found)}
+            return self._frames.finish_calibration(guide, self.folder)
 
     def cancel_calibration(self) -> None:
         """Forget the calibration that is being made."""
         with self._turn:
-            self._guide = None
+            self._frames.guide = None
             self._report()
 
     def use_calibration(self, name: str) -> None:
@@ -238,9 +217,9 @@ class Session:
         with self._turn:
             found = None
             if name:
-                path = named(self.folder, name, ".json")
+                path = find_file(self.folder, name, ".json")
                 found = read_calibration(path, sensor=self._sensor_name() or None)
-            self._note(self._meaning.use(found, name))
+            self._note(self._frames.state.use(found, name))
             self._report()
 
     def newest(self) -> tuple[Frame, Array, str]:
@@ -252,27 +231,20 @@ class Session:
             When none came yet.
         """
         with self._turn:
-            if self._newest is None:
-                raise BusyError("no frame came yet", fix="connect a probe first")
-            values, newtons, _ = safe_values(self._meaning, self._newest)
-            return self._newest, values, "N" if newtons else "counts"
+            return self._frames.newest()
 
-    def told(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the state for the page."""
         with self._turn:
-            recorder, guide = self._recorder, self._guide
             return {
                 "port": self._url,
-                "feed": self._feed.told(),
+                "feed": self._feed.as_json(),
                 "simulated": self.simulation is not None,
-                "recording": None if recorder is None
-                else {"name": recorder.path.name, "frames": recorder.frames},
-                "guide": None if guide is None else guide.told(),
-                **self._meaning.told(),
-                "recordings": listed(self.folder, ".h5"),
-                "calibrations": listed(self.folder, ".json"),
+                **self._frames.as_json(),
+                "recordings": list_files(self.folder, ".h5"),
+                "calibrations": list_files(self.folder, ".json"),
                 "notices": [{"number": n, "text": text} for n, text in self._notices],
-                "pages": len(self._bulletin.readers),
+                "pages": len(self._broker.subscribers),
             }  # fmt: skip
 
     # What follows runs in the thread, or under its lock.
@@ -281,77 +253,37 @@ class Session:
         due_s = 0.0
         while not self._stop.is_set():
             feed = self._feed
-            frames = feed.take(WAIT_S)
+            frames = feed.take(SESSION.wait_s)
             with self._turn:
                 if feed is self._feed:
-                    self._take(frames)
+                    self._frames.take(frames)
                     for notice in feed.notices():
                         self._note(notice)
                 now_s = time.monotonic()
                 if now_s >= due_s:
-                    due_s = now_s + STATUS_S
+                    due_s = now_s + SESSION.status_s
                     self._report()
-
-    def _take(self, frames: list[Frame]) -> None:
-        for frame in frames:
-            if self._recorder is not None:
-                self._record(frame)
-            if self._guide is not None:
-                self._guide.take(frame)
-            for notice in self._meaning.take(frame):
-                self._note(notice)
-        if not frames:
-            return
-        frame, received_ms = frames[-1], time.time() * 1e3
-        values, newtons, wrong = safe_values(self._meaning, frame)
-        if wrong:
-            self._note(wrong)
-        self._newest = frame
-        bias = None if newtons else self._meaning.bias
-        self._bulletin.publish(
-            "frame",
-            FramePicture(values, self.sensor, bias, newtons, frame.seq, frame.t_ns * 1e-9,
-                         received_ms),
-        )  # fmt: skip
-        self.reading.offer(Offered(frame, self._meaning.calibration, received_ms))
-
-    def _record(self, frame: Frame) -> None:
-        assert self._recorder is not None
-        try:
-            self._recorder.append(frame)
-        except ProbeError as error:
-            self._note(str(error))
-            self._recorder = None
 
     def _leave(self) -> None:
         """Let go of what is connected."""
-        self._end_recording()
+        self._frames.leave()
         feed, self._feed = self._feed, NoFeed()
         feed.close()
         if self.simulation is not None:
             self.simulation.close()
             self.simulation = None
         self._url = ""
-        self._newest = self._guide = None
-        self._meaning = Meaning()
-
-    def _end_recording(self) -> None:
-        if self._recorder is not None:
-            recorder, self._recorder = self._recorder, None
-            recorder.close()
-            files = ", ".join(file.name for file in recorder.files)
-            self._note(f"{files}: {recorder.frames:,} frames")
 
     def _sensor_name(self) -> str:
-        told = self._feed.told()
+        feed = self._feed.as_json()
         if isinstance(self._feed, ReplayFeed):
-            return str(told["device"])
-        device = told.get("device", "")
-        return f"{device}/{told['sensor']}" if device else ""
+            return str(feed["device"])
+        device = feed.get("device", "")
+        return f"{device}/{feed['sensor']}" if device else ""
 
     def _note(self, text: str) -> None:
-        self._told += 1
-        self._notices.append((self._told, text))
+        self._noted += 1
+        self._notices.append((self._noted, text))
 
     def _report(self) -> None:
-        self._bulletin.publish("status", self.told())
+        self._broker.publish("status", self.as_json())

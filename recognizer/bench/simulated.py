@@ -23,12 +23,12 @@ from probe.port.simulated import FULL_COUNTS, FULL_MV
 from probe.sensor import SensorType
 from probe.simulate.registered import registered_object, registered_surface
 from probe.simulate.scene import Scene
-from recognizer.bench.beats import Beats, Manner
 from recognizer.bench.errors import BenchError
-from recognizer.bench.line import SoftwareLine
+from recognizer.bench.press_sequence import PressSequence, SimulationSettings
+from recognizer.bench.serial_line import SoftwareLine
+from recognizer.bench.settings import PRESS
 
 SCHEME = "touch:"
-SCENES = 32  #: surfaces that are kept
 _OPTIONS = ("firmware", "rate", "noise", "hold", "seed")
 
 
@@ -53,10 +53,10 @@ class TouchProbe:
     """
 
     def __init__(self, url: str, database: str, sensor: SensorType) -> None:
-        firmware, manner = manner_of(url)
+        firmware, manner = parse_simulation(url)
         self.database = database
         self.firmware = firmware
-        self._beats = Beats(sensor, manner)
+        self._presses = PressSequence(sensor, manner)
         self._scenes: OrderedDict[tuple[str, str], Scene] = OrderedDict()
         self._turn = threading.Lock()
         self._closed = threading.Event()
@@ -69,7 +69,7 @@ class TouchProbe:
                 stack.callback(self._closed.set)
                 thread.start()
             else:
-                self._line = SoftwareLine(self._beats.frames(), "bench")
+                self._line = SoftwareLine(self._presses.frames(), "bench")
                 self.url = self._line.url
                 stack.callback(self._line.close)
             stack.callback(self._closed.set)
@@ -90,7 +90,7 @@ class TouchProbe:
             raise BenchError("a touch at what is no number", fix="give mm, degrees and N")
         touch = Touch(x_mm, y_mm, math.radians(theta_deg), force_n)
         with self._turn:
-            self._beats.touch(self._scene(object_name, face), touch)
+            self._presses.touch(self._scene(object_name, face), touch)
 
     def prepare(self, object_name: str) -> None:
         """Read an object's faces meanwhile, so that its first touch does not wait for it."""
@@ -106,17 +106,19 @@ class TouchProbe:
         threading.Thread(target=read, name="faces", daemon=True).start()
 
     def load(self, newtons: float) -> None:
-        """Put an even load on; see `Beats.load`."""
-        self._beats.load(newtons)
+        """Put an even load on; see `PressSequence.load`."""
+        self._presses.load(newtons)
 
     def lift(self) -> None:
         """Lift at once."""
-        self._beats.lift()
+        self._presses.lift()
 
     def unplug(self, seconds: float) -> None:
         """Pull the plug, and put it in again after so many seconds."""
-        if not 0 < seconds <= 60:
-            raise BenchError(f"unplugged for {seconds:g} s", fix="give up to 60 s")
+        if not 0 < seconds <= PRESS.unplugged_s:
+            raise BenchError(
+                f"unplugged for {seconds:g} s", fix=f"give up to {PRESS.unplugged_s:g} s"
+            )
         if self.firmware:
             self._emulator.fault(f"unplug {seconds:g}")
         else:
@@ -136,13 +138,13 @@ class TouchProbe:
         if key not in self._scenes:
             self._scenes[key] = registered_surface(self.database, object_name, face)
         self._scenes.move_to_end(key)
-        while len(self._scenes) > SCENES:
+        while len(self._scenes) > PRESS.scenes:
             self._scenes.popitem(last=False)
         return self._scenes[key]
 
     def _show(self) -> None:
-        period_s = 1 / self._beats.manner.rate
-        for frame in self._beats.frames():
+        period_s = 1 / self._presses.manner.rate
+        for frame in self._presses.frames():
             try:
                 self._emulator.show(frame.counts * (FULL_MV / FULL_COUNTS))
             except ProbeError:  # the emulator ended; its port is gone, and whoever reads it told
@@ -151,7 +153,7 @@ class TouchProbe:
                 return
 
 
-def manner_of(url: str) -> tuple[bool, Manner]:
+def parse_simulation(url: str) -> tuple[bool, SimulationSettings]:
     """Read the options of a URL: whether by firmware, and how the probe moves."""
     _, _, query = url.removeprefix(SCHEME).partition("?")
     given = dict(parse_qsl(query, keep_blank_values=True))
@@ -172,7 +174,7 @@ def manner_of(url: str) -> tuple[bool, Manner]:
         if not low <= value <= high:
             raise BenchError(f"{name}={given[name]!r}", fix=f"give {low:g} to {high:g}", place=url)
         numbers[name] = value
-    return bool(firmware), Manner(
+    return bool(firmware), SimulationSettings(
         rate=numbers["rate"], noise=noise, hold_s=numbers["hold"], seed=int(numbers["seed"])
     )
 

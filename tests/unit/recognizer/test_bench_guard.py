@@ -6,10 +6,10 @@ import asyncio
 
 import pytest
 
-from recognizer.bench.guard import COOKIE, Guard, Rules, is_loopback, rules_for
+from recognizer.bench.guard import COOKIE, AccessRules, RequestGuard, access_rules, is_loopback
 
-LOCAL = rules_for("127.0.0.1", "")
-OPEN = rules_for("0.0.0.0", "a-long-token")
+LOCAL = access_rules("127.0.0.1", "")
+OPEN = access_rules("0.0.0.0", "a-long-token")
 
 
 async def echo(scope, receive, send):
@@ -44,7 +44,7 @@ def asked(rules, method="GET", path="/api/x", *, body=(b"",), query="", kind="ht
     async def send(message):
         sent.append(message)
 
-    asyncio.run(Guard(echo, rules)(scope, receive, send))
+    asyncio.run(RequestGuard(echo, rules)(scope, receive, send))
     return sent
 
 
@@ -103,20 +103,20 @@ def test_a_token_is_known_by_header_by_cookie_and_by_the_printed_address():
     headers = dict(start["headers"])
     assert (start["status"], headers[b"location"]) == (303, b"/")
     assert b"HttpOnly" in headers[b"set-cookie"]
-    assert b"SameSite=Strict" in headers[b"set-cookie"]
+    assert b"SameSite=strict" in headers[b"set-cookie"]
     assert status(OPEN, path="/", query="token=") == 401
     assert status(OPEN, host="bench.example", authorization="Bearer a-long-token") == 200
 
 
 @pytest.mark.parametrize("length", ["101", "99999999999999999999999", "-1", "ten", "1_0", "²"])
 def test_a_declared_length_beyond_the_limit_is_refused_before_it_comes(length):
-    rules = Rules(frozenset({"127.0.0.1"}), body=100)
+    rules = AccessRules(frozenset({"127.0.0.1"}), body=100)
     sent = asked(rules, "POST", content_length=length)
     assert [sent[0]["status"], len(sent)] == [413, 2]
 
 
 def test_a_body_that_grows_beyond_the_limit_ends_there():
-    rules = Rules(frozenset({"127.0.0.1"}), body=100, upload=300)
+    rules = AccessRules(frozenset({"127.0.0.1"}), body=100, upload=300)
     assert asked(rules, "POST", body=(b"x" * 60, b"x" * 40))[1]["body"] == b"100"
     sent = asked(rules, "POST", body=(b"x" * 60, b"x" * 41, b"x" * 1000))
     assert [sent[0]["status"], len(sent)] == [413, 2]  # and nothing after it

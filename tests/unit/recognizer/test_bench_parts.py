@@ -17,15 +17,22 @@ from probe.frame import frame_from
 from probe.recording.read import Recording
 from probe.recording.record import Recorder
 from probe.sensor import SensorType
-from recognizer.bench.bulletin import Bulletin, Reader
+from recognizer.bench.broker import Broker, Subscriber
+from recognizer.bench.calibration_guide import CalibrationGuide, forces_given
 from recognizer.bench.errors import BenchError, BusyError, UnknownError
-from recognizer.bench.files import checked_name, kept, listed, named, part_to_send
-from recognizer.bench.guided import Guide, forces_given
-from recognizer.bench.images import FILTERS, filtered
-from recognizer.bench.message import FramePicture, mosaic_picture
+from recognizer.bench.files import (
+    checked_name,
+    find_file,
+    list_files,
+    part_to_send,
+    store_recording,
+)
+from recognizer.bench.images import FILTERS, filter_image
+from recognizer.bench.message import FrameMessage, mosaic_message
+from recognizer.bench.read_trigger import ReadTrigger
 from recognizer.bench.replay import ReplayFeed
-from recognizer.bench.simulated import manner_of
-from recognizer.bench.watch import AGAIN_S, RESTLESS_S, Watch
+from recognizer.bench.settings import TRIGGER
+from recognizer.bench.simulated import parse_simulation
 from recognizer.scan.mosaic.image import GlobalImage
 
 
@@ -57,24 +64,24 @@ def test_files_of_the_folder_and_no_others(tmp_path):
     (tmp_path / "secret.h5").write_text("secret")
     (folder / "link.h5").symlink_to(tmp_path / "secret.h5")
     (folder / "touch-001.h5").write_text("")
-    assert named(folder, "touch-001.h5", ".h5") == folder / "touch-001.h5"
+    assert find_file(folder, "touch-001.h5", ".h5") == folder / "touch-001.h5"
     for name in ("link.h5", "none.h5"):
         with pytest.raises(UnknownError):
-            named(folder, name, ".h5")
+            find_file(folder, name, ".h5")
     (folder / "live.part.h5").write_text("")
-    assert set(listed(folder, ".h5")) == {"touch-001.h5", "link.h5"}
-    assert listed(tmp_path / "nowhere", ".h5") == []
+    assert set(list_files(folder, ".h5")) == {"touch-001.h5", "link.h5"}
+    assert list_files(tmp_path / "nowhere", ".h5") == []
 
 
 def test_a_recording_that_is_sent_in_is_kept_only_if_it_is_one(tmp_path):
     content = recorded(tmp_path / "mine.h5", [0, 9]).read_bytes()
     folder = tmp_path / "kept"
-    assert kept(folder, "a.h5", content) == 2
+    assert store_recording(folder, "a.h5", content) == 2
     with pytest.raises(BenchError, match="already"):
-        kept(folder, "a.h5", content)
+        store_recording(folder, "a.h5", content)
     for bad in (b"", b"no recording", content[:-900]):
         with pytest.raises(RecordingError):
-            kept(folder, "b.h5", bad)
+            store_recording(folder, "b.h5", bad)
     assert [path.name for path in folder.iterdir()] == ["a.h5"]
 
 
@@ -103,7 +110,7 @@ def test_parts_are_sent_from_their_folder_alone(tmp_path):
 def test_a_touch_is_read_once_it_is_steady_and_again_when_it_has_changed():
     rng = np.random.default_rng(0)
     touch, other = rng.random((16, 16)), rng.random((16, 16))
-    watch = Watch()
+    watch = ReadTrigger()
     assert not watch.due(0 * touch, contact=False, now_s=0.0)
     assert not watch.due(0.3 * touch, contact=True, now_s=0.01)
     assert not watch.due(touch, contact=True, now_s=0.02)
@@ -119,15 +126,15 @@ def test_a_touch_is_read_once_it_is_steady_and_again_when_it_has_changed():
 
 def test_restless_and_unanswered_touches_are_read_all_the_same():
     rng = np.random.default_rng(0)
-    watch, now_s = Watch(), 0.0
+    watch, now_s = ReadTrigger(), 0.0
     while not watch.due(rng.random((16, 16)), contact=True, now_s=now_s):
         now_s += 0.01
-    assert now_s == pytest.approx(RESTLESS_S, abs=0.02)
+    assert now_s == pytest.approx(TRIGGER.restless_s, abs=0.02)
     touch = rng.random((16, 16))
     watch.read(touch, answered=False, now_s=now_s)
     watch.due(touch, contact=True, now_s=now_s)
-    assert not watch.due(touch, contact=True, now_s=now_s + 0.9 * AGAIN_S)
-    assert watch.due(touch, contact=True, now_s=now_s + 1.1 * AGAIN_S)
+    assert not watch.due(touch, contact=True, now_s=now_s + 0.9 * TRIGGER.again_s)
+    assert watch.due(touch, contact=True, now_s=now_s + 1.1 * TRIGGER.again_s)
 
 
 # -- what the pages get
@@ -137,7 +144,7 @@ def test_filters_build_on_each_other():
     image = np.full((16, 16), 7.0)
     image[4:10, 4:10] = 107.0
     image[2, 12] = 300.0
-    made = {wish: filtered(image, SensorType(), wish) for wish in FILTERS}
+    made = {wish: filter_image(image, SensorType(), wish) for wish in FILTERS}
     assert made["raw"][0, 0] == 7
     assert made["bias-free"][0, 0] == 0
     assert made["bias-free"][6, 6] == 100
@@ -145,12 +152,12 @@ def test_filters_build_on_each_other():
     assert made["median"][6, 6] == 100
     assert made["sobel"][6, 6] == 0
     assert made["sobel"][6, 3] > 0
-    assert filtered(image, SensorType(), "bias-free", image).max() == 0
+    assert filter_image(image, SensorType(), "bias-free", image).max() == 0
 
 
 def test_a_frame_is_packed_as_its_module_says():
     image = np.arange(256.0).reshape(16, 16)
-    picture = FramePicture(image, SensorType(), None, True, 2**32 + 5, 1.5, 1e12)
+    picture = FrameMessage(image, SensorType(), None, True, 2**32 + 5, 1.5, 1e12)
     data = picture.as_bytes("raw")
     assert len(data) == 32 + 1024
     kind, newtons, wish, _, seq, t_s, received, largest, _ = struct.unpack("<cBBBIddff", data[:32])
@@ -166,7 +173,7 @@ def test_a_mosaic_is_packed_thinned_and_tells_what_was_not_felt():
     count = np.ones(values.shape, np.int64)
     count[0, 0] = 0
     image = GlobalImage(values, values, values, count, 0.4, (1.0, 2.0))
-    data = mosaic_picture(image, 3).as_bytes("raw")
+    data = mosaic_message(image, 3).as_bytes("raw")
     _, _, _, _, rows, columns, touches, step, x, y, top = struct.unpack("<cBBBIIIffff", data[:32])
     assert (rows, columns, touches) == (350, 15, 3)
     assert (step, x, y) == pytest.approx((0.8, 1.0, 2.0))
@@ -175,15 +182,15 @@ def test_a_mosaic_is_packed_thinned_and_tells_what_was_not_felt():
     assert cells[0, 1] == 1
     assert np.allclose((cells[1:] - 1.0) * top / 254, values[2::2, ::2], atol=top / 254)
     empty = GlobalImage(*[np.zeros((0, 0))] * 3, np.zeros((0, 0), np.int64), 0.4, (0.0, 0.0))
-    assert len(mosaic_picture(empty, 0).as_bytes("raw")) == 32
+    assert len(mosaic_message(empty, 0).as_bytes("raw")) == 32
 
 
 def test_a_page_gets_the_newest_of_every_topic_and_nothing_twice():
     async def told():
-        board = Bulletin()
+        board = Broker()
         board.attach(asyncio.get_running_loop())
-        page = Reader()
-        board.readers.add(page)
+        page = Subscriber()
+        board.subscribers.add(page)
         for i in range(3):
             board.publish("status", {"i": i})
         board.publish("answer", {"face": "F1"})
@@ -204,7 +211,7 @@ def test_a_page_gets_the_newest_of_every_topic_and_nothing_twice():
 
 def taken(feed, seconds):
     frames, end_s = [], time.monotonic() + seconds
-    while time.monotonic() < end_s and feed.told()["playing"]:
+    while time.monotonic() < end_s and feed.as_json()["playing"]:
         frames += feed.take(0.05)
     frames += feed.take(0.0)
     return [frame.seq for frame in frames]
@@ -215,8 +222,8 @@ def test_a_recording_plays_in_order_goes_where_it_is_told_and_pauses_at_its_end(
     feed = ReplayFeed("file:x", Recording(recorded(tmp_path / "x.h5", values)))
     assert feed.seconds == pytest.approx(0.59)
     assert taken(feed, 5.0) == list(range(60))
-    assert feed.told()["at"] == pytest.approx(feed.seconds, abs=1e-3)
-    assert not feed.told()["playing"]
+    assert feed.as_json()["at"] == pytest.approx(feed.seconds, abs=1e-3)
+    assert not feed.as_json()["playing"]
     feed.play(playing=None, speed=None, at_s=0.305)
     assert [frame.seq for frame in feed.take(0.0)] == [30]  # shown although it pauses
     assert feed.take(0.0) == []
@@ -233,7 +240,7 @@ def test_a_recording_plays_in_order_goes_where_it_is_told_and_pauses_at_its_end(
 
 def test_an_empty_recording_and_one_whose_clock_jumps(tmp_path):
     feed = ReplayFeed("file:x", Recording(recorded(tmp_path / "empty.h5", [])))
-    assert (feed.take(0.0), feed.overview(), feed.told()["playing"]) == ([], [], False)
+    assert (feed.take(0.0), feed.overview(), feed.as_json()["playing"]) == ([], [], False)
     path = tmp_path / "jump.h5"
     with Recorder(path) as recorder:
         for i, t_ns in enumerate((0, 10**7, 10**13, 10**13 + 10**7, 5, 10**7)):
@@ -249,32 +256,34 @@ def fed(guide, newtons, rng, state):
     """Read one step of a guide from a simulated board."""
     guide.read()
     board, fsr, forces = Electronics(), fsr_of(16, 16), np.full((16, 16), newtons / 256)
-    while guide.told()["reading"]:
+    while guide.as_json()["reading"]:
         counts, state[0] = read_counts(forces, board, fsr, state[0], rng)
         state[1] += 1
         guide.take(frame_from(counts, t_ns=state[1] * 10_000_000, seq=state[1]))
 
 
 def test_a_guide_leads_to_a_calibration():
-    guide = Guide("bench/0", forces_given([80, 200, 600]), 0.3, Electronics(), "2026-01-01")
+    guide = CalibrationGuide(
+        "bench/0", forces_given([80, 200, 600]), 0.3, Electronics(), "2026-01-01"
+    )
     rng, state = np.random.default_rng(0), [None, 0]
     with pytest.raises(BusyError):
         guide.calibration()
     for newtons in (0, 80, 200, 600):
-        assert guide.told()["newtons"] == newtons
+        assert guide.as_json()["newtons"] == newtons
         fed(guide, newtons, rng, state)
     assert guide.done
-    assert "felt by 256 of 256" in guide.told()["felt"][-1]
+    assert "felt by 256 of 256" in guide.as_json()["felt"][-1]
     assert not guide.calibration().bad.any()
     guide.again()
-    assert guide.told()["step"] == 3
+    assert guide.as_json()["step"] == 3
     fed(guide, 600, rng, state)
     with pytest.raises(BusyError):
         guide.read()
 
 
 def test_loads_that_tell_nothing_are_refused_with_what_is_missing():
-    guide = Guide("bench/0", forces_given([40]), 0.2, Electronics(), "2026-01-01")
+    guide = CalibrationGuide("bench/0", forces_given([40]), 0.2, Electronics(), "2026-01-01")
     rng, state = np.random.default_rng(0), [None, 0]
     for newtons in (0, 40):
         fed(guide, newtons, rng, state)
@@ -295,10 +304,10 @@ def test_loads_that_tell_nothing_are_refused_with_what_is_missing():
 )
 def test_a_simulated_probe_that_cannot_be_had(url):
     with pytest.raises(BenchError):
-        manner_of(url)
+        parse_simulation(url)
 
 
 def test_a_simulated_probe_as_asked():
-    firmware, manner = manner_of("touch:?firmware=avr&rate=50&hold=1&noise=quiet&seed=3")
+    firmware, manner = parse_simulation("touch:?firmware=avr&rate=50&hold=1&noise=quiet&seed=3")
     assert firmware
     assert (manner.rate, manner.hold_s, manner.noise, manner.seed) == (50, 1, "quiet", 3)

@@ -28,7 +28,7 @@ ADVICE = {
 }
 
 
-def told(recognition: Recognition, lab: Lab, sensor: SensorType) -> dict[str, Any]:
+def answer_json(recognition: Recognition, lab: Lab, sensor: SensorType) -> dict[str, Any]:
     """Return an answer for the page."""
     answer = recognition.as_json()
     margin = recognition.margin
@@ -51,7 +51,7 @@ def told(recognition: Recognition, lab: Lab, sensor: SensorType) -> dict[str, An
             "sigma_mm": round(float(spread[:2].max()), 3),
             "sigma_deg": round(math.degrees(float(spread[2])), 3),
         },
-        "symbols": _seen(encoding, face, sensor, pose),
+        "symbols": _symbols_in_view(encoding, face, sensor, pose),
         "turn": round(-face.rotation_rad - theta, 5),
         "window": {"encoding": number, "corners": _corners(encoding, face, sensor, pose)},
     }
@@ -65,7 +65,7 @@ def _face(lab: Lab, recognition: Recognition) -> tuple[int, EmbossedArray, Encod
     return None
 
 
-def _seen(
+def _symbols_in_view(
     encoding: EmbossedArray, face: EncodedFace, sensor: SensorType, pose: Array
 ) -> list[list[float]]:
     """Return row, column, label, x and y (sensor frame, mm) of the symbols in view."""

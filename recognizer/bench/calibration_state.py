@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(slots=True)
-class Meaning:
+class CalibrationState:
     """Calibration and bias; both belong to the sensor that is read."""
 
     calibration: Calibration | None = None
@@ -67,7 +67,7 @@ class Meaning:
         self.calibration, self.name, self.warning = calibration, name, ""
         return f"readings are newtons by {name}" if calibration else "readings are counts"
 
-    def told(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return both for the page."""
         known = self.calibration
         taken = "none" if self.bias is None else "taken"
@@ -83,13 +83,13 @@ class Meaning:
         }  # fmt: skip
 
 
-def safe_values(meaning: Meaning, frame: Frame) -> tuple[Array, bool, str]:
+def values_or_counts(state: CalibrationState, frame: Frame) -> tuple[Array, bool, str]:
     """Return the readings; counts, and why, where the calibration does not fit the frame."""
     try:
-        return (*meaning.values(frame), "")
+        return (*state.values(frame), "")
     except ProbeError as error:
-        meaning.use(None)
-        return (*meaning.values(frame), f"calibration off: {error.cause}")
+        state.use(None)
+        return (*state.values(frame), f"calibration off: {error.cause}")
 
 
 def _age(made: str) -> str:

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from probe.port.listing import list_ports
 from recognizer.bench.errors import UnknownError
-from recognizer.bench.files import kept, named
+from recognizer.bench.files import find_file, store_recording
 from recognizer.bench.images import FILTERS
 from recognizer.bench.session import Session
 from recognizer.touch.settings import DEFAULTS
@@ -23,30 +23,30 @@ from recognizer.touch.settings import DEFAULTS
 Ports = tuple[tuple[str, str], ...]
 
 
-class _Body(BaseModel):
+class _Request(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class Port(_Body):
+class PortRequest(_Request):
     """Which port to read; empty: none."""
 
     url: str = Field(max_length=400)
     sensor: int | None = Field(default=None, ge=0, le=7)
 
 
-class Selected(_Body):
+class SensorRequest(_Request):
     """Which sensor of the board."""
 
     sensor: int = Field(ge=0, le=7)
 
 
-class Switch(_Body):
+class SwitchRequest(_Request):
     """On or off."""
 
     on: bool
 
 
-class Replay(_Body):
+class ReplayRequest(_Request):
     """A recording to play, or what to do on its time line."""
 
     name: str = Field(default="", max_length=200)
@@ -55,7 +55,7 @@ class Replay(_Body):
     at_s: float | None = Field(default=None, allow_inf_nan=False)
 
 
-class Touched(_Body):
+class TouchRequest(_Request):
     """Where the simulated probe shall come down: face frame."""
 
     object: str = Field(max_length=200)
@@ -66,19 +66,19 @@ class Touched(_Body):
     force_n: float = Field(default=80.0, allow_inf_nan=False)
 
 
-class Loaded(_Body):
+class LoadRequest(_Request):
     """An even load on the simulated probe."""
 
     newtons: float = Field(allow_inf_nan=False)
 
 
-class Unplugged(_Body):
+class UnplugRequest(_Request):
     """How long the simulated probe is away."""
 
     seconds: float = Field(allow_inf_nan=False)
 
 
-class Calibrating(_Body):
+class CalibrationRequest(_Request):
     """A step of a calibration."""
 
     do: Literal["begin", "read", "again", "finish", "cancel", "use"]
@@ -88,20 +88,20 @@ class Calibrating(_Body):
     name: str = Field(default="", max_length=200)
 
 
-def work_routes(session: Session, ports: Ports) -> APIRouter:
+def control_routes(session: Session, ports: Ports) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/api")
 
-    def offered() -> list[dict[str, Any]]:
+    def port_list() -> list[dict[str, Any]]:
         there = [(entry.url, f"{entry.device} {entry.vendor} {entry.product}".strip())
                  for entry in list_ports()]  # fmt: skip
         return [{"url": url, "label": label} for url, label in dict([*ports, *there]).items()]
 
     @routes.get("/bench")
     def bench() -> dict[str, Any]:
-        sensor, reader = session.sensor, session.reading.reader
+        sensor, reader = session.sensor, session.recognition.reader
         return {
-            "ports": offered(),
+            "ports": port_list(),
             "database": session.database,
             "folder": str(session.folder),
             "filters": FILTERS,
@@ -116,37 +116,37 @@ def work_routes(session: Session, ports: Ports) -> APIRouter:
         }
 
     @routes.post("/port")
-    def port(body: Port) -> dict[str, Any]:
-        if body.url and body.url not in {entry["url"] for entry in offered()}:
+    def port(body: PortRequest) -> dict[str, Any]:
+        if body.url and body.url not in {entry["url"] for entry in port_list()}:
             raise UnknownError(
                 f"{body.url[:80]} is none of the ports that are offered",
                 fix="choose one from the list, or start open-bench with --port",
             )
         session.open(body.url, body.sensor)
-        return session.told()
+        return session.as_json()
 
     @routes.post("/sensor")
-    def sensor(body: Selected) -> dict[str, Any]:
+    def sensor(body: SensorRequest) -> dict[str, Any]:
         session.select(body.sensor)
-        return session.told()
+        return session.as_json()
 
     @routes.post("/bias")
-    def bias(body: Switch) -> dict[str, Any]:
+    def bias(body: SwitchRequest) -> dict[str, Any]:
         session.bias(on=body.on)
-        return session.told()
+        return session.as_json()
 
     @routes.post("/record")
-    def record(body: Switch) -> dict[str, Any]:
+    def record(body: SwitchRequest) -> dict[str, Any]:
         session.record(on=body.on)
-        return session.told()
+        return session.as_json()
 
     @routes.post("/replay")
-    def replay(body: Replay) -> dict[str, Any]:
+    def replay(body: ReplayRequest) -> dict[str, Any]:
         if body.name:
             session.replay(body.name)
         else:
             session.timeline().play(playing=body.playing, speed=body.speed, at_s=body.at_s)
-        return session.told()
+        return session.as_json()
 
     @routes.get("/timeline")
     def timeline() -> dict[str, Any]:
@@ -154,24 +154,24 @@ def work_routes(session: Session, ports: Ports) -> APIRouter:
         return {"seconds": feed.seconds, "strength": feed.overview()}
 
     @routes.post("/touch")
-    def touch(body: Touched) -> dict[str, Any]:
+    def touch(body: TouchRequest) -> dict[str, Any]:
         session.simulated().touch(
             body.object, body.face, body.x_mm, body.y_mm, body.theta_deg, body.force_n
         )
         return {"touched": True}
 
     @routes.post("/load")
-    def load(body: Loaded) -> dict[str, Any]:
+    def load(body: LoadRequest) -> dict[str, Any]:
         session.simulated().load(body.newtons)
         return {"newtons": body.newtons}
 
     @routes.post("/unplug")
-    def unplug(body: Unplugged) -> dict[str, Any]:
+    def unplug(body: UnplugRequest) -> dict[str, Any]:
         session.simulated().unplug(body.seconds)
         return {"seconds": body.seconds}
 
     @routes.post("/calibration")
-    def calibration(body: Calibrating) -> dict[str, Any]:
+    def calibration(body: CalibrationRequest) -> dict[str, Any]:
         if body.do == "begin":
             session.calibrate(body.newtons, body.seconds, simulated_board=body.simulated_board)
         elif body.do == "finish":
@@ -183,22 +183,22 @@ def work_routes(session: Session, ports: Ports) -> APIRouter:
         else:
             with session.guide() as guide:
                 guide.read() if body.do == "read" else guide.again()
-        return session.told()
+        return session.as_json()
 
     @routes.post("/mosaic")
     def mosaic() -> dict[str, Any]:
-        session.reading.clear()
+        session.recognition.clear()
         return {"cleared": True}
 
     @routes.get("/recordings/{name}")
     def recording(name: str) -> Response:
-        path = named(session.folder, name, ".h5")
+        path = find_file(session.folder, name, ".h5")
         return FileResponse(path, filename=name, media_type="application/x-hdf5")
 
     @routes.post("/recordings")
     async def upload(name: str, request: Request) -> dict[str, Any]:
         body = await request.body()  # bounded by the guard
-        frames = await run_in_threadpool(kept, session.folder, name, body)
+        frames = await run_in_threadpool(store_recording, session.folder, name, body)
         return {"name": name, "frames": frames}
 
     @routes.get("/frame.csv")

@@ -14,32 +14,32 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 
-class Picture(Protocol):
+class BinaryTopic(Protocol):
     """A frame or a mosaic, as bytes in the way that a page wants it."""
 
-    def as_bytes(self, wish: str, /) -> bytes:
+    def as_bytes(self, filter_name: str, /) -> bytes:
         """Return the message for a page that wants this filter."""
         ...
 
 
 @dataclass(slots=True, eq=False)
-class Reader:
+class Subscriber:
     """One page: what it has seen, and the filter that it wants."""
 
-    wish: str = "bias-free"
+    filter_name: str = "bias-free"
     seen: dict[str, int] = field(default_factory=dict)
     news: asyncio.Event = field(default_factory=asyncio.Event)
 
 
-class Bulletin:
+class Broker:
     """The board; `publish` from any thread, the rest on the server's loop."""
 
     def __init__(self) -> None:
-        self._topics: dict[str, tuple[int, str | Picture]] = {}
+        self._topics: dict[str, tuple[int, str | BinaryTopic]] = {}
         self._turn = threading.Lock()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._waking = False
-        self.readers: set[Reader] = set()
+        self.subscribers: set[Subscriber] = set()
         self._number = 0
 
     def attach(self, loop: asyncio.AbstractEventLoop | None) -> None:
@@ -47,40 +47,40 @@ class Bulletin:
         with self._turn:
             self._loop = loop
 
-    def publish(self, topic: str, content: dict[str, Any] | Picture) -> None:
+    def publish(self, topic: str, content: dict[str, Any] | BinaryTopic) -> None:
         """Replace a topic."""
         if isinstance(content, dict):
-            told: str | Picture = json.dumps({"topic": topic, **content}, allow_nan=False)
+            message: str | BinaryTopic = json.dumps({"topic": topic, **content}, allow_nan=False)
         else:
-            told = content
+            message = content
         with self._turn:
             self._number += 1
-            self._topics[topic] = (self._number, told)
+            self._topics[topic] = (self._number, message)
             if self._loop is not None and not self._waking:
                 self._waking = True
                 self._loop.call_soon_threadsafe(self._wake)
 
-    def newest(self, topic: str) -> str | Picture | None:
+    def newest(self, topic: str) -> str | BinaryTopic | None:
         """Return what a topic says now."""
         with self._turn:
             return self._topics.get(topic, (0, None))[1]
 
-    def news(self, reader: Reader) -> list[str | bytes]:
+    def news(self, subscriber: Subscriber) -> list[str | bytes]:
         """Return what a page has not seen yet, oldest first."""
         with self._turn:
             fresh = sorted(
                 (number, topic, content)
                 for topic, (number, content) in self._topics.items()
-                if number > reader.seen.get(topic, 0)
+                if number > subscriber.seen.get(topic, 0)
             )
-        reader.seen.update({topic: number for number, topic, _ in fresh})
+        subscriber.seen.update({topic: number for number, topic, _ in fresh})
         return [
-            content if isinstance(content, str) else content.as_bytes(reader.wish)
+            content if isinstance(content, str) else content.as_bytes(subscriber.filter_name)
             for _, _, content in fresh
         ]
 
     def _wake(self) -> None:
         with self._turn:
             self._waking = False
-        for reader in self.readers:
-            reader.news.set()
+        for subscriber in self.subscribers:
+            subscriber.news.set()

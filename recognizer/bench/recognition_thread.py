@@ -1,6 +1,6 @@
 """Touch -> answer -> mosaic, in a thread of its own: the newest frame wins.
 
-A frame is read when `Watch` says so; its answer is published at once, then the first answered
+A frame is read when `ReadTrigger` says so; its answer is published at once, then the first answered
 frame of a touch goes into the mosaic of its face. Thesis 4.3, 6.3.
 """
 
@@ -20,10 +20,11 @@ from probe.calibration import Calibration, calibrated
 from probe.errors import ProbeError
 from probe.frame import Frame
 from probe.sensor import SensorType
-from recognizer.bench.bulletin import Bulletin
-from recognizer.bench.message import MosaicPicture, mosaic_picture
-from recognizer.bench.telling import told
-from recognizer.bench.watch import Watch
+from recognizer.bench.answers import answer_json
+from recognizer.bench.broker import Broker
+from recognizer.bench.message import MosaicMessage, mosaic_message
+from recognizer.bench.read_trigger import ReadTrigger
+from recognizer.bench.settings import RECOGNITION
 from recognizer.scan.mosaic.grow import added
 from recognizer.scan.mosaic.mosaic import Mosaic, no_touches
 from recognizer.scan.mosaic.touch import PlacedTouch, decoded_place
@@ -33,12 +34,9 @@ from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import Recognition
 from recognizer.touch.signal import Signal, signal_of
 
-FACES = 24  #: mosaics that are kept
-TOUCHES = 300  #: of one mosaic
-
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Offered:
+class PendingFrame:
     """A frame with what belongs to it."""
 
     frame: Frame
@@ -46,17 +44,17 @@ class Offered:
     received_ms: float
 
 
-class Reading:
+class RecognitionThread:
     """The thread. `offer`, `reload` and `clear` may be called from any other."""
 
-    def __init__(self, database: str, sensor: SensorType, bulletin: Bulletin) -> None:
+    def __init__(self, database: str, sensor: SensorType, broker: Broker) -> None:
         self.database, self.sensor = database, sensor
         self.reader: Reader | None = None
-        self._bulletin = bulletin
+        self._broker = broker
         self._news = threading.Condition()
-        self._offered: Offered | None = None
+        self._pending: PendingFrame | None = None
         self._stop = self._reload = False
-        self._watch = Watch()
+        self._watch = ReadTrigger()
         self._answers = 0
         self._mosaics: OrderedDict[tuple[str, str], Mosaic] = OrderedDict()
         self._grown = 0  #: touch that went into a mosaic last
@@ -64,10 +62,10 @@ class Reading:
         self._thread = threading.Thread(target=self._run, name="reading", daemon=True)
         self._thread.start()
 
-    def offer(self, offered: Offered) -> None:
+    def offer(self, pending: PendingFrame) -> None:
         """Put a frame in the place of the one that waits."""
         with self._news:
-            self._offered = offered
+            self._pending = pending
             self._news.notify()
 
     def reload(self) -> None:
@@ -81,8 +79,8 @@ class Reading:
         with self._news:
             self._mosaics.clear()
         image = no_touches(self.sensor).image
-        self._bulletin.publish("mosaic-of", {"object": None, "face": None, "touches": 0})
-        self._bulletin.publish("mosaic", mosaic_picture(image, 0))
+        self._broker.publish("mosaic-of", {"object": None, "face": None, "touches": 0})
+        self._broker.publish("mosaic", mosaic_message(image, 0))
 
     def close(self) -> None:
         """End the thread."""
@@ -95,15 +93,15 @@ class Reading:
         self._prepare()
         while True:
             with self._news:
-                self._news.wait_for(lambda: self._offered or self._stop or self._reload)
-                offered, self._offered = self._offered, None
+                self._news.wait_for(lambda: self._pending or self._stop or self._reload)
+                pending, self._pending = self._pending, None
                 reload_, self._reload = self._reload, False
                 if self._stop:
                     return
             if reload_:
                 self._prepare()
-            if offered is not None:
-                self._look(offered)
+            if pending is not None:
+                self._look(pending)
 
     def _prepare(self) -> None:
         if not self.database:
@@ -119,29 +117,29 @@ class Reading:
         self._tell("ready")
 
     def _tell(self, state: str, **more: Any) -> None:
-        self._bulletin.publish("reader", {"state": state, **more})
+        self._broker.publish("reader", {"state": state, **more})
 
-    def _look(self, offered: Offered) -> None:
-        signal = _signal(offered)
+    def _look(self, pending: PendingFrame) -> None:
+        signal = _signal(pending)
         if signal.contact != self._contact:
             self._contact = signal.contact
-            self._bulletin.publish("contact", {"contact": signal.contact})
+            self._broker.publish("contact", {"contact": signal.contact})
         now_s = time.monotonic()
         due = self._watch.due(signal.forces, contact=signal.contact, now_s=now_s)
         if not due or self.reader is None:
             return
-        answer = recognise(self.reader, signal, offered.frame.seq)
+        answer = recognise(self.reader, signal, pending.frame.seq)
         done_s = time.monotonic()
         self._watch.read(signal.forces, answered=bool(answer), now_s=done_s)
         self._answers += 1
-        self._bulletin.publish(
+        self._broker.publish(
             "answer",
-            told(answer, self.reader.lab, self.sensor)
+            answer_json(answer, self.reader.lab, self.sensor)
             | {
                 "touch": self._watch.touches,
                 "read": self._answers,
                 "read_ms": round(1e3 * (done_s - now_s), 1),
-                "received_ms": offered.received_ms,
+                "received_ms": pending.received_ms,
                 "answered_ms": time.time() * 1e3,
             },
         )
@@ -156,30 +154,30 @@ class Reading:
         key = (answer.object, answer.face)
         with self._news:
             mosaic = self._mosaics.get(key) or no_touches(self.sensor)
-        if len(mosaic) < TOUCHES:
+        if len(mosaic) < RECOGNITION.touches:
             mosaic = added(mosaic, PlacedTouch(signal, decoded=place, seq=answer.seq))
         with self._news:
             self._mosaics[key] = mosaic
             self._mosaics.move_to_end(key)
-            while len(self._mosaics) > FACES:
+            while len(self._mosaics) > RECOGNITION.faces:
                 self._mosaics.popitem(last=False)
-        self._bulletin.publish(
+        self._broker.publish(
             "mosaic-of",
-            {"object": key[0], "face": key[1], "touches": len(mosaic), "most": TOUCHES},
+            {"object": key[0], "face": key[1], "touches": len(mosaic), "most": RECOGNITION.touches},
         )
-        self._bulletin.publish("mosaic", self.picture(mosaic))
+        self._broker.publish("mosaic", self.picture(mosaic))
 
-    def picture(self, mosaic: Mosaic) -> MosaicPicture:
+    def picture(self, mosaic: Mosaic) -> MosaicMessage:
         """Return a mosaic for the pages."""
-        return mosaic_picture(mosaic.image, len(mosaic))
+        return mosaic_message(mosaic.image, len(mosaic))
 
 
-def _signal(offered: Offered) -> Signal:
-    counts: NDArray[np.float64] = offered.frame.counts.astype(np.float64)
-    if offered.calibration is None:
+def _signal(pending: PendingFrame) -> Signal:
+    counts: NDArray[np.float64] = pending.frame.counts.astype(np.float64)
+    if pending.calibration is None:
         return signal_of(counts)
     try:
-        found = calibrated(counts, offered.calibration)
+        found = calibrated(counts, pending.calibration)
     except ProbeError:  # another sensor's readings: beyond the board's range
         return signal_of(counts)
     trust = 1.0 - found.bad.astype(np.float64)

@@ -24,7 +24,7 @@ from recognizer.touch.lab import EmbossedArray, Lab
 DIGITS = 4  #: after the point, of mm: a tenth of a micrometre
 
 
-def objects_told(connection: Connection) -> list[dict[str, Any]]:
+def objects_json(connection: Connection) -> list[dict[str, Any]]:
     """Return the list of objects."""
     return [
         {
@@ -42,7 +42,7 @@ def objects_told(connection: Connection) -> list[dict[str, Any]]:
     ]
 
 
-def object_told(connection: Connection, name: str) -> dict[str, Any]:
+def object_json(connection: Connection, name: str) -> dict[str, Any]:
     """Return an object as solid and symbols.
 
     Raises
@@ -72,13 +72,13 @@ def _face(held: RegisteredObject, number: int) -> dict[str, Any]:
     triangles = filled(face.polygon_mm)
     return {
         "name": face.name,
-        "T_object_face": _listed(face.T_object_face, 9),
-        "loops": [_listed(loop) for loop in face.polygon_mm],
+        "T_object_face": _nested(face.T_object_face, 9),
+        "loops": [_nested(loop) for loop in face.polygon_mm],
         "triangles": triangles.tolist(),
         "turn": 0.0 if face.placement is None else -face.placement.rotation_rad,
         "blank": face.placement is None,
         "labels": cells.labels.tolist(),
-        "centres": _listed(cells.centres_mm),
+        "centres": _nested(cells.centres_mm),
     }
 
 
@@ -95,7 +95,7 @@ def _glyphs(held: RegisteredObject) -> list[list[float]]:
     ]
 
 
-def encodings_told(lab: Lab) -> list[dict[str, Any]]:
+def arrays_json(lab: Lab) -> list[dict[str, Any]]:
     """Return the arrays with the strokes of their alphabets, mm in the symbol's axes."""
     return [
         {
@@ -116,7 +116,7 @@ def encodings_told(lab: Lab) -> list[dict[str, Any]]:
     ]
 
 
-def map_told(connection: Connection, encoding: EmbossedArray) -> dict[str, Any]:
+def map_json(connection: Connection, encoding: EmbossedArray) -> dict[str, Any]:
     """Return the cells of an array that objects hold, face by face."""
     columns = np.uint64(encoding.array.columns)
     owners, labels = encoding.owners[:-1], encoding.labels[:-1]
@@ -154,5 +154,5 @@ def _face_names(connection: Connection) -> dict[int, dict[int, str]]:
     return found
 
 
-def _listed(values: NDArray[np.float64], digits: int = DIGITS) -> Any:
+def _nested(values: NDArray[np.float64], digits: int = DIGITS) -> Any:
     return np.round(values, digits).tolist()

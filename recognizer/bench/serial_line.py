@@ -18,10 +18,7 @@ from pathlib import Path
 from probe.frame import Frame
 from probe.port.software import SoftwareProbe
 from probe.protocol import IdentPacket
-
-_WAIT_S = 0.005  # of the probe for its next frame, and so of a command for its answer
-_AT_ONCE = 4096
-_LOST = 65536  # bytes that wait for a reader
+from recognizer.bench.settings import LINE
 
 
 class SoftwareLine:
@@ -76,10 +73,10 @@ class SoftwareLine:
                 self._plug()
                 waiting = b""
             with suppress(BlockingIOError):
-                self._probe.write(os.read(self._near, _AT_ONCE))
-            waiting += self._probe.read(_WAIT_S)
+                self._probe.write(os.read(self._near, LINE.at_once))
+            waiting += self._probe.read(LINE.wait_s)
             with suppress(BlockingIOError):
                 waiting = waiting[os.write(self._near, waiting) :] if waiting else b""
-            if len(waiting) > _LOST:  # nobody listens: as on a real line
+            if len(waiting) > LINE.lost:  # nobody listens: as on a real line
                 waiting = b""
         self._pull()

@@ -17,17 +17,13 @@ from probe.calibration import Calibration, Condition, calibration_from, even_loa
 from probe.circuit import Electronics
 from probe.frame import Frame
 from recognizer.bench.errors import BenchError, BusyError
+from recognizer.bench.settings import GUIDE
 
 Counts = NDArray[np.uint16]
 
-FELT_COUNTS = 5.0  #: above rest
-STEADY = 0.05  #: share by which a load may change while it is read
-MOST_LOADS = 12
-_LONGEST = 20_000  # frames of a step
-
 
 @dataclass(slots=True)
-class Guide:
+class CalibrationGuide:
     """A mutable value: a calibration that is being made."""
 
     sensor: str
@@ -79,10 +75,10 @@ class Guide:
             self._began_ns = frame.t_ns
         self._frames.append(frame.counts)
         passed_s = (frame.t_ns - self._began_ns) * 1e-9
-        if not 0 <= passed_s < self.seconds or len(self._frames) >= _LONGEST:
+        if not 0 <= passed_s < self.seconds or len(self._frames) >= GUIDE.most_frames:
             counts, self._frames = np.stack(self._frames), None
             self.taken.append(counts)
-            self.felt.append(_felt(counts, self.taken[0] if self.step else None))
+            self.felt.append(_describe_load(counts, self.taken[0] if self.step else None))
             self.step += 1
 
     def calibration(self) -> Calibration:
@@ -105,7 +101,7 @@ class Guide:
             self.taken[0], loads, sensor=self.sensor, made=self.made, board=self.board
         )
 
-    def told(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the step for the page."""
         force = self.forces_n[self.step - 1] if 0 < self.step < self.steps else 0.0
         ask = "Unload the sensor." if self.step == 0 else f"Put {force:g} N on, evenly."
@@ -129,14 +125,14 @@ def forces_given(forces_n: list[float]) -> tuple[float, ...]:
         When they are none, or too many.
     """
     sound = all(math.isfinite(force) and 0 < force <= 10_000 for force in forces_n)
-    if not sound or not 1 <= len(forces_n) <= MOST_LOADS:
+    if not sound or not 1 <= len(forces_n) <= GUIDE.most_loads:
         raise BenchError(
-            f"loads {forces_n}", fix=f"give 1 to {MOST_LOADS} forces above 0 N, rising"
+            f"loads {forces_n}", fix=f"give 1 to {GUIDE.most_loads} forces above 0 N, rising"
         )
     return tuple(forces_n)
 
 
-def condition_told(calibration: Calibration) -> dict[str, Any]:
+def condition_json(calibration: Calibration) -> dict[str, Any]:
     """Return what a calibration says of the sensor: unsound tactels, scatter, loads."""
     marks = ["".join(Condition(int(v)).letter for v in row) for row in calibration.condition]
     return {
@@ -149,18 +145,18 @@ def condition_told(calibration: Calibration) -> dict[str, Any]:
     }
 
 
-def _felt(counts: Counts, rest: Counts | None) -> str:
+def _describe_load(counts: Counts, rest: Counts | None) -> str:
     """Return in words what a load did."""
     mean = counts.mean(axis=0)
     if rest is None:
         return f"{len(counts)} frames at rest, median {np.median(mean):.1f} counts"
     rise = mean - rest.mean(axis=0)
-    half = len(counts) // 2
+    felt, half = int((rise > GUIDE.felt_counts).sum()), len(counts) // 2
     change = float(np.median(counts[half:].mean(axis=0) - counts[: max(half, 1)].mean(axis=0)))
     words = (
-        f"{len(counts)} frames, felt by {int((rise > FELT_COUNTS).sum())} of {rise.size} tactels, "
+        f"{len(counts)} frames, felt by {felt} of {rise.size} tactels, "
         f"median {np.median(rise):.1f} counts above rest"
     )
-    if abs(change) > max(1.0, STEADY * float(np.median(rise))):
+    if abs(change) > max(1.0, GUIDE.steady * float(np.median(rise))):
         words += f"; not steady, it changed by {change:+.1f} counts"
     return words

@@ -12,16 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from recognizer.bench.settings import TRIGGER
 
-STEADY = 0.15  #: share of the forces that may change from frame to frame; noise alone changes 0.1
-CHANGED = 0.35  #: share by which a read touch differs from a new one, whatever their strength
-RESTLESS_S = 0.3  #: after so long a touch is read although it moves
-AGAIN_S = 0.4  #: after so long a touch that was not answered is read again
+Array = NDArray[np.float64]
 
 
 @dataclass(slots=True)
-class Watch:
+class ReadTrigger:
     """A mutable value: the touch at hand."""
 
     touches: int = 0  #: begun so far
@@ -51,14 +48,14 @@ class Watch:
             self.touches += 1
             self._since_s = now_s
             return False
-        steady = _apart(forces, before) < STEADY
+        steady = _apart(forces, before) < TRIGGER.steady
         if steady:
             self._since_s = now_s
-        elif now_s - self._since_s < RESTLESS_S:
+        elif now_s - self._since_s < TRIGGER.restless_s:
             return False
-        if self._read is None or _apart(_shape(forces), _shape(self._read)) > CHANGED:
+        if self._read is None or _apart(_shape(forces), _shape(self._read)) > TRIGGER.changed:
             return True
-        return not self._answered and now_s - self._read_s > AGAIN_S
+        return not self._answered and now_s - self._read_s > TRIGGER.again_s
 
     def read(self, forces: Array, *, answered: bool, now_s: float) -> None:
         """Take note that a frame was read."""

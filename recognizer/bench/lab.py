@@ -13,11 +13,11 @@ from generator.database.read import object_entry, read_parts
 from generator.database.transaction import reading
 from recognizer.bench.errors import UnknownError
 from recognizer.bench.files import part_to_send
-from recognizer.bench.scenes import encodings_told, map_told, object_told, objects_told
+from recognizer.bench.lab_json import arrays_json, map_json, object_json, objects_json
 from recognizer.bench.session import Session
 
 
-def holdings_routes(session: Session, parts: Path | None) -> APIRouter:
+def lab_routes(session: Session, parts: Path | None) -> APIRouter:
     """Return the routes; files are sent from the folder `parts` alone."""
     routes = APIRouter(prefix="/api")
 
@@ -31,15 +31,15 @@ def holdings_routes(session: Session, parts: Path | None) -> APIRouter:
         if not session.database:
             return {"objects": []}
         with reading(engine()) as connection:
-            return {"objects": objects_told(connection)}
+            return {"objects": objects_json(connection)}
 
     @routes.get("/objects/{name}")
     def one(name: str) -> dict[str, Any]:
         with reading(engine()) as connection:
-            told = object_told(connection, name)
+            held = object_json(connection, name)
         if session.simulation is not None:
             session.simulation.prepare(name)
-        return told
+        return held
 
     @routes.get("/objects/{name}/parts/{number}")
     def part(name: str, number: int) -> FileResponse:
@@ -52,23 +52,23 @@ def holdings_routes(session: Session, parts: Path | None) -> APIRouter:
 
     @routes.get("/lab")
     def lab() -> dict[str, Any]:
-        reader = session.reading.reader
-        return {"encodings": [] if reader is None else encodings_told(reader.lab)}
+        reader = session.recognition.reader
+        return {"encodings": [] if reader is None else arrays_json(reader.lab)}
 
     @routes.post("/lab")
     def reload() -> dict[str, Any]:
-        session.reading.reload()
+        session.recognition.reload()
         if session.simulation is not None:
             session.simulation.forget()
         return {"reloading": True}
 
     @routes.get("/map/{number}")
     def array(number: int) -> dict[str, Any]:
-        reader = session.reading.reader
+        reader = session.recognition.reader
         known = () if reader is None else reader.lab.arrays
         if not 0 <= number < len(known):
             raise UnknownError(f"there is no array {number}", fix=f"there are {len(known)}")
         with reading(engine()) as connection:
-            return map_told(connection, known[number])
+            return map_json(connection, known[number])
 
     return routes

@@ -1,4 +1,4 @@
-"""What a simulated probe feels, beat by beat: it rests, comes down, holds, and lifts.
+"""What a simulated probe feels, frame by frame: it rests, comes down, holds, and lifts.
 
 Touch on a face -> forces -> counts at the board's rate. On the way down and up, a beat each,
 the forces are taken in proportion; the film remembers (hysteresis, creep), and the board is
@@ -22,16 +22,13 @@ from probe.frame import Frame, frame_from
 from probe.sensor import SensorType
 from probe.simulate.scene import Scene
 from recognizer.bench.errors import BenchError
+from recognizer.bench.settings import PRESS
 
 Array = NDArray[np.float64]
 
-STEPS = (0.5,)  #: shares of the force on the way down, a beat each
-APART_S = 0.08  #: between two touches
-LARGEST_N = 400.0
-
 
 @dataclass(frozen=True, slots=True)
-class Manner:
+class SimulationSettings:
     """How the simulated probe is built and moves."""
 
     rate: float = 100.0  #: frames per second
@@ -40,10 +37,10 @@ class Manner:
     seed: int = 0
 
 
-class Beats:
+class PressSequence:
     """The probe's state; `touch`, `load` and `lift` may be called from any thread."""
 
-    def __init__(self, sensor: SensorType, manner: Manner) -> None:
+    def __init__(self, sensor: SensorType, manner: SimulationSettings) -> None:
         self.sensor, self.manner = sensor, manner
         noise = QUIET if manner.noise == "quiet" else Noise()
         self._board = Electronics(noise=noise, frame_s=1 / manner.rate)
@@ -62,13 +59,14 @@ class Beats:
         BenchError
             For a force that no operator would use.
         """
-        if not 0 < touch.force_n <= LARGEST_N:
+        if not 0 < touch.force_n <= PRESS.largest_n:
             raise BenchError(
-                f"a force of {touch.force_n:g} N", fix=f"give more than 0, at most {LARGEST_N:g} N"
+                f"a force of {touch.force_n:g} N",
+                fix=f"give more than 0, at most {PRESS.largest_n:g} N",
             )
         full = press(scene.under(touch).surface, self.sensor, touch).forces_n
         held = self._beats(self.manner.hold_s)
-        steps = [(1, share * full) for share in STEPS]
+        steps = [(1, share * full) for share in PRESS.steps]
         self._play([*steps, (held, full), *reversed(steps), (1, self._rest)])
 
     def load(self, newtons: float) -> None:
@@ -79,8 +77,10 @@ class Beats:
         BenchError
             For what is no load.
         """
-        if not 0 <= newtons <= 10 * LARGEST_N:
-            raise BenchError(f"a load of {newtons:g} N", fix=f"give 0 to {10 * LARGEST_N:g} N")
+        if not 0 <= newtons <= 10 * PRESS.largest_n:
+            raise BenchError(
+                f"a load of {newtons:g} N", fix=f"give 0 to {10 * PRESS.largest_n:g} N"
+            )
         self._play([(1, np.full(self._rest.shape, newtons / self._rest.size))])
 
     def lift(self) -> None:
@@ -102,7 +102,7 @@ class Beats:
     def _play(self, coming: list[tuple[int, Array]]) -> None:
         with self._turn:
             if self._now.any() and len(coming) > 1:
-                coming = [(self._beats(APART_S), self._rest), *coming]
+                coming = [(self._beats(PRESS.apart_s), self._rest), *coming]
             self._coming = coming
 
     def _beat(self) -> Array:

@@ -1,0 +1,96 @@
+"""Numbers that decide at the bench: when a touch is read, what is given up, how much is kept.
+
+One frozen value a stage; limits of requests stand in `guard.AccessRules`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class TriggerSettings:
+    """When a touch is worth reading."""
+
+    steady: float = 0.15
+    """Share of the forces that may change from frame to frame; noise alone changes 0.1."""
+    changed: float = 0.35
+    """Share by which a read touch differs from a new one, whatever their strength."""
+    restless_s: float = 0.3  #: after so long a touch is read although it moves
+    again_s: float = 0.4  #: after so long a touch that was not answered is read again
+
+
+@dataclass(frozen=True, slots=True)
+class RecognitionSettings:
+    """How much the thread that reads keeps."""
+
+    faces: int = 24  #: mosaics that are kept
+    touches: int = 300  #: of one mosaic; more cost time and show nothing new
+
+
+@dataclass(frozen=True, slots=True)
+class SessionSettings:
+    """How often the session looks about."""
+
+    wait_s: float = 0.05  #: of the thread for a frame
+    status_s: float = 0.25  #: between two reports
+    notices: int = 40  #: that are kept for the page
+    retry_s: float = 1.0  #: after a probe went away for good
+    silent_s: float = 0.6  #: without a frame a probe is gone
+    calibration_s: tuple[float, float] = (0.2, 60.0)  #: to read one load
+
+
+@dataclass(frozen=True, slots=True)
+class GuideSettings:
+    """How loads of a calibration are judged while they are taken."""
+
+    felt_counts: float = 5.0  #: above rest, for a tactel that feels the load
+    steady: float = 0.05  #: share by which a load may change while it is read
+    most_loads: int = 12
+    most_frames: int = 20_000  #: of a load
+
+
+@dataclass(frozen=True, slots=True)
+class ReplaySettings:
+    """How recordings are played."""
+
+    at_once: int = 512  #: frames taken at a time
+    points: int = 800  #: of the time line's picture
+    most_frames: int = 2_000_000  #: of a recording that is played
+    faint: float = 2048.0  #: counts of all tactels; a recording of noise alone looks like one
+    jump_s: float = 0.5  #: longer pauses in a recording are shortened to it
+
+
+@dataclass(frozen=True, slots=True)
+class PressSettings:
+    """How the simulated probe comes down, and what it is spared."""
+
+    steps: tuple[float, ...] = (0.5,)  #: shares of the force on the way down, a frame each
+    apart_s: float = 0.08  #: between two touches
+    largest_n: float = 400.0  #: of a touch; a load may be ten times as large
+    scenes: int = 32  #: surfaces that are kept
+    unplugged_s: float = 60.0  #: at most
+
+
+@dataclass(frozen=True, slots=True)
+class LineSettings:
+    """The serial line of the simulated probe."""
+
+    wait_s: float = 0.005  #: of the probe for its next frame, and so of a command for its answer
+    at_once: int = 4096  #: bytes read
+    lost: int = 65536  #: bytes that wait for a reader; more are thrown away, as on a real line
+
+
+@dataclass(frozen=True, slots=True)
+class PageSettings:
+    """What pages may ask of the live line, and how much they get."""
+
+    pages: int = 64  #: open at once
+    message: int = 1024  #: bytes of a message from a page
+    mosaic: int = 512  #: rows or columns of a mosaic that is sent; beyond, cells are left out
+    listed: int = 200  #: files of a kind that are offered
+
+
+TRIGGER, RECOGNITION, SESSION = TriggerSettings(), RecognitionSettings(), SessionSettings()
+GUIDE, REPLAY, PRESS = GuideSettings(), ReplaySettings(), PressSettings()
+LINE, PAGE = LineSettings(), PageSettings()
