@@ -10,6 +10,7 @@ takes an explicit encoding; both give a `SymbolArray` (`contract`).
     fold                          PRBA, PRMVA
     product                       PRPA, PRMVPA
     window                        minimum distance, unique windows
+    touches                       how many of a sensor's touches name a place
     definition, profiles          arrays by plain values and by name
 """
 

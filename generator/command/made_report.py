@@ -50,6 +50,8 @@ def _object_text(made: MadeObject, dry_run: bool) -> str:
     counts = f"{_count(made.faces, 'face')}, {_count(made.symbols, 'symbol')}"
     parts, places = _count(made.parts, "part"), _count(made.places, "place")
     lines = [f"{made.name}: {verb}; {counts}, {parts}, {places} told apart by touch"]
+    if made.touches > 1:
+        lines.append(f"  read by a scan: about {made.touches} touches (recognize-object --scan)")
     for face in made.face_reports:
         size, least = (
             " x ".join(f"{v:.3g}" for v in each) for each in (face.size_mm, face.smallest_mm)
@@ -101,6 +103,7 @@ def _encoded_values(result: Encoded, dry_run: bool) -> dict[str, Any]:
                 "symbols": made.symbols,
                 "files": [str(file) for file in made.files],
                 "places": made.places,
+                "touches": made.touches,
                 "parts": made.parts,
                 "reused": made.reused,
                 "skipped": made.skipped,

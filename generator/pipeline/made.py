@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from generator.array.touches import touches_needed
 from generator.layout.placement import Layout
 from generator.pipeline.faces import FaceReport
 from generator.pipeline.plan import ObjectPlan
@@ -23,6 +24,7 @@ class MadeObject:
     warnings: tuple[str, ...]
     reused: bool  #: registered before, so the same cells again
     skipped: bool = False  #: registered before, and all its files stand unchanged
+    touches: int = 1  #: about so many that overlap name a place; 1: no scan is needed
     face_reports: tuple[
         FaceReport, ...
     ] = ()  #: of a dry run: face by face, and how small it may be
@@ -101,4 +103,7 @@ def describe_object(
         warnings=(*plan.polyhedron.notes, *plan.notes, *layout.warnings, *warnings),
         reused=reused,
         skipped=skipped,
+        touches=touches_needed(
+            plan.array.order, plan.array.rows * plan.array.columns, plan.spec.style.pitch_mm
+        ),
     )

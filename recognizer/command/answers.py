@@ -22,10 +22,19 @@ from probe.sensor import SensorType
 from recognizer.command import report
 from recognizer.command.in_base import object_in_base
 from recognizer.command.port import listen, source_at
+from recognizer.command.scanning import (
+    Belief,
+    Joints,
+    belief_for,
+    pose_during,
+    read_joints,
+    refuse_single,
+    touches_for,
+)
 from recognizer.touch.contacts import TouchImage
 from recognizer.touch.lab import Lab, open_lab
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognition import Recognition
+from recognizer.touch.recognition import NO_CONTACT, Recognition
 from recognizer.touch.robot import ObjectPose
 from recognizer.touch.source import TouchSource, source_of
 
@@ -49,6 +58,8 @@ class RecognizeOptions:
     plot: Path | None
     replace: bool
     as_json: bool
+    scan: str = ""  #: joint or thesis; empty: every touch by itself
+    joints_file: Path | None = None  #: angles of every touch
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,6 +69,7 @@ class Answer:
     touch: TouchImage
     found: Recognition
     in_base: ObjectPose | None
+    touches: int | None = None  #: of a scan, that it rests on
 
 
 def recognize_touches(options: RecognizeOptions) -> int:
@@ -117,6 +129,9 @@ def _print_answers(
     kept: list[Answer] = []
     read = answered = 0
     lines = options.as_json and options.follow
+    needed = touches_for(reader)
+    if options.scan and needed == 1:
+        message("one touch is enough for these symbols; a scan helps where parts are worn or cut")
     with ExitStack() as stack:
         bar = None
         if options.as_json or not out.isatty():  # otherwise the answers show how far it is
@@ -124,17 +139,19 @@ def _print_answers(
             frames = _show_count(frames, bar)
         for answer in _answers(options, reader, source, frames, interrupted):
             read += 1
-            answered += bool(answer.found)
+            answered = bool(answer.found) + (0 if options.scan else answered)
             if options.plot is not None:
                 if options.follow:
                     _draw(reader, source, answer, options.plot)
                 else:
                     kept.append(answer)
             if not options.as_json:
-                out.write(report.sentence(answer.touch, answer.found, answer.in_base) + "\n")
+                out.write(_sentence(answer, needed) + "\n")
                 out.flush()
                 continue
             entry = report.entry(answer.touch, answer.found, answer.in_base)
+            if answer.touches is not None:
+                entry["touches"] = answer.touches
             if lines:
                 write_json(entry, line=True)
                 out.flush()
@@ -144,8 +161,14 @@ def _print_answers(
         _draw_all(reader, source, kept, options.plot, interrupted)
     if options.as_json and not lines:
         write_json(values)
+    elif options.scan and read:
+        what = f"{answer.found.object}/{answer.found.face}" if answered else "not recognised"
+        message(f"a scan of {answer.touches} touches: {what}")
     elif read != 1:
         message(report.summary(read, answered, source.frames))
+    if not answered and read and not options.scan and needed > 1:
+        message(f"symbols of this lab are read by a scan of about {needed} overlapping touches: "
+                "recognize-object --scan")  # fmt: skip
     if interrupted.is_set():
         message("recognize-object: interrupted")
         return INTERRUPTED
@@ -159,20 +182,70 @@ def _answers(
     frames: Iterator[Frame],
     interrupted: Event,
 ) -> Iterator[Answer]:
-    most = 1 if options.port and not options.follow and options.most is None else options.most
-    warned = ""
+    belief = belief_for(reader, options.scan) if options.scan else None
+    most = options.most
+    if options.port and not options.follow and most is None and belief is None:
+        most = 1
+    by_touch = read_joints(options.joints_file) if options.joints_file else ()
     touches = source.touches(_until(interrupted, frames), reader.settings)
-    for number, touch in enumerate(touches, start=1):
+    if belief is not None and options.recording is not None:
+        touches = refuse_single(touches, source.place, touches_for(reader))
+    warned = ""
+    last: Answer | None = None  # that answers
+    for count, touch in enumerate(touches, start=1):
         if interrupted.is_set():  # what an interruption cuts short is no touch
             return
-        found = reader.read(touch.counts, calibration=source.calibration, seq=touch.seq)
-        in_base, trouble = object_in_base(touch, found, options.joints_deg, options.joint_error_deg)
+        own = by_touch[count - 1 : count]
+        if belief is None:
+            found = reader.read(touch.counts, calibration=source.calibration, seq=touch.seq)
+        else:
+            signal = reader.signal(touch.counts, calibration=source.calibration)
+            pose = pose_during(touch, count, by_touch, options.joint_error_deg)
+            found = belief.add(signal, pose, seq=touch.seq)
+        answer, trouble = _answer(options, touch, found, own, belief)
         if trouble and trouble != warned:
             warning(f"touch {touch.seq}: the place in the robot's base is not known: {trouble}")
             warned = trouble
-        yield Answer(touch, found, in_base)
-        if number == most:
+        yield answer
+        last = answer if found else last
+        until_told = belief is not None and options.port and not options.follow
+        if count == most or (found and until_told):
+            break
+    else:
+        if belief is None or not belief.touches or found or not belief.answer:
             return
+        # the answer of the scan, though its last touch could not be read
+        if last is not None and last.found is belief.answer:
+            yield last
+        else:
+            yield _answer(options, touch, belief.answer, own, belief)[0]
+
+
+def _answer(
+    options: RecognizeOptions,
+    touch: TouchImage,
+    found: Recognition,
+    own: Joints,
+    belief: Belief | None,
+) -> tuple[Answer, str]:
+    """Return an answer with the object in the robot's base, or what kept it from being known.
+
+    Joint angles are those of the touch (`own`), if there are such.
+    """
+    joints = own[0] if own else options.joints_deg
+    in_base, trouble = object_in_base(touch, found, joints, options.joint_error_deg)
+    return Answer(touch, found, in_base, None if belief is None else belief.touches), trouble
+
+
+def _sentence(answer: Answer, needed: int) -> str:
+    """Return an answer in a line; of a scan with the number of its touches."""
+    said = report.sentence(answer.touch, answer.found, answer.in_base)
+    if answer.touches is None:
+        return said
+    if not answer.found and answer.found.reason != NO_CONTACT:
+        more = f"; go on: about {needed} touches" if answer.touches < needed else ""
+        said = f"{answer.touch.seq}: not yet: {answer.found.reason}{more}"
+    return f"{said} ({answer.touches} {'touch' if answer.touches == 1 else 'touches'})"
 
 
 def _show_count(frames: Iterator[Frame], bar: ProgressBar) -> Iterator[Frame]:

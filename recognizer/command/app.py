@@ -46,6 +46,15 @@ def recognize(
     every: Annotated[
         bool, typer.Option("--every", help="Every frame by itself, not every touch."),
     ] = False,
+    scan: Annotated[
+        bool, typer.Option("--scan", help="All touches together, of one face: for symbols too "
+                                          "large for one touch (profiles thesis, product), worn "
+                                          "parts, edges. A port is read until they answer."),
+    ] = False,
+    method: Annotated[
+        str, typer.Option(metavar="joint|thesis", help="How a scan is read: the joint fit, or as "
+                                                       "the thesis has it."),
+    ] = "joint",
     most: Annotated[
         int | None, typer.Option("--touches", metavar="N", min=1, show_default=False,
                                  help="End after so many touches."),
@@ -67,10 +76,10 @@ def recognize(
         bool, typer.Option("--live", help="Also a recording that is still being written."),
     ] = False,
     joints: Annotated[
-        str, typer.Option(metavar="Q1,...,Q5", show_default=False,
+        str, typer.Option(metavar="Q1,...,Q5|FILE", show_default=False,
                           help="Joint angles of the arm, degrees: with the wrist's readings they "
                                "place the object in the robot's base. A pose in the recording "
-                               "does so too."),
+                               "does so too. Of a scan a text file, a line for each touch."),
     ] = "",
     joint_error: Annotated[
         float, typer.Option(metavar="DEGREES", min=0.0, help="Standard deviation of each."),
@@ -106,7 +115,13 @@ def recognize(
         raise typer.BadParameter("--follow needs --port; a file is played by --port file:FILE")
     if overlay not in ("", "tab", "pad"):
         raise typer.BadParameter(f"--overlay {overlay}: give tab or pad")
-    angles = _angles(joints)
+    if method not in ("joint", "thesis"):
+        raise typer.BadParameter(f"--method {method}: give joint or thesis")
+    by_touch = joints if joints and Path(joints).is_file() else ""
+    angles = _angles("" if by_touch else joints)
+    scan = scan or method == "thesis"
+    if scan and angles:
+        raise typer.BadParameter("--joints of a scan: give a file with a line for each touch")
 
     def action() -> int:
         from recognizer.command.answers import RecognizeOptions, recognize_touches
@@ -116,7 +131,8 @@ def recognize(
                 recording=recording, port=port, database=database, follow=follow, every=every,
                 most=most, overlay=overlay, calibration=calibration, sensor=sensor, live=live,
                 joints_deg=angles, joint_error_deg=joint_error, plot=plot, replace=replace,
-                as_json=as_json,
+                as_json=as_json, scan=method if scan else "",
+                joints_file=Path(by_touch) if by_touch else None,
             )
         )  # fmt: skip
 

@@ -1,24 +1,31 @@
 """A scan of overlapping touches, read the thesis's way: merged, then read as one image.
 
-    classical_image    touches and believed poses -> global tactile image
-    classical          image -> symbols, grid, window, index, pose
+    image    touches and believed poses -> global tactile image
+    read     image -> symbols, grid, window, index, pose
 
+Where nobody knows how the probe moved, the mosaic of `recognizer.scan` says where touches lie.
 The answer says where the probe stands at the last touch. Thesis 4.3, 6.1-6.3.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from probe.arm.carried import SensorPose
 from probe.sensor import SensorType
+from recognizer.scan.mosaic.grow import added
+from recognizer.scan.mosaic.mosaic import no_touches
+from recognizer.scan.session import TouchPlaces
+from recognizer.scan.settings import ScanSettings
 from recognizer.thesis.image import GlobalImage, Merging, merged
 from recognizer.thesis.read import ClassicalReading, Settings, read_classically
 from recognizer.touch.lab import Lab
-from recognizer.touch.recognition import Recognition
+from recognizer.touch.recognition import NO_CONTACT, TOO_FEW, Recognition, refusal
+from recognizer.touch.signal import Signal, signal_of
 
 Array = NDArray[np.float64]
 
@@ -104,3 +111,100 @@ def read_while_scanning(
     places = np.asarray(poses, np.float64)
     for number in [*range(every, len(readings), every), len(readings)]:
         yield read_scan(lab, sensor, readings[:number], places[:number], settings, merging)
+
+
+class ThesisScan:
+    """Overlapping touches of one face, merged and read anew every few touches.
+
+    It takes and gives what `recognizer.scan.session.Scan` does.
+
+    Parameters
+    ----------
+    lab
+        What can be touched.
+    sensor
+        The one that feels all touches; the usual one if not given.
+    settings, merging
+        Of the stages; by default corrections are searched around the arm's poses.
+    every
+        After so many touches the image is read again; `answer` reads what is left.
+    """
+
+    def __init__(
+        self,
+        lab: Lab,
+        *,
+        sensor: SensorType | None = None,
+        settings: Settings | None = None,
+        merging: Merging | None = None,
+        every: int = 8,
+    ) -> None:
+        self._lab, self._settings, self._merging = (
+            lab,
+            settings,
+            merging or Merging(placing="bounded"),
+        )
+        self._mosaic = no_touches(sensor or SensorType())
+        self._places = TouchPlaces(ScanSettings())
+        self._answer = refusal(0, TOO_FEW)
+        self._every, self._unread = every, 0
+
+    @property
+    def answer(self) -> Recognition:
+        """The best answer so far, of the probe's pose at the touch `answer.seq`; or why none."""
+        if self._unread:
+            self._read()
+        return self._answer
+
+    @property
+    def touches(self) -> int:
+        """How many touches it rests on: those with contact."""
+        return len(self._mosaic)
+
+    def add(
+        self,
+        touch: Signal | ArrayLike,
+        pose: SensorPose | ArrayLike | None = None,
+        *,
+        seq: int | None = None,
+    ) -> Recognition:
+        """Return what all touches say by now, with the pose of the probe at this one.
+
+        Parameters
+        ----------
+        touch
+            Counts (rows, columns) or a signal.
+        pose
+            T_base_sensor (4, 4), mm, alone or with its covariance; None: not known.
+        seq
+            Number of the touch; counted if not given.
+        """
+        signal = touch if isinstance(touch, Signal) else signal_of(np.asarray(touch, np.float64))
+        number = self.touches if seq is None else seq
+        if not signal.contact:
+            return refusal(number, NO_CONTACT)
+        self._mosaic = added(self._mosaic, self._places.place(signal, pose, number))
+        self._places.keep(pose)
+        self._unread += 1
+        if self._unread < self._every:
+            return refusal(number, TOO_FEW)
+        return self._read()
+
+    def _read(self) -> Recognition:
+        """Merge and read all touches."""
+        touches, self._unread = self._mosaic.touches, 0
+        arm = [each.believed.pose for each in touches if each.believed is not None]
+        known = len(arm) == len(touches)
+        found = read_scan(
+            self._lab,
+            self._mosaic.sensor,
+            [each.signal.forces for each in touches],
+            np.array(arm) if known else self._mosaic.poses,
+            self._settings,
+            self._merging if known else replace(self._merging, placing="believed"),
+            trust=np.min([each.signal.trust for each in touches], axis=0),
+            seq=touches[-1].seq,
+        ).recognition
+        if found or not self._answer:
+            self._answer = found
+        return found

@@ -23,6 +23,8 @@ from probe.simulate.registered import registered_surface
 from probe.wrist.distances import counts_of, distances_at
 from probe.wrist.geometry import Wrist
 from recognizer.command import run
+from recognizer.command.scanning import ScanError, pose_during, read_joints
+from recognizer.touch.contacts import TouchImage
 
 SPEC = "name: Cube\nshape: {cube: 40 mm}\n"
 KEYS = {"seq", "object", "face", "index", "T_face_probe", "T_object_probe", "margin", "reason"}
@@ -349,3 +351,19 @@ def test_the_symbols_of_the_picture_are_those_of_the_touch(lab, images):
     assert near >= 9
     assert won.felt[won.registered >= 0].mean() > 0.8
     assert winning_lattice(reader, signal_of(np.zeros((16, 16)))) is None
+
+
+def test_joint_angles_of_each_touch_say_where_it_stood(tmp_path):
+    file = tmp_path / "joints.txt"
+    file.write_text("# degrees\n0, -30, 60, 0, 0\n\n5 -30 60 0 0  # the second\n")
+    joints = read_joints(file)
+    assert joints == ((0, -30, 60, 0, 0), (5, -30, 60, 0, 0))
+    wrist = counts_of(Wrist(), np.full(4, 5.0))
+    touch = TouchImage(0, 0, 1, np.zeros((16, 16)), wrist.astype(float), None)
+    first, second = (pose_during(touch, number, joints, 0.1) for number in (1, 2))
+    turn = first.T_base_sensor[:3, :3].T @ second.T_base_sensor[:3, :3]
+    assert math.degrees(math.acos((np.trace(turn) - 1) / 2)) == pytest.approx(5, abs=1e-6)
+    assert first.covariance.any()
+    with pytest.raises(ScanError, match="there is touch 3"):
+        pose_during(touch, 3, joints, 0.1)
+    assert pose_during(touch, 1, (), 0.1) is None

@@ -1,0 +1,164 @@
+"""`--scan` and `--method thesis`: several touches as one belief, and how the probe moved.
+
+What is known of the motion: the joint angles of each touch (`--joints FILE`) with the wrist's
+readings, else the poses of the recording, else nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from itertools import chain, islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from probe.arm.carried import SensorPose
+from recognizer.errors import RecognizerError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from recognizer.touch.contacts import TouchImage
+    from recognizer.touch.lab import EmbossedArray
+    from recognizer.touch.reader import Reader
+    from recognizer.touch.recognition import Recognition
+    from recognizer.touch.signal import Signal
+
+Joints = tuple[tuple[float, ...], ...]
+
+
+class ScanError(RecognizerError):
+    """Touches that are no scan."""
+
+
+class Belief(Protocol):
+    """Touches so far, joined: `Scan`, or the thesis's way of doing so."""
+
+    @property
+    def answer(self) -> Recognition:
+        """The best answer so far."""
+
+    @property
+    def touches(self) -> int:
+        """How many touches it rests on."""
+
+    def add(
+        self, touch: Signal, pose: SensorPose | ArrayLike | None = None, *, seq: int | None = None
+    ) -> Recognition:
+        """Return what all touches say by now."""
+
+
+def belief_for(reader: Reader, method: str) -> Belief:
+    """Return an empty belief of a method, `joint` or `thesis`."""
+    if method == "thesis":
+        from recognizer.thesis.scan import ThesisScan
+
+        return ThesisScan(reader.lab, sensor=reader.sensor)
+    from recognizer.scan.session import Scan
+
+    return Scan(reader)
+
+
+def refuse_single(touches: Iterable[TouchImage], place: str, needed: int) -> Iterator[TouchImage]:
+    """Return touches, of which there must be two.
+
+    Raises
+    ------
+    ScanError
+        A recording of one touch.
+    """
+    rest = iter(touches)
+    first = list(islice(rest, 2))
+    if len(first) == 1:
+        more = f"; here an answer takes about {needed} touches" if needed > 1 else ""
+        raise ScanError(
+            f"one touch is no scan{more}",
+            fix="leave --scan out, or record touches that overlap by a third or more",
+            place=place,
+        )
+    return chain(first, rest)
+
+
+def pose_during(
+    touch: TouchImage, number: int, joints_deg: Joints, error_deg: float
+) -> SensorPose | ArrayLike | None:
+    """Return where the arm held the sensor, as far as anything tells.
+
+    Parameters
+    ----------
+    touch, number
+        The touch, and which one it is, from 1.
+    joints_deg, error_deg
+        Joint angles of every touch, none if they are not known, and their standard deviation.
+
+    Raises
+    ------
+    ScanError
+        Angles for fewer touches than there are.
+    PoseError
+        Angles or readings of the wrist that no arm can have.
+    """
+    if not joints_deg:
+        return touch.pose
+    if number > len(joints_deg):
+        raise ScanError(
+            f"joint angles of {len(joints_deg)} touches, but there is touch {number}",
+            fix="give --joints FILE with a line of five angles for each touch",
+        )
+    import numpy as np
+
+    from probe.arm.links import Arm
+    from probe.wrist.geometry import Wrist
+    from recognizer.touch.robot import carried_pose
+
+    angles = np.radians(joints_deg[number - 1])
+    errors = np.full(len(angles), math.radians(error_deg))
+    return carried_pose(Arm(), Wrist(), angles, errors, touch.wrist)
+
+
+def read_joints(path: Path) -> Joints:
+    """Return the angles (degrees) of a text file, a line of five for every touch.
+
+    Raises
+    ------
+    ScanError
+        It cannot be read, or a line holds something else.
+    """
+    try:
+        lines = path.read_text("utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ScanError(
+            f"cannot read joint angles: {error}", fix="give a text file", place=str(path)
+        ) from error
+    found = []
+    for number, line in enumerate(lines, start=1):
+        words = line.partition("#")[0].replace(",", " ").split()
+        if not words:
+            continue
+        try:
+            angles = tuple(float(word) for word in words)
+        except ValueError:
+            angles = ()
+        if len(angles) != 5 or not all(abs(angle) <= 360 for angle in angles):
+            raise ScanError(
+                f"{line.strip()!r} is not five angles in degrees",
+                fix="write a line such as 0,-30,60,0,0 for each touch",
+                place=f"{path}:{number}",
+            )
+        found.append(angles)
+    return tuple(found)
+
+
+def touches_for(reader: Reader) -> int:
+    """Return about how many touches an answer takes, of the lab's array that takes most."""
+    from generator.array.touches import touches_needed
+
+    width = 2 * min(reader.sensor.half_mm)
+
+    def needed(each: EmbossedArray) -> int:
+        return touches_needed(
+            each.array.order, each.array.rows * each.array.columns, each.style.pitch_mm,
+            sensor_mm=width,
+        )  # fmt: skip
+
+    return max(needed(each) for each in reader.lab.arrays)

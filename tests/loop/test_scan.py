@@ -1,0 +1,162 @@
+"""From a spec to the answer of a scan by the commands that people use; face and pose are right."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from generator.command import run as encode_object
+from probe.circuit import Electronics, Noise, fsr_of, read_counts
+from probe.contact.contract import Touch
+from probe.contact.press import press
+from probe.frame import frame_from
+from probe.recording.record import Recorder
+from probe.scan.places import surface_to_sensor
+from probe.scan.raster import raster
+from probe.sensor import SensorType
+from probe.simulate.registered import registered_surface
+from probe.simulate.touch import pose_of
+from recognizer.command import run as recognize_object
+
+SPECS = Path(__file__).parents[2] / "fixtures" / "specs"
+SENSOR = SensorType()
+FRAMES = 3  # of a touch
+T_BASE_FACE = surface_to_sensor(300, 20, 0.4, 100) @ np.diag([1.0, -1.0, -1.0, 1.0])
+ARM_MM, ARM_RAD = 0.3, 0.003  # standard deviations of recorded poses
+
+
+def record_scan(path, url, name, face, *, seed, most=None, step=4.25, theta=0.3, poses=True):
+    """Scan a face in lines there and back; return the true poses (n, 4, 4) on the face."""
+    rng = np.random.default_rng(seed)
+    scene = registered_surface(url, name, face)
+    plan = raster(
+        [scene.region.starts], SENSOR, theta_rad=theta, least_cover=0.9, step_tactels=step
+    )
+    lines = [plan.places_mm[plan.lines == n] for n in np.unique(plan.lines)]
+    places = np.concatenate([line[:: (-1) ** n] for n, line in enumerate(lines)])[:most]
+    board, fsr, truth = Electronics(noise=Noise()), fsr_of(SENSOR.rows, SENSOR.columns), []
+    about = {"sensor": "simulated/tab", "attributes": {"frames_per_touch": FRAMES}}
+    with Recorder(path, roll_over_s=math.inf, **about) as recorder:
+        for k, (x, y) in enumerate(places):
+            touch = Touch(x, y, theta, float(rng.uniform(60, 100)), *rng.normal(0, 0.006, 2))
+            contact = press(scene.surface, SENSOR, touch)
+            truth.append(pose_of(touch, contact))
+            dx, dy, turn = rng.normal(0, 1, 3) * (ARM_MM, ARM_MM, ARM_RAD)
+            believed = surface_to_sensor(x + dx, y + dy, theta + turn, truth[-1][2, 3])
+            state = None
+            for beat in range(FRAMES):
+                counts, state = read_counts(contact.forces_n, board, fsr, state, rng)
+                seq = FRAMES * k + beat
+                pose = T_BASE_FACE @ believed if poses else None
+                recorder.append(
+                    frame_from(counts, t_ns=round(seq * board.frame_s * 1e9), seq=seq, pose=pose)
+                )
+    return np.array(truth)
+
+
+@pytest.fixture(scope="module")
+def labs(tmp_path_factory):
+    """Folders with a cube of each profile, what `encode-object` said beside it."""
+    made = {}
+    for profile in ("thesis", "product"):
+        folder = tmp_path_factory.mktemp(profile)
+        words = (SPECS / f"{profile}-cube.yaml", "-o", folder / "out", "--format", "stl",
+                 "--database", folder / "lab.db")  # fmt: skip
+        assert encode_object([str(word) for word in words]) == 0
+        made[profile] = folder
+    return made
+
+
+@pytest.fixture
+def asked(capsys):
+    """Run `recognize-object`; its exit code, entries, and messages."""
+
+    def ask(*words):
+        capsys.readouterr()
+        code = recognize_object([*map(str, words), "--json"])
+        said = capsys.readouterr()
+        return code, json.loads(said.out), said.err
+
+    return ask
+
+
+def check(entries, truth, name, face):
+    """Every answer is right; the last entry is one."""
+    assert entries[-1]["object"] == name
+    for entry in entries:
+        if entry["object"] is None:
+            assert entry["reason"]
+            continue
+        assert (entry["object"], entry["face"]) == (name, face)
+        away = np.array(entry["T_face_probe"]) - truth[entry["seq"] // FRAMES]
+        assert math.hypot(*away[:2, 3]) < 0.4
+
+
+@pytest.mark.parametrize(
+    ("profile", "face", "seed", "most", "poses"),
+    [
+        ("thesis", "F4", 3, 10, True),
+        ("thesis", "F1", 0, 16, False),
+        ("product", "F2", 2, 10, True),
+        ("product", "F2", 2, 10, False),
+    ],
+)
+def test_a_scan_is_recognised(labs, asked, tmp_path, profile, face, seed, most, poses):
+    folder, name = labs[profile], f"Cube {profile}"
+    url = f"sqlite:///{folder / 'lab.db'}"
+    touched = tmp_path / "scan.h5"
+    truth = record_scan(touched, url, name, face, seed=seed, most=most, poses=poses)
+    code, entries, _ = asked(touched, "--database", url, "--scan")
+    assert code == 0
+    assert [entry["seq"] for entry in entries[:most]] == [FRAMES * k for k in range(most)]
+    assert [entry["touches"] for entry in entries[:most]] == list(range(1, most + 1))
+    check(entries, truth, name, face)
+
+
+def test_the_thesis_reads_a_whole_face(labs, asked, tmp_path):
+    folder = labs["thesis"]
+    url = f"sqlite:///{folder / 'lab.db'}"
+    touched = tmp_path / "scan.h5"
+    truth = record_scan(touched, url, "Cube thesis", "F1", seed=6, theta=0.8)
+    code, entries, _ = asked(touched, "--database", url, "--method", "thesis")
+    assert code == 0
+    assert entries[0]["object"] is None
+    assert entries[-1]["touches"] > len(truth) / 2
+    check(entries, truth, "Cube thesis", "F1")
+
+
+def test_what_is_no_scan_is_refused_and_what_needs_one_is_told(labs, asked, tmp_path):
+    folder = labs["thesis"]
+    url = f"sqlite:///{folder / 'lab.db'}"
+    touched = tmp_path / "one.h5"
+    record_scan(touched, url, "Cube thesis", "F2", seed=3, most=1)
+    code, entries, said = asked(touched, "--database", url)
+    assert code == 1
+    assert entries[0]["object"] is None
+    assert "a scan of about 8 overlapping touches: recognize-object --scan" in said
+    code, refused, _ = asked(touched, "--database", url, "--scan")
+    assert code == 2
+    assert refused["error"]["kind"] == "ScanError"
+    assert "about 8 touches" in refused["error"]["cause"]
+    code, refused, _ = asked(touched, "--database", url, "--scan", "--joints", "0,-30,60,0,0")
+    assert code == 2
+    assert "a line for each touch" in refused["error"]["cause"]
+    several = tmp_path / "several.h5"
+    record_scan(several, url, "Cube thesis", "F2", seed=3, most=2, poses=False)
+    code, entries, _ = asked(several, "--database", url, "--method", "thesis")
+    assert (code, len(entries)) == (1, 2)
+    (tmp_path / "joints.txt").write_text("0, -30, sixty, 0, 0\n")
+    code, refused, _ = asked(several, "--database", url, "--scan",
+                             "--joints", tmp_path / "joints.txt")  # fmt: skip
+    assert refused["error"]["place"].endswith("joints.txt:1")
+
+
+def test_making_says_how_many_touches_an_answer_takes(capsys, tmp_path):
+    words = ("-o", tmp_path / "out", "--database", tmp_path / "lab.db", "--dry-run")
+    capsys.readouterr()
+    assert encode_object([str(word) for word in (SPECS / "thesis-cube.yaml", *words)]) == 0
+    assert "read by a scan: about 8 touches" in capsys.readouterr().out
+    assert encode_object([str(w) for w in (SPECS / "thesis-cube.yaml", *words, "--json")]) == 0
+    assert json.loads(capsys.readouterr().out)["objects"][0]["touches"] == 8
