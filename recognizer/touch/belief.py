@@ -1,4 +1,4 @@
-"""Whether the best reading of a touch may be believed. Thesis 6.3.
+"""Whether the best hypothesis about a touch may be believed. Thesis 6.3.
 
 The best of all registered places always exists; it is an answer only if
 

@@ -32,7 +32,7 @@ WAYS_OUT = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunnerUp:
-    """The second-best reading, the one that the margin is measured against."""
+    """The best other place, the one that the margin is measured against."""
 
     object: str
     face: str
@@ -116,9 +116,9 @@ class Recognition:
             "object": self.object,
             "face": self.face,
             "index": None if self.index is None else list(self.index),
-            "T_face_probe": _nested(self.T_face_probe),
-            "T_object_probe": _nested(self.T_object_probe),
-            "covariance": _nested(self.covariance),
+            "T_face_probe": _as_lists(self.T_face_probe),
+            "T_object_probe": _as_lists(self.T_object_probe),
+            "covariance": _as_lists(self.covariance),
             "margin": None if self.margin is None else round(self.margin, 4),
             "runner_up": None
             if runner_up is None
@@ -138,5 +138,5 @@ def refusal(
     return Recognition(seq, None, None, None, None, None, None, margin, runner_up, reason)
 
 
-def _nested(matrix: NDArray[np.float64] | None) -> list[list[float]] | None:
+def _as_lists(matrix: NDArray[np.float64] | None) -> list[list[float]] | None:
     return None if matrix is None else [[float(value) for value in row] for row in matrix]

@@ -134,8 +134,8 @@ class RefineSettings:
 class CovarianceSettings:
     """By how much the fit's own covariance is too small.
 
-    Measured against simulated touches of all contact levels: 95 % of the errors lie within the
-    95 % ellipse (`docs/recognizer.md`, "How sure it is").
+    Measured against simulated touches of all contact levels: on faces 95-97 % of the errors lie
+    within the 95 % ellipse (`docs/recognizer.md`, "How sure it is").
     """
 
     pad: float = 1.18  #: times the variance under a pad, neighbours that err alike counted
@@ -261,7 +261,7 @@ class ReaderSettings:
     covariance: CovarianceSettings = field(default_factory=CovarianceSettings)
     first: FitSettings = field(default_factory=FitSettings)  #: the first try
     #: the second, of touches that the first does not answer or that few cells speak for: seven
-    #: times the work (`docs/recognizer.md`); 24 candidates are no better than 12
+    #: times the work (`docs/recognizer.md`)
     thorough: FitSettings = FitSettings(12, 4, 6, 6, crossed=3)
     hypotheses: HypothesisSettings = field(default_factory=HypothesisSettings)
     belief: BeliefSettings = field(default_factory=BeliefSettings)
