@@ -30,9 +30,11 @@ from generator.pipeline.files import parts_of
 from generator.pipeline.place import NO_CELLS, lay_out_object
 from generator.pipeline.plan import plan_object
 from generator.polyhedron import Polyhedron
-from generator.polyhedron.random_shapes import random_convex, random_nonconvex
 from generator.solid import prove_closed, triangles, volume
 from generator.spec import LocatedSpec, read_specs
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from random_shapes import random_convex, random_nonconvex
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 

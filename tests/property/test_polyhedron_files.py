@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from random_shapes import random_convex, random_nonconvex
 
 from generator.errors import ShapeError
 from generator.polyhedron import (
@@ -18,7 +19,6 @@ from generator.polyhedron import (
     surface_area,
     volume,
 )
-from generator.polyhedron.random_shapes import random_convex, random_nonconvex
 from generator.polyhedron.read import read_shape
 
 SHAPES_FOLDER = Path(__file__).parents[2] / "fixtures" / "shapes"

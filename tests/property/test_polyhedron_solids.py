@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from random_shapes import random_convex, random_nonconvex
 
 from generator.errors import ShapeError
 from generator.polyhedron import (
@@ -22,7 +23,6 @@ from generator.polyhedron import (
     volume,
 )
 from generator.polyhedron.polygon import orientation
-from generator.polyhedron.random_shapes import random_convex, random_nonconvex
 
 SEEDS = st.integers(0, 2**32 - 1)
 SOLIDS = st.builds(
