@@ -8,6 +8,9 @@ counts: a crossing, an overlap in one plane, a neighbour folded over, and a mere
 no vertex is shared (a vertex on the other's side or inside it), for there the surface
 touches itself.
 
+By hand because the mesh libraries decide in floats: pymeshlab reports triangles that only touch,
+so what it reports is decided here.
+
 Reference: Sutherland and Hodgman, Reentrant polygon clipping, Communications of the ACM 17
 (1974), here in homogeneous integers.
 """

@@ -4,6 +4,9 @@ A template is written once with marked fields (entity numbers, decimals, names);
 instance is a row of bytes in which only the fields are overwritten. All numbers of one
 kind have the same width, so that every row has the same length and a block of a thousand
 instances is one (m, length) array of bytes.
+
+By hand because neither numpy nor Python formats many numbers at once: a million coordinates
+take 0.06 s of CPU here and 0.17 s as one `%` over a tuple, before names and numbers are set in.
 """
 
 from __future__ import annotations

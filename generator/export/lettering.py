@@ -1,4 +1,7 @@
-"""Letters of the preview: title, captions, names of faces, the scale. Pixels."""
+"""Letters of the preview: title, captions, names of faces, the scale. Pixels.
+
+Pillow draws them; its import takes 0.01 s of CPU, that of matplotlib 0.34 s.
+"""
 
 from __future__ import annotations
 

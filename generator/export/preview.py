@@ -2,7 +2,7 @@
 
 The left view looks from the front, right and above; the right one from the opposite corner,
 with panels moved apart, so that every face of a convex object is seen. Orthographic, flat
-shading, two by two samples for each pixel. Object frame in mm, z up.
+shading, two by two samples for each pixel. Object frame in mm, z up. Why by hand: `raster`.
 """
 
 from __future__ import annotations

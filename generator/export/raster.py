@@ -4,6 +4,10 @@ Each triangle becomes one span for each pixel row that it covers, each span beco
 pixels, and for each pixel the nearest triangle wins. Depth and triangle number share one
 64-bit integer, so that one maximum finds both. Screen frame: pixels, x right, y down, the
 centre of pixel (row i, column j) at (j + 1/2, i + 1/2); depth grows towards the eye.
+
+By hand because of start-up time and depth: of the libraries here only matplotlib draws solids,
+an extra that costs 0.34 s of CPU to import and 0.28 s for the 60 mm cube (28,348 triangles),
+which takes 0.13 s here; it sorts triangles by their middles and lets symbols show through.
 """
 
 from __future__ import annotations
