@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 from decoder.decoded import Decoded
 from decoder.errors import DecoderError, MethodError
 from decoder.exact import decode_exact
-from decoder.likelihood import BLANK, DOUBT, decode_likelihood
-from decoder.score import SYMBOL_ERROR
+from decoder.likelihood import decode_likelihood
+from decoder.settings import LIKELIHOOD
 from decoder.window import parse_window
 from generator.array import DEFAULT_PROFILE, FoldedArray, ProductArray, array_from
 from generator.array import profile as profile_named
@@ -34,9 +34,9 @@ def decode(
     array: FoldedArray | ProductArray | Mapping[str, Any] | None = None,
     database: str = "",
     method: str = "logarithm",
-    error: float = SYMBOL_ERROR,
-    doubt: float = DOUBT,
-    blank: float = BLANK,
+    error: float = LIKELIHOOD.symbol_error,
+    doubt: float = LIKELIHOOD.doubt,
+    blank: float = LIKELIHOOD.blank,
     rotations: Sequence[int] = (0,),
     top: int = 0,
 ) -> Decoded:

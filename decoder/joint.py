@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from decoder.errors import MethodError
 from decoder.ranked import Ranked, best_of, best_of_all
 from decoder.score import Scores
+from decoder.settings import LIKELIHOOD
 from generator.array.product import ProductArray
 from generator.array.sequence import Sequence
 
 LARGEST_FACTOR = 1 << 16  #: terms of one sequence
 _PAIRS = 1 << 18  #: pairs that are looked at together
-_NEGLIGIBLE = 30.0  #: nats below the best: no weight left
 
 
 class Joint:
@@ -64,7 +64,7 @@ class Joint:
         for start in range(0, len(order), block):
             rows = order[start : start + block]
             if best is not None and bounds[rows[0]] < max(
-                best.values[0, -1], best.values[0, 0] - _NEGLIGIBLE
+                best.values[0, -1], best.values[0, 0] - LIKELIHOOD.negligible
             ):
                 break
             values = (by_row[rows] @ self._in_columns).reshape(1, -1)

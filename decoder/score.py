@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from decoder.errors import WindowError
+from decoder.settings import LIKELIHOOD
 from generator.array.contract import Labels
 
 Scores = NDArray[np.float32]
 
-SYMBOL_ERROR = 0.05  #: probability that a symbol is read wrong, unless it is told
 
-
-def hard_scores(labels: Labels, order: int, error: float = SYMBOL_ERROR) -> Scores:
+def hard_scores(labels: Labels, order: int, error: float = LIKELIHOOD.symbol_error) -> Scores:
     """Return the scores of labels that are wrong with probability `error`.
 
     Parameters

@@ -14,10 +14,7 @@ import numpy as np
 from generator.layout.footprint import Region
 from generator.layout.lattice import choose_lattice
 from generator.layout.places import Identifies
-
-_STEPS = 7  # of a bisection
-_SMALLEST_PITCH = 0.1  # share of the pitch asked for
-_LARGEST_SIZE = 8.0  # times the object's size
+from generator.layout.settings import LAYOUT
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +77,7 @@ def _pitch(region: Region, request: Request) -> float:
     def shows(share: float) -> bool:
         return _shows(region, request.half_mm * share, request.pitch_mm * share, request)
 
-    share = _last(shows, _SMALLEST_PITCH, 1.0)
+    share = _last(shows, LAYOUT.least_pitch, 1.0)
     for step in (0.1, 0.05, 0.01):  # the roundest number that still works
         pitch = float(np.floor(share * request.pitch_mm / step + 1e-9)) * step
         if pitch > 0.0 and shows(pitch / request.pitch_mm):
@@ -95,7 +92,7 @@ def _scale(region: Region, request: Request) -> float:
         larger = Region(region.start / inverse, region.end / inverse, region.clearance)
         return _shows(larger, request.half_mm, request.pitch_mm, request)
 
-    inverse = _last(shows, 1.0 / _LARGEST_SIZE, 1.0)
+    inverse = _last(shows, 1.0 / LAYOUT.most_size, 1.0)
     if inverse == 0.0:
         return float(np.inf)
     for step in (0.1, 0.01):
@@ -109,7 +106,7 @@ def _last(shows: Callable[[float], bool], low: float, high: float) -> float:
     """Return a share from low (works) to high (does not) that works, by bisection; 0 if none."""
     if not shows(low):
         return 0.0
-    for _ in range(_STEPS):
+    for _ in range(LAYOUT.hint_bisections):
         middle = float(np.sqrt(low * high))
         if shows(middle):
             low = middle

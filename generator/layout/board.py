@@ -12,11 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.layout.occupancy import TILE, Mask, Occupancy
-
-WHOLE = 1 << 17  #: an array with no more cells is looked at as a whole
-CORNER = 192  #: first extent of the corner of a larger array, rows and columns
-STEPS = 32  #: the corner's shorter side grows by this part of it, in whole tiles
-NEIGHBOURS = 512  #: of a piece with more cells around it only every second, third, ... counts
+from generator.layout.settings import LAYOUT
 
 
 class Board:
@@ -101,7 +97,7 @@ class Board:
         if touching == 0:
             return (free & -free).bit_length() - 1, 0
         beside = np.argwhere(ring & ~around) @ (self._stride, 1)
-        beside = beside[:: -(-len(beside) // NEIGHBOURS)]
+        beside = beside[:: -(-len(beside) // LAYOUT.neighbours)]
         origins = _positions(touching)
         contact = np.zeros(len(origins), np.int64)
         sheet = self._sheet.ravel()
@@ -140,9 +136,9 @@ def board_size(occupancy: Occupancy) -> tuple[int, int]:
     objects hold far away opens nothing.
     """
     size = occupancy.rows, occupancy.columns
-    if size[0] * size[1] <= WHOLE:
+    if size[0] * size[1] <= LAYOUT.whole_cells:
         return size
-    extent = min(size[0], CORNER), min(size[1], CORNER)
+    extent = min(size[0], LAYOUT.corner), min(size[1], LAYOUT.corner)
     low = np.array([(y * TILE, x * TILE) for y, x in occupancy.tiles]).reshape(-1, 2)
     while extent != (following := _larger(extent, size)):
         inside = (low < _larger(following, size)).all(axis=1)  # a step for each side
@@ -161,7 +157,7 @@ def _larger(extent: tuple[int, int], size: tuple[int, int]) -> tuple[int, int]:
 
 
 def _step(side: int) -> int:
-    return side + TILE * -(-side // (STEPS * TILE))
+    return side + TILE * -(-side // (LAYOUT.corner_growth * TILE))
 
 
 def _blocks_of(form: Mask) -> list[tuple[int, int, int, int]]:

@@ -17,15 +17,13 @@ from numpy.typing import NDArray
 
 from generator.layout.footprint import Region, free_grid, mirror_region, move_region, slack
 from generator.layout.places import Cells, Identifies, array_cells, count_places, windows_in
+from generator.layout.settings import LAYOUT
 
 Points = NDArray[np.float64]
 
 ANGLE = 1e-9  #: rotations nearer than this are the same, rad
-SEARCH_STEPS = 12  #: rotations tried over a quarter turn beside the edges' directions
-EDGE_ROTATIONS = 12  #: edge directions tried at most
 _POINTS = 1 << 17  #: candidate centres looked at for one rotation
 _FACE = 1 << 32  # a face that shows a place counts more than any number of places elsewhere
-_TRIED = 8  #: sets of cells with equal scores that are compared by their margin
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +115,8 @@ def _candidates(
         found += _best_shifts(regions, half, pitch, window, rotation, fine, best)
         best = max(((c.worth, c.cells) for c in found), default=best)
     if search:
-        for rotation in (np.arange(1, SEARCH_STEPS) / SEARCH_STEPS * np.pi / 2).tolist():
+        steps = LAYOUT.search_rotations
+        for rotation in (np.arange(1, steps) / steps * np.pi / 2).tolist():
             # A coarse look is enough to see whether a rotation may win.
             coarse = _best_shifts(regions, half, pitch, window, rotation, 4, best)
             if best[0] == 0:
@@ -142,7 +141,7 @@ def edge_rotations(regions: Sequence[Region]) -> list[float]:
             angle += quarter
         if all(abs((angle - r + quarter / 2) % quarter - quarter / 2) > ANGLE for r in rotations):
             rotations.append(0.0 if abs(angle) <= ANGLE else angle)
-        if len(rotations) == EDGE_ROTATIONS:
+        if len(rotations) == LAYOUT.edge_rotations:
             break
     return rotations
 
@@ -194,8 +193,8 @@ def _unique_sets(
     xs: Points,
 ) -> tuple[_Set, ...]:
     """Return the different sets of cells at some shifts (k, 2), the first few of them."""
-    if len(at) > 8 * _TRIED:
-        at = at[np.linspace(0, len(at) - 1, 8 * _TRIED).astype(int)]
+    if len(at) > 8 * LAYOUT.compared_sets:
+        at = at[np.linspace(0, len(at) - 1, 8 * LAYOUT.compared_sets).astype(int)]
     sets: dict[bytes, _Set] = {}
     for y, x in at.tolist():
         masks = [free[:, y, :, x] for free, _ in grids]
@@ -206,7 +205,7 @@ def _unique_sets(
                 for mask, (_, first) in zip(masks, grids, strict=True)
             )
             sets[key] = _Set(float(ys[y]), float(xs[x]), cells)
-        if len(sets) == _TRIED:
+        if len(sets) == LAYOUT.compared_sets:
             break
     return tuple(sets.values())
 

@@ -13,9 +13,7 @@ import numpy as np
 from generator.layout.blank import Request
 from generator.layout.footprint import Region
 from generator.layout.lattice import choose_lattice
-
-STEPS = 8  #: of a bisection: to 1.1 % of the size
-RANGE = 16.0  #: how many times smaller and larger is tried
+from generator.layout.settings import LAYOUT
 
 
 def extent_mm(region: Region) -> tuple[float, float]:
@@ -36,10 +34,10 @@ def smallest_mm(region: Region, request: Request) -> tuple[float, float]:
         )  # fmt: skip
         return any(lattice.places)
 
-    works, fails = (1.0, 1.0 / RANGE) if shows(1.0) else (RANGE, 1.0)
-    if works == RANGE and not shows(RANGE):
+    works, fails = (1.0, 1.0 / LAYOUT.size_range) if shows(1.0) else (LAYOUT.size_range, 1.0)
+    if works == LAYOUT.size_range and not shows(LAYOUT.size_range):
         return math.inf, math.inf
-    for _ in range(STEPS):
+    for _ in range(LAYOUT.size_bisections):
         middle = math.sqrt(works * fails)
         works, fails = (middle, fails) if shows(middle) else (works, middle)
     width, height = extent_mm(region)

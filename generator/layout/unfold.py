@@ -20,15 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.layout.overlap import Triangles, overlap, triangles_of
+from generator.layout.settings import LAYOUT
 from generator.polyhedron.frame import face_polygon
 from generator.polyhedron.winged import Polyhedron
 
 Points = NDArray[np.float64]
 
 TOLERANCE = 1e-7  #: faces that overlap by less than this share of the net's size touch
-_WORK = 6000  #: faces laid down at most over all trees
-_RANDOM_TREES = 24
-_BREADTH_ROOTS = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +75,7 @@ def unfold(polyhedron: Polyhedron, *, seed: int = 0) -> Net:
         if best is None or len(net.pieces) < len(best.pieces):
             best = net
         work += len(polyhedron.faces)
-        if len(best.pieces) == 1 or work >= _WORK:
+        if len(best.pieces) == 1 or work >= LAYOUT.faces_laid:
             break
     if best is None:
         raise ValueError("a polyhedron without faces has no net")
@@ -124,12 +122,12 @@ def _trees(polyhedron: Polyhedron, surface: _Surface, seed: int) -> Iterator[tup
     """Yield the face to begin with and the order of folds, promising ones first."""
     areas = [_area(triangles) for triangles in surface.triangles]
     roots = sorted(range(len(areas)), key=lambda face: (-round(areas[face], 6), face))
-    for root in roots[:_BREADTH_ROOTS]:
+    for root in roots[: LAYOUT.breadth_roots]:
         yield root, lambda _edge, depth: float(depth)
     for direction in _directions():
         yield roots[0], _uncut_first(_steepest(polyhedron, direction))
     random = np.random.default_rng(seed)
-    for _ in range(_RANDOM_TREES):
+    for _ in range(LAYOUT.random_trees):
         yield roots[0], _edge_order(random.permutation(len(polyhedron.edges)))
 
 
