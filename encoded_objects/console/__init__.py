@@ -70,6 +70,7 @@ def main(
         code = run(name, chosen, given, groups=groups, bare=bare)
         sys.stdout.flush()
     except KeyboardInterrupt:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second one would end us without our code
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second one would end it without a code
         sys.stderr.write(f"\n{name}: interrupted{advice}\n")
         code = INTERRUPTED
