@@ -42,7 +42,7 @@ _NAMES = {
 }
 
 
-class Picture:
+class SvgPicture:
     """A figure while it is drawn, and its SVG afterwards."""
 
     def __init__(self) -> None:
@@ -51,7 +51,7 @@ class Picture:
 
 @contextmanager
 def _picture(
-    rows: int, columns: int, size: tuple[float, float], into: Picture
+    rows: int, columns: int, size: tuple[float, float], into: SvgPicture
 ) -> Iterator[tuple[Figure, list[Axes]]]:
     import matplotlib
     from matplotlib.backends.backend_svg import FigureCanvasSVG
@@ -93,7 +93,7 @@ def confusion(objects: dict[str, Any]) -> str:
         return ""
     matrix = np.array(objects["matrix"], float)
     shares = matrix / np.maximum(matrix.sum(axis=1, keepdims=True), 1)
-    picture, side = Picture(), 0.28 * len(names)
+    picture, side = SvgPicture(), 0.28 * len(names)
     with _picture(1, 1, (max(5.0, side + 3.2), max(2.6, side + 1.6)), picture) as (_, (axis,)):
         axis.grid(visible=False)
         axis.imshow(shares, cmap="Blues", vmin=0, vmax=1, aspect="auto")
@@ -111,7 +111,7 @@ def confusion(objects: dict[str, Any]) -> str:
 
 def pose(rows: dict[str, Any]) -> str:
     """Return the distribution of pose errors, and how honest the covariance is."""
-    picture = Picture()
+    picture = SvgPicture()
     right = rows["verdict"] == RIGHT
     with _picture(1, 3, (11.5, 3.2), picture) as (_, axes):
         for axis, name, label in (
@@ -144,7 +144,7 @@ def pose(rows: dict[str, Any]) -> str:
 
 def against(results: dict[str, Any]) -> str:
     """Return answers and pose error against level, force, tilt, edge distance and symbols."""
-    picture = Picture()
+    picture = SvgPicture()
     names = [name for name in _NAMES if results["against"][name]["bins"]]
     with _picture(2, len(names) + 1, (2.6 * len(names) + 2.6, 4.6), picture) as (_, axes):
         above, below = axes[: len(names) + 1], axes[len(names) + 1 :]
@@ -176,7 +176,7 @@ def against(results: dict[str, Any]) -> str:
 
 def margins(rows: dict[str, Any]) -> str:
     """Return how sure right, wrong and refused answers are."""
-    picture = Picture()
+    picture = SvgPicture()
     bins = np.linspace(0, 100, 41)
     with _picture(1, 1, (6.2, 2.6), picture) as (_, (axis,)):
         for verdict, colour in COLOURS.items():
@@ -191,7 +191,7 @@ def margins(rows: dict[str, Any]) -> str:
 
 def work_precision(study: dict[str, Any], times: dict[str, Any]) -> str:
     """Return error against run time for contact levels, decoders and readers."""
-    picture = Picture()
+    picture = SvgPicture()
     with _picture(2, 2, (11.5, 7.6), picture) as (_, axes):
         for kind, marker in (("tab", "o"), ("pad", "s")):
             points = [
@@ -205,7 +205,7 @@ def work_precision(study: dict[str, Any], times: dict[str, Any]) -> str:
         axes[0].set_ylabel("largest error of an image, %")
         axes[0].set_title("contact models")
         axes[0].legend(frameon=False)
-        _scattered(
+        _scatter(
             axes[1],
             [
                 (1e3 * ms, 100 * (1 - line["right"] / line["windows"]), line["decoder"])
@@ -219,10 +219,10 @@ def work_precision(study: dict[str, Any], times: dict[str, Any]) -> str:
             (ms, 100 * (1 - line["right"] / line["touches"]), line["reader"])
             for line, ms in readers
         ]
-        _scattered(axes[2], missed)
+        _scatter(axes[2], missed)
         axes[2].set_ylabel("touches not answered right, %")
         axes[2].set_title("readers")
-        _scattered(axes[3], [(ms, _number(line["rms_mm"]), line["reader"]) for line, ms in readers])
+        _scatter(axes[3], [(ms, _number(line["rms_mm"]), line["reader"]) for line, ms in readers])
         axes[3].set_ylabel("place, rms, mm")
         axes[3].set_title("readers")
         for axis, unit in zip(axes, ("ms", "µs", "ms", "ms"), strict=True):
@@ -234,7 +234,7 @@ def work_precision(study: dict[str, Any], times: dict[str, Any]) -> str:
     return picture.svg
 
 
-def _scattered(axis: Axes, points: list[tuple[float, float, str]]) -> None:
+def _scatter(axis: Axes, points: list[tuple[float, float, str]]) -> None:
     """Draw named points over a logarithm of the time."""
     from matplotlib.ticker import LogFormatter, LogLocator
 

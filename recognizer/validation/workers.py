@@ -2,7 +2,8 @@
 
 A pool that loses a process (out of memory, killed) is made anew and given what is not done,
 at most `SharingSettings.losses` times without a batch done between. Workers leave interrupts to the
-process that started them, and end when it is gone.
+process that started them, and end when it is gone. `concurrent.futures` gives up when a
+process is lost, and dask, which does not, is an extra (`cluster`).
 """
 
 from __future__ import annotations
@@ -28,10 +29,10 @@ def workers_of(processes: int, cluster: str = "") -> Workers:
         from recognizer.validation.cluster import on_cluster
 
         return partial(on_cluster, cluster)
-    return here if processes == 1 else partial(in_processes, processes)
+    return in_this_process if processes == 1 else partial(in_processes, processes)
 
 
-def here(work: Work, batches: Iterable[Batch]) -> Iterator[BatchResult]:
+def in_this_process(work: Work, batches: Iterable[Batch]) -> Iterator[BatchResult]:
     """Do one batch after another."""
     for batch in batches:
         yield touch(work, batch)
