@@ -146,7 +146,8 @@ def cap_mm(width_mm: Floats, height_mm: Floats) -> Floats:
     r = height_mm / 2
     flat = (width_mm - height_mm) / 2
     turned = math.pi * height_mm * flat**2 + math.pi**2 * r**2 * flat + 4 / 3 * math.pi * r**3
-    length: Floats = turned / 2 / (2 * flat * height_mm + math.pi * r**2)
+    section = np.maximum(2 * flat * height_mm + math.pi * r**2, 1e-12)
+    length: Floats = turned / 2 / section
     return length
 
 
