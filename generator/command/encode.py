@@ -70,6 +70,18 @@ def encode(
     replace: Annotated[
         bool, typer.Option("--replace", help="Allow a changed spec under a registered name."),
     ] = False,
+    printed_check: Annotated[
+        bool, typer.Option("--printed-check", help="Slice and print in simulation: which symbols "
+                                                   "survive; makes a picture, registers nothing."),
+    ] = False,
+    print_profile: Annotated[
+        str, typer.Option(metavar="NAME", show_default=False,
+                          help="For --printed-check: fdm-0.4-0.2, ... or an exported .ini file."),
+    ] = "",
+    print_faults: Annotated[
+        str, typer.Option(metavar="none|usual|bad|k=v,...", show_default=False,
+                          help="For --printed-check: what the machine does wrong."),
+    ] = "",
     jobs: Annotated[
         int | None, typer.Option("-j", "--jobs", metavar="N", min=1, show_default=False,
                                  help="Processes for a set of many objects."),
@@ -92,6 +104,11 @@ def encode(
             return 0
         if not specs:
             raise typer.BadParameter("no spec is named")
+        if printed_check:
+            _check_printed(specs, folder, database, print_profile, print_faults, as_json=as_json)
+            return 0
+        if print_profile or print_faults:
+            raise typer.BadParameter("print profile and faults need --printed-check")
         _make(specs, folder, formats, database, dry_run=dry_run, verify=verify, replace=replace,
               jobs=jobs, as_json=as_json)  # fmt: skip
         return 0
@@ -136,3 +153,33 @@ def _make(
             jobs=jobs,
         )
     print_made(encoded, dry_run=dry_run, as_json=as_json)
+
+
+def _check_printed(
+    specs: list[Path],
+    folder: Path | None,
+    database: str,
+    profile: str,
+    faults: str,
+    *,
+    as_json: bool,
+) -> None:
+    """Print the objects in simulation and say what became of their symbols."""
+    from encoded_objects.console.progress import progress_bar
+    from generator.command.printed_report import print_printed
+    from generator.pipeline.printed_check import check_printed
+    from generator.printed.faults import print_faults
+    from generator.spec.option import database_option
+    from generator.spec.read import read_specs
+
+    url = database_option(database) if database else None
+    with progress_bar("reading", 1) as bar:
+        objects = check_printed(
+            read_specs(specs, database=url),
+            folder=folder,
+            database=url,
+            profile=profile,
+            faults=print_faults(faults),
+            progress=lambda what, share: bar.show(share, label=what),
+        )
+    print_printed(objects, as_json=as_json)

@@ -13,6 +13,7 @@
     plates.py   the set on the printer's bed: plates, overview, packing list
     encode.py   one run
     made.py     what came of it
+    printed_check.py  what becomes of every symbol on a printer
 """
 
 from generator.pipeline.encode import encode
