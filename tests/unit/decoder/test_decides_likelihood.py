@@ -61,11 +61,11 @@ def drawn(array, shape, seed, scale=1.5):
     return scale * np.random.default_rng(seed).normal(size=(*shape, array.order))
 
 
-@pytest.mark.parametrize("turns", [(0,), (2,), (0, 2), (3, 1), ALL_TURNS])
+@pytest.mark.parametrize("turns", [(0,), (3, 1), ALL_TURNS])
 @pytest.mark.parametrize("name", ARRAYS)
 def test_doubt_margin_and_place_are_those_of_bayes_rule(name, turns):
     array = ARRAYS[name]
-    for seed, shape in enumerate([(4, 4), (3, 5), (5, 3), (4, 4), (3, 5)]):
+    for seed, shape in enumerate([(4, 4), (3, 5), (5, 3)]):
         scores = drawn(array, shape, seed)
         ranked, doubt, _ = bayes(array, scores, turns)
         found = Likelihood(array, rotations=turns, doubt=1.0).decode(scores)
@@ -141,7 +141,7 @@ def clear(array, shape, seed, scale):
 def with_doubt(target, turns=(0,)):
     """Scores of a window whose best place is wrong with a probability `target`."""
     low, high = 0.1, 20.0
-    for _ in range(60):
+    for _ in range(26):
         middle = (low + high) / 2
         doubt = bayes(BINARY, clear(BINARY, (5, 5), 3, middle), turns)[1]
         low, high = (middle, high) if doubt > target else (low, middle)
@@ -172,7 +172,7 @@ def test_a_doubt_as_large_as_is_allowed_is_allowed():
 def test_a_surface_without_code_is_told_where_it_is_the_likelier_one(blank, turns):
     base = drawn(BINARY, (6, 6), 11)
     low, high = 0.05, 20.0
-    for _ in range(50):
+    for _ in range(26):
         middle = (low + high) / 2
         _, _, without = bayes(BINARY, middle * base, turns, blank=blank)
         low, high = (low, middle) if without else (middle, high)
@@ -186,7 +186,7 @@ def test_a_surface_without_code_is_told_where_it_is_the_likelier_one(blank, turn
 def test_why_nothing_is_answered(name, turns):
     array = ARRAYS[name]
     reasons = set()
-    for seed in range(60):
+    for seed in range(30):
         rng = np.random.default_rng(seed)
         shape = ((7, 6), (3, 4), (5, 3))[seed % 3]
         scores = drawn(array, shape, seed, scale=rng.choice([0.8, 1.5, 3.0]))

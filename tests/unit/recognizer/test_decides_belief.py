@@ -72,6 +72,7 @@ def one_cell(small, scores, seen=20.0, held=2, order=4):
         # none is likelier than the symbol: it is worn, and speaks for no other one
         ([-2, -9, -3, -9, 0], 20, 2, (True, True, False, 0.0)),
         ([-9, -9, 0, -9, 0], 20, 2, (False, True, False, 0.0)),
+        ([-1000, -1000, 0, -1000, 0], 20, 2, (False, True, False, 0.0)),  # as likely as all else
         # another symbol is likelier
         ([0, -9, -4.5, -9, -9], 20, 2, (False, True, False, 4.5)),
         ([0, -9, -4.5, -9, -4.4], 20, 2, (True, True, False, 0.0)),

@@ -192,7 +192,7 @@ def window(labels, left, width, small, gap=12.0):
     return cells, shown, small.sure_of(shown, least=-gap)
 
 
-@pytest.mark.parametrize(("gap", "looked_up"), [(6.1, True), (5.9, False)])
+@pytest.mark.parametrize(("gap", "looked_up"), [(6.1, True), (6.0, False), (5.9, False)])
 @pytest.mark.parametrize("against", ["symbol", "none"])
 def test_windows_are_looked_up_whose_every_cell_is_sure_by_six_nats(small, gap, looked_up, against):
     lab, _ = strip(small)
@@ -214,6 +214,27 @@ def test_of_a_window_the_weakest_cell_may_be_read_wrong(small):
             scores[weak, 4] = -7.0  # the least sure
             found = find_hypotheses(lab.embossed, (small.fit_of(cells, scores),), USUAL)
             assert ((4, 3, 0) in where(found)) is (weak == wrong)
+
+
+@pytest.mark.parametrize("order", [2, 7])
+def test_windows_of_arrays_of_fewer_or_more_symbols(small, order):
+    labels = np.random.default_rng(31).integers(0, order, (6, 9))
+    held = {(r, c): (0, int(labels[r, c])) for r in range(6) for c in range(9)}
+    lab = small.Lab(held, order=order)
+    cells = [(i, -r) for r in range(3) for i in range(3)]
+    shown = [int(labels[1 + r, 4 + i]) for r in range(3) for i in range(3)]
+    for weak in range(9):
+        scores = small.sure_of(shown, order)
+        others = [label for label in range(order) if label != shown[weak]]
+        scores[weak, others] = -9.0
+        scores[weak, shown[weak]], scores[weak, others[0]] = -3.0, 0.0  # read wrong
+        scores[weak, order] = -8.0
+        found = find_hypotheses(lab.embossed, (small.fit_of(cells, scores),), USUAL)
+        assert (1, 4, 0) in where(found)
+        scores[weak, others[0]] = -9.0
+        scores[weak, shown[weak]] = 0.0
+        found = find_hypotheses(lab.embossed, (small.fit_of(cells, scores),), USUAL)
+        assert (found[0].row, found[0].column) == (1, 4)
 
 
 def test_smaller_windows_are_not_looked_up_beside_larger_ones(small):
@@ -295,8 +316,9 @@ def test_after_six_cells_512_candidates_go_on(small, cells, zeros, finite):
     fit = small.fit_of([(i, 0) for i in range(cells)], scores)
     one = replace(ALL, anchors=1)
     found = find_hypotheses(lab.embossed, (fit,), one)
-    assert sum(np.isfinite(place.score) for place in found) == finite
     assert len(found) == zeros
+    assert [place.score for place in found[finite:]] == [-np.inf] * (zeros - finite)
+    assert np.isfinite([place.score for place in found[:finite]]).all()
 
 
 def test_the_surest_and_most_seen_cells_come_first(small):
@@ -318,7 +340,7 @@ def test_the_surest_and_most_seen_cells_come_first(small):
         fit = small.fit_of([(0, 0), (1, 0), (2, 0)], scores, [40.0, second[1], third[1]])
         few = replace(ALL, anchors=1, first=2, followed=2)
         found = find_hypotheses(lab.embossed, (fit,), few)
-        assert {one.column for one in found if not np.isfinite(one.score)} == {dropped}
+        assert [one.column for one in found if one.score == -np.inf] == [dropped]
 
 
 @pytest.mark.parametrize(("cells", "places"), [(1 << 18, 1), ((1 << 18) + 1, 0)])
@@ -330,7 +352,7 @@ def test_in_a_lab_of_more_than_2_to_the_18_cells_a_window_must_be_whole(small, c
         owners=np.append(np.zeros(cells), -1).astype(np.int32),
         labels=np.append(np.arange(cells) != 77, -1).astype(np.int8),
     )
-    fit = small.fit_of([(0, 0)], [[0.0, -30, -30, -30, -30]])
+    fit = small.fit_of([(0, 0), (5, 0)], [[0.0, -30, -30, -30, -30], [-2, -2, -2, -2, 0.0]])
     found = find_hypotheses(large, (fit,), USUAL)
     assert [one.column for one in found] == [77] * places
 

@@ -84,9 +84,10 @@ def reads(small, lab, monkeypatch):
         answer, judged = recognise_with_hypothesis(READER, signal, 7)
         assert answer.seq == 7
         assert tries == [READER.settings.first, READER.settings.thorough][: len(tries)]
+        count = len(tries)
         tries.clear()
         assert recognise(READER, signal, 7).reason == answer.reason
-        return answer, judged, len(tries)
+        return answer, judged, count
 
     def one(place="here", score=0.0, inliers=16, embossed=lab, face=0, index=(3, 4), **changed):
         fit = {name: changed.pop(name) for name in ("x_mm", "y_mm") if name in changed}
@@ -100,6 +101,12 @@ def test_without_contact_nothing_is_tried(reads):
     answer, judged, tries = reads.read([], signal=SimpleNamespace(contact=False))
     assert (answer.reason, judged, tries) == (NO_CONTACT, None, 0)
     assert answer.object is None
+
+
+def test_a_touch_that_is_not_numbered_is_the_first(reads):
+    nothing = SimpleNamespace(contact=False)
+    assert recognise(READER, nothing).seq == 0
+    assert recognise_with_hypothesis(READER, nothing)[0].seq == 0
 
 
 def test_where_nothing_is_found_there_are_too_few_symbols(reads):
@@ -134,7 +141,7 @@ def test_an_answer_that_few_cells_speak_for_is_looked_at_again(reads):
 @pytest.mark.parametrize("inliers", [10, 16])
 def test_if_the_second_try_says_another_place_neither_is_believed(reads, inliers):
     first = [reads.one(inliers=10), reads.one("rival", -30.0, face=1, index=(9, 12))]
-    second = [reads.one("there", inliers=inliers)]
+    second = [reads.one("there", inliers=inliers), reads.one("elsewhere", -50.0)]
     answer, judged, _ = reads.read(first, second)
     assert (answer.reason, answer.margin) == (AMBIGUOUS, 0.0)
     assert (answer.runner_up.face, answer.runner_up.index) == ("F2", (9, 12))
@@ -146,6 +153,19 @@ def test_what_the_first_try_refuses_the_second_may_answer(reads):
     answer, judged, _ = reads.read(first, [reads.one("there")])
     assert answer
     assert judged.place == "there"
+
+
+def test_where_many_cells_speak_at_the_second_try_ten_nats_are_enough(reads):
+    second = [reads.one("there", inliers=11), reads.one("rival", -10.0)]
+    answer, _, _ = reads.read([reads.one(explained=0.1)], second)
+    assert answer
+
+
+def test_it_is_the_lab_of_the_best_in_which_few_cells_name_a_place(reads):
+    binary = replace(reads.lab, array=SimpleNamespace(rows=11, columns=13, order=2))
+    found = [reads.one(inliers=4), reads.one("rival", -40.0, embossed=binary)]
+    assert reads.read(found, found)[0]
+    assert reads.read(found[:1], found[::-1])[0].reason == AMBIGUOUS
 
 
 def test_what_the_second_try_refuses_is_refused(reads):
@@ -227,7 +247,7 @@ def test_a_surface_that_is_not_believed_is_none_of_the_lab(reads, changed, reaso
 
 @pytest.mark.parametrize(
     ("x", "y", "reason"),
-    [(20.0, -1.99, ""), (20.0, -2.01, OUTSIDE), (43.99, 20.0, ""), (44.01, 20.0, OUTSIDE)],
+    [(20.0, -1.99, ""), (20.0, -2.01, OUTSIDE), (44.0, 20.0, ""), (44.01, 20.0, OUTSIDE)],
 )
 def test_the_centre_lies_at_most_two_mm_beyond_the_face(reads, x, y, reason):
     found = [reads.one(x_mm=x, y_mm=y), reads.one("rival", -40.0)]
