@@ -30,7 +30,7 @@ from generator.pipeline.made import Encoded, MadeObject
 from generator.pipeline.make import Order, make_under_lock
 from generator.pipeline.plan import plan_object
 from generator.polyhedron import Polyhedron
-from generator.polyhedron.read import READERS
+from generator.polyhedron.read import MESHES, STEP
 from generator.solid import Part
 from generator.spec import Problem, SpecError, read_specs
 from generator.spec.document import Tree, tree_of
@@ -214,7 +214,7 @@ def _spec_source(given: str | Path | Mapping[str, Any], named: Mapping[str, Any]
     """Return where the spec is read from; settings beside a YAML file are refused."""
     if isinstance(given, Mapping):
         return tree_from({**given, **{key: one for key, one in named.items() if one is not None}})
-    if Path(given).suffix.lower() in READERS:
+    if Path(given).suffix.lower() in (*MESHES, *STEP):
         return tree_from({**named, "shape": {"file": given}})
     if more := [key for key, one in named.items() if one is not None]:
         cause = f"'{more[0]}' stands beside a spec, which says it itself"

@@ -7,9 +7,10 @@ from collections.abc import Callable
 from difflib import get_close_matches
 from pathlib import Path
 
+from generator.polyhedron.read import MESHES, STEP
 from generator.spec.document import Tree
 from generator.spec.resolved import ShapeSpec
-from generator.spec.shape import EXAMPLES, KINDS, MODEL_SUFFIXES, Shape
+from generator.spec.shape import EXAMPLES, KINDS, Shape
 
 Refuse = Callable[[str, str, str], None]
 """Takes path, cause and fix of a problem."""
@@ -77,11 +78,11 @@ def _check_faces(faces: list[tuple[tuple[int, ...], ...]], vertices: int, refuse
 def _model_file(name: str, scale: float, folder: Path, refuse: Refuse) -> ShapeSpec | None:
     """Return a shape that is read from a model file, which must be there."""
     path = folder / name
-    if path.suffix.lower() not in MODEL_SUFFIXES:
+    if path.suffix.lower() not in (*STEP, *MESHES):
         refuse(
             "shape.file",
             f"'{name}' is no model that is read here",
-            f"give a file that ends in {', '.join(MODEL_SUFFIXES)}",
+            f"give a file that ends in {', '.join((*STEP, *MESHES))}",
         )
         return None
     try:
@@ -98,7 +99,7 @@ def _model_file(name: str, scale: float, folder: Path, refuse: Refuse) -> ShapeS
 def _similar_model(path: Path) -> str:
     """Return a fix that names models like `path` beside it."""
     try:
-        models = [f.name for f in path.parent.iterdir() if f.suffix.lower() in MODEL_SUFFIXES]
+        models = [f.name for f in path.parent.iterdir() if f.suffix.lower() in (*STEP, *MESHES)]
     except (OSError, ValueError):
         return f"check the folder '{path.parent}'; file names are relative to the spec"
     near = get_close_matches(path.name, sorted(models), n=1, cutoff=0.5)

@@ -6,21 +6,26 @@ source of the JSON schema. Lengths are in mm and angles in radians after reading
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
+from generator.alphabet.known import ALPHABETS
 from generator.spec.block import Block, ObjectName, PathText, whole_number
 from generator.spec.encoding import Encoding
 from generator.spec.quantity import Angle, Length, LengthOrZero, refuse
 from generator.spec.shape import EXAMPLES, Shape
+
+if TYPE_CHECKING:
+    AlphabetName = str
+else:
+    AlphabetName = Literal[tuple(ALPHABETS)]  # those that are registered
 
 SPEC_VERSION = 1
 COPIES_MAX = 1000
 SCHEMES = ("sqlite", "postgresql", "postgres", "postgresql+psycopg")  #: of databases
 
 ProfileName = Literal["one-touch", "thesis", "product", "large", "fine", "auto"]
-AlphabetName = Literal["thesis-2", "dense-4", "letters-4", "dense-8"]
 Format = Literal["step", "stl", "3mf", "glb"]
 
 

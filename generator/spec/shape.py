@@ -166,7 +166,6 @@ class Shape(Block):
 
 
 KINDS = tuple(name for name in Shape.model_fields if name != "scale")
-MODEL_SUFFIXES = (".step", ".stp", ".stl", ".obj")
 EXAMPLES = {
     "cube": "{cube: 60 mm}",
     "box": "{box: [80 mm, 80 mm, 120 mm]}",

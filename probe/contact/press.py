@@ -78,7 +78,7 @@ def press(
             f"rad, tilted by {touch.tilt_x_rad:g}, {touch.tilt_y_rad:g} rad, {touch.force_n:g} N",
             fix="give finite numbers, and a force of 0 or more",
         )
-    return _MODELS[level](surface, sensor, touch)
+    return MODELS[level](surface, sensor, touch)
 
 
 def level_for(sensor: SensorType, accuracy: Accuracy = "auto") -> str:
@@ -161,7 +161,7 @@ def _elements(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
     return elements(surface, sensor, touch)
 
 
-_MODELS: dict[str, Callable[[HeightMap, SensorType, Touch], Contact]] = {
+MODELS: dict[str, Callable[[HeightMap, SensorType, Touch], Contact]] = {
     "footprint": _footprint,
     **{f"tabs-{points}": partial(_tabs, points) for points in (7, 19, 61)},
     **{f"layer-{cells}": partial(_layer, cells) for cells in (2, 4, 8, 16)},

@@ -42,3 +42,61 @@ def test_cadquery_wedge(tmp_path):
     assert extents[0] == 51.6
     assert extents[1] == 41.6
     assert 40.0 < extents[2] < 41.6
+
+
+def test_encode_set(tmp_path):
+    said = said_by("encode_set.py", tmp_path)
+    assert [line.partition(":")[0] for line in said.splitlines()[:3]] == ["Cube", "Box-1", "Box-2"]
+    assert re.search(r"^\d+ of 4095 cells in use$", said, re.MULTILINE)
+
+
+def test_simulate_and_read(tmp_path):
+    said = said_by("simulate_and_read.py", tmp_path)
+    assert "Cube/F3" in said.splitlines()[1]
+    assert float(re.findall(r"off by ([\d.]+) mm", said)[0]) < 0.1
+
+
+def test_read_recording(tmp_path):
+    said = said_by("read_recording.py", tmp_path).splitlines()
+    assert said[0] == "touches.h5: 40 frames, by simulated/tab"
+    assert len(said) == 6
+    assert sum("Cube/F2" in line for line in said) >= 3
+
+
+def test_follow_port(tmp_path):
+    assert "Cube/F1" in said_by("follow_port.py", tmp_path)
+
+
+def test_scan(tmp_path):
+    assert said_by("scan.py", tmp_path).splitlines()[-1].endswith("touches: Plate")
+
+
+def test_decode_windows(tmp_path):
+    said = said_by("decode_windows.py", tmp_path).splitlines()
+    assert said[0] == "row 1, column 61 (t = 2206)"
+    assert said[2] == "2206"
+    assert said[3].endswith("Cube/F1")
+
+
+def test_own_sensor_data(tmp_path):
+    said = said_by("own_sensor_data.py", tmp_path).splitlines()
+    assert "Cube/F4" in said[0]
+    assert said[1].startswith("mine.h5: 2 frames")
+
+
+def test_report(tmp_path):
+    said = said_by("report.py", tmp_path)
+    assert re.match(r"40 touches: \d+ right, 0 wrong, ", said)
+    assert said.endswith("True\n")
+
+
+def test_trimesh_part(tmp_path):
+    assert said_by("trimesh_part.py", tmp_path).startswith("Block: 6 faces, 184 symbols")
+
+
+def test_examples_are_short_and_all_shown_and_run():
+    scripts = {path.stem: path.read_text() for path in EXAMPLES.glob("*.py")}
+    assert {stem for stem, text in scripts.items() if text.count("\n") > 30} == set()
+    shown = re.findall(r"examples/(\w+)\.py", (EXAMPLES.parent / "examples.md").read_text())
+    assert sorted(shown) == sorted(scripts)
+    assert {f"test_{stem}" for stem in scripts} <= set(globals())

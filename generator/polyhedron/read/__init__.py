@@ -23,7 +23,7 @@ LARGEST_BYTES = 64 * 2**20
 LARGEST_MM = 1e4  #: as of a length in a spec
 
 MESHES: dict[str, Callable[[bytes, str], Soup]] = {".stl": read_stl, ".obj": read_obj}
-READERS = (*MESHES, ".step", ".stp")
+STEP = (".step", ".stp")
 
 
 def read_shape(path: str | Path, scale: float = 1.0) -> Polyhedron:
@@ -53,8 +53,8 @@ def read_shape(path: str | Path, scale: float = 1.0) -> Polyhedron:
     file = Path(path)
     suffix = file.suffix.lower()
     place = str(path)
-    if suffix not in READERS:
-        known = ", ".join(READERS)
+    if suffix not in (*MESHES, *STEP):
+        known = ", ".join((*MESHES, *STEP))
         raise ShapeError(
             f"cannot read a shape from a '{suffix}' file" if suffix else "the file has no suffix",
             fix=f"save it as one of {known}",

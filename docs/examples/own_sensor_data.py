@@ -1,0 +1,18 @@
+"""Read images of a sensor of your own: an array (N, 16, 16) of values that rise with force."""
+
+from pathlib import Path
+
+import numpy as np
+
+from encoded_objects import Reader, encode, open_lab, simulate
+from probe.recording.imported import import_array
+
+encode({"name": "Cube", "shape": {"cube": "60 mm"}}, database="lab.db", formats=["stl"])
+felt = simulate("lab.db#Cube/F4", x=28, y=31, force=80).counts
+np.save("mine.npy", np.stack([felt, felt]) / 1023)  # here: in volts of the amplifier, say
+
+reader = Reader(open_lab("lab.db"))
+print(reader.read(np.load("mine.npy")[0]))  # at once: any unit will do
+
+recording = import_array(Path("mine.npy"), Path("mine.h5"))  # or as a recording for the commands
+print(recording)
