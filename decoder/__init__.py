@@ -1,6 +1,6 @@
 """Window -> index: the code conversions of thesis 5.1, 5.4.3 and appendix 5, and their heirs.
 
-Windows (N, rows, columns) -> `Decodings`, one `Decoded` each: place, margin, reason.
+Windows (N, rows, columns) -> `Decodings`, one `Decoded` each: place, margin, reason::
 
     window, decoded                   what goes in, what comes out
     view                              rank and minimum distance of any set of visible cells

@@ -81,12 +81,6 @@ def read_scan(
     ------
     MosaicError
         Another sensor's image, or a touch that hangs on nothing.
-
-    Examples
-    --------
-    >>> answer = read_scan(reader, touches)  # doctest: +SKIP
-    >>> answer.object, answer.face  # doctest: +SKIP
-    ('Cube', 'F1')
     """
     scan = begin_scan(reader, settings)
     for touch in touches:

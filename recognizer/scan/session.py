@@ -41,13 +41,12 @@ class Scan:
 
     Examples
     --------
-    >>> from recognizer.touch.lab import open_lab
-    >>> scan = Scan(open_lab("lab.db"))  # doctest: +SKIP
-    >>> for counts in images:  # doctest: +SKIP
-    ...     if scan.add(counts):
-    ...         break
-    >>> scan.answer.object, scan.answer.face  # doctest: +SKIP
-    ('Cube', 'F1')
+    >>> from encoded_objects import Scan, open_lab, simulate
+    >>> scan = Scan(open_lab("lab.db"))
+    >>> for x in (20, 28):
+    ...     answer = scan.add(simulate("lab.db#Cube/F1", x=x, y=31).counts)
+    >>> scan.touches, scan.answer.object, scan.answer.face
+    (2, 'Cube', 'F1')
     """
 
     def __init__(

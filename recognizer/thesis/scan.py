@@ -74,12 +74,6 @@ def read_scan(
     ------
     ImageError
         If readings and poses do not belong together.
-
-    Examples
-    --------
-    >>> answer = read_scan(lab, SensorType(), images, believed)  # doctest: +SKIP
-    >>> answer.recognition.object, answer.recognition.face  # doctest: +SKIP
-    ('Cube', 'F1')
     """
     image = merged(sensor, readings, poses, merging, trust)
     found = read_classically(

@@ -137,6 +137,13 @@ def open_lab(database: str | Path, settings: LabSettings = DEFAULTS.lab) -> Lab:
         The database cannot be read.
     LabError
         It holds no encoded object.
+
+    Examples
+    --------
+    >>> lab = open_lab("lab.db")
+    >>> embossed = lab.arrays[0]
+    >>> embossed.alphabet.name, embossed.style.pitch_mm, embossed.face(0).object
+    ('dense-4', 7.0, 'Cube')
     """
     url = str(database)
     engine = open_database(url, writable=False)

@@ -50,3 +50,9 @@ def test_the_touch_of_the_readme_is_recognised(lab):
 def test_the_readme_is_two_screens_before_it_tests():
     before = (ROOT / "README.md").read_text().partition("## Test it")[0]
     assert before.count("\n") <= 100
+
+
+def test_the_glossary_points_to_modules_that_are_there():
+    places = re.findall(r"`(\w+/[\w/]+\.py)`", (ROOT / "docs" / "glossary.md").read_text())
+    assert len(places) > 30
+    assert [place for place in places if not (ROOT / place).is_file()] == []

@@ -40,4 +40,5 @@ def bench(tmp_path_factory):
 def test_examples_of(module, bench, monkeypatch):
     monkeypatch.chdir(bench)
     result = doctest.testmod(importlib.import_module(module), optionflags=doctest.ELLIPSIS)
+    assert result.attempted, "all of its examples are skipped"
     assert result.failed == 0, "see the captured output"

@@ -19,7 +19,6 @@ NAMES = {
     "EncodedObjectsError", "Frame", "Reader", "Recognition", "Recording", "Scan", "SensorType",
     "decode", "encode", "open_lab", "simulate", "validate",
 }  # fmt: skip
-WAITING = {"Reader", "Recognition", "Scan", "open_lab", "validate"}
 HEAVY = ("numpy", "scipy", "sqlalchemy", "typer", "rich", "pydantic", "yaml", "h5py")
 OURS = ("generator", "decoder", "probe", "recognizer")
 
@@ -44,7 +43,7 @@ def test_each_name_is_documented_by_an_example_that_runs(name):
     value = getattr(encoded_objects, name)
     assert value is getattr(module, name)
     (found,) = (one for one in doctest.DocTestFinder(recurse=False).find(value, name, module))
-    assert found.examples or name in WAITING, f"{name} has no example"
+    assert found.examples, f"{name} has no example"
     # The examples themselves run with those of all modules, see test_docstrings.
 
 
