@@ -11,8 +11,7 @@ encode({"name": "Cube", "shape": {"cube": "60 mm"}}, database="lab.db", formats=
 felt = simulate("lab.db#Cube/F4", x=28, y=31, force=80).counts
 np.save("mine.npy", np.stack([felt, felt]) / 1023)  # here: in volts of the amplifier, say
 
-reader = Reader(open_lab("lab.db"))
-print(reader.read(np.load("mine.npy")[0]))  # at once: any unit will do
-
-recording = import_array(Path("mine.npy"), Path("mine.h5"))  # or as a recording for the commands
+recording = import_array(Path("mine.npy"), Path("mine.h5"))  # as counts, for the commands, too
 print(recording)
+for answer in Reader(open_lab("lab.db")).read_all(recording, every=True):
+    print(answer)
