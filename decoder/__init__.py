@@ -18,13 +18,38 @@ Windows (N, rows, columns) -> `Decodings`, one `Decoded` each: place, margin, re
     command, plot                     decode-window
 """
 
-from decoder.any_method import decode
-from decoder.decoded import Candidate, Decoded, Decodings, Reason
-from decoder.errors import DecoderError, MethodError, WindowError
-from decoder.exact import decode_exact
-from decoder.good_tuple import decode_good_tuple
-from decoder.likelihood import Likelihood, decode_likelihood
-from decoder.view import Strength, strength, strength_of_window
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from decoder.any_method import decode
+    from decoder.decoded import Candidate, Decoded, Decodings, Reason
+    from decoder.errors import DecoderError, MethodError, WindowError
+    from decoder.exact import decode_exact
+    from decoder.good_tuple import decode_good_tuple
+    from decoder.likelihood import Likelihood, decode_likelihood
+    from decoder.view import Strength, strength, strength_of_window
+
+#: name: the module that holds it, loaded when it is first used
+_HOMES = {
+    "Candidate": "decoder.decoded",
+    "Decoded": "decoder.decoded",
+    "DecoderError": "decoder.errors",
+    "Decodings": "decoder.decoded",
+    "Likelihood": "decoder.likelihood",
+    "MethodError": "decoder.errors",
+    "Reason": "decoder.decoded",
+    "Strength": "decoder.view",
+    "WindowError": "decoder.errors",
+    "decode": "decoder.any_method",
+    "decode_exact": "decoder.exact",
+    "decode_good_tuple": "decoder.good_tuple",
+    "decode_likelihood": "decoder.likelihood",
+    "strength": "decoder.view",
+    "strength_of_window": "decoder.view",
+}
 
 __all__ = [
     "Candidate",
@@ -43,3 +68,9 @@ __all__ = [
     "strength",
     "strength_of_window",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        return getattr(import_module(_HOMES[name]), name)
+    raise AttributeError(f"module 'decoder' has no attribute '{name}'")

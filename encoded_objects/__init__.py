@@ -25,9 +25,6 @@ else. Beside the names stand the two things that all packages share: the root of
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import Any
-
 __version__ = "0.2.0"
 
 #: name: the module that holds it; `__init__.pyi` says the same to type checkers
@@ -49,10 +46,12 @@ HOMES = {
 __all__ = ["__version__", *HOMES]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name not in HOMES:
         raise AttributeError(f"module 'encoded_objects' has no attribute '{name}'")
-    value = getattr(import_module(HOMES[name]), name)
+    from importlib import import_module  # `__init__.pyi` has the types: typing alone takes 10 ms
+
+    value: object = getattr(import_module(HOMES[name]), name)
     globals()[name] = value
     return value
 
