@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from encoded_objects.console.files import refuse_taken, staged
 from encoded_objects.console.output import number, write, write_json
@@ -14,6 +15,7 @@ from probe.calibration import Calibration, calibrated, read_calibration
 from probe.errors import CalibrationError, RecordingError
 from probe.frame import median_filter
 from probe.recording.read import Recording
+from probe.sensor import Overlay, SensorType
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +36,7 @@ def export_files(
     view: PictureView,
     *,
     calibration: Path | None,
+    pad_mm: float | None,
     live: bool,
     replace: bool,
     as_json: bool,
@@ -46,6 +49,8 @@ def export_files(
         When the recording cannot be read, or has no such frame.
     CalibrationError
         When the calibration is none, or of another sensor.
+    ContactError
+        When the blur of a pad so high cannot be taken back.
     EncodedObjectsError
         When a file is there already.
     """
@@ -59,9 +64,9 @@ def export_files(
     recording = Recording(path, live=live)
     known = None if calibration is None else calibration_for(calibration, recording)
     if png is not None:
-        _picture(recording, png, view, known)
+        _picture(recording, png, view, known, pad_mm)
     if npy is not None:
-        _array(recording, npy, known)
+        _array(recording, npy, known, pad_mm)
     if csv is not None:
         from probe.recording.table import export_csv
 
@@ -97,7 +102,13 @@ def calibration_for(path: Path, recording: Recording) -> Calibration:
     return known
 
 
-def _picture(recording: Recording, out: Path, view: PictureView, known: Calibration | None) -> None:
+def _picture(
+    recording: Recording,
+    out: Path,
+    view: PictureView,
+    known: Calibration | None,
+    pad_mm: float | None,
+) -> None:
     from probe.plot.frame import frame_picture
 
     if view.frame >= len(recording):
@@ -110,7 +121,7 @@ def _picture(recording: Recording, out: Path, view: PictureView, known: Calibrat
     first = recording.block(0, 1)
     image, unit = block.counts[0].astype(np.float64), recording.origin.units
     if known is not None:
-        image, unit = calibrated(block.counts[0], known).values, "N"
+        image, unit = _newtons(block.counts, known, pad_mm)[0], "N"
     if view.median:
         image = median_filter(image)
     title = f"frame {view.frame}, {(block.t_ns[0] - first.t_ns[0]) * 1e-9:.3f} s"
@@ -121,12 +132,28 @@ def _picture(recording: Recording, out: Path, view: PictureView, known: Calibrat
                       elevation_deg=view.elevation_deg)  # fmt: skip
 
 
-def _array(recording: Recording, out: Path, known: Calibration | None) -> None:
+def _newtons(
+    counts: NDArray[np.uint16], known: Calibration, pad_mm: float | None
+) -> NDArray[np.float64]:
+    """Return the forces (n, rows, columns) on the tactels, or on top of a pad over them."""
+    read = calibrated(counts, known)
+    if pad_mm is None:
+        return read.values
+    from probe.contact.deblur import deblurred
+
+    sensor = SensorType(overlay=Overlay(kind="pad", height_mm=pad_mm))
+    noise_n = float(np.sqrt(np.mean(np.square(read.sigma[np.isfinite(read.sigma)]))))
+    return np.array([deblurred(image, sensor, noise_n=noise_n).forces_n for image in read.values])
+
+
+def _array(
+    recording: Recording, out: Path, known: Calibration | None, pad_mm: float | None
+) -> None:
     shape = (len(recording), *recording.block(0, 0).counts.shape[1:])
     with staged(out) as draft, open(draft, "wb") as file:
         dtype = np.dtype("<u2" if known is None else "<f4")
         header = {"descr": dtype.str, "fortran_order": False, "shape": shape}
         np.lib.format.write_array_header_1_0(file, header)
         for block in recording.blocks():
-            values = block.counts if known is None else calibrated(block.counts, known).values
+            values = block.counts if known is None else _newtons(block.counts, known, pad_mm)
             file.write(np.ascontiguousarray(values, dtype).tobytes())

@@ -36,6 +36,11 @@ def export(
     ] = -60.0,
     elevation: Annotated[float, typer.Option(help="--png: and from how high, degrees.")] = 40.0,
     calibration: Calibrated = None,
+    deblur: Annotated[
+        float | None, typer.Option(metavar="MM", min=0.1, show_default=False,
+                                   help="Thickness of the pad whose blur is taken back; with "
+                                        "--calibration."),
+    ] = None,
     live: Annotated[
         bool, typer.Option("--live", help="Also a recording that is still being written."),
     ] = False,
@@ -51,10 +56,12 @@ def export(
             raise typer.BadParameter("nothing to write: give --csv, --npy or --png")
         if calibration is not None and csv is not None:
             raise typer.BadParameter("--csv holds counts; --calibration is for --npy and --png")
+        if deblur is not None and calibration is None:
+            raise typer.BadParameter("--deblur needs newtons: give --calibration")
         view = PictureView(frame, median, azimuth, elevation)
         return export_files(
-            recording, csv, npy, png, view, calibration=calibration, live=live, replace=replace,
-            as_json=as_json,
+            recording, csv, npy, png, view, calibration=calibration, pad_mm=deblur, live=live,
+            replace=replace, as_json=as_json,
         )  # fmt: skip
 
     return action

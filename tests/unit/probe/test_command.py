@@ -319,6 +319,15 @@ def test_export_in_newtons(asked, bench, tmp_path):
     newtons = np.load(out)
     assert newtons.dtype == np.float32
     assert newtons.mean(axis=0).sum() == pytest.approx(100, rel=0.03)
+    clear = tmp_path / "b.npy"
+    assert asked(*words[:3], clear, *words[4:], "--deblur", "1")[0] == 0
+    assert np.load(clear).mean(axis=0).sum() == pytest.approx(newtons.mean(axis=0).sum(), rel=0.1)
+    assert np.load(clear).std() > newtons.std()
+    assert "--calibration" in error_of(asked(*words[:4], "--deblur", "1"))[1]
+    assert (
+        "at most 3"
+        in error_of(asked(*words[:3], tmp_path / "c.npy", *words[4:], "--deblur", "8"))[1]
+    )
     _, err = error_of(asked(*words[:2], "--csv", tmp_path / "a.csv", *words[4:]))
     assert "--csv holds counts" in err
 
