@@ -35,6 +35,7 @@ class MeshSurface:
     """
 
     corners: Array = field(repr=False)  #: (n, 3, 3) mm, surface frame; all cover an area
+    solid_mm: Array = field(repr=False)  #: (m, 3, 3) all triangles, as they were given
 
     @cached_property
     def top_mm(self) -> float:
@@ -137,6 +138,7 @@ def mesh(
         rows = [T[i, 0] * x + T[i, 1] * y + T[i, 2] * z + T[i, 3] for i in range(3)]
         corners = np.stack(rows, axis=-1)
     a, b, c = (corners[:, i, :2] for i in range(3))
+    solid = corners
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     corners = corners[(area > 0) | ((area < 0) & ~outward)]
     if not len(corners):
@@ -146,7 +148,7 @@ def mesh(
             place=place,
         )
     order = np.lexsort((corners[:, :, 1], corners[:, :, 0]), axis=1)
-    return MeshSurface(np.take_along_axis(corners, order[:, :, None], axis=1))
+    return MeshSurface(np.take_along_axis(corners, order[:, :, None], axis=1), solid)
 
 
 def _outward(corners: Array) -> NDArray[np.bool_]:

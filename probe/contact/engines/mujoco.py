@@ -1,0 +1,306 @@
+"""MuJoCo's tactile sensor on the written mesh: an engine that shares no model with ours.
+
+Solid + sensor + touch + tips -> Contact. MuJoCo holds the part as a signed distance field on an
+octree of fixed depth, so the part is cut to what lies under the sensor first; its `tactile`
+sensor says how deep every point of every tip stands in the part, along the shortest way out.
+Each point is a column of the overlay's elastomer (neo-Hookean, its share of the tip's area);
+the plate advances and tilts until forces and moments balance those of the touch and the wrist.
+What is left out: the wall between points of a tip, friction, and depths beyond the half width
+of a stroke, where the shortest way out leads through its side.
+
+The simulation is never stepped: one touch is a handful of forward evaluations. SI units are
+MuJoCo's; mm and N here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.contact.contract import Contact, Touch
+from probe.contact.neo_hooke import NeoHooke
+from probe.contact.plate import checked_load, load_of
+from probe.contact.tips import Tips, tip_points
+from probe.errors import ContactError
+from probe.sensor import SensorType
+from probe.surface.contract import Surface
+
+Array = NDArray[np.float64]
+
+_LEAST = 1e-9  # of the stiffness, against a singular system where one row of points bears all
+
+
+@dataclass(frozen=True, slots=True)
+class MujocoSettings:
+    """How finely the part is asked, and when the plate is at rest."""
+
+    around_mm: float = 5.0  #: of the part kept around the sensor's square: domes of 2 degrees tilt
+    deep_mm: float = 2.5  #: kept under the highest point: symbols of 1 mm and some of the wall
+    tolerance: float = 1e-4  #: of the force; MuJoCo's distances are no better
+    stiffer: float = 8.0  #: elastomer against the overlay's: 120 N press 0.5 mm deep, not 1 mm,
+    #: since a distance field knows no depth beyond the half width of a stroke, 0.7 mm
+    step_mm: float = 0.3  #: at most, of the advance and of the rim by a tilt
+    halvings: int = 8  #: of a step that does not help
+    steps: int = 60  #: of Newton's method; 5-12 are usual
+    steepest_rad: float = 0.35  #: tilts beyond are not small
+
+
+class Solid(Protocol):
+    """A surface that is also known as a closed body."""
+
+    @property
+    def solid_mm(self) -> Array:
+        """(n, 3, 3) corners of the triangles, counter-clockwise from outside, surface frame."""
+        ...
+
+
+def press(surface: Surface, sensor: SensorType, touch: Touch, tips: Tips) -> Contact:
+    """Press a sensor on a closed body.
+
+    Parameters
+    ----------
+    surface
+        Must be a `Solid`: a written part.
+    sensor
+        Any matrix; its overlay must be of tabs.
+    touch
+        Pose, force and wrist.
+    tips
+        How finely the tips are asked (7 points are enough here), and their defects.
+
+    Returns
+    -------
+    Contact
+        Forces (rows, columns) in N, which sum to the touch's force.
+
+    Raises
+    ------
+    ContactError
+        No closed body, an overlay that is no tabs, nothing under the sensor, or no rest.
+    """
+    solid = getattr(surface, "solid_mm", None)
+    if solid is None:
+        raise ContactError(
+            "engine mujoco touches closed bodies; this surface is a height map",
+            fix="touch written files (--surfaces files), or take --engine own",
+        )
+    if sensor.overlay.kind != "tab":
+        raise ContactError(
+            f"engine mujoco knows tabs, the overlay is a {sensor.overlay.kind}",
+            fix="take --engine own for a pad",
+        )
+    checked_load(load_of(touch))
+    settings = MujocoSettings()
+    shape = (sensor.rows, sensor.columns)
+    if touch.force_n == 0:
+        tilts = (touch.tilt_x_rad, touch.tilt_y_rad)
+        return Contact(np.zeros(shape), math.inf, *tilts, "mujoco", 0)
+    points, drop = tip_points(sensor, tips)
+    depths, top_mm = _scene(solid, sensor, touch, points, drop, settings)
+    share = math.pi * sensor.overlay.tab_diameter_mm**2 / 4 / points.shape[1]
+    modulus = settings.stiffer * sensor.overlay.young_mpa
+    law = NeoHooke(modulus * share / sensor.overlay.height_mm, sensor.overlay.height_mm)
+    return _rest(depths, top_mm, law, points.reshape(-1, 2), touch, shape, settings)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Balance:
+    """What a pose of the plate leaves over, and what every point bears."""
+
+    wrong_n: Array  #: (1 to 3,) force and moments (over the half width) that do not balance
+    forces_n: Array  #: (n,)
+    slopes: Array  #: (n,) N / mm, of the points in contact
+
+
+Depths = Callable[[Array], Array]
+"""Plate (z mm, tilt x, tilt y) -> depth of every point in the part, mm, 0 outside."""
+
+
+def _rest(
+    depths: Depths, top_mm: float, law: NeoHooke, at: Array, touch: Touch,
+    shape: tuple[int, int], settings: MujocoSettings,
+) -> Contact:  # fmt: skip
+    """Advance and tilt the plate until it balances: damped Newton on force and moments."""
+    half = float(np.abs(at).max())
+    rows = np.stack([np.ones(len(at)), at[:, 1] / half, -at[:, 0] / half])  # of pressing
+    unloaded = np.array([touch.tilt_x_rad, touch.tilt_y_rad]) * half
+    stiffness = np.array([touch.wrist.tilt_x_nmm_rad, touch.wrist.tilt_y_nmm_rad]) / half**2
+    held = np.isinf(stiffness)
+    stiffness = np.where(held, 0.0, stiffness)
+    free = np.array([True, *~held])
+
+    def balance(plate: Array) -> Balance:
+        deep = depths(np.array([plate[0], plate[1] / half, plate[2] / half]))
+        forces, slopes = law(deep)
+        wrist = np.array([touch.force_n, *(stiffness * (plate[1:] - unloaded))])
+        return Balance((rows @ forces - wrist)[free], forces, np.where(deep > 0, slopes, 0.0))
+
+    lift = float(np.abs(unloaded).sum())
+    plate = np.array([top_mm + lift, *unloaded])
+    plate[0] = _advance(balance, plate, lift + settings.deep_mm)
+    now = balance(plate)
+    for step in range(1, settings.steps + 1):
+        if np.abs(now.wrong_n).max() <= settings.tolerance * touch.force_n:
+            tilts = plate[1:] / half
+            if np.abs(tilts).max() > settings.steepest_rad:
+                break
+            per_tab = now.forces_n.reshape(shape[0] * shape[1], -1).sum(axis=1)
+            return Contact(
+                per_tab.reshape(shape), float(plate[0]), float(tilts[0]), float(tilts[1]),
+                "mujoco", step,
+            )  # fmt: skip
+        stiff = ((rows * now.slopes) @ rows.T + np.diag([0.0, *stiffness]))[np.ix_(free, free)]
+        move = np.zeros(3)
+        move[free] = np.linalg.solve(stiff + _LEAST * np.trace(stiff) * np.eye(len(stiff)),
+                                     now.wrong_n)  # fmt: skip
+        move *= min(1.0, settings.step_mm / max(float(np.abs(move).max()), settings.step_mm))
+        for _ in range(settings.halvings):
+            then = balance(plate + move)
+            if np.linalg.norm(then.wrong_n) < np.linalg.norm(now.wrong_n):
+                break
+            move /= 2
+        plate, now = plate + move, then
+    raise ContactError(
+        "the plate finds no rest in MuJoCo's distance field",
+        fix="press with less force, or nearer to the middle of the face",
+    )
+
+
+def _advance(balance: Callable[[Array], Balance], plate: Array, most_mm: float) -> float:
+    """Return the height at which the plate, tilted as the unloaded wrist, bears the force."""
+    high, low = plate[0], plate[0] - most_mm
+    for _ in range(12):
+        middle = (high + low) / 2
+        if balance(np.array([middle, *plate[1:]])).wrong_n[0] > 0:
+            low = middle
+        else:
+            high = middle
+    if balance(np.array([low, *plate[1:]])).wrong_n[0] <= 0:
+        raise ContactError(
+            "there is too little under the sensor to bear the force",
+            fix="move the sensor over the object, or press with less force",
+        )
+    return float(low)
+
+
+def _scene(
+    solid_mm: Array, sensor: SensorType, touch: Touch, points: Array, drop: Array,
+    settings: MujocoSettings,
+) -> tuple[Depths, float]:  # fmt: skip
+    """Build MuJoCo's model of the part under the sensor; return its depths and the top."""
+    import mujoco
+
+    corners, faces = cut_under(solid_mm, sensor, touch, settings)
+    pad, fans = _pad(points.reshape(-1, 2), drop.ravel(), points.shape[1], sensor)
+    spec = mujoco.MjSpec()
+    spec.option.gravity = [0, 0, 0]
+    part = spec.add_mesh(name="part")
+    part.uservert, part.userface = (1e-3 * corners).ravel().tolist(), faces.ravel().tolist()
+    tips = spec.add_mesh(name="tips")
+    tips.uservert, tips.userface = (1e-3 * pad).ravel().tolist(), fans.ravel().tolist()
+    tips.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+    kind = mujoco.mjtGeom
+    body = spec.worldbody.add_body(name="part")
+    body.add_freejoint()  # two static bodies never touch
+    body.add_geom(name="part", type=kind.mjGEOM_MESH, meshname="part")
+    octree = spec.worldbody.add_body(name="octree", pos=[0, 0, -1])  # made for a geom of this type
+    octree.add_geom(type=kind.mjGEOM_SDF, meshname="part", contype=0, conaffinity=0)
+    probe = spec.worldbody.add_body(name="probe", mocap=True, pos=[0, 0, 1])
+    half_x, half_y = (1e-3 * half for half in sensor.half_mm)
+    probe.add_geom(type=kind.mjGEOM_BOX, size=[half_x, half_y, 2e-3], pos=[0, 0, 2e-3])
+    probe.add_geom(
+        name="tips", type=kind.mjGEOM_MESH, meshname="tips", contype=0, conaffinity=0, mass=0.01
+    )
+    spec.add_sensor(
+        name="depth", type=mujoco.mjtSensor.mjSENS_TACTILE,
+        objtype=mujoco.mjtObj.mjOBJ_MESH, objname="tips",
+        reftype=mujoco.mjtObj.mjOBJ_GEOM, refname="tips",
+    )  # fmt: skip
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    asked = points.shape[0] * points.shape[1]
+
+    def depths(plate: Array) -> Array:
+        z, tilt_x, tilt_y = plate
+        data.mocap_pos[0] = [1e-3 * touch.x_mm, 1e-3 * touch.y_mm, 1e-3 * z]
+        data.mocap_quat[0] = _quaternion(touch.theta_rad, float(tilt_x), float(tilt_y))
+        mujoco.mj_forward(model, data)
+        deep: Array = 1e3 * np.asarray(data.sensordata[:asked], dtype=np.float64)
+        return deep
+
+    return depths, float(corners[:, 2].max())
+
+
+def cut_under(
+    solid_mm: Array, sensor: SensorType, touch: Touch, settings: MujocoSettings | None = None
+) -> tuple[Array, NDArray[np.int64]]:
+    """Return what of a body lies under the sensor: corners (n, 3) mm and triangles (m, 3).
+
+    Raises
+    ------
+    ContactError
+        The triangles close no body, or nothing of it lies under the sensor.
+    """
+    from manifold3d import Error, Manifold
+    from manifold3d import Mesh as Triangles
+
+    given = settings or MujocoSettings()
+    corners, index = np.unique(solid_mm.reshape(-1, 3), axis=0, return_inverse=True)
+    body = Manifold(
+        Triangles(
+            vert_properties=corners.astype(np.float32),
+            tri_verts=index.reshape(-1, 3).astype(np.uint32),
+        )
+    )
+    if body.status() != Error.NoError:
+        raise ContactError(
+            f"the part is no closed body ({body.status().name})", fix="touch a written part"
+        )
+    reach = max(sensor.half_mm) + given.around_mm
+    near = (np.abs(solid_mm[:, :, :2] - [touch.x_mm, touch.y_mm]) <= 2 * reach).all(axis=2).any()
+    top = float(solid_mm[:, :, 2].max())
+    box = Manifold.cube((2 * reach, 2 * reach, 2 * given.deep_mm), center=True).translate(
+        (0, 0, top)
+    )
+    turned = box.rotate((0, 0, math.degrees(touch.theta_rad))).translate(
+        (touch.x_mm, touch.y_mm, 0.0)
+    )
+    cut: Any = (body ^ turned).to_mesh() if near else None
+    if cut is None or len(cut.tri_verts) == 0:
+        raise ContactError(
+            f"there is nothing under the sensor to bear {touch.force_n:g} N",
+            fix="move the sensor over the object",
+        )
+    found = np.asarray(cut.vert_properties, dtype=np.float64)[:, :3]
+    return found, np.asarray(cut.tri_verts, dtype=np.int64)
+
+
+def _pad(
+    at_mm: Array, drop_mm: Array, each: int, sensor: SensorType
+) -> tuple[Array, NDArray[np.int64]]:
+    """Return the mesh whose first corners are the points of the tips; a plate closes it above."""
+    first = each * np.arange(len(at_mm) // each)[:, None]
+    ring = np.arange(1, each)
+    fans = np.stack(
+        [np.broadcast_to(first, (len(first), each - 1)), first + np.roll(ring, -1), first + ring],
+        -1,
+    ).reshape(-1, 3)
+    (half_x, half_y), count = sensor.half_mm, len(at_mm)
+    lid = [[-half_x, -half_y, 4], [half_x, -half_y, 4], [half_x, half_y, 4], [-half_x, half_y, 4]]
+    corners = np.concatenate([np.column_stack([at_mm, drop_mm]), np.array(lid, dtype=float)])
+    closing = count + np.array([[0, 1, 2], [0, 2, 3]])
+    return corners, np.concatenate([fans, closing])
+
+
+def _quaternion(turn: float, tilt_x: float, tilt_y: float) -> list[float]:
+    """Return (w, x, y, z) of the plate: turned about z, then tilted about its own x and y."""
+    (a, z), (b, x), (c, y) = (
+        (math.cos(angle / 2), math.sin(angle / 2)) for angle in (turn, tilt_x, tilt_y)
+    )
+    w1, x1, y1, z1 = a * b, a * x, z * x, z * b  # about z, then x
+    return [w1 * c - y1 * y, x1 * c - z1 * y, w1 * y + y1 * c, x1 * y + z1 * c]
