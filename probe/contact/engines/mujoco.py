@@ -262,7 +262,6 @@ def cut_under(
             f"the part is no closed body ({body.status().name})", fix="touch a written part"
         )
     reach = max(sensor.half_mm) + given.around_mm
-    near = (np.abs(solid_mm[:, :, :2] - [touch.x_mm, touch.y_mm]) <= 2 * reach).all(axis=2).any()
     top = float(solid_mm[:, :, 2].max())
     box = Manifold.cube((2 * reach, 2 * reach, 2 * given.deep_mm), center=True).translate(
         (0, 0, top)
@@ -270,8 +269,8 @@ def cut_under(
     turned = box.rotate((0, 0, math.degrees(touch.theta_rad))).translate(
         (touch.x_mm, touch.y_mm, 0.0)
     )
-    cut: Any = (body ^ turned).to_mesh() if near else None
-    if cut is None or len(cut.tri_verts) == 0:
+    cut: Any = (body ^ turned).to_mesh()
+    if len(cut.tri_verts) == 0:
         raise ContactError(
             f"there is nothing under the sensor to bear {touch.force_n:g} N",
             fix="move the sensor over the object",

@@ -1,0 +1,160 @@
+"""Engines of contact: MuJoCo's against numbers worked by hand, and against our own."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from manifold3d import Manifold
+from scipy.optimize import brentq
+
+from probe.contact.contract import Touch, WristStiffness
+from probe.contact.engines import ENGINES, engine_named
+from probe.contact.engines.mujoco import MujocoSettings, cut_under
+from probe.contact.tips import Tips
+from probe.errors import ContactError
+from probe.sensor import Overlay, SensorType
+from probe.surface.mesh import mesh
+
+RIGID = WristStiffness(math.inf, math.inf)
+TIPS = Tips(points=7)
+SENSOR = SensorType()
+
+
+def block(low, high):
+    """Return the triangles of a box, counter-clockwise from outside."""
+    corners = np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)], float)
+    quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    faces = [f for a, b, c, d in quads for f in ((a, b, c), (a, c, d))]
+    return corners[np.array(faces)]
+
+
+def plate_with_bars():
+    """Return a plate with two bars of 1.4 mm, 1 mm high, as one closed body."""
+    boxes = [((-30, -30, -5), (30, 30, 0)), ((-6, -4, -1), (-4.6, 4, 1)), ((1, 2, -1), (9, 3.4, 1))]
+    size = [np.subtract(high, low) for low, high in boxes]
+    solids = [Manifold.cube(s).translate(low) for s, (low, _) in zip(size, boxes, strict=True)]
+    made = (solids[0] + solids[1] + solids[2]).to_mesh()
+    return np.asarray(made.vert_properties, float)[np.asarray(made.tri_verts)]
+
+
+def compression_mm(force_n, overlay=SENSOR.overlay):
+    """Return how far one tab is pressed by a force: neo-Hookean, of MuJoCo's stiffer elastomer."""
+    area = math.pi * overlay.tab_diameter_mm**2 / 4
+    modulus = MujocoSettings().stiffer * overlay.young_mpa
+
+    def miss(c):
+        stretch = 1 - c / overlay.height_mm
+        return modulus * area / 3 * (stretch**-2 - stretch) - force_n
+
+    return brentq(miss, 0, 0.9 * overlay.height_mm)
+
+
+@pytest.fixture(scope="module")
+def press():
+    return engine_named("mujoco")
+
+
+def test_a_plane_bears_all_tabs_alike(press):
+    plate = mesh(block((-30, -30, -5), (30, 30, 0)))
+    found = press(plate, SENSOR, Touch(0, 0, 0.3, 100.0, wrist=RIGID), TIPS)
+    assert found.forces_n.sum() == pytest.approx(100, rel=1e-3)
+    assert found.forces_n == pytest.approx(np.full((16, 16), 100 / 256), rel=5e-3)
+    assert -found.z_mm == pytest.approx(compression_mm(100 / 256), rel=5e-3)
+
+
+def test_rows_and_columns_stand_as_the_sensor_frame_says(press):
+    # A block under x > 3, y > 5 of the sensor: the upper right of the image.
+    corner = mesh(block((3, 5, -2), (30, 30, 0)))
+    forces = press(corner, SENSOR, Touch(0, 0, 0, 20.0, wrist=RIGID), TIPS).forces_n
+    centres = SENSOR.centres_mm()
+    inside = (centres[..., 0] > 3.7) & (centres[..., 1] > 5.7)
+    outside = (centres[..., 0] < 2.3) | (centres[..., 1] < 4.3)
+    assert (forces[inside] > 0.1).all()
+    assert not forces[outside].any()
+
+
+def test_the_touch_turns_the_sensor_not_the_image(press):
+    # The block lies along the surface's +x; the sensor's +x points along the surface's +y.
+    corner = mesh(block((4, -30, -2), (30, 30, 0)))
+    forces = press(corner, SENSOR, Touch(0, 0, math.pi / 2, 20.0, wrist=RIGID), TIPS).forces_n
+    centres = SENSOR.centres_mm()
+    assert (forces[centres[..., 1] < -4.7] > 0).all()  # surface +x is the sensor's -y
+    assert not forces[centres[..., 1] > -3.3].any()
+
+
+def test_moments_balance_the_wrist(press):
+    ridge = mesh(block((4, -30, -2), (9, 30, 0)))
+    wrist = WristStiffness(3000.0, 3000.0)
+    found = press(ridge, SENSOR, Touch(0, 0, 0, 40.0, wrist=wrist), TIPS)
+    x, y = np.moveaxis(SENSOR.centres_mm(), -1, 0)
+    # what is pressed on the right lifts the right side: a negative turn about y
+    assert found.tilt_y_rad < -0.01
+    assert found.tilt_y_rad * 3000 == pytest.approx(-(found.forces_n * x).sum(), rel=0.05)
+    assert abs(found.tilt_x_rad * 3000 - (found.forces_n * y).sum()) < 0.05 * 40 * 6
+
+
+def test_longer_tabs_bear_more(press):
+    plate = mesh(block((-30, -30, -5), (30, 30, 0)))
+    lengths = np.zeros((16, 16))
+    lengths[2, 5] = 0.05
+    found = press(plate, SENSOR, Touch(0, 0, 0, 60.0, wrist=RIGID), Tips(7, lengths_mm=lengths))
+    usual = np.median(found.forces_n)
+    assert compression_mm(found.forces_n[2, 5]) - compression_mm(usual) == pytest.approx(
+        0.05, abs=0.004
+    )
+    assert (np.delete(found.forces_n.ravel(), 2 * 16 + 5) < 1.02 * usual).all()
+
+
+def test_both_engines_feel_the_same_symbol():
+    surface = mesh(plate_with_bars())
+    touch = Touch(0.4, -0.3, 0.5, 10.0, 0.01, -0.01)
+    own, other = (engine_named(name)(surface, SENSOR, touch, TIPS) for name in ENGINES)
+    assert np.corrcoef(own.forces_n.ravel(), other.forces_n.ravel())[0, 1] > 0.9
+    assert other.forces_n.sum() == pytest.approx(own.forces_n.sum(), rel=1e-3)
+
+
+def test_only_what_lies_under_the_sensor_is_kept():
+    corners, faces = cut_under(block((-90, -90, -40), (90, 90, 0)), SENSOR, Touch(50, 0, 0, 1.0))
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    reach = 12.7 + MujocoSettings().around_mm
+    assert low == pytest.approx([50 - reach, -reach, -MujocoSettings().deep_mm], abs=1e-4)
+    assert high == pytest.approx([50 + reach, reach, 0], abs=1e-4)
+    assert len(faces) == 12
+
+
+def test_no_force_is_no_contact(press):
+    plate = mesh(block((-30, -30, -5), (30, 30, 0)))
+    found = press(plate, SENSOR, Touch(0, 0, 0, 0.0), TIPS)
+    assert not found.forces_n.any()
+    assert found.z_mm == math.inf
+
+
+class Flat:
+    """A height map without a body."""
+
+    top_mm = 0.0
+
+    def heights_mm(self, points_mm):
+        return np.zeros(len(points_mm))
+
+
+@pytest.mark.parametrize(
+    ("surface", "sensor", "touch", "says"),
+    [
+        (Flat(), SENSOR, Touch(0, 0, 0, 10.0), "height map"),
+        (None, SensorType(overlay=Overlay(kind="pad")), Touch(0, 0, 0, 10.0), "knows tabs"),
+        (None, SENSOR, Touch(500, 0, 0, 10.0), "nothing under the sensor"),
+        (None, SENSOR, Touch(0, 0, 0, -1.0), "must be finite"),
+    ],
+)
+def test_what_cannot_be_touched_is_refused(press, surface, sensor, touch, says):
+    given = surface or mesh(block((-30, -30, -5), (30, 30, 0)))
+    with pytest.raises(ContactError, match=says):
+        press(given, sensor, touch, TIPS)
+
+
+def test_an_unknown_engine_is_named_with_those_there_are():
+    with pytest.raises(ContactError, match="own, mujoco"):
+        engine_named("bullet")
