@@ -60,8 +60,43 @@ class Campaign:
     levels: Shares = LEVEL_SHARES
     overlay: str = "tab"
     files: bool = True  #: touch the written STL files
+    engine: str = "own"  #: of contact
     study: int = 0  #: touches of every reader of `READERS`; 0: no study
     shard: int = SHARING.shard  #: touches in a file: at most so many are lost with a run
+
+
+def bodies_alone(campaign: Campaign, named: bool) -> Campaign:
+    """Return a campaign whose engine touches closed bodies: no surfaces of no database.
+
+    Parameters
+    ----------
+    campaign
+        As it was asked for.
+    named
+        Whether a person named the kinds; otherwise those that cannot be are left out.
+
+    Raises
+    ------
+    ValidationError
+        It asks for what such an engine cannot touch.
+    """
+    other = [kind for kind, _ in campaign.kinds if kind not in ON_FACES]
+    if named and other:
+        raise ValidationError(
+            f"engine {campaign.engine} touches written parts, not {', '.join(other)}",
+            fix=f"name kinds among {', '.join(ON_FACES)}, or take --engine own",
+            place="--kinds",
+        )
+    if not campaign.files or campaign.overlay != "tab":
+        what = "the pad" if campaign.overlay != "tab" else "registered faces"
+        raise ValidationError(
+            f"engine {campaign.engine} touches written parts by tabs, not {what}",
+            fix="take --surfaces files and --overlay tab, or --engine own",
+            place="--engine",
+        )
+    kept = [(kind, share) for kind, share in campaign.kinds if kind in ON_FACES]
+    total = sum(share for _, share in kept)
+    return replace(campaign, kinds=tuple((kind, share / total) for kind, share in kept))
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +155,8 @@ def plan_of(
     if kind == STRANGE:
         strange = [name for name in FOREIGN if name != BLANK]
         surface = strange[int(rng.integers(len(strange)))]
-    plan = TouchPlan(database, campaign.seed, level, surface, files=campaign.files)
+    plan = TouchPlan(database, campaign.seed, level, surface, files=campaign.files,
+                     engine=campaign.engine)  # fmt: skip
     return kind, plan
 
 

@@ -102,6 +102,11 @@ def touch_set(
                           help="What is touched: the written STL files, or the registered faces; "
                                "files."),
     ] = "",
+    engine: Annotated[
+        str, typer.Option(metavar="own|mujoco", show_default=False,
+                          help="Who computes the contact; own. mujoco shares no model with the "
+                               "reader, and touches written files alone."),
+    ] = "",
     study: Annotated[
         int | None, typer.Option(min=0, show_default=False,
                                  help="Touches of each reader in the picture of error against run "
@@ -145,8 +150,8 @@ def touch_set(
         with progress_bar("making the set") as bar:
             result = validate(
                 specs or (), folder=folder, touches=touches, database=database, kinds=kinds,
-                levels=levels, overlay=overlay, surfaces=surfaces, study=study, shard=shard,
-                seed=seed, jobs=processes, cluster=cluster, resume=resume,
+                levels=levels, overlay=overlay, surfaces=surfaces, engine=engine, study=study,
+                shard=shard, seed=seed, jobs=processes, cluster=cluster, resume=resume,
                 progress=TouchProgress(bar),
             )  # fmt: skip
         _say(result, as_json=as_json)

@@ -49,6 +49,7 @@ class TouchPlan:
     tilt_rad: float = DRAWING.tilt_rad
     worn: float = DRAWING.worn
     files: bool = False  #: touch the written STL files, not what the database says of them
+    engine: str = "own"  #: of contact, `probe.contact.engines`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,7 +86,7 @@ def draw_touch(plan: TouchPlan, number: int, reader: Reader) -> DrawnTouch:
                 pitch = encoding.style.pitch_mm
                 surface = wear_part(surface, face, pitch, plan.worn, rng)
         try:
-            counts, _ = read_sensor(surface, reader.sensor, touch, level, rng)
+            counts, _ = read_sensor(surface, reader.sensor, touch, level, rng, plan.engine)
         except ContactError:
             continue  # the plate slips off: no touch
         return DrawnTouch(surface, scene, touch, counts)

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.contact.contract import Contact, Touch
-from probe.contact.press import press
-from probe.contact.tabs import tabs
+from probe.contact.engines import engine_named
 from probe.contact.tips import Tips
 from probe.sensor import SensorType
+from probe.surface.body import body_of
 from probe.surface.contract import HeightMap
 
 Array = NDArray[np.float64]
@@ -32,7 +32,6 @@ class ReadoutSettings:
     counts_per_n: float = 150.0  #: of a tactel under small forces
     full: int = 1023  #: counts, 10 bits
     bias: float = 8.0  #: counts of an unloaded tactel
-    points: int = 19  #: on each tab
 
 
 READOUT = ReadoutSettings()
@@ -90,9 +89,22 @@ class PrintedSurface:
                 highest = np.maximum(highest, self.surface.heights_mm(at + by))
         return highest
 
+    @property
+    def solid_mm(self) -> Array:
+        """Return the body (n, 3, 3), scaled; its strokes are as wide as drawn."""
+        centre = np.array([*self.about_mm, 0.0])
+        scales = np.array([1 + self.scale, 1 + self.scale, 1.0])
+        scaled: Array = (body_of(self.surface) - centre) * scales + centre
+        return scaled
+
 
 def read_sensor(
-    surface: HeightMap, sensor: SensorType, touch: Touch, level: Level, rng: np.random.Generator
+    surface: HeightMap,
+    sensor: SensorType,
+    touch: Touch,
+    level: Level,
+    rng: np.random.Generator,
+    engine: str = "own",
 ) -> tuple[NDArray[np.uint16], Contact]:
     """Return the counts (rows, columns) of a sensor drawn from a level, and the contact.
 
@@ -105,15 +117,14 @@ def read_sensor(
     if level.wider_mm > 0 or level.scale != 0:
         about = (touch.x_mm, touch.y_mm)
         surface = PrintedSurface(surface, level.wider_mm, level.scale, about)
+    contacts, tips = engine_named(engine), Tips()
     if sensor.overlay.kind == "tab":
         tips = Tips(
-            points=READOUT.points,
+            points=contacts.points,
             lengths_mm=level.length_mm * rng.standard_normal(shape),
             shifts_mm=level.shift_mm * rng.standard_normal((*shape, 2)),
         )
-        contact = tabs(surface, sensor, touch, tips)
-    else:
-        contact = press(surface, sensor, touch)
+    contact = contacts.press(surface, sensor, touch, tips)
     forces = contact.forces_n
     if level.cross_talk > 0:
         from scipy.ndimage import gaussian_filter

@@ -15,8 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from probe.contact.engines import ENGINES, engine_named
 from recognizer.validation.campaign import (
     Campaign,
+    bodies_alone,
     kinds_of,
     levels_of,
     series_of,
@@ -64,6 +66,7 @@ class CampaignOptions:
     levels: str = ""
     overlay: str = ""
     surfaces: str = ""
+    engine: str = ""
     study: int | None = None
     shard: int | None = None
 
@@ -78,6 +81,7 @@ def validate(
     levels: str = "",
     overlay: str = "",
     surfaces: str = "",
+    engine: str = "",
     study: int | None = None,
     shard: int | None = None,
     seed: int | None = None,
@@ -104,6 +108,9 @@ def validate(
         `tab` or `pad`; tabs if empty.
     surfaces
         `files`: the written STL files are touched; `database`: the registered faces.
+    engine
+        Of contact: `own`, or `mujoco` (extra `engines`), which touches written files alone and
+        draws no surfaces of no database.
     study
         Touches of each reader in the picture of error against run time; 0: none.
     shard
@@ -136,7 +143,8 @@ def validate(
     begun, start = datetime.now(UTC), time.monotonic()
     named = [Path(spec) for spec in ([specs] if isinstance(specs, str | Path) else specs)]
     place, steps = Path(folder), progress or TouchProgress()
-    options = CampaignOptions(touches, seed, kinds, levels, overlay, surfaces, study, shard)
+    options = CampaignOptions(touches, seed, kinds, levels, overlay, surfaces, engine,
+                              study, shard)  # fmt: skip
     known = resume and (place / RECORD).exists()
     campaign = _campaign(options, read_record(place).campaign if known else None)
     with lock_folder(place):
@@ -174,6 +182,7 @@ def _campaign(options: CampaignOptions, known: Campaign | None) -> Campaign:
     for given, allowed, option in (
         (options.overlay, ("tab", "pad"), "--overlay"),
         (options.surfaces, ("files", "database"), "--surfaces"),
+        (options.engine, tuple(ENGINES), "--engine"),
     ):
         if given and given not in allowed:
             raise ValidationError(
@@ -182,7 +191,7 @@ def _campaign(options: CampaignOptions, known: Campaign | None) -> Campaign:
     base = known or Campaign()
     touches = base.touches if options.touches is None else options.touches
     study = base.study if known else STUDIES.touches_of(touches)
-    return replace(
+    campaign = replace(
         base,
         touches=touches,
         seed=base.seed if options.seed is None else options.seed,
@@ -190,8 +199,14 @@ def _campaign(options: CampaignOptions, known: Campaign | None) -> Campaign:
         levels=levels_of(options.levels) if options.levels else base.levels,
         overlay=options.overlay or base.overlay,
         files=options.surfaces == "files" if options.surfaces else base.files,
+        engine=options.engine or base.engine,
         study=study if options.study is None else options.study,
         shard=base.shard if options.shard is None else options.shard,
+    )
+    return (
+        bodies_alone(campaign, bool(options.kinds))
+        if engine_named(campaign.engine).bodies
+        else campaign
     )
 
 

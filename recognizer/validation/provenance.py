@@ -14,10 +14,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from probe.contact.engines import engine_named
 from recognizer.validation.campaign import KINDS, LEVEL_SHARES, Campaign, Shares
 from recognizer.validation.draw import TouchPlan
 from recognizer.validation.encoded_set import members_of
-from recognizer.validation.levels import LEVELS, READOUT
+from recognizer.validation.levels import LEVELS
 from recognizer.validation.record import RunRecord
 from recognizer.validation.settings import DRAWING, JUDGING
 
@@ -37,13 +38,22 @@ def provenance(record: RunRecord, database: str) -> dict[str, Any]:
             **{name: version(name) for name in LIBRARIES},
         },
         "campaign": asdict(campaign),
-        "contact": f"tabs, {READOUT.points} points a tab" if campaign.overlay == "tab" else "layer",
+        "contact": _contact(campaign),
         "force_n": list(plan.force_n),
         "tilt_deg": round(math.degrees(plan.tilt_rad), 6),
         "levels": [asdict(LEVELS[name]) for name, _ in campaign.levels],
         "set": record.set_digest,
         "members": [asdict(member) for member in members_of(database)],
     }
+
+
+def _contact(campaign: Campaign) -> str:
+    """Return which engine pressed, and how finely."""
+    if campaign.overlay == "pad":
+        return "layer"
+    points = engine_named(campaign.engine).points
+    engine = "tabs" if campaign.engine == "own" else campaign.engine
+    return f"{engine}, {points} points a tab"
 
 
 def rule() -> dict[str, float]:
@@ -68,6 +78,8 @@ def command_of(record: RunRecord) -> str:
         words += ["--levels", _shares(campaign.levels)]
     if campaign.overlay != plain.overlay:
         words += ["--overlay", campaign.overlay]
+    if campaign.engine != plain.engine:
+        words += ["--engine", campaign.engine]
     if campaign.files != plain.files:
         words += ["--surfaces", "database"]
     words += ["--study", str(campaign.study)]

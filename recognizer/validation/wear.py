@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from probe.surface.body import body_of, indexed_triangles, manifold_of
 from probe.surface.contract import HeightMap
 from probe.surface.face import FaceSurface
 from recognizer.touch.lab import EncodedFace
@@ -57,6 +59,21 @@ class WornAway:
         heights = heights.copy()
         heights[high[gone]] = 0.0
         return heights
+
+    @property
+    def solid_mm(self) -> Array:
+        """Return the body (n, 3, 3) without what stood above the face in these cells."""
+        from manifold3d import Manifold, OpType
+
+        if len(self.centres_mm) == 0:
+            return body_of(self.surface)
+        side, top = self.pitch_mm, self.top_mm
+        box = Manifold.cube((side, side, 2 * top)).translate((-side / 2, -side / 2, 0))
+        box = box.rotate((0, 0, -math.degrees(self.rotation_rad)))
+        boxes = [box.translate((float(x), float(y), 0)) for x, y in self.centres_mm]
+        gone = Manifold.batch_boolean(boxes, OpType.Add)
+        corners, triangles = indexed_triangles(manifold_of(body_of(self.surface)) - gone)
+        return corners[triangles]
 
 
 def wear_part(

@@ -17,18 +17,22 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.errors import require
 from probe.contact.contract import Contact, Touch
+from probe.contact.engines import Engine
 from probe.contact.neo_hooke import NeoHooke
 from probe.contact.plate import checked_load, load_of
 from probe.contact.tips import Tips, tip_points
 from probe.errors import ContactError
 from probe.sensor import SensorType
-from probe.surface.contract import Surface
+from probe.surface.body import body_of, indexed_triangles, manifold_of
+from probe.surface.contract import HeightMap
+
+require("mujoco", extra="engines", purpose="engine mujoco")
 
 Array = NDArray[np.float64]
 
@@ -50,16 +54,7 @@ class MujocoSettings:
     steepest_rad: float = 0.35  #: tilts beyond are not small
 
 
-class Solid(Protocol):
-    """A surface that is also known as a closed body."""
-
-    @property
-    def solid_mm(self) -> Array:
-        """(n, 3, 3) corners of the triangles, counter-clockwise from outside, surface frame."""
-        ...
-
-
-def press(surface: Surface, sensor: SensorType, touch: Touch, tips: Tips) -> Contact:
+def press(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips) -> Contact:
     """Press a sensor on a closed body.
 
     Parameters
@@ -83,12 +78,7 @@ def press(surface: Surface, sensor: SensorType, touch: Touch, tips: Tips) -> Con
     ContactError
         No closed body, an overlay that is no tabs, nothing under the sensor, or no rest.
     """
-    solid = getattr(surface, "solid_mm", None)
-    if solid is None:
-        raise ContactError(
-            "engine mujoco touches closed bodies; this surface is a height map",
-            fix="touch written files (--surfaces files), or take --engine own",
-        )
+    solid = body_of(surface)
     if sensor.overlay.kind != "tab":
         raise ContactError(
             f"engine mujoco knows tabs, the overlay is a {sensor.overlay.kind}",
@@ -244,39 +234,24 @@ def cut_under(
     Raises
     ------
     ContactError
-        The triangles close no body, or nothing of it lies under the sensor.
+        Nothing of it lies under the sensor.
+    SurfaceError
+        The triangles close no body.
     """
-    from manifold3d import Error, Manifold
-    from manifold3d import Mesh as Triangles
+    from manifold3d import Manifold
 
     given = settings or MujocoSettings()
-    corners, index = np.unique(solid_mm.reshape(-1, 3), axis=0, return_inverse=True)
-    body = Manifold(
-        Triangles(
-            vert_properties=corners.astype(np.float32),
-            tri_verts=index.reshape(-1, 3).astype(np.uint32),
-        )
-    )
-    if body.status() != Error.NoError:
-        raise ContactError(
-            f"the part is no closed body ({body.status().name})", fix="touch a written part"
-        )
     reach = max(sensor.half_mm) + given.around_mm
     top = float(solid_mm[:, :, 2].max())
-    box = Manifold.cube((2 * reach, 2 * reach, 2 * given.deep_mm), center=True).translate(
-        (0, 0, top)
-    )
-    turned = box.rotate((0, 0, math.degrees(touch.theta_rad))).translate(
-        (touch.x_mm, touch.y_mm, 0.0)
-    )
-    cut: Any = (body ^ turned).to_mesh()
-    if len(cut.tri_verts) == 0:
+    box = Manifold.cube((2 * reach, 2 * reach, 2 * given.deep_mm), center=True)
+    box = box.rotate((0, 0, math.degrees(touch.theta_rad))).translate((touch.x_mm, touch.y_mm, top))
+    corners, triangles = indexed_triangles(manifold_of(solid_mm) ^ box)
+    if len(triangles) == 0:
         raise ContactError(
             f"there is nothing under the sensor to bear {touch.force_n:g} N",
             fix="move the sensor over the object",
         )
-    found = np.asarray(cut.vert_properties, dtype=np.float64)[:, :3]
-    return found, np.asarray(cut.tri_verts, dtype=np.int64)
+    return corners, triangles
 
 
 def _pad(
@@ -303,3 +278,11 @@ def _quaternion(turn: float, tilt_x: float, tilt_y: float) -> list[float]:
     )
     w1, x1, y1, z1 = a * b, a * x, z * x, z * b  # about z, then x
     return [w1 * c - y1 * y, x1 * c - z1 * y, w1 * y + y1 * c, x1 * y + z1 * c]
+
+
+ENGINE = Engine(
+    press,
+    points=7,
+    bodies=True,
+    left_out="friction, and how deep a tip stands in a stroke beyond the stroke's half width",
+)

@@ -4,14 +4,23 @@ from __future__ import annotations
 
 from probe.contact import press as ladder
 from probe.contact.contract import Contact, Touch
+from probe.contact.engines import Engine
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.sensor import SensorType
-from probe.surface.contract import Surface
+from probe.surface.contract import HeightMap
 
 
-def press(surface: Surface, sensor: SensorType, touch: Touch, tips: Tips) -> Contact:
+def press(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips) -> Contact:
     """Press a sensor on a surface; see `probe.contact.press`. A pad has no tips to be off."""
     if sensor.overlay.kind == "tab":
         return tabs(surface, sensor, touch, tips)
     return ladder.press(surface, sensor, touch)
+
+
+ENGINE = Engine(
+    press,
+    points=19,
+    bodies=False,
+    left_out="a tab is a column: it does not bulge, slide or feel its neighbours",
+)

@@ -13,7 +13,7 @@ from probe.contact.contract import Touch, WristStiffness
 from probe.contact.engines import ENGINES, engine_named
 from probe.contact.engines.mujoco import MujocoSettings, cut_under
 from probe.contact.tips import Tips
-from probe.errors import ContactError
+from probe.errors import ContactError, ProbeError
 from probe.sensor import Overlay, SensorType
 from probe.surface.mesh import mesh
 
@@ -53,7 +53,7 @@ def compression_mm(force_n, overlay=SENSOR.overlay):
 
 @pytest.fixture(scope="module")
 def press():
-    return engine_named("mujoco")
+    return engine_named("mujoco").press
 
 
 def test_a_plane_bears_all_tabs_alike(press):
@@ -110,7 +110,7 @@ def test_longer_tabs_bear_more(press):
 def test_both_engines_feel_the_same_symbol():
     surface = mesh(plate_with_bars())
     touch = Touch(0.4, -0.3, 0.5, 10.0, 0.01, -0.01)
-    own, other = (engine_named(name)(surface, SENSOR, touch, TIPS) for name in ENGINES)
+    own, other = (engine_named(name).press(surface, SENSOR, touch, TIPS) for name in ENGINES)
     assert np.corrcoef(own.forces_n.ravel(), other.forces_n.ravel())[0, 1] > 0.9
     assert other.forces_n.sum() == pytest.approx(own.forces_n.sum(), rel=1e-3)
 
@@ -151,7 +151,7 @@ class Flat:
 )
 def test_what_cannot_be_touched_is_refused(press, surface, sensor, touch, says):
     given = surface or mesh(block((-30, -30, -5), (30, 30, 0)))
-    with pytest.raises(ContactError, match=says):
+    with pytest.raises(ProbeError, match=says):
         press(given, sensor, touch, TIPS)
 
 
