@@ -22,6 +22,7 @@ class ValidationBound:
     limit: float  #: a share, or in `unit`
     unit: str  #: empty: shares are bounded
     holds: bool
+    state: str  #: holds, fails, or too few touches to tell
     value: float | None  #: found: the share, or the size in `unit`; None: nothing to judge
     counted: tuple[int, int] | None = None  #: of a share: how many, of how many
     interval: tuple[float, float] | None = None  #: of a share, 95 %
@@ -61,8 +62,7 @@ class ValidationResult:
             f"{self.rejected:,} rejected; pose {_size(self.rms_mm, 'mm')}, "
             f"{_size(self.rms_deg, 'degrees')} rms ({self.seconds:.1f} s)"
         )
-        marks = (("holds" if bound.holds else "FAILS", bound) for bound in self.bounds)
-        return "\n".join([head, *(f"  {mark}  {bound}" for mark, bound in marks)])
+        return "\n".join([head, *(f"  {bound.state}: {bound}" for bound in self.bounds)])
 
     @property
     def holds(self) -> bool:
@@ -110,6 +110,7 @@ def bound_from(line: dict[str, Any]) -> ValidationBound:
         limit=line["bound"],
         unit=line["unit"],
         holds=line["holds"],
+        state=line["state"],
         value=line["share" if of_shares else "value"],
         counted=(line["count"], line["of"]) if of_shares else None,
         interval=(line["low"], line["high"]) if of_shares else None,

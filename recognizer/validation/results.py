@@ -29,6 +29,7 @@ from recognizer.validation.trial import REJECTED, RIGHT, WRONG
 Columns = dict[str, Any]
 Mask = NDArray[np.bool_]
 
+HOLDS, FAILS, UNTOLD = "holds", "fails", "too few touches to tell"  #: of a bound
 WORST = 20
 QUANTILES = (0.5, 0.9, 0.99, 1.0)
 
@@ -57,6 +58,7 @@ def results_of(rows: Columns) -> dict[str, Any]:
     return {
         "totals": line_of(rows, everything),
         "enough": line_of(rows, fair),
+        "worlds": _worlds(rows),
         "verdict": _verdict(rows, fair),
         "kinds": [
             {
@@ -141,12 +143,28 @@ def _verdict(rows: Columns, fair: Mask) -> list[dict[str, Any]]:
     ]
     found = []
     for name, value, sign, bound, unit in checks:
-        size = value["share"] if isinstance(value, dict) else value
-        holds = size is not None and (size >= bound if sign == ">=" else size <= bound)
         shown = value if isinstance(value, dict) else {"value": value}
-        line = {"name": name, "sign": sign, "bound": bound, "unit": unit, "holds": holds}
+        state = state_of(shown, sign, bound)
+        line = {"name": name, "sign": sign, "bound": bound, "unit": unit,
+                "holds": state == HOLDS, "state": state}  # fmt: skip
         found.append(line | shown)
     return found
+
+
+def state_of(found: dict[str, Any], sign: str, bound: float) -> str:
+    """Return whether a bound holds, fails, or the touches are too few to tell.
+
+    A share that must be reached holds or fails when its whole 95 % interval does; a count that
+    must be zero fails by one touch.
+    """
+    if "share" not in found:
+        size = found["value"]
+        return UNTOLD if size is None else HOLDS if size <= bound else FAILS
+    if sign == "=":
+        return HOLDS if found["count"] == bound else FAILS
+    if found["low"] >= bound:
+        return HOLDS
+    return FAILS if found["high"] < bound else UNTOLD
 
 
 def _confusion(rows: Columns, on_face: Mask) -> dict[str, Any]:
@@ -203,6 +221,20 @@ def _pose(rows: Columns) -> dict[str, Any]:
         if (here := right & (rows["level"] == level)).any()
     ]
     return found
+
+
+def _worlds(rows: Columns) -> list[dict[str, Any]]:
+    """Return what became of the touches of registered faces, by the sensor that felt them."""
+    on_face = _isin(rows["kind"], list(ON_FACES))
+    return [
+        {
+            "level": level,
+            **line_of(rows, here),
+            "inside_95": calibration(rows["chi2"][here & (rows["verdict"] == RIGHT)])[2],
+        }
+        for level in LEVELS
+        if (here := on_face & (rows["level"] == level)).any()
+    ]
 
 
 def _bins(rows: Columns, name: str, edges: list[float], where: Mask) -> list[dict[str, Any]]:

@@ -101,9 +101,35 @@ def test_counts_confusion_and_worst(tmp_path):
     result = result_from(found, 1.25, tmp_path)
     assert (result.holds, result.fair, result.fair_right) == (False, 9, 7)
     assert str(result).startswith("10 touches: 7 right, 1 wrong, 2 rejected; pose 0.15")
-    assert str(result).count("\n  FAILS  ") == 2
+    assert str(result).count("\n  fails: ") == 2
     assert result.as_json()["folder"] == str(tmp_path)
     json.dumps(found, allow_nan=False)
+
+
+def test_a_bound_is_told_by_enough_touches_alone(tmp_path):
+    few = results_of(columns([row(i) for i in range(20)], tmp_path / "few"))
+    many = results_of(columns([row(i) for i in range(800)], tmp_path / "many"))
+    most = [row(i) for i in range(790)] + [row(i, "rejected") for i in range(790, 800)]
+    below = results_of(columns(most, tmp_path / "below"))
+    # Wilson's interval of n of n begins at n / (n + 3.84): .995 takes 765 touches
+    assert [found["verdict"][1]["state"] for found in (few, many, below)] == [
+        "too few touches to tell", "holds", "fails",
+    ]  # fmt: skip
+    assert not few["verdict"][1]["holds"]
+
+
+def test_worlds_are_the_touches_of_faces_by_sensor(tmp_path):
+    rows = [
+        row(0, level="low"),
+        row(1, "rejected", level="low"),
+        row(2, level="mismatch", kind="edge", chi2=1.0),
+        row(3, level="mismatch", kind="corner", chi2=9.0),
+        row(4, "rejected", kind="blank", surface="blank", object="", face="", enough=False),
+    ]
+    low, mismatch = results_of(columns(rows, tmp_path))["worlds"]
+    assert (low["level"], low["touches"], low["right"], low["rejected"]) == ("low", 2, 1, 1)
+    assert (mismatch["touches"], mismatch["right"]) == (2, 2)
+    assert mismatch["inside_95"]["count"] == 1  # of the chi2 with 3 degrees of freedom: 7.81
 
 
 def test_a_wrong_answer_on_a_foreign_surface_is_named(tmp_path):
