@@ -64,7 +64,7 @@ LEVELS = {level.name: level for level in (LOW, TYPICAL, HARD, MISMATCH)}
 
 
 @dataclass(frozen=True, slots=True)
-class PrintedSurface:
+class DistortedSurface:
     """A surface as a printer leaves it: everything wider by a stroke's excess, and scaled."""
 
     surface: HeightMap
@@ -116,7 +116,7 @@ def read_sensor(
     shape = (sensor.rows, sensor.columns)
     if level.wider_mm > 0 or level.scale != 0:
         about = (touch.x_mm, touch.y_mm)
-        surface = PrintedSurface(surface, level.wider_mm, level.scale, about)
+        surface = DistortedSurface(surface, level.wider_mm, level.scale, about)
     contacts, tips = engine_named(engine), Tips()
     if sensor.overlay.kind == "tab":
         tips = Tips(
