@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import SensorType
-from recognizer.thesis.filters import median, sobel, touch_image, unbiased
+from recognizer.thesis.filters import median, sobel, unbiased
+from recognizer.touch.tactile_image import touch_image
 
 Array = NDArray[np.float64]
 

@@ -50,7 +50,7 @@ Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Located:
+class LocatedComposite:
     """A place of a composite."""
 
     encoding: EmbossedArray
@@ -71,7 +71,7 @@ class Located:
         held = self.encoding.face(self.place.face)
         return held.object, held.face
 
-    def same(self, other: Located) -> bool:
+    def same(self, other: LocatedComposite) -> bool:
         """Whether two say the same place, up to a cell's rounding."""
         if self.encoding is not other.encoding or self.place.face != other.place.face:
             return False
@@ -83,10 +83,10 @@ def located(
     composites: Sequence[Composite],
     limits: ScanSettings,
     settings: HypothesisSettings,
-) -> list[Located]:
+) -> list[LocatedComposite]:
     """Return the likeliest places of composites of one encoding."""
     settings = replace(settings, kept=limits.places)
-    found: list[Located] = []
+    found: list[LocatedComposite] = []
     for each in composites[: limits.located]:
         fit = each.fit
         told = np.median(-fit.scores, axis=1)
@@ -96,13 +96,17 @@ def located(
         )
         for place in find_hypotheses(encoding, (listed,), settings):
             score = log_likelihood(encoding, fit, place, settings)
-            found.append(Located(encoding, each, replace(place, score=score), fit, score))
+            found.append(LocatedComposite(encoding, each, replace(place, score=score), fit, score))
     return found
 
 
 def posed(
-    reader: Reader, image: Image, template: ResponseTemplate, found: Located, limits: ScanSettings
-) -> Located:
+    reader: Reader,
+    image: Image,
+    template: ResponseTemplate,
+    found: LocatedComposite,
+    limits: ScanSettings,
+) -> LocatedComposite:
     """Return a place whose last touch was fitted again with the symbols that belong there."""
     encoding, place, fit = found.encoding, found.place, found.fit
     worn = fit.cells[weigh_cells(encoding, fit, place, reader.settings.belief).worn]
@@ -136,7 +140,7 @@ def posed(
 
 def answered(
     reader: Reader,
-    found: Sequence[Located],
+    found: Sequence[LocatedComposite],
     limits: ScanSettings,
     seq: int,
     *,
@@ -163,7 +167,7 @@ def answered(
 
 
 def _doubt(
-    reader: Reader, best: Located, margin: float, limits: ScanSettings, *, by_hand: bool
+    reader: Reader, best: LocatedComposite, margin: float, limits: ScanSettings, *, by_hand: bool
 ) -> str:
     """Return why the best place may not be believed; nothing if it may."""
     encoding, fit, place = best.encoding, best.fit, best.place

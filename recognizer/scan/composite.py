@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from recognizer.scan.lattice import Agreement, expected_at
 from recognizer.scan.settings import ScanSettings
-from recognizer.scan.views import Stands, Views
+from recognizer.scan.views import LatticeViews, Stands
 from recognizer.touch.symbols.fit import Fit
 
 Array = NDArray[np.float64]
@@ -31,7 +31,7 @@ class Composite:
 
 
 def composite(
-    views: Views, stands: Stands, agreement: Agreement, pitch_mm: float, limits: ScanSettings
+    views: LatticeViews, stands: Stands, agreement: Agreement, pitch_mm: float, limits: ScanSettings
 ) -> Composite | None:
     """Return the sum of what agrees; None where nothing does."""
     contradicting = True
@@ -84,7 +84,7 @@ def expected_fit(found: Composite, stands: Stands) -> Fit:
 
 
 def _summed(
-    views: Views, agreement: Agreement, limits: ScanSettings
+    views: LatticeViews, agreement: Agreement, limits: ScanSettings
 ) -> tuple[Ints, Array, Array, Array, Array]:
     """Return cells, scores, how much is seen, looks, and (n,) what each touch is contradicted."""
     touches = np.flatnonzero(agreement.chosen >= 0)

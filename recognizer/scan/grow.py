@@ -9,15 +9,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.scan.answer import Located, answered, located, posed
+from recognizer.scan.answer import LocatedComposite, answered, located, posed
 from recognizer.scan.composite import Composite, composite, expected_fit
 from recognizer.scan.lattice import PlaneLattice, agreed, alike, expected_at, seeded
 from recognizer.scan.mosaic.touch import PlacedTouch
 from recognizer.scan.settings import ScanSettings
 from recognizer.scan.views import (
+    LatticeView,
+    LatticeViews,
     Stands,
-    View,
-    Views,
     fits_of,
     is_unmeasured,
     round_views,
@@ -49,11 +49,11 @@ class ScanBelief:
     settings: ScanSettings
     touches: tuple[PlacedTouch, ...]  #: those with contact
     stands: Stands | None
-    views: tuple[tuple[tuple[View, ...], ...], ...]  #: of each encoding, of each touch
+    views: tuple[tuple[tuple[LatticeView, ...], ...], ...]  #: of each encoding, of each touch
     lattices: tuple[tuple[PlaneLattice, ...], ...]  #: of each encoding, best first
     astray: int  #: touches in a row that agree with nothing that the others say
     told: tuple[str | None, str | None] | None  #: object and face by a touch that agreed
-    leading: Located | None  #: the likeliest place, whether it is the answer or not
+    leading: LocatedComposite | None  #: the likeliest place, whether it is the answer or not
     recognition: Recognition  #: of the probe's pose at the last touch
 
 
@@ -150,8 +150,12 @@ def extend_scan(scan: ScanBelief, touch: PlacedTouch) -> ScanBelief:
 
 
 def _posed(
-    reader: Reader, images: list[Image], best: Located, stands: Stands, limits: ScanSettings
-) -> tuple[Located, bool]:
+    reader: Reader,
+    images: list[Image],
+    best: LocatedComposite,
+    stands: Stands,
+    limits: ScanSettings,
+) -> tuple[LocatedComposite, bool]:
     """Return a place with the pose of the last touch, and whether that touch agrees with it."""
     if best.composite.agreement.chosen[-1] >= 0:
         k = next(n for n, each in enumerate(reader.prepared) if each[0] is best.encoding)
@@ -186,7 +190,7 @@ def _believed(
     return answer, named
 
 
-def _tells_alone(reader: Reader, views: list[tuple[tuple[View, ...], ...]]) -> bool:
+def _tells_alone(reader: Reader, views: list[tuple[tuple[LatticeView, ...], ...]]) -> bool:
     """Whether the last touch shows cells enough for an answer, if they were all clear."""
     least = reader.settings.belief.surprise + reader.settings.belief.margin
     for (encoding, _, _), each in zip(reader.prepared, views, strict=True):
@@ -212,7 +216,7 @@ def _near(lattices: tuple[PlaneLattice, ...], stands: Stands) -> Array:
 
 
 def _composites(
-    views: Views,
+    views: LatticeViews,
     stands: Stands,
     before: tuple[PlaneLattice, ...],
     pitch_mm: float,

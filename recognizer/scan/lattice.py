@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from recognizer.scan.mosaic.planar import composed, inverse, wrapped
 from recognizer.scan.settings import ScanSettings
-from recognizer.scan.views import Stands, Views
+from recognizer.scan.views import LatticeViews, Stands
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -47,7 +47,7 @@ class Agreement:
     score: float  #: their sum
 
 
-def seeded(views: Views, stands: Stands, view: int) -> PlaneLattice:
+def seeded(views: LatticeViews, stands: Stands, view: int) -> PlaneLattice:
     """Return the lattice that one view shows."""
     touch, pose = int(views.touch[view]), views.poses[view]
     T_lattice_plane = composed(pose, inverse(stands.poses[touch]))
@@ -57,7 +57,11 @@ def seeded(views: Views, stands: Stands, view: int) -> PlaneLattice:
 
 
 def agreed(
-    views: Views, stands: Stands, lattice: PlaneLattice, pitch_mm: float, limits: ScanSettings
+    views: LatticeViews,
+    stands: Stands,
+    lattice: PlaneLattice,
+    pitch_mm: float,
+    limits: ScanSettings,
 ) -> Agreement:
     """Return what agrees with a lattice, and the lattice moved to where that wants it."""
     found = _agreed(views, stands, lattice, pitch_mm, limits)
@@ -86,7 +90,11 @@ def expected_at(lattice: PlaneLattice, pose: Array, covariance: Array) -> tuple[
 
 
 def _agreed(
-    views: Views, stands: Stands, lattice: PlaneLattice, pitch_mm: float, limits: ScanSettings
+    views: LatticeViews,
+    stands: Stands,
+    lattice: PlaneLattice,
+    pitch_mm: float,
+    limits: ScanSettings,
 ) -> Agreement:
     number = len(stands.poses)
     expected = composed(lattice.T_lattice_plane, stands.poses)
@@ -112,7 +120,7 @@ def _agreed(
     return Agreement(lattice, chosen, taken, expected, best, float(best.sum()))
 
 
-def _away(views: Views, expected: Array, pitch_mm: float) -> tuple[Array, Ints]:
+def _away(views: LatticeViews, expected: Array, pitch_mm: float) -> tuple[Array, Ints]:
     """Return how far (m, 3) views lie from what is expected, and whole pitches (m, 2) beyond."""
     away = views.poses - expected[views.touch]
     shifts = np.rint(away[:, :2] / pitch_mm)
@@ -122,7 +130,11 @@ def _away(views: Views, expected: Array, pitch_mm: float) -> tuple[Array, Ints]:
 
 
 def _own(
-    views: Views, stands: Stands, lattice: PlaneLattice, expected: Array, limits: ScanSettings
+    views: LatticeViews,
+    stands: Stands,
+    lattice: PlaneLattice,
+    expected: Array,
+    limits: ScanSettings,
 ) -> Array:
     """Return covariances (m, 3, 3) of views against a lattice that is known exactly."""
     turned = _turned(stands.covariances, float(lattice.T_lattice_plane[2]))[views.touch]
@@ -144,7 +156,7 @@ def _sure(away: Array, precision: Array, pitch_mm: float, margin: float) -> NDAr
 
 
 def _moved(
-    views: Views, stands: Stands, found: Agreement, pitch_mm: float, limits: ScanSettings
+    views: LatticeViews, stands: Stands, found: Agreement, pitch_mm: float, limits: ScanSettings
 ) -> PlaneLattice:
     """Return the lattice where the chosen views want it."""
     chosen = found.chosen[found.chosen >= 0]

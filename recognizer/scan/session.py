@@ -14,7 +14,7 @@ from probe.arm.carried import SensorPose
 from probe.sensor import SensorType
 from recognizer.scan.grow import begin_scan, extend_scan
 from recognizer.scan.mosaic.planar import planar_covariance, planar_pose
-from recognizer.scan.mosaic.touch import Placed, PlacedTouch, placed
+from recognizer.scan.mosaic.touch import PlacedTouch, PlanarBelief, placed
 from recognizer.scan.settings import ScanSettings
 from recognizer.touch.contacts import TouchImage
 from recognizer.touch.lab import Lab
@@ -147,7 +147,7 @@ class TouchPlaces:
             step = self._within(_inverse(_matrix(self._before)), pose)
         return PlacedTouch(signal, stepped=step, seq=seq)
 
-    def _within(self, T_plane_base: Array, pose: SensorPose | ArrayLike) -> Placed:
+    def _within(self, T_plane_base: Array, pose: SensorPose | ArrayLike) -> PlanarBelief:
         at = planar_pose(T_plane_base @ _matrix(pose))
         return placed(at, self._spread(pose, _inverse(T_plane_base)))
 

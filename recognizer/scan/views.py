@@ -46,7 +46,7 @@ class Stands:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class View:
+class LatticeView:
     """One lattice that a touch may show."""
 
     fit: Fit
@@ -54,7 +54,7 @@ class View:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Views:
+class LatticeViews:
     """All lattices that touches may show, one after the other: m views of n touches."""
 
     fits: tuple[Fit, ...]
@@ -117,7 +117,7 @@ def fits_of(
     *,
     known: bool,
     hard: bool,
-) -> tuple[View, ...]:
+) -> tuple[LatticeView, ...]:
     """Return the likeliest lattices of an image, and those that lie near given ones.
 
     The latter leave more unexplained, and so say less of each cell, if the image shows what
@@ -138,16 +138,16 @@ def fits_of(
     if known and len(near):
         expected = _near(image, template, settings, near[:1], None)
         if expected and expected[0].noise <= clean:
-            return (View(expected[0], led=True),)
+            return (LatticeView(expected[0], led=True),)
     found = fit_lattices(image, template, bank, settings)
     if hard and found and found[0].noise > clean:
         found = fit_lattices(image, template, bank, reader.settings.thorough)
-    views = tuple(View(fit, led=False) for fit in found)
+    views = tuple(LatticeView(fit, led=False) for fit in found)
     rest = [pose for pose in near if not any(_same(pose, f, template.pitch_mm) for f in found)]
     for fit in _near(image, template, settings, np.array(rest).reshape(-1, 3), found):
         pose = np.array([fit.x_mm, fit.y_mm, fit.theta_rad])
         if not any(_same(pose, view.fit, template.pitch_mm) for view in views):
-            views = (*views, View(fit, led=True))
+            views = (*views, LatticeView(fit, led=True))
     return views
 
 
@@ -158,7 +158,7 @@ def round_views(
     reader: Reader,
     encoding: EmbossedArray,
     near: Array,
-) -> tuple[View, ...]:
+) -> tuple[LatticeView, ...]:
     """Return the likeliest lattices of an image of a round face, and those near given ones.
 
     Parameters
@@ -169,16 +169,16 @@ def round_views(
         (k, 3) as for `fits_of`.
     """
     settings = reader.settings
-    views: list[View] = []
+    views: list[LatticeView] = []
     for guess in guess_bends(
         image, reader.sensor, encoding.radii_mm, template.ink, settings.round.bends
     ):
         under = bend_image(image, reader.sensor, guess.bend)
         found = fit_lattices(under, template, bank, settings.first, [guess.gain])
-        views += [View(fit, led=False) for fit in found]
+        views += [LatticeView(fit, led=False) for fit in found]
         rest = [pose for pose in near if not any(_same(pose, f, template.pitch_mm) for f in found)]
         led = _near(under, template, settings.first, np.array(rest).reshape(-1, 3), found)
-        views += [View(fit, led=True) for fit in led]
+        views += [LatticeView(fit, led=True) for fit in led]
     return tuple(views)
 
 
@@ -198,7 +198,7 @@ def _near(
     return score_cells(image, template, lattices)
 
 
-def views_of(found: Sequence[tuple[View, ...]]) -> Views:
+def views_of(found: Sequence[tuple[LatticeView, ...]]) -> LatticeViews:
     """Return the views of touches. Fits that do not say where they lie are left out."""
     kept = [tuple(view for view in each if tells_place(view.fit.covariance)) for each in found]
     every = tuple(view.fit for each in kept for view in each)
@@ -206,7 +206,7 @@ def views_of(found: Sequence[tuple[View, ...]]) -> Views:
     values = np.array([fit.value for fit in every])
     best = np.full(len(kept), -np.inf)
     np.maximum.at(best, touch, values)
-    return Views(
+    return LatticeViews(
         fits=every,
         led=np.array([view.led for each in kept for view in each], np.bool_),
         touch=touch,

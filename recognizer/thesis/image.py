@@ -22,14 +22,9 @@ from numpy.typing import ArrayLike, NDArray
 from probe.sensor import SensorType
 from recognizer.scan.mosaic.planar import between, composed, inverse, moved, planar_pose
 from recognizer.scan.mosaic.raster import MAGNIFIED
-from recognizer.thesis.filters import (
-    ImageError,
-    TactileImage,
-    magnified,
-    tactile_image,
-    touch_image,
-)
+from recognizer.thesis.filters import magnified
 from recognizer.thesis.product import product_shift
+from recognizer.touch.tactile_image import ImageError, TactileImage, tactile_image, touch_image
 
 Array = NDArray[np.float64]
 
@@ -48,7 +43,7 @@ class Merging:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class GlobalImage:
+class MergedImage:
     """The thesis's GTI, and where its touches were laid."""
 
     image: TactileImage  #: four samples to a tactel; frame: the sensor frame of the first touch
@@ -90,7 +85,7 @@ def merged(
     poses: ArrayLike,
     merging: Merging | None = None,
     trust: ArrayLike | None = None,
-) -> GlobalImage:
+) -> MergedImage:
     """Merge the touches of a scan.
 
     Parameters
@@ -129,7 +124,7 @@ def merged(
             step = np.array([*shift, step[2]])
         placed[k] = composed(placed[k - 1 if near is None else near], step)
         corrected[k] = shift is not None
-    return GlobalImage(laid(sensor, images, placed), placed, corrected)
+    return MergedImage(laid(sensor, images, placed), placed, corrected)
 
 
 def laid(sensor: SensorType, images: Sequence[TactileImage], placed: Array) -> TactileImage:

@@ -30,10 +30,9 @@ from decoder import (
     decode_good_tuple,
 )
 from generator.array import ProductArray
-from recognizer.thesis.filters import TactileImage, median, unbiased
+from recognizer.thesis.filters import median, unbiased
 from recognizer.thesis.grid import Acceptance, Grid, grid
-from recognizer.thesis.skeleton import symbols as by_skeleton
-from recognizer.thesis.skeleton.symbols import Symbol, symbols
+from recognizer.thesis.skeleton.symbols import SkeletonSettings, Symbol, symbols
 from recognizer.touch.lab import EmbossedArray, Lab
 from recognizer.touch.locate import Hypothesis
 from recognizer.touch.pose import face_covariance, face_pose, inside_mm, pose_on_object
@@ -48,6 +47,7 @@ from recognizer.touch.recognition import (
     refusal,
 )
 from recognizer.touch.symbols.fit import Fit
+from recognizer.touch.tactile_image import TactileImage
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -56,11 +56,11 @@ Conversion = Literal["likelihood", "good tuple", "exact"]
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class ThesisSettings:
     """How the stages work, and when an answer is given."""
 
     median: bool = True  #: where strokes are wide enough to survive it
-    symbols: by_skeleton.Settings = field(default_factory=by_skeleton.Settings)
+    symbols: SkeletonSettings = field(default_factory=SkeletonSettings)
     acceptance: Acceptance = field(default_factory=Acceptance)
     conversion: Conversion = "likelihood"
     error: float = 0.02  #: probability that a symbol is read wrong (likelihood)
@@ -81,7 +81,7 @@ class ClassicalReading:
 def read_classically(
     lab: Lab,
     image: TactileImage,
-    settings: Settings | None = None,
+    settings: ThesisSettings | None = None,
     *,
     T_image_probe: Array | None = None,
     seq: int = 0,
@@ -107,7 +107,7 @@ def read_classically(
     ClassicalReading
         Its margin is the decoder's, in nats; None with conversions that weigh nothing.
     """
-    chosen = settings or Settings()
+    chosen = settings or ThesisSettings()
     over = unbiased(image)
     if not over.values.any():
         return ClassicalReading(refusal(seq, NO_CONTACT), None, (), None)
@@ -129,7 +129,11 @@ def _seen(reading: ClassicalReading) -> int:
 
 
 def _read(
-    encoding: EmbossedArray, image: TactileImage, settings: Settings, T_image_probe: Array, seq: int
+    encoding: EmbossedArray,
+    image: TactileImage,
+    settings: ThesisSettings,
+    T_image_probe: Array,
+    seq: int,
 ) -> ClassicalReading:
     style = encoding.style
     filtered = image
@@ -144,7 +148,7 @@ def _read(
     return ClassicalReading(answer, encoding, found, laid)
 
 
-def _converted(encoding: EmbossedArray, laid: Grid, settings: Settings) -> Decoded:
+def _converted(encoding: EmbossedArray, laid: Grid, settings: ThesisSettings) -> Decoded:
     """Return the place of a window by the conversion that is asked for."""
     array = encoding.array
     if settings.conversion == "exact":
@@ -179,7 +183,7 @@ def _answered(
     encoding: EmbossedArray,
     laid: Grid,
     decoded: Decoded,
-    settings: Settings,
+    settings: ThesisSettings,
     T_image_probe: Array,
     seq: int,
 ) -> Recognition:

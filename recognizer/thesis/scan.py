@@ -21,8 +21,8 @@ from recognizer.scan.mosaic.grow import added
 from recognizer.scan.mosaic.mosaic import no_touches
 from recognizer.scan.session import TouchPlaces
 from recognizer.scan.settings import ScanSettings
-from recognizer.thesis.image import GlobalImage, Merging, merged
-from recognizer.thesis.read import ClassicalReading, Settings, read_classically
+from recognizer.thesis.image import MergedImage, Merging, merged
+from recognizer.thesis.read import ClassicalReading, ThesisSettings, read_classically
 from recognizer.touch.lab import Lab
 from recognizer.touch.recognition import NO_CONTACT, TOO_FEW, Recognition, refusal
 from recognizer.touch.signal import Signal, signal_of
@@ -35,7 +35,7 @@ class ScanReading:
     """The answer to a scan and how it came about."""
 
     recognition: Recognition  #: of the probe's pose at the last touch
-    merged: GlobalImage
+    merged: MergedImage
     reading: ClassicalReading
 
 
@@ -44,7 +44,7 @@ def read_scan(
     sensor: SensorType,
     readings: Sequence[ArrayLike],
     poses: ArrayLike,
-    settings: Settings | None = None,
+    settings: ThesisSettings | None = None,
     merging: Merging | None = None,
     *,
     trust: ArrayLike | None = None,
@@ -94,7 +94,7 @@ def read_while_scanning(
     sensor: SensorType,
     readings: Sequence[ArrayLike],
     poses: ArrayLike,
-    settings: Settings | None = None,
+    settings: ThesisSettings | None = None,
     merging: Merging | None = None,
     every: int = 1,
 ) -> Iterator[ScanReading]:
@@ -129,7 +129,7 @@ class ThesisScan:
         lab: Lab,
         *,
         sensor: SensorType | None = None,
-        settings: Settings | None = None,
+        settings: ThesisSettings | None = None,
         merging: Merging | None = None,
         every: int = 8,
     ) -> None:

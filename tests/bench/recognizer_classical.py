@@ -36,13 +36,14 @@ from probe.surface.face import FaceSurface
 from probe.surface.polygon import polygon
 from recognizer.scan.mosaic.planar import between, moved
 from recognizer.thesis.edges.find import classical_edges, outline
-from recognizer.thesis.filters import median, touch_image, unbiased
+from recognizer.thesis.filters import median, unbiased
 from recognizer.thesis.grid import grid
 from recognizer.thesis.image import Merging, merged
 from recognizer.thesis.read import read_classically
 from recognizer.thesis.scan import read_while_scanning, spatial_pose
 from recognizer.thesis.skeleton.symbols import symbols
 from recognizer.touch.lab import open_lab
+from recognizer.touch.tactile_image import touch_image
 
 SENSOR = SensorType()
 LEVELS = ("typical", "mismatch")

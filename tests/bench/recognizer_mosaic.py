@@ -42,7 +42,7 @@ from probe.simulate.registered import registered_object, registered_surface
 from recognizer.scan.mosaic.grow import added, settled
 from recognizer.scan.mosaic.mosaic import Mosaic, MosaicSettings, no_touches, outliers
 from recognizer.scan.mosaic.pair import registered
-from recognizer.scan.mosaic.patch import Patch, patch_of
+from recognizer.scan.mosaic.patch import TouchPatch, patch_of
 from recognizer.scan.mosaic.planar import (
     between,
     between_covariance,
@@ -51,7 +51,7 @@ from recognizer.scan.mosaic.planar import (
     planar_pose,
     wrapped,
 )
-from recognizer.scan.mosaic.touch import Placed, PlacedTouch, decoded_place, placed
+from recognizer.scan.mosaic.touch import PlacedTouch, PlanarBelief, decoded_place, placed
 from recognizer.thesis.product import product_shift
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
@@ -74,7 +74,7 @@ class Scan:
     """What was felt, believed and true."""
 
     signals: list[Signal]
-    believed: list[Placed]  #: in the plane that the operator taught
+    believed: list[PlanarBelief]  #: in the plane that the operator taught
     true: np.ndarray  #: (n, 3) T_face_sensor
     pitch_mm: float
 
@@ -141,7 +141,7 @@ def shape_errors(poses: np.ndarray, true: np.ndarray) -> np.ndarray:
     return np.hypot(*(b - a @ np.array([[c, s], [-s, c]])).T) / P
 
 
-def pairs(scan: Scan, patches: list[Patch]) -> None:
+def pairs(scan: Scan, patches: list[TouchPatch]) -> None:
     """Print pair registration, ours and the thesis's, and the drift of chains of them."""
     at = np.array([place.pose for place in scan.believed])
     ours, theirs, turns, inside, why = [], [], [], [], Counter()
@@ -291,7 +291,7 @@ def measure(database: str, profile: str, tactels: float, counts: bool, seed: int
     told("steps", scan, steps, face=True)
 
 
-def touches_of(scan: Scan, decoded: dict[int, Placed]) -> list[PlacedTouch]:
+def touches_of(scan: Scan, decoded: dict[int, PlanarBelief]) -> list[PlacedTouch]:
     """Return the touches of a scan, some of them decoded."""
     return [
         PlacedTouch(signal, believed=believed, decoded=decoded.get(k), seq=k)

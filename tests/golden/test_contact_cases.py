@@ -29,6 +29,7 @@ from probe.surface.polygon import polygon
 from recognizer.scan.mosaic.pair import registered
 from recognizer.scan.mosaic.patch import patch_of
 from recognizer.scan.mosaic.planar import composed
+from recognizer.touch.settings import SignalSettings
 from recognizer.touch.signal import signal_of
 
 SENSORS = {kind: SensorType(overlay=Overlay(kind=kind)) for kind in ("tab", "pad")}
@@ -43,6 +44,8 @@ GLYPHS = (
 EVERY_LEVEL = [
     (kind, level) for kind, levels in LEVELS.items() for level in levels if level != "elements"
 ]
+
+FELT = SignalSettings(contact_counts=0.1)  #: of newtons without a calibration
 
 
 @pytest.mark.parametrize(("kind", "level"), EVERY_LEVEL)
@@ -181,7 +184,7 @@ def test_case_12_raw_products_fail_where_registration_does_not(scene):
         images = [felt(faces[pair % 2], at) for at in (place, composed(place, true))]
         shift = raw_product(*images, believed[:2] / P, 4)
         raw_wrong += math.hypot(*(shift - true[:2] / P)) > 1
-        patches = [patch_of(TAB, signal_of(image, floor=0.0, least=0.1)) for image in images]
+        patches = [patch_of(TAB, signal_of(image, floor=0.0, settings=FELT)) for image in images]
         found = registered(*patches, believed, spread, period_mm=7.0)
         answered += bool(found)
         wrong += bool(found) and math.hypot(*(found.pose - true)[:2]) > P

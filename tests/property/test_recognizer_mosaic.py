@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from probe.sensor import SensorType
 from recognizer.scan.mosaic.canvas import Laid, empty_canvas, laid
 from recognizer.scan.mosaic.correlation import correlated
-from recognizer.scan.mosaic.graph import PLANE, Tie, covariances, solved
+from recognizer.scan.mosaic.graph import PLANE, Constraint, covariances, solved
 from recognizer.scan.mosaic.image import image_of
 from recognizer.scan.mosaic.patch import patch_of
 from recognizer.scan.mosaic.planar import between, composed, inverse, moved
-from recognizer.scan.mosaic.raster import Raster
+from recognizer.scan.mosaic.raster import KnownRaster
 from recognizer.touch.signal import signal_of
 
 SENSOR = SensorType()
@@ -46,9 +46,9 @@ def test_gain_and_offset_leave_the_correlation_as_it_is(seed, gain, offset):
     rng = np.random.default_rng(seed)
     values, known = rng.normal(size=(14, 13)), rng.random((14, 13)) > 0.1
     image, seen = rng.normal(size=(9, 9)), rng.random((9, 9)) > 0.1
-    first = correlated(Raster(values, known, 0, 0, 1), Raster(image, seen, 0, 0, 1))
-    other = Raster(gain * image + offset, seen, 0, 0, 1)
-    second = correlated(Raster(values, known, 0, 0, 1), other)
+    first = correlated(KnownRaster(values, known, 0, 0, 1), KnownRaster(image, seen, 0, 0, 1))
+    other = KnownRaster(gain * image + offset, seen, 0, 0, 1)
+    second = correlated(KnownRaster(values, known, 0, 0, 1), other)
     assert second.rho == pytest.approx(first.rho, abs=1e-4, nan_ok=True)
     assert np.nanmax(np.abs(first.rho)) <= 1
 
@@ -83,15 +83,15 @@ def test_the_order_of_touches_does_not_matter_to_the_canvas(seed, places):
 @settings(max_examples=20, deadline=None)
 def test_whatever_the_ties_say_there_is_a_pose_with_a_covariance(seed, n):
     rng = np.random.default_rng(seed)
-    ties = []
+    constraints = []
     for k in range(n):
         sure = np.diag(10.0 ** rng.uniform(-2, 6, 3))
-        ties.append(Tie(PLANE, k, rng.normal(0, [50, 50, 2]), sure, "decoded"))
+        constraints.append(Constraint(PLANE, k, rng.normal(0, [50, 50, 2]), sure, "decoded"))
     for _ in range(3 * n):
         a, b = rng.choice(n, 2, replace=False).tolist()
         root = rng.normal(size=(3, rng.integers(1, 4))) * 10.0 ** rng.uniform(-2, 3)
-        ties.append(Tie(a, b, rng.normal(0, [50, 50, 2]), root @ root.T, "pair"))
-    found = solved(ties, rng.normal(0, 50, (n, 3)), np.zeros(3), arm_stands=True)
+        constraints.append(Constraint(a, b, rng.normal(0, [50, 50, 2]), root @ root.T, "pair"))
+    found = solved(constraints, rng.normal(0, 50, (n, 3)), np.zeros(3), arm_stands=True)
     assert np.isfinite(found.poses).all()
     assert ((found.weights > 0) & (found.weights <= 1)).all()
     spread = covariances(found.normal, range(n))

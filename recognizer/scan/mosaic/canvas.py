@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.scan.mosaic.patch import Patch, asked, covered, nearest
+from recognizer.scan.mosaic.patch import TouchPatch, asked, covered, nearest
 from recognizer.scan.mosaic.planar import inverse, moved
-from recognizer.scan.mosaic.raster import MAGNIFIED, Raster
+from recognizer.scan.mosaic.raster import MAGNIFIED, KnownRaster
 
 Array = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ def empty_canvas(pitch_mm: float) -> Canvas:
     return Canvas(pitch_mm / MAGNIFIED, {})
 
 
-def laid(canvas: Canvas, patch: Patch, how: Laid, sign: int = 1) -> Canvas:
+def laid(canvas: Canvas, patch: TouchPatch, how: Laid, sign: int = 1) -> Canvas:
     """Return the canvas with a touch more, or with one less (sign -1)."""
     h, (half_x, half_y) = canvas.cell_mm, patch.sensor.half_mm
     x, y, theta = how.pose.tolist()
@@ -89,7 +89,7 @@ def cut(canvas: Canvas, i0: int, j0: int, rows: int, columns: int) -> Array:
     return found
 
 
-def reference(canvas: Canvas, x_mm: float, y_mm: float, reach_mm: float) -> Raster:
+def reference(canvas: Canvas, x_mm: float, y_mm: float, reach_mm: float) -> KnownRaster:
     """Return the mean about a place, for `search`."""
     h = canvas.cell_mm
     size = 2 * math.ceil(reach_mm / h)
@@ -97,7 +97,7 @@ def reference(canvas: Canvas, x_mm: float, y_mm: float, reach_mm: float) -> Rast
     sums = cut(canvas, i0, j0, size, size)
     known = sums[COUNT] > 0.5
     values = np.where(known, sums[VALUE] / np.where(known, sums[WEIGHT], 1.0), 0.0)
-    return Raster(values, known, (j0 + 0.5) * h, -(i0 + 0.5) * h, h)
+    return KnownRaster(values, known, (j0 + 0.5) * h, -(i0 + 0.5) * h, h)
 
 
 def _put(canvas: Canvas, sums: Array, i0: int, j0: int) -> Canvas:

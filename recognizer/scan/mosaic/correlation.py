@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.scan.mosaic.raster import Raster
+from recognizer.scan.mosaic.raster import KnownRaster
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ class Correlation:
     overlap: Array  #: the same shape, cells that both know
 
 
-def correlated(reference: Raster, image: Raster) -> Correlation:
+def correlated(reference: KnownRaster, image: KnownRaster) -> Correlation:
     """Correlate an image with a reference that reaches further on all sides.
 
     Parameters
@@ -107,7 +107,7 @@ def _vertex(before: float, at: float, after: float) -> float:
     return min(0.5, max(-0.5, 0.5 * (before - after) / bend))
 
 
-def _centred(raster: Raster) -> Array:
+def _centred(raster: KnownRaster) -> Array:
     """Return values less their mean (sums of squares then lose no digits), 0 where not known."""
     mean = float(raster.values[raster.known].mean()) if raster.known.any() else 0.0
     return np.where(raster.known, raster.values - mean, 0.0)

@@ -1,14 +1,14 @@
 """Beliefs, steps, pairs and decoded places -> the poses that agree with them best. Thesis 4.3.
 
-Every tie says where frame b lies in frame a, and how sure it is:
+Every constraint says where frame b lies in frame a, and how sure it is:
 
     face   - touch    decoded by the reader
     arm    - touch    believed by the arm, in a frame of its own
     touch  - touch    registered images (`pair`), or a step that was counted on the way
 
-so there is one residual, r = T_a^-1 T_b - z. A tie that disagrees with the rest is let go: its
-chi^2 is scaled by s^2, s = min(1, 2 f / (f + chi^2)), which leaves good ties as they are
-(dynamic covariance scaling). Levenberg-Marquardt on sparse normal equations.
+so there is one residual, r = T_a^-1 T_b - z. A constraint that disagrees with the rest is let go:
+its chi^2 is scaled by s^2, s = min(1, 2 f / (f + chi^2)), which leaves good constraints as they
+are (dynamic covariance scaling). Levenberg-Marquardt on sparse normal equations.
 
 Agarwal, Tipaldi, Spinello, Stachniss and Burgard, "Robust map optimization using dynamic
 covariance scaling", ICRA 2013. Kuemmerle et al., "g2o", ICRA 2011.
@@ -32,15 +32,15 @@ PLANE, ARM = -2, -1  #: the mosaic's frame, which stands fast, and the arm's
 
 Kind = Literal["decoded", "believed", "stepped", "pair"]
 
-FREE = 16.0  #: chi^2 of three numbers from which a tie is doubted
+FREE = 16.0  #: chi^2 of three numbers from which a constraint is doubted
 OUTLIER = 0.5  #: s^2 under which it is reported
 STEPS = 30
 DONE_MM, DONE_RAD = 1e-4, 1e-6
-_LEAST = 1e-4  # s^2 of a tie that is let go; keeps everything somewhere
+_LEAST = 1e-4  # s^2 of a constraint that is let go; keeps everything somewhere
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tie:
+class Constraint:
     """Where frame b lies in frame a."""
 
     a: int  #: number of a touch, PLANE or ARM
@@ -52,24 +52,26 @@ class Tie:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Solved:
+class PoseGraphSolution:
     """Poses and what is known of them."""
 
     poses: Array  #: (n, 3) T_plane_touch
     arm: Array  #: (3,) T_plane_arm
-    chi2: Array  #: (m,) of each tie
-    weights: Array  #: (m,) 0 ... 1; under `OUTLIER` a tie is taken as wrong
+    chi2: Array  #: (m,) of each constraint
+    weights: Array  #: (m,) 0 ... 1; under `OUTLIER` a constraint is taken as wrong
     cost: float
     steps: int
     normal: Any  #: sparse matrix (3 n + 3) square, inverse covariance of poses and arm
 
 
-def solved(ties: Sequence[Tie], poses: Array, arm: Array, *, arm_stands: bool) -> Solved:
-    """Return the poses that agree best with all ties.
+def solved(
+    constraints: Sequence[Constraint], poses: Array, arm: Array, *, arm_stands: bool
+) -> PoseGraphSolution:
+    """Return the poses that agree best with all constraints.
 
     Parameters
     ----------
-    ties
+    constraints
         Every touch must hang on the plane by some of them.
     poses, arm
         (n, 3) and (3,) to start from.
@@ -79,7 +81,7 @@ def solved(ties: Sequence[Tie], poses: Array, arm: Array, *, arm_stands: bool) -
     from scipy.sparse import diags
     from scipy.sparse.linalg import splu
 
-    graph = _graph(ties, len(poses), arm_stands=arm_stands)
+    graph = _graph(constraints, len(poses), arm_stands=arm_stands)
     at = np.concatenate([poses, arm[None]])
     damping, steps = 1e-6, 0
     now = _linear(graph, at)
@@ -97,11 +99,11 @@ def solved(ties: Sequence[Tie], poses: Array, arm: Array, *, arm_stands: bool) -
         at, now = moved, then
         if np.abs(step[:, :2]).max() < DONE_MM and np.abs(step[:, 2]).max() < DONE_RAD:
             break
-    return Solved(at[:-1], at[-1], now.chi2, now.weights, now.cost, steps, now.normal)
+    return PoseGraphSolution(at[:-1], at[-1], now.chi2, now.weights, now.cost, steps, now.normal)
 
 
 def covariances(normal: Any, numbers: Sequence[int]) -> Array:
-    """Return (k, 3, 3) of some poses of `Solved.normal`, x, y (mm) and theta (rad).
+    """Return (k, 3, 3) of some poses of `PoseGraphSolution.normal`, x, y (mm) and theta (rad).
 
     The arm's frame has the number n, after all touches.
     """
@@ -144,16 +146,16 @@ class _Linear:
     pull: Array
 
 
-def _graph(ties: Sequence[Tie], n: int, *, arm_stands: bool) -> _Graph:
+def _graph(constraints: Sequence[Constraint], n: int, *, arm_stands: bool) -> _Graph:
     number = {PLANE: n + 1, ARM: n}
     stands = np.zeros(n + 2, np.bool_)
-    hangs = any(tie.a == ARM for tie in ties)
+    hangs = any(constraint.a == ARM for constraint in constraints)
     stands[n + 1], stands[n] = True, arm_stands or not hangs
     return _Graph(
-        a=np.array([number.get(tie.a, tie.a) for tie in ties]),
-        b=np.array([tie.b for tie in ties]),
-        pose=np.array([tie.pose for tie in ties]),
-        information=np.array([tie.information for tie in ties]),
+        a=np.array([number.get(constraint.a, constraint.a) for constraint in constraints]),
+        b=np.array([constraint.b for constraint in constraints]),
+        pose=np.array([constraint.pose for constraint in constraints]),
+        information=np.array([constraint.information for constraint in constraints]),
         n=n,
         stands=stands,
     )

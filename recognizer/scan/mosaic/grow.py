@@ -16,10 +16,17 @@ from numpy.typing import NDArray
 from probe.sensor import SensorType
 from recognizer.scan.mosaic.canvas import Canvas, Laid, empty_canvas, laid
 from recognizer.scan.mosaic.errors import MosaicError
-from recognizer.scan.mosaic.graph import ARM, OUTLIER, Solved, Tie, covariances, solved
+from recognizer.scan.mosaic.graph import (
+    ARM,
+    OUTLIER,
+    Constraint,
+    PoseGraphSolution,
+    covariances,
+    solved,
+)
 from recognizer.scan.mosaic.mosaic import ALONE, PARTLY, Mosaic, MosaicSettings, no_touches
 from recognizer.scan.mosaic.pair import CONSTANT
-from recognizer.scan.mosaic.patch import Patch, patch_of
+from recognizer.scan.mosaic.patch import TouchPatch, patch_of
 from recognizer.scan.mosaic.place import placing
 from recognizer.scan.mosaic.planar import composed, inverse
 from recognizer.scan.mosaic.texture import far_apart
@@ -77,21 +84,21 @@ def added(mosaic: Mosaic, touch: PlacedTouch) -> Mosaic:
     patch = patch_of(mosaic.sensor, touch.signal)
     mosaic = _framed(mosaic, touch, patch)
     place = placing(mosaic, touch, patch, number)
-    ties = mosaic.ties + place.ties
+    constraints = mosaic.constraints + place.constraints
     grown = replace(
         mosaic,
         touches=(*mosaic.touches, touch),
         patches=(*mosaic.patches, patch),
         poses=np.concatenate([mosaic.poses, place.pose[None]]),
         covariances=np.concatenate([mosaic.covariances, np.full((1, 3, 3), np.nan)]),
-        reasons=(*_joined(mosaic.reasons, place.ties), place.reason),
+        reasons=(*_joined(mosaic.reasons, place.constraints), place.reason),
         gains=np.append(mosaic.gains, place.gain),
         laid=(*mosaic.laid, None),
-        ties=ties,
+        constraints=constraints,
     )
-    fresh = {number, *(tie.a for tie in place.ties if tie.a >= 0)}
+    fresh = {number, *(constraint.a for constraint in place.constraints if constraint.a >= 0)}
     found = _solved(grown)
-    doubted = [k for k, tie in enumerate(ties) if tie.kind == "decoded"]
+    doubted = [k for k, constraint in enumerate(constraints) if constraint.kind == "decoded"]
     if any(found.weights[k] < OUTLIER for k in doubted):
         found = _revoted(grown, found)
     return _updated(grown, found, fresh)
@@ -112,9 +119,9 @@ def settled(mosaic: Mosaic) -> Mosaic:
     return _updated(mosaic, _solved(mosaic), set(range(len(mosaic))), anew=True)
 
 
-def _joined(reasons: tuple[str, ...], ties: tuple[Tie, ...]) -> tuple[str, ...]:
+def _joined(reasons: tuple[str, ...], constraints: tuple[Constraint, ...]) -> tuple[str, ...]:
     """Return reasons without "alone" for touches that were registered from a later one."""
-    met = {tie.a for tie in ties if tie.kind == "pair"}
+    met = {constraint.a for constraint in constraints if constraint.kind == "pair"}
     return tuple("" if n in met and why == ALONE else why for n, why in enumerate(reasons))
 
 
@@ -122,18 +129,28 @@ def _again(mosaic: Mosaic, number: int) -> Mosaic:
     """Return the mosaic with one touch placed anew."""
     touch = mosaic.touches[number]
     place = placing(mosaic, touch, mosaic.patches[number], number)
-    known = {tie.b for tie in mosaic.ties if tie.a == number}
-    pairs = tuple(tie for tie in place.ties if tie.kind == "pair" and tie.a not in known)
+    known = {constraint.b for constraint in mosaic.constraints if constraint.a == number}
+    pairs = tuple(
+        constraint
+        for constraint in place.constraints
+        if constraint.kind == "pair" and constraint.a not in known
+    )
     if not pairs and place.reason != CONSTANT:
         return mosaic
-    others = tuple(tie for tie in mosaic.ties if tie.kind != "pair" or tie.b != number)
+    others = tuple(
+        constraint
+        for constraint in mosaic.constraints
+        if constraint.kind != "pair" or constraint.b != number
+    )
     poses, gains, reasons = mosaic.poses.copy(), mosaic.gains.copy(), list(mosaic.reasons)
     poses[number], gains[number], reasons[number] = place.pose, place.gain, place.reason
-    tried = replace(mosaic, poses=poses, gains=gains, reasons=tuple(reasons), ties=others + pairs)
+    tried = replace(
+        mosaic, poses=poses, gains=gains, reasons=tuple(reasons), constraints=others + pairs
+    )
     return _updated(tried, _solved(tried), {number})
 
 
-def _framed(mosaic: Mosaic, touch: PlacedTouch, patch: Patch) -> Mosaic:
+def _framed(mosaic: Mosaic, touch: PlacedTouch, patch: TouchPatch) -> Mosaic:
     """Return the mosaic in the frame in which a touch can be placed."""
     if touch.decoded is None:
         if not mosaic.on_face or touch.believed is None or _hangs(mosaic):
@@ -179,23 +196,23 @@ def _turned(mosaic: Mosaic, T_new_old: Array) -> Mosaic:
 
 
 def _hangs(mosaic: Mosaic) -> bool:
-    return any(tie.a == ARM for tie in mosaic.ties)
+    return any(constraint.a == ARM for constraint in mosaic.constraints)
 
 
-def _solved(mosaic: Mosaic) -> Solved:
+def _solved(mosaic: Mosaic) -> PoseGraphSolution:
     stands = not mosaic.on_face
-    return solved(mosaic.ties, mosaic.poses, mosaic.arm, arm_stands=stands)
+    return solved(mosaic.constraints, mosaic.poses, mosaic.arm, arm_stands=stands)
 
 
-def _revoted(mosaic: Mosaic, found: Solved) -> Solved:
+def _revoted(mosaic: Mosaic, found: PoseGraphSolution) -> PoseGraphSolution:
     """Return a better solution, if the face lies where other decoded touches say.
 
     The first decoded touch decides where everything lies. If it was wrong, all later ones look
     wrong: so each of them may propose, and the cost decides.
     """
-    for tie in mosaic.ties:
-        if tie.kind == "decoded":
-            shift = composed(tie.pose, inverse(found.poses[tie.b]))
+    for constraint in mosaic.constraints:
+        if constraint.kind == "decoded":
+            shift = composed(constraint.pose, inverse(found.poses[constraint.b]))
             if far_apart(shift, np.zeros(3), mosaic.sensor) < 0.1:
                 continue
             moved_ = replace(
@@ -207,7 +224,9 @@ def _revoted(mosaic: Mosaic, found: Solved) -> Solved:
     return found
 
 
-def _updated(mosaic: Mosaic, found: Solved, fresh: set[int], *, anew: bool = False) -> Mosaic:
+def _updated(
+    mosaic: Mosaic, found: PoseGraphSolution, fresh: set[int], *, anew: bool = False
+) -> Mosaic:
     """Return the mosaic with the poses of a solution, touches laid where they stand now."""
     numbers = sorted(fresh)
     free = mosaic.on_face and _hangs(mosaic)
@@ -232,7 +251,7 @@ def _updated(mosaic: Mosaic, found: Solved, fresh: set[int], *, anew: bool = Fal
 
 
 def _relaid(
-    mosaic: Mosaic, canvas: Canvas, found: Solved, n: int, now: Laid | None
+    mosaic: Mosaic, canvas: Canvas, found: PoseGraphSolution, n: int, now: Laid | None
 ) -> tuple[Canvas, Laid | None]:
     """Return the canvas with a touch where it belongs, and how it lies there."""
     pose, gain = found.poses[n], float(mosaic.gains[n])
@@ -253,10 +272,10 @@ def _gains(mosaic: Mosaic) -> Array:
     """Return gains (n,) that agree with all pairs at once, near 1 where nothing is known."""
     n = len(mosaic)
     normal, right = np.eye(n) / SPREAD_LOG**2, np.zeros(n)
-    for tie, weight in zip(mosaic.ties, mosaic.weights, strict=True):
-        if tie.kind == "pair" and weight > OUTLIER:
-            normal[[tie.a, tie.b], [tie.a, tie.b]] += 1 / SURE_LOG**2
-            normal[[tie.a, tie.b], [tie.b, tie.a]] -= 1 / SURE_LOG**2
-            right[tie.b] += tie.log_gain / SURE_LOG**2
-            right[tie.a] -= tie.log_gain / SURE_LOG**2
+    for constraint, weight in zip(mosaic.constraints, mosaic.weights, strict=True):
+        if constraint.kind == "pair" and weight > OUTLIER:
+            normal[[constraint.a, constraint.b], [constraint.a, constraint.b]] += 1 / SURE_LOG**2
+            normal[[constraint.a, constraint.b], [constraint.b, constraint.a]] -= 1 / SURE_LOG**2
+            right[constraint.b] += constraint.log_gain / SURE_LOG**2
+            right[constraint.a] -= constraint.log_gain / SURE_LOG**2
     return np.asarray(np.exp(np.linalg.solve(normal, right)))

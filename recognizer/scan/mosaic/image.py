@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.scan.mosaic.canvas import COUNT, SQUARE, TILE, VALUE, WEIGHT, Canvas, cut
-from recognizer.thesis.filters import TactileImage, tactile_image
+from recognizer.touch.tactile_image import TactileImage, tactile_image
 
 Array = NDArray[np.float64]
 

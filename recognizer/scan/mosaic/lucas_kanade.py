@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.scan.mosaic.patch import Patch, asked, covered
+from recognizer.scan.mosaic.patch import TouchPatch, asked, covered
 from recognizer.scan.mosaic.planar import inverse, moved, wrapped
 
 Array = NDArray[np.float64]
@@ -70,7 +70,9 @@ class _Step:
     rho: float
 
 
-def aligned(a: Patch, b: Patch, start: Array, believed: Array, prior: Array) -> Aligned | None:
+def aligned(
+    a: TouchPatch, b: TouchPatch, start: Array, believed: Array, prior: Array
+) -> Aligned | None:
     """Return the pose that explains both images best, or None where there is none near.
 
     Parameters
@@ -104,7 +106,7 @@ def aligned(a: Patch, b: Patch, start: Array, believed: Array, prior: Array) -> 
     return Aligned(pose, found.information, found.gain, found.rho, tactels, steps)
 
 
-def _rows(a: Patch, b: Patch, pose: Array) -> _Rows | None:
+def _rows(a: TouchPatch, b: TouchPatch, pose: Array) -> _Rows | None:
     there, here = moved(inverse(pose), a.points_mm), moved(pose, b.points_mm)
     over_b = a.good.reshape(-1) & covered(a.sensor, there)
     over_a = b.good.reshape(-1) & covered(b.sensor, here)

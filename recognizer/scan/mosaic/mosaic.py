@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from probe.sensor import SensorType
 from recognizer.scan.mosaic.canvas import Canvas, Laid, empty_canvas
-from recognizer.scan.mosaic.graph import OUTLIER, Tie
+from recognizer.scan.mosaic.graph import OUTLIER, Constraint
 from recognizer.scan.mosaic.image import GlobalImage, image_of
-from recognizer.scan.mosaic.patch import Patch
+from recognizer.scan.mosaic.patch import TouchPatch
 from recognizer.scan.mosaic.search import ImageSearchSettings
 from recognizer.scan.mosaic.touch import PlacedTouch
 
@@ -45,15 +45,15 @@ class Mosaic:
     sensor: SensorType
     settings: MosaicSettings
     touches: tuple[PlacedTouch, ...]
-    patches: tuple[Patch, ...]
+    patches: tuple[TouchPatch, ...]
     poses: Array  #: (n, 3) T_plane_touch, mm and rad
     covariances: Array  #: (n, 3, 3) of them; not smaller than they are until `grow.settled`
     reasons: tuple[str, ...]  #: "" where decoded or registered, otherwise why not
     gains: Array  #: (n,) readings times this are alike
     arm: Array  #: (3,) T_plane_arm
     arm_covariance: Array  #: (3, 3); zero where the arm's plane is the frame
-    ties: tuple[Tie, ...]
-    weights: Array  #: (m,) of the ties
+    constraints: tuple[Constraint, ...]
+    weights: Array  #: (m,) of the constraints
     chi2: Array  #: (m,)
     laid: tuple[Laid | None, ...]  #: how each touch lies on the canvas
     canvas: Canvas
@@ -74,9 +74,9 @@ class Mosaic:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outlier:
-    """A tie that disagrees with all others and was let go."""
+    """A constraint that disagrees with all others and was let go."""
 
-    tie: Tie
+    constraint: Constraint
     chi2: float  #: of three numbers; 0.1 % of good ones pass 16
 
 
@@ -93,7 +93,7 @@ def no_touches(sensor: SensorType, settings: MosaicSettings | None = None) -> Mo
         gains=np.zeros(0),
         arm=np.zeros(3),
         arm_covariance=np.zeros((3, 3)),
-        ties=(),
+        constraints=(),
         weights=np.zeros(0),
         chi2=np.zeros(0),
         laid=(),
@@ -102,10 +102,12 @@ def no_touches(sensor: SensorType, settings: MosaicSettings | None = None) -> Mo
 
 
 def outliers(mosaic: Mosaic) -> list[Outlier]:
-    """Return the ties that were let go, the worst first."""
+    """Return the constraints that were let go, the worst first."""
     found = [
-        Outlier(tie, float(chi2))
-        for tie, weight, chi2 in zip(mosaic.ties, mosaic.weights, mosaic.chi2, strict=True)
+        Outlier(constraint, float(chi2))
+        for constraint, weight, chi2 in zip(
+            mosaic.constraints, mosaic.weights, mosaic.chi2, strict=True
+        )
         if weight < OUTLIER
     ]
     return sorted(found, key=lambda outlier: -outlier.chi2)

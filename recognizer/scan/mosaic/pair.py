@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.scan.mosaic.lucas_kanade import Aligned, aligned
-from recognizer.scan.mosaic.patch import Patch, covered
+from recognizer.scan.mosaic.patch import TouchPatch, covered
 from recognizer.scan.mosaic.planar import inverse, moved, wrapped
 from recognizer.scan.mosaic.raster import magnified
 from recognizer.scan.mosaic.search import ImageSearchSettings, nats, searched, window_mm
@@ -50,8 +50,8 @@ class ImageRegistration:
 
 
 def registered(
-    a: Patch,
-    b: Patch,
+    a: TouchPatch,
+    b: TouchPatch,
     believed: Array,
     covariance: Array,
     *,
@@ -146,7 +146,7 @@ def refused(
     )
 
 
-def varies(patch: Patch, over: NDArray[np.bool_], contrast: float) -> bool:
+def varies(patch: TouchPatch, over: NDArray[np.bool_], contrast: float) -> bool:
     """Whether a patch shows more than a plane on some of its tactels (n,)."""
     values = patch.values.reshape(-1)[over]
     if len(values) < 4:
@@ -157,7 +157,7 @@ def varies(patch: Patch, over: NDArray[np.bool_], contrast: float) -> bool:
 
 
 def _hopeless(
-    a: Patch, b: Patch, believed: Array, limits: ImageSearchSettings, reach_mm: float
+    a: TouchPatch, b: TouchPatch, believed: Array, limits: ImageSearchSettings, reach_mm: float
 ) -> str:
     """Return why two patches cannot be registered, before anything is tried; or nothing."""
     if min(a.scale, b.scale) <= 0:
@@ -174,7 +174,7 @@ def _hopeless(
 
 
 def _held(
-    a: Patch, b: Patch, found: Aligned, motions: Array, believed: Array, prior: Array
+    a: TouchPatch, b: TouchPatch, found: Aligned, motions: Array, believed: Array, prior: Array
 ) -> Aligned | None:
     """Align again in the motions that are seen; what they leave open stays as believed."""
     away = found.pose - believed
@@ -184,7 +184,7 @@ def _held(
     return aligned(a, b, start, believed, prior + held(motions, a.sensor))
 
 
-def _elsewhere(best: Array, other: Array, information: Array, a: Patch) -> bool:
+def _elsewhere(best: Array, other: Array, information: Array, a: TouchPatch) -> bool:
     """Whether two candidates differ by more than the images leave open (along an edge, say)."""
     away = other - best
     away[2] = wrapped(away[2])

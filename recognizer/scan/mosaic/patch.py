@@ -1,6 +1,6 @@
 """The image of a touch as a function: asked between the tactels, with its slopes. Thesis 4.3.
 
-Signal -> Patch. Bad tactels are filled from their neighbours and marked; a little smoothing
+Signal -> TouchPatch. Bad tactels are filled from their neighbours and marked; a little smoothing
 takes off what the matrix cannot resolve (tabs leave gaps, so edges alias); a cubic spline goes
 through the rest. Values are in shares of the upper level of the image, so that touches of
 different force look alike. mm, sensor frame.
@@ -25,7 +25,7 @@ RIM = 2  #: coefficients beyond the matrix, mirrored
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Patch:
+class TouchPatch:
     """One image."""
 
     sensor: SensorType
@@ -39,7 +39,7 @@ class Patch:
     slopes: Array  #: (2, rows * columns) of them by x and y, 1/tactel
 
 
-def patch_of(sensor: SensorType, signal: Signal) -> Patch:
+def patch_of(sensor: SensorType, signal: Signal) -> TouchPatch:
     """Return the patch of a signal.
 
     Examples
@@ -68,10 +68,12 @@ def patch_of(sensor: SensorType, signal: Signal) -> Patch:
     slopes = np.stack([right.reshape(-1), -down.reshape(-1)])
     for array in (raw, values, good, coefficients, points, smooth, slopes):
         array.setflags(write=False)
-    return Patch(sensor, scale, raw, values, good, coefficients, points, smooth.reshape(-1), slopes)
+    return TouchPatch(
+        sensor, scale, raw, values, good, coefficients, points, smooth.reshape(-1), slopes
+    )
 
 
-def asked(patch: Patch, points_mm: Array) -> tuple[Array, Array, Array]:
+def asked(patch: TouchPatch, points_mm: Array) -> tuple[Array, Array, Array]:
     """Return values and slopes by x and y (1/mm) at points (n, 2) inside `covered`."""
     sensor, pitch = patch.sensor, patch.sensor.pitch_mm
     column = points_mm[:, 0] / pitch + ((sensor.columns - 1) / 2 + RIM)

@@ -1,4 +1,4 @@
-"""Where one touch belongs among those that are there: its start, and its ties to them.
+"""Where one touch belongs among those that are there: its start, and its constraints to them.
 
 A decoded touch stands where it says; images of neighbours only check it. Any other one is
 looked for on the mean of all touches near it, which shows more than each of them and so
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from recognizer.scan.mosaic.canvas import laid, reference
 from recognizer.scan.mosaic.errors import MosaicError
-from recognizer.scan.mosaic.graph import ARM, FREE, PLANE, Kind, Tie
+from recognizer.scan.mosaic.graph import ARM, FREE, PLANE, Constraint, Kind
 from recognizer.scan.mosaic.mosaic import ALONE, PARTLY, Mosaic
 from recognizer.scan.mosaic.pair import (
     AMBIGUOUS,
@@ -26,7 +26,7 @@ from recognizer.scan.mosaic.pair import (
     registered,
     varies,
 )
-from recognizer.scan.mosaic.patch import Patch, covered
+from recognizer.scan.mosaic.patch import TouchPatch, covered
 from recognizer.scan.mosaic.planar import (
     between,
     between_covariance,
@@ -37,7 +37,7 @@ from recognizer.scan.mosaic.planar import (
 )
 from recognizer.scan.mosaic.search import searched, window_mm
 from recognizer.scan.mosaic.texture import scales, seen_motions
-from recognizer.scan.mosaic.touch import Placed, PlacedTouch
+from recognizer.scan.mosaic.touch import PlacedTouch, PlanarBelief
 
 Array = NDArray[np.float64]
 
@@ -47,12 +47,12 @@ class Placing:
     """What is known of a touch when it comes in."""
 
     pose: Array  #: (3,) T_plane_touch to start from
-    ties: tuple[Tie, ...]
+    constraints: tuple[Constraint, ...]
     gain: float
     reason: str  #: "" where decoded or registered in all directions
 
 
-def placing(mosaic: Mosaic, touch: PlacedTouch, patch: Patch, number: int) -> Placing:
+def placing(mosaic: Mosaic, touch: PlacedTouch, patch: TouchPatch, number: int) -> Placing:
     """Return where a touch belongs in a mosaic that may hold it already under this number."""
     given = _given(touch, number)
     predicted = _predicted(mosaic, touch, number)
@@ -60,19 +60,19 @@ def placing(mosaic: Mosaic, touch: PlacedTouch, patch: Patch, number: int) -> Pl
         # neighbours shall say who is right
         other = placing(mosaic, replace(touch, decoded=None), patch, number)
         if not other.reason:
-            return replace(other, ties=(given[0], *other.ties))
+            return replace(other, constraints=(given[0], *other.constraints))
     near = _near(mosaic, patch, predicted, number)
     reason, start = _found(mosaic, patch, predicted, near, number)
     pairs: list[tuple[int, ImageRegistration]] = []
     if not reason:
         pairs = _registered(mosaic, patch, predicted, start, near)
     softer = 1 / mosaic.settings.inflation
-    ties = given + [
-        Tie(j, number, pair.pose, pair.information * softer, "pair", math.log(pair.gain))
+    constraints = given + [
+        Constraint(j, number, pair.pose, pair.information * softer, "pair", math.log(pair.gain))
         for j, pair in pairs
         if pair
     ]
-    tied = [tie for tie in ties if tie.kind == "pair"]
+    tied = [constraint for constraint in constraints if constraint.kind == "pair"]
     if touch.decoded is not None:
         reason = ""
     elif not reason and not tied:
@@ -80,25 +80,29 @@ def placing(mosaic: Mosaic, touch: PlacedTouch, patch: Patch, number: int) -> Pl
     elif tied and _rank(mosaic, tied) < 3:
         reason = PARTLY
     starts = [predicted.pose, start]
-    starts += [composed(_pose(mosaic, tie.a), tie.pose) for tie in ties if tie.a != ARM]
-    pose = min(starts, key=lambda pose: _disagreement(mosaic, ties, pose))
-    return Placing(pose, tuple(ties), _gain(mosaic, pairs), reason)
+    starts += [
+        composed(_pose(mosaic, constraint.a), constraint.pose)
+        for constraint in constraints
+        if constraint.a != ARM
+    ]
+    pose = min(starts, key=lambda pose: _disagreement(mosaic, constraints, pose))
+    return Placing(pose, tuple(constraints), _gain(mosaic, pairs), reason)
 
 
-def _given(touch: PlacedTouch, number: int) -> list[Tie]:
+def _given(touch: PlacedTouch, number: int) -> list[Constraint]:
     """Return what arm, steps and reader say."""
 
-    def tie(a: int, place: Placed, kind: Kind) -> Tie:
-        return Tie(a, number, place.pose, np.asarray(np.linalg.inv(place.covariance)), kind)
+    def constraint(a: int, place: PlanarBelief, kind: Kind) -> Constraint:
+        return Constraint(a, number, place.pose, np.asarray(np.linalg.inv(place.covariance)), kind)
 
-    ties = []
+    constraints = []
     if touch.decoded is not None:
-        ties.append(tie(PLANE, touch.decoded, "decoded"))
+        constraints.append(constraint(PLANE, touch.decoded, "decoded"))
     if touch.believed is not None:
-        ties.append(tie(ARM, touch.believed, "believed"))
+        constraints.append(constraint(ARM, touch.believed, "believed"))
     if touch.stepped is not None and number > 0:
-        ties.append(tie(number - 1, touch.stepped, "stepped"))
-    return ties
+        constraints.append(constraint(number - 1, touch.stepped, "stepped"))
+    return constraints
 
 
 def _contradicted(mosaic: Mosaic, touch: PlacedTouch, number: int) -> bool:
@@ -118,20 +122,20 @@ def _pose(mosaic: Mosaic, frame: int) -> Array:
     return mosaic.arm if frame == ARM else np.asarray(mosaic.poses[frame])
 
 
-def _predicted(mosaic: Mosaic, touch: PlacedTouch, number: int) -> Placed:
+def _predicted(mosaic: Mosaic, touch: PlacedTouch, number: int) -> PlanarBelief:
     """Return where a touch should stand, before its image is looked at."""
     if touch.decoded is not None:
         return touch.decoded
-    found: list[Placed] = []
+    found: list[PlanarBelief] = []
     if touch.believed is not None and np.isfinite(mosaic.arm_covariance).all():
         pose, covariance = touch.believed.pose, touch.believed.covariance
         spread = composed_covariance(mosaic.arm, pose, mosaic.arm_covariance, covariance)
-        found.append(Placed(composed(mosaic.arm, pose), spread))
+        found.append(PlanarBelief(composed(mosaic.arm, pose), spread))
     if touch.stepped is not None and number > 0:
         pose, covariance = touch.stepped.pose, touch.stepped.covariance
         before, sure = mosaic.poses[number - 1], mosaic.covariances[number - 1]
         spread = composed_covariance(before, pose, sure, covariance)
-        found.append(Placed(composed(before, pose), spread))
+        found.append(PlanarBelief(composed(before, pose), spread))
     if not found:
         raise MosaicError(
             "a touch that hangs on nothing: no touch before it tells how its frame lies",
@@ -141,7 +145,7 @@ def _predicted(mosaic: Mosaic, touch: PlacedTouch, number: int) -> Placed:
     return min(found, key=lambda place: float(np.trace(place.covariance[:2, :2])))
 
 
-def _near(mosaic: Mosaic, patch: Patch, predicted: Placed, number: int) -> list[int]:
+def _near(mosaic: Mosaic, patch: TouchPatch, predicted: PlanarBelief, number: int) -> list[int]:
     """Return neighbours that may be registered with, by overlap."""
     sensor, least = mosaic.sensor, mosaic.settings.overlap
     away = np.hypot(*(mosaic.poses[:, :2] - predicted.pose[:2]).T)
@@ -159,8 +163,8 @@ def _near(mosaic: Mosaic, patch: Patch, predicted: Placed, number: int) -> list[
 
 def _found(
     mosaic: Mosaic,
-    patch: Patch,
-    predicted: Placed,
+    patch: TouchPatch,
+    predicted: PlanarBelief,
     near: Sequence[int],
     number: int,
 ) -> tuple[str, Array]:
@@ -203,8 +207,8 @@ def _found(
 
 def _registered(
     mosaic: Mosaic,
-    patch: Patch,
-    predicted: Placed,
+    patch: TouchPatch,
+    predicted: PlanarBelief,
     start: Array,
     near: Sequence[int],
 ) -> list[tuple[int, ImageRegistration]]:
@@ -228,26 +232,26 @@ def _registered(
     return pairs
 
 
-def _rank(mosaic: Mosaic, ties: Sequence[Tie]) -> int:
+def _rank(mosaic: Mosaic, constraints: Sequence[Constraint]) -> int:
     """Return how many motions of a touch its pairs define."""
     unit = scales(mosaic.sensor)
     total = np.zeros((3, 3))
-    for tie in ties:
-        angle = float(mosaic.poses[tie.a][2])
+    for constraint in constraints:
+        angle = float(mosaic.poses[constraint.a][2])
         c, s = math.cos(angle), math.sin(angle)
         turned = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        total += turned @ tie.information @ turned.T * np.outer(unit, unit)
+        total += turned @ constraint.information @ turned.T * np.outer(unit, unit)
     values = np.linalg.eigvalsh(total)
     return int((values > 4.0).sum())  # half a tactel
 
 
-def _disagreement(mosaic: Mosaic, ties: Sequence[Tie], pose: Array) -> float:
-    """Return the robust cost of a touch's ties at a pose."""
+def _disagreement(mosaic: Mosaic, constraints: Sequence[Constraint], pose: Array) -> float:
+    """Return the robust cost of a touch's constraints at a pose."""
     total = 0.0
-    for tie in ties:
-        away = between(_pose(mosaic, tie.a), pose) - tie.pose
+    for constraint in constraints:
+        away = between(_pose(mosaic, constraint.a), pose) - constraint.pose
         away[2] = wrapped(away[2])
-        chi2 = float(away @ tie.information @ away)
+        chi2 = float(away @ constraint.information @ away)
         scale = min(1.0, 2 * FREE / (FREE + chi2))
         total += scale**2 * chi2 + FREE * (1 - scale) ** 2
     return total

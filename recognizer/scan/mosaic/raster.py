@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.scan.mosaic.patch import RIM, Patch, basis
+from recognizer.scan.mosaic.patch import RIM, TouchPatch, basis
 from recognizer.scan.mosaic.planar import moved
 
 Array = NDArray[np.float64]
@@ -22,7 +22,7 @@ MAGNIFIED = 4  #: cells to a tactel, the thesis's 64 by 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Raster:
+class KnownRaster:
     """Values on cells, and which of them are known."""
 
     values: Array  #: (rows, columns); 0 where not known
@@ -32,22 +32,22 @@ class Raster:
     cell_mm: float
 
 
-def magnified(patch: Patch) -> Raster:
+def magnified(patch: TouchPatch) -> KnownRaster:
     """Return a patch at four times its resolution, sensor frame."""
     rows, columns = patch.values.shape
     h = patch.sensor.pitch_mm / MAGNIFIED
     values = _between(rows) @ patch.coefficients @ _between(columns).T
     known = patch.good.repeat(MAGNIFIED, axis=0).repeat(MAGNIFIED, axis=1)
     width, height = columns * MAGNIFIED, rows * MAGNIFIED
-    return Raster(
+    return KnownRaster(
         np.where(known, values, 0.0), known, -(width - 1) / 2 * h, (height - 1) / 2 * h, h
     )
 
 
-def enlarged(raster: Raster, rows: int, columns: int) -> Raster:
+def enlarged(raster: KnownRaster, rows: int, columns: int) -> KnownRaster:
     """Return a raster with so many unknown cells more on each side."""
     margin = ((rows, rows), (columns, columns))
-    return Raster(
+    return KnownRaster(
         np.pad(raster.values, margin),
         np.pad(raster.known, margin),
         raster.x0_mm - columns * raster.cell_mm,
@@ -56,7 +56,7 @@ def enlarged(raster: Raster, rows: int, columns: int) -> Raster:
     )
 
 
-def points_mm(raster: Raster) -> Array:
+def points_mm(raster: KnownRaster) -> Array:
     """Return the cells' centres (rows, columns, 2)."""
     rows, columns = raster.values.shape
     points = np.empty((rows, columns, 2))
@@ -65,7 +65,7 @@ def points_mm(raster: Raster) -> Array:
     return points
 
 
-def laid_under(source: Raster, like: Raster, T_source_like: Array) -> Raster:
+def laid_under(source: KnownRaster, like: KnownRaster, T_source_like: Array) -> KnownRaster:
     """Return a raster on the cells of another one, between cells by the four around.
 
     A cell is known where all four are.
@@ -89,7 +89,7 @@ def laid_under(source: Raster, like: Raster, T_source_like: Array) -> Raster:
     ):
         total += values[first + offset] * share
         inside &= known[first + offset] | (share < 1e-9)
-    return Raster(np.where(inside, total, 0.0), inside, like.x0_mm, like.y0_mm, like.cell_mm)
+    return KnownRaster(np.where(inside, total, 0.0), inside, like.x0_mm, like.y0_mm, like.cell_mm)
 
 
 @lru_cache(maxsize=8)

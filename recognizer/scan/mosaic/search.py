@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.scan.mosaic.correlation import correlated, peaks
-from recognizer.scan.mosaic.patch import Patch
+from recognizer.scan.mosaic.patch import TouchPatch
 from recognizer.scan.mosaic.planar import composed
-from recognizer.scan.mosaic.raster import MAGNIFIED, Raster, enlarged, laid_under, magnified
+from recognizer.scan.mosaic.raster import MAGNIFIED, KnownRaster, enlarged, laid_under, magnified
 
 Array = NDArray[np.float64]
 
@@ -39,14 +39,14 @@ class ImageSearchSettings:
     significance: float = 8.0  #: nats over what the best of as many shifts of noise gives
     margin: float = 3.0  #: nats over the next place, in a window within half a period
     margin_beyond: float = 8.0  #: the same in a wider window
-    independent: float = 0.4  #: readings to a tactel: smoothing ties neighbours together
+    independent: float = 0.4  #: readings to a tactel: smoothing constraints neighbours together
     enough: float = 96.0  #: tactels of overlap, beyond which more do not count
     candidates: int = 6  #: maxima that are looked at
     near_tactels: float = 0.4  #: windows no wider than this need no search
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Candidate:
+class PlaceCandidate:
     """A place that explains the images."""
 
     pose: Array  #: (3,) T_reference_patch
@@ -58,7 +58,7 @@ class Candidate:
 class Searched:
     """What the search found."""
 
-    candidates: tuple[Candidate, ...]  #: best first
+    candidates: tuple[PlaceCandidate, ...]  #: best first
     tried: float  #: independent places in the window
 
 
@@ -76,8 +76,8 @@ def window_mm(covariance: Array, settings: ImageSearchSettings) -> tuple[float, 
 
 
 def searched(
-    reference: Raster,
-    patch: Patch,
+    reference: KnownRaster,
+    patch: TouchPatch,
     believed: Array,
     covariance: Array,
     settings: ImageSearchSettings,
@@ -102,7 +102,7 @@ def searched(
     wide = enlarged(image, rows, columns)
     prior = np.linalg.inv(inside)
     down, right = np.mgrid[-rows : rows + 1, -columns : columns + 1]
-    found: list[Candidate] = []
+    found: list[PlaceCandidate] = []
     turns = _turns(math.sqrt(covariance[2, 2]), patch, settings)
     for turn in turns.tolist():
         stands = np.array([believed[0], believed[1], believed[2] + turn])
@@ -116,13 +116,13 @@ def searched(
         for i, j, value in peaks(score, settings.candidates):
             shift = np.array([(j - columns) * h, (rows - i) * h, 0.0])
             alone = float(images[round(i), round(j)])
-            found.append(Candidate(composed(stands, shift), value, alone))
+            found.append(PlaceCandidate(composed(stands, shift), value, alone))
     found.sort(key=lambda candidate: -candidate.score)
     tried = down.size * len(turns) / MAGNIFIED**2
     return Searched(tuple(found[: settings.candidates]), tried)
 
 
-def _turns(sigma_rad: float, patch: Patch, settings: ImageSearchSettings) -> Array:
+def _turns(sigma_rad: float, patch: TouchPatch, settings: ImageSearchSettings) -> Array:
     """Return the turns to try about a belief: each moves the rim by a tactel more."""
     step = patch.sensor.pitch_mm / patch.sensor.reach_mm
     count = math.floor(min(settings.sigmas * sigma_rad, math.pi) / step + 0.5)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import SensorType
-from recognizer.scan.mosaic.patch import Patch
+from recognizer.scan.mosaic.patch import TouchPatch
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ def scales(sensor: SensorType) -> Array:
     return np.array([1.0, 1.0, 1 / min(sensor.half_mm)]) * sensor.pitch_mm
 
 
-def seen_motions(a: Patch, over: NDArray[np.bool_], pose: Array) -> Array:
+def seen_motions(a: TouchPatch, over: NDArray[np.bool_], pose: Array) -> Array:
     """Return the motions (3, k), orthonormal in tactels, that change an image.
 
     Parameters

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Placed:
+class PlanarBelief:
     """A pose in the plane and how sure it is."""
 
     pose: Array  #: (3,) x, y (mm), theta (rad)
@@ -34,9 +34,9 @@ class PlacedTouch:
     """What was felt, and where that may be; one of the places is enough."""
 
     signal: Signal
-    believed: Placed | None = None  #: by the arm, in the arm's plane
-    decoded: Placed | None = None  #: by the reader, in the frame of the face
-    stepped: Placed | None = None  #: from the touch before, in its frame (dead reckoning)
+    believed: PlanarBelief | None = None  #: by the arm, in the arm's plane
+    decoded: PlanarBelief | None = None  #: by the reader, in the frame of the face
+    stepped: PlanarBelief | None = None  #: from the touch before, in its frame (dead reckoning)
     seq: int = 0
 
     def __post_init__(self) -> None:
@@ -48,7 +48,7 @@ class PlacedTouch:
             )
 
 
-def placed(pose: ArrayLike, covariance: ArrayLike) -> Placed:
+def placed(pose: ArrayLike, covariance: ArrayLike) -> PlanarBelief:
     """Return a checked place.
 
     Parameters
@@ -84,10 +84,10 @@ def placed(pose: ArrayLike, covariance: ArrayLike) -> Placed:
         )
     at.setflags(write=False)
     spread.setflags(write=False)
-    return Placed(at, spread)
+    return PlanarBelief(at, spread)
 
 
-def decoded_place(recognition: Recognition) -> Placed | None:
+def decoded_place(recognition: Recognition) -> PlanarBelief | None:
     """Return where the reader says that a touch stands on its face; None without an answer."""
     if recognition.T_face_probe is None or recognition.covariance is None:
         return None

@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import SensorType
-from recognizer.thesis.edges.fit import Fitted, Fitting, fitted
-from recognizer.thesis.edges.hough import Settings as Hough
-from recognizer.thesis.edges.hough import segments
+from recognizer.thesis.edges.fit import FittedEdges, Fitting, fitted
+from recognizer.thesis.edges.hough import HoughSettings, segments
 from recognizer.thesis.edges.line import Corner, Edge, meeting
 from recognizer.thesis.edges.points import STEEP, edge_points
 from recognizer.thesis.edges.response import BLURS_MM
-from recognizer.thesis.edges.syntax import Rules, fused, vertices
-from recognizer.thesis.filters import TactileImage, magnified, median, unbiased
+from recognizer.thesis.edges.syntax import SyntaxRules, fused, vertices
+from recognizer.thesis.filters import magnified, median, unbiased
+from recognizer.touch.tactile_image import TactileImage
 
 Array = NDArray[np.float64]
 
@@ -34,8 +34,8 @@ class Finding:
     median: bool = True
     doublings: int = 2  #: of the image before its slopes are taken; a mosaic is fine already
     steep: float = STEEP
-    hough: Hough = field(default_factory=Hough)
-    rules: Rules = field(default_factory=Rules)
+    hough: HoughSettings = field(default_factory=HoughSettings)
+    rules: SyntaxRules = field(default_factory=SyntaxRules)
     fitting: Fitting = field(default_factory=Fitting)
     most: int = 3  #: edges that are fitted at once
     beyond: float = 0.15  #: of what is felt inside an edge, that may be felt beyond it
@@ -88,7 +88,7 @@ def face_edges(
 
     Examples
     --------
-    >>> from recognizer.thesis.filters import touch_image
+    >>> from recognizer.touch.tactile_image import touch_image
     >>> readings = np.zeros((16, 16))
     >>> readings[:, 7:] = 0.5
     >>> edge, = face_edges(touch_image(SensorType(), readings), SensorType())
@@ -123,7 +123,7 @@ def outline(image: TactileImage, sensor: SensorType, finding: Finding | None = N
 
 def _best(
     image: TactileImage, sensor: SensorType, edges: tuple[Edge, ...], finding: Finding
-) -> Fitted | None:
+) -> FittedEdges | None:
     """Return the fit of a face inside of all edges, or of any, whichever explains more."""
     reflex = False
     if len(edges) > 1:
@@ -164,7 +164,7 @@ def _moved_mm(edge: Edge, before: Edge) -> float:
     return float(np.abs(edge.inside_mm(ends)).max())
 
 
-def _corners(found: Fitted, rules: Rules) -> tuple[Corner, ...]:
+def _corners(found: FittedEdges, rules: SyntaxRules) -> tuple[Corner, ...]:
     """Return the corners with the covariance of edges that were fitted together."""
     corners = []
     for corner in vertices(found.edges, rules):

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from probe.sensor import SensorType
 from recognizer.thesis.edges.line import Edge
 from recognizer.thesis.edges.response import BLURS_MM, felt_at, responses
-from recognizer.thesis.filters import TactileImage
+from recognizer.touch.tactile_image import TactileImage
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -44,7 +44,7 @@ class Fitting:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fitted:
+class FittedEdges:
     """Edges with what they leave unexplained."""
 
     edges: tuple[Edge, ...]
@@ -62,7 +62,7 @@ def fitted(
     reflex: bool = False,
     blurs_mm: Sequence[float] = BLURS_MM,
     fitting: Fitting | None = None,
-) -> Fitted | None:
+) -> FittedEdges | None:
     """Fit one, two or more edges at once.
 
     Parameters
@@ -106,7 +106,7 @@ def fitted(
     )
     inside = np.zeros(image.values.shape, np.bool_)
     inside[image.defined] = _joined(_inside(at, lines), reflex) > 0
-    return Fitted(moved, covariance, blur, off, inside)
+    return FittedEdges(moved, covariance, blur, off, inside)
 
 
 def _settled(

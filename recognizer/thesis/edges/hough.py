@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class HoughSettings:
     """What makes a segment."""
 
     turn_rad: float = math.radians(35)  #: of a point's slope against the segment's normal
@@ -44,9 +44,9 @@ class Segment:
     edge: Edge
 
 
-def segments(points: EdgePoints, settings: Settings | None = None) -> list[Segment]:
+def segments(points: EdgePoints, settings: HoughSettings | None = None) -> list[Segment]:
     """Return the line segments among edge points, the longest first."""
-    chosen = settings or Settings()
+    chosen = settings or HoughSettings()
     found: list[Segment] = []
     left = points
     while len(left) >= chosen.least_points and len(found) < chosen.longest:
@@ -75,7 +75,7 @@ def segments(points: EdgePoints, settings: Settings | None = None) -> list[Segme
     return sorted(found, key=lambda segment: -segment.edge.length_mm)
 
 
-def _peaks(points: EdgePoints, settings: Settings) -> list[tuple[float, float]]:
+def _peaks(points: EdgePoints, settings: HoughSettings) -> list[tuple[float, float]]:
     """Return angle and offset of the fullest lines, refined."""
     reach = float(np.abs(points.at_mm).max()) * math.sqrt(2) + _COARSE_MM
     angles = (np.arange(_DIRECTIONS) + 0.5) * math.tau / _DIRECTIONS
@@ -89,7 +89,7 @@ def _peaks(points: EdgePoints, settings: Settings) -> list[tuple[float, float]]:
 
 
 def _refined(
-    points: EdgePoints, angle: float, offset: float, settings: Settings
+    points: EdgePoints, angle: float, offset: float, settings: HoughSettings
 ) -> tuple[float, float]:
     turn, cell = math.tau / _DIRECTIONS, _COARSE_MM
     while cell > _FINE_MM:
@@ -103,7 +103,7 @@ def _refined(
 
 
 def _votes(
-    points: EdgePoints, angles: Array, offsets: Array, width_mm: float, settings: Settings
+    points: EdgePoints, angles: Array, offsets: Array, width_mm: float, settings: HoughSettings
 ) -> Array:
     """Return how many points (a, o) lie within half a width of each line, nearer ones more."""
     normals = np.stack([np.cos(angles), np.sin(angles)])
@@ -112,7 +112,9 @@ def _votes(
     return np.asarray((alike[..., None] * np.maximum(0.0, 1.0 - away)).sum(axis=0))
 
 
-def _run(points: EdgePoints, angle: float, offset: float, settings: Settings) -> NDArray[np.intp]:
+def _run(
+    points: EdgePoints, angle: float, offset: float, settings: HoughSettings
+) -> NDArray[np.intp]:
     """Return the points of the longest unbroken run along a line, in order."""
     n = np.array([math.cos(angle), math.sin(angle)])
     near = np.abs(points.at_mm @ n - offset) <= settings.near_mm

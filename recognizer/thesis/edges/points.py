@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.thesis.filters import TactileImage, sobel
+from recognizer.thesis.filters import sobel
+from recognizer.touch.tactile_image import TactileImage
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from recognizer.thesis.edges.points import EdgePoints
 
 
 @dataclass(frozen=True, slots=True)
-class Rules:
+class SyntaxRules:
     """When segments run on into each other, and when they turn."""
 
     straight_rad: float = math.radians(155)  #: angle from which two are one edge
@@ -33,9 +33,9 @@ class Rules:
     beyond_mm: float = 5.0  #: how far from its edges' seen parts a corner may lie
 
 
-def fused(segments: list[Segment], rules: Rules | None = None) -> tuple[Edge, ...]:
+def fused(segments: list[Segment], rules: SyntaxRules | None = None) -> tuple[Edge, ...]:
     """Return the edges that segments are parts of, the longest first."""
-    chosen = rules or Rules()
+    chosen = rules or SyntaxRules()
     parts = sorted(segments, key=lambda segment: -segment.edge.length_mm)
     edges: list[Segment] = []
     for part in parts:
@@ -48,9 +48,9 @@ def fused(segments: list[Segment], rules: Rules | None = None) -> tuple[Edge, ..
     return tuple(segment.edge for segment in edges)
 
 
-def vertices(edges: tuple[Edge, ...], rules: Rules | None = None) -> tuple[Corner, ...]:
+def vertices(edges: tuple[Edge, ...], rules: SyntaxRules | None = None) -> tuple[Corner, ...]:
     """Return the corners where edges that are seen up to there meet."""
-    chosen = rules or Rules()
+    chosen = rules or SyntaxRules()
     found = []
     for first, second in itertools.combinations(edges, 2):
         between = math.pi - abs(math.remainder(second.angle_rad - first.angle_rad, math.tau))
@@ -60,7 +60,7 @@ def vertices(edges: tuple[Edge, ...], rules: Rules | None = None) -> tuple[Corne
     return tuple(found)
 
 
-def _one(edge: Edge, part: Edge, rules: Rules) -> bool:
+def _one(edge: Edge, part: Edge, rules: SyntaxRules) -> bool:
     between = math.pi - abs(math.remainder(part.angle_rad - edge.angle_rad, math.tau))
     if between < rules.straight_rad:
         return False
@@ -73,7 +73,7 @@ def _one(edge: Edge, part: Edge, rules: Rules) -> bool:
     return max(others[0] - own[1], own[0] - others[1]) <= rules.apart_mm
 
 
-def _union(a: Segment, b: Segment, rules: Rules) -> Segment:
+def _union(a: Segment, b: Segment, rules: SyntaxRules) -> Segment:
     points = EdgePoints(
         np.concatenate([a.points.at_mm, b.points.at_mm]),
         np.concatenate([a.points.normals, b.points.normals]),
@@ -82,7 +82,7 @@ def _union(a: Segment, b: Segment, rules: Rules) -> Segment:
     return Segment(points, through(points.at_mm, points.normals, rules.spread_mm))
 
 
-def _reaches(edge: Edge, corner: Corner, rules: Rules) -> bool:
+def _reaches(edge: Edge, corner: Corner, rules: SyntaxRules) -> bool:
     way = edge.end_mm - edge.start_mm
     length = max(float(np.linalg.norm(way)), 1e-9)
     along = float((corner.at_mm - edge.start_mm) @ way) / length

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.thesis.filters import TactileImage
+from recognizer.touch.tactile_image import TactileImage
 
 FAINT = 0.15  #: of what the image feels most; below it nothing is pressed
 

@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 
 from encoded_objects.errors import require
 from generator.alphabet import Alphabet, Glyph, SymbolStyle
-from recognizer.thesis.filters import TactileImage, magnified
+from recognizer.thesis.filters import magnified
 from recognizer.thesis.skeleton.count import Counting, Points, points_of_glyph, points_of_skeleton
 from recognizer.thesis.skeleton.ink import ink
+from recognizer.touch.tactile_image import TactileImage
 
 Array = NDArray[np.float64]
 
@@ -31,7 +32,7 @@ THICK = 6  #: samples that a stroke is magnified to before it is thinned
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class SkeletonSettings:
     """When ink is a symbol."""
 
     share: float = 0.58  #: of the strongest reading nearby, from which a sample is ink
@@ -55,7 +56,10 @@ class Symbol:
 
 
 def symbols(
-    image: TactileImage, alphabet: Alphabet, style: SymbolStyle, settings: Settings | None = None
+    image: TactileImage,
+    alphabet: Alphabet,
+    style: SymbolStyle,
+    settings: SkeletonSettings | None = None,
 ) -> list[Symbol]:
     """Return what an image shows, whole symbols and what is none.
 
@@ -68,7 +72,7 @@ def symbols(
     from scipy.ndimage import find_objects, label
     from skimage.morphology import skeletonize
 
-    chosen = settings or Settings()
+    chosen = settings or SkeletonSettings()
     thin = THICK * image.step_mm / style.stroke_mm
     image = magnified(image, max(0, math.ceil(math.log2(thin))))
     unit_mm = alphabet.reach * style.pitch_mm

@@ -17,13 +17,13 @@ from probe.scan.raster import raster
 from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from recognizer.scan.mosaic.planar import between, moved
-from recognizer.thesis.filters import ImageError, tactile_image, touch_image
 from recognizer.thesis.image import Merging, laid, merged, relative_poses
-from recognizer.thesis.read import Settings, read_classically
+from recognizer.thesis.read import ThesisSettings, read_classically
 from recognizer.thesis.scan import read_scan, read_while_scanning
 from recognizer.thesis.skeleton.symbols import symbols
 from recognizer.touch.lab import open_lab
 from recognizer.touch.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, TOO_FEW
+from recognizer.touch.tactile_image import ImageError, tactile_image, touch_image
 
 SENSOR = SensorType()
 SET = """
@@ -229,7 +229,7 @@ def test_a_turned_scan_of_a_triangle(url, lab):
 @pytest.mark.parametrize("conversion", ["likelihood", "good tuple", "exact"])
 def test_every_conversion_reads_the_window(lab, scan, conversion):
     image = merged(SENSOR, scan.readings, scan.believed, Merging(placing="believed")).image
-    answer = read_classically(lab, image, Settings(conversion=conversion)).recognition
+    answer = read_classically(lab, image, ThesisSettings(conversion=conversion)).recognition
     assert (answer.object, answer.face) in {("Cube", "F2"), (None, None)}
     if conversion == "likelihood":
         assert answer.object == "Cube"

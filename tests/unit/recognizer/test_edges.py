@@ -19,7 +19,7 @@ from recognizer.thesis.edges.points import EdgePoints, edge_points
 from recognizer.thesis.edges.pose import corner_poses
 from recognizer.thesis.edges.response import BLURS_MM, REACH_MM, felt_at, responses
 from recognizer.thesis.edges.syntax import fused, vertices
-from recognizer.thesis.filters import tactile_image, touch_image
+from recognizer.touch.tactile_image import tactile_image, touch_image
 
 SENSOR = SensorType()
 SQUARE = np.array([[0.0, 0], [80, 0], [80, 80], [0, 80]])

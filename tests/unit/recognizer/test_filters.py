@@ -5,16 +5,9 @@ import pytest
 from scipy import ndimage
 
 from probe.sensor import SensorType
-from recognizer.thesis.filters import (
-    ImageError,
-    magnified,
-    median,
-    sobel,
-    tactile_image,
-    touch_image,
-    unbiased,
-)
+from recognizer.thesis.filters import magnified, median, sobel, unbiased
 from recognizer.thesis.product import magnified as by_convolution
+from recognizer.touch.tactile_image import ImageError, tactile_image, touch_image
 
 
 def noise(seed=0, shape=(16, 16)):

@@ -1,11 +1,11 @@
-"""Ties of all kinds -> poses, covariances and the ties that were let go."""
+"""Constraints of all kinds -> poses, covariances and the constraints that were let go."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from recognizer.scan.mosaic.graph import ARM, OUTLIER, PLANE, Tie, covariances, solved
+from recognizer.scan.mosaic.graph import ARM, OUTLIER, PLANE, Constraint, covariances, solved
 from recognizer.scan.mosaic.planar import between, composed, wrapped
 
 BELIEF, PAIR = np.diag([0.4, 0.4, 4e3]), np.diag([90.0, 60.0, 6e4])
@@ -26,11 +26,13 @@ def test_ties_without_errors_give_the_truth_from_afar():
     rng = np.random.default_rng(1)
     true, near = scene(rng)
     arm = np.array([5.0, -8.0, 0.6])
-    ties = [Tie(ARM, n, between(arm, pose), BELIEF, "believed") for n, pose in enumerate(true)]
-    ties += [Tie(a, b, between(true[a], true[b]), PAIR, "pair") for a, b in near]
-    ties += [Tie(PLANE, n, true[n], SURE, "decoded") for n in (0, 7)]
+    constraints = [
+        Constraint(ARM, n, between(arm, pose), BELIEF, "believed") for n, pose in enumerate(true)
+    ]
+    constraints += [Constraint(a, b, between(true[a], true[b]), PAIR, "pair") for a, b in near]
+    constraints += [Constraint(PLANE, n, true[n], SURE, "decoded") for n in (0, 7)]
     start = true + rng.normal(0, [2, 2, 0.02], true.shape)
-    found = solved(ties, start, arm + 0.05 * np.array([40, -40, 1]), arm_stands=False)
+    found = solved(constraints, start, arm + 0.05 * np.array([40, -40, 1]), arm_stands=False)
     assert found.poses == pytest.approx(true, abs=1e-5)
     assert found.arm == pytest.approx(arm, abs=1e-4)
     assert found.cost < 1e-6
@@ -40,12 +42,18 @@ def test_ties_without_errors_give_the_truth_from_afar():
 def test_wrong_pairs_are_let_go_and_named():
     rng = np.random.default_rng(2)
     true, near = scene(rng, 16)
-    ties = [Tie(ARM, n, noisy(rng, p, BELIEF), BELIEF, "believed") for n, p in enumerate(true)]
+    constraints = [
+        Constraint(ARM, n, noisy(rng, p, BELIEF), BELIEF, "believed") for n, p in enumerate(true)
+    ]
     wrong = set(range(3, len(near), 7))
     for k, (a, b) in enumerate(near):
         pose = noisy(rng, between(true[a], true[b]), PAIR)
-        ties.append(Tie(a, b, pose + np.array([7.0 * (k in wrong), 0, 0]), PAIR, "pair"))
-    found = solved(ties, np.array([t.pose for t in ties[:16]]), np.zeros(3), arm_stands=True)
+        constraints.append(
+            Constraint(a, b, pose + np.array([7.0 * (k in wrong), 0, 0]), PAIR, "pair")
+        )
+    found = solved(
+        constraints, np.array([t.pose for t in constraints[:16]]), np.zeros(3), arm_stands=True
+    )
     assert set((np.flatnonzero(found.weights < OUTLIER) - 16).tolist()) == wrong
     shape = (found.poses - true)[:, :2]
     assert np.hypot(*(shape - shape.mean(axis=0)).T).max() < 1.0
@@ -56,11 +64,14 @@ def test_covariances_are_true():
     true, near = scene(rng)
     inside = []
     for _ in range(60):
-        ties = [Tie(ARM, n, noisy(rng, p, BELIEF), BELIEF, "believed") for n, p in enumerate(true)]
+        constraints = [
+            Constraint(ARM, n, noisy(rng, p, BELIEF), BELIEF, "believed")
+            for n, p in enumerate(true)
+        ]
         for a, b in near:
             pose = noisy(rng, between(true[a], true[b]), PAIR)
-            ties.append(Tie(a, b, pose, PAIR, "pair"))
-        found = solved(ties, true, np.zeros(3), arm_stands=True)
+            constraints.append(Constraint(a, b, pose, PAIR, "pair"))
+        found = solved(constraints, true, np.zeros(3), arm_stands=True)
         spread = covariances(found.normal, range(len(true)))
         dense = np.linalg.inv(found.normal.toarray())
         assert spread[5] == pytest.approx(dense[15:18, 15:18], rel=1e-6, abs=1e-12)
@@ -72,12 +83,12 @@ def test_covariances_are_true():
 
 def test_a_tie_along_a_ridge_leaves_the_rest_to_belief():
     across_only = np.diag([500.0, 0.0, 1e5])
-    ties = [
-        Tie(ARM, 0, np.zeros(3), SURE, "believed"),
-        Tie(ARM, 1, np.array([5.0, 1.0, 0.0]), BELIEF, "believed"),
-        Tie(0, 1, np.array([4.0, 9.0, 0.01]), across_only, "pair"),
+    constraints = [
+        Constraint(ARM, 0, np.zeros(3), SURE, "believed"),
+        Constraint(ARM, 1, np.array([5.0, 1.0, 0.0]), BELIEF, "believed"),
+        Constraint(0, 1, np.array([4.0, 9.0, 0.01]), across_only, "pair"),
     ]
-    found = solved(ties, np.zeros((2, 3)), np.zeros(3), arm_stands=True)
+    found = solved(constraints, np.zeros((2, 3)), np.zeros(3), arm_stands=True)
     assert found.poses[1] == pytest.approx([4.0, 1.0, 0.01], abs=0.01)
     spread = covariances(found.normal, [1])[0]
     assert spread[1, 1] == pytest.approx(2.5, rel=0.01)
@@ -93,9 +104,11 @@ def test_the_frame_does_not_matter():
 
     def solution(shift):
         sure = np.diag([1e3, 1e3, 3e5])  # round, so that it may be turned
-        ties = [Tie(PLANE, n, composed(shift, p), sure, "decoded") for n, p in enumerate(poses)]
-        ties += [Tie(a, b, pose, PAIR, "pair") for a, b, pose in links]
+        constraints = [
+            Constraint(PLANE, n, composed(shift, p), sure, "decoded") for n, p in enumerate(poses)
+        ]
+        constraints += [Constraint(a, b, pose, PAIR, "pair") for a, b, pose in links]
         start = composed(shift, np.array(poses))
-        return solved(ties, start, np.zeros(3), arm_stands=False).poses
+        return solved(constraints, start, np.zeros(3), arm_stands=False).poses
 
     assert composed(T, solution(np.zeros(3))) == pytest.approx(solution(T), abs=1e-5)

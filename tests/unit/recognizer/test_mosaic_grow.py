@@ -18,6 +18,7 @@ from recognizer.scan.mosaic.mosaic import ALONE, no_touches, outliers
 from recognizer.scan.mosaic.pair import AMBIGUOUS, CONSTANT
 from recognizer.scan.mosaic.planar import between, composed
 from recognizer.scan.mosaic.touch import PlacedTouch, placed
+from recognizer.touch.settings import SignalSettings
 from recognizer.touch.signal import signal_of
 
 SENSOR = SensorType()
@@ -32,6 +33,8 @@ GLYPHS = (
 SPREAD = (1.0 * P, 1.0 * P, 0.3 * DEG)
 DECODED = (0.03, 0.03, 0.1 * DEG)
 T_FACE_ARM = np.array([60.0, 35.0, 0.4])
+
+FELT = SignalSettings(contact_counts=0.1)  #: of newtons without a calibration
 
 
 @lru_cache
@@ -49,7 +52,7 @@ def scanned(n=4):
         forces = tabs(face, SENSOR, Touch(*pose, 80.0)).forces_n * gains
         forces = np.maximum(forces + rng.normal(0, 0.02, (16, 16)), 0)
         poses.append(pose)
-        signals.append(signal_of(forces, floor=0.0, least=0.1))
+        signals.append(signal_of(forces, floor=0.0, settings=FELT))
     return np.array(poses), tuple(signals)
 
 
@@ -114,7 +117,7 @@ def test_where_all_are_decoded_they_stay():
 @pytest.mark.parametrize("wrong", [0, 10])
 def test_a_wrongly_decoded_touch_is_named(wrong):
     mosaic = mosaic_of(SENSOR, touches(decoded=(0, 3, 6, 9, 10, 13), wrong=(wrong,)))
-    named = [o.tie.b for o in outliers(mosaic) if o.tie.kind == "decoded"]
+    named = [o.constraint.b for o in outliers(mosaic) if o.constraint.kind == "decoded"]
     assert named == [wrong]
     assert errors(mosaic).max() < 0.3
 
@@ -151,7 +154,9 @@ def test_steps_do_not_drift():
 
 def test_blank_touches_stay_where_they_are_believed():
     rng = np.random.default_rng(1)
-    flat = [signal_of(0.3 + rng.normal(0, 0.01, (16, 16)), floor=0.0, least=0.1) for _ in range(3)]
+    flat = [
+        signal_of(0.3 + rng.normal(0, 0.01, (16, 16)), floor=0.0, settings=FELT) for _ in range(3)
+    ]
     places = [placed((k * 4.25 * P, 0.0, 0.0), SPREAD) for k in range(3)]
     some = [PlacedTouch(f, p, seq=k) for k, (f, p) in enumerate(zip(flat, places, strict=True))]
     mosaic = mosaic_of(SENSOR, some)
@@ -168,7 +173,7 @@ def test_a_surface_that_repeats_is_ambiguous():
     for k in range(2):
         forces = tabs(face, SENSOR, Touch(30 + 6.0 * k, 40, 0.2, 80.0)).forces_n
         pose = placed((6.0 * k * math.cos(0.2), -6.0 * k * math.sin(0.2), 0.0), wide)
-        some.append(PlacedTouch(signal_of(forces, floor=0.0, least=0.1), pose, seq=k))
+        some.append(PlacedTouch(signal_of(forces, floor=0.0, settings=FELT), pose, seq=k))
     mosaic = mosaic_of(SENSOR, some)
     assert mosaic.reasons == (ALONE, AMBIGUOUS)
     assert mosaic.poses[1] == pytest.approx(some[1].believed.pose, abs=1e-6)

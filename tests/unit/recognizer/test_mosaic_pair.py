@@ -14,6 +14,7 @@ from probe.surface.face import endless
 from recognizer.scan.mosaic.pair import AMBIGUOUS, APART, CONSTANT, NOISE, registered
 from recognizer.scan.mosaic.patch import patch_of
 from recognizer.scan.mosaic.planar import composed, inverse
+from recognizer.touch.settings import SignalSettings
 from recognizer.touch.signal import signal_of
 
 SENSOR = SensorType()
@@ -27,6 +28,8 @@ GLYPHS = (
 )
 A = np.array([41.3, 52.9, 0.35])
 BELIEF = np.diag([P**2, P**2, (0.5 * DEG) ** 2])
+
+FELT = SignalSettings(contact_counts=0.1)  #: of newtons without a calibration
 
 
 class Ridges:
@@ -56,7 +59,7 @@ def felt(surface, pose, seed=0, trust=None, force=80.0):
     noisy = np.maximum(noisy + rng.normal(0, 0.02, (16, 16)), 0)
     if trust is not None:
         noisy = np.where(trust > 0, noisy, 0.0)
-    return patch_of(SENSOR, signal_of(noisy, trust=trust, floor=0.0, least=0.1))
+    return patch_of(SENSOR, signal_of(noisy, trust=trust, floor=0.0, settings=FELT))
 
 
 def two(surface, true, **options):

@@ -24,7 +24,7 @@ from recognizer.scan.mosaic.planar import (
     planar_covariance,
     planar_pose,
 )
-from recognizer.scan.mosaic.raster import Raster, laid_under, magnified, points_mm
+from recognizer.scan.mosaic.raster import KnownRaster, laid_under, magnified, points_mm
 from recognizer.scan.mosaic.texture import kept, seen_motions
 from recognizer.scan.mosaic.touch import PlacedTouch, decoded_place, placed
 from recognizer.thesis.product import product_shift
@@ -127,8 +127,8 @@ def brute(reference, image, i, j):
 
 def test_correlation_in_parts_is_that_of_every_overlap():
     rng = np.random.default_rng(4)
-    wide = Raster(rng.normal(5, 1, (20, 23)), rng.random((20, 23)) > 0.2, 0, 0, 1)
-    image = Raster(rng.normal(9, 3, (12, 11)), rng.random((12, 11)) > 0.2, 0, 0, 1)
+    wide = KnownRaster(rng.normal(5, 1, (20, 23)), rng.random((20, 23)) > 0.2, 0, 0, 1)
+    image = KnownRaster(rng.normal(9, 3, (12, 11)), rng.random((12, 11)) > 0.2, 0, 0, 1)
     found = correlated(wide, image)
     assert found.rho.shape == (9, 13)
     for i in range(9):
@@ -141,11 +141,11 @@ def test_correlation_in_parts_is_that_of_every_overlap():
 def test_where_nothing_varies_there_is_no_correlation():
     known = np.ones((12, 12), bool)
     varied = np.random.default_rng(1).normal(size=(8, 8))
-    flat = correlated(Raster(np.full((12, 12), 3.0), known, 0, 0, 1),
-                      Raster(varied, known[:8, :8], 0, 0, 1))  # fmt: skip
+    flat = correlated(KnownRaster(np.full((12, 12), 3.0), known, 0, 0, 1),
+                      KnownRaster(varied, known[:8, :8], 0, 0, 1))  # fmt: skip
     assert np.isnan(flat.rho).all()
-    nothing = correlated(Raster(np.zeros((12, 12)), ~known, 0, 0, 1),
-                         Raster(varied, known[:8, :8], 0, 0, 1))  # fmt: skip
+    nothing = correlated(KnownRaster(np.zeros((12, 12)), ~known, 0, 0, 1),
+                         KnownRaster(varied, known[:8, :8], 0, 0, 1))  # fmt: skip
     assert np.isnan(nothing.rho).all()
     assert (nothing.overlap == 0).all()
     assert peaks(nothing.rho, 4) == []

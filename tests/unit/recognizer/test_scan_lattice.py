@@ -10,7 +10,7 @@ from recognizer.scan.composite import composite, expected_fit
 from recognizer.scan.lattice import agreed, alike, expected_at, seeded
 from recognizer.scan.mosaic.planar import composed, inverse
 from recognizer.scan.settings import ScanSettings
-from recognizer.scan.views import Stands, View, views_of
+from recognizer.scan.views import LatticeView, Stands, views_of
 from recognizer.touch.symbols.fit import Fit
 
 PITCH = 12.0
@@ -62,7 +62,7 @@ def a_scan(number=6, sigma_mm=0.3, seed=1):
 
 
 def views_from(fits):
-    return views_of([tuple(View(f, led=False) for f in each) for each in fits])
+    return views_of([tuple(LatticeView(f, led=False) for f in each) for each in fits])
 
 
 def test_touches_on_one_lattice_agree_and_their_cells_meet():

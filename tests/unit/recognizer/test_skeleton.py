@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from generator.alphabet import SymbolStyle, alphabet_named
-from recognizer.thesis.filters import tactile_image
 from recognizer.thesis.skeleton.count import Counting, points_of_glyph, points_of_skeleton
 from recognizer.thesis.skeleton.graph import graph, length
-from recognizer.thesis.skeleton.symbols import COUNTS, CUT, Settings, symbols
+from recognizer.thesis.skeleton.symbols import COUNTS, CUT, SkeletonSettings, symbols
+from recognizer.touch.tactile_image import tactile_image
 
 STEP = 0.4
 
@@ -129,5 +129,5 @@ def test_right_counts_in_the_wrong_shape_are_rejected():
     wide = drawn(alphabet, [(0, 0, 0, 0.0)], size_mm=40, pitch=22.0, half_mm=0.9)
     (found,) = symbols(wide, alphabet, style(alphabet))
     assert (found.label, found.rejected) == (-1, "shape")
-    (found,) = symbols(wide, alphabet, style(alphabet), Settings(shape=math.inf))
+    (found,) = symbols(wide, alphabet, style(alphabet), SkeletonSettings(shape=math.inf))
     assert found.label == 0
