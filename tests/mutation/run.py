@@ -57,12 +57,16 @@ class Watched:
 
     module: str
     tests: tuple[str, ...]
-    within: tuple[str, ...] = ()  #: classes and functions that decide; all if none is named
+    within: tuple[str, ...] = ()  #: classes, functions and fields that decide; all by default
 
     def mutants(self) -> list[Mutant]:
         """Return every change of it."""
         every = mutants_of((ROOT / self.module).read_text())
-        return [m for m in every if not self.within or m.place.split(".")[0] in self.within]
+        return [
+            m
+            for m in every
+            if not self.within or {m.place.split(".")[0], m.before.split(":")[0]} & {*self.within}
+        ]
 
     def state(self) -> str:
         """Return a digest of the tests: with other ones a survivor is tried again."""

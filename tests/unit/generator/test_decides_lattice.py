@@ -202,6 +202,27 @@ def test_fewer_cells_are_taken_where_more_of_them_do_not_pass():
     assert len(fewer.cells[0]) == max(n for n in tried if n < 4)  # the most that pass
 
 
+def test_of_the_cells_that_pass_the_most_are_taken_in_the_turn_that_passes():
+    strip = [region(rectangle(room(4, 2.0), room(1, 2.0)))]
+    found = choose_lattice(strip, HALF, PITCH, WINDOW, lambda *_: True)
+    assert len(found.cells[0]) == 4
+    for quarter, passes in (
+        (0, lambda rows, columns: rising(columns)),
+        (1, lambda rows, columns: rising(-rows)),
+        (2, lambda rows, columns: rising(-columns)),
+        (3, lambda rows, columns: rising(rows)),
+    ):
+
+        def identifies(rows, columns, passes=passes):
+            return len(rows) == 2 and passes(rows, columns)
+
+        found = choose_lattice(strip, HALF, PITCH, WINDOW, identifies)
+        assert (found.places, found.quarter, len(found.cells[0])) == ((1,), quarter, 2)
+    two = [*strip, region(rectangle(room(1, 0.5), room(1, 0.5), y=63.0))]
+    found = choose_lattice(two, HALF, PITCH, WINDOW, lambda rows, _: len(rows) == 2)
+    assert found.places == (1, 0)
+
+
 def test_one_of_two_faces_that_passes_the_rank_test_is_enough():
     strips = [rectangle(room(4, 2.0), room(1, 1.0)), rectangle(room(2, 2.0), 9.0, y=63.0)]
     regions = [region(loop) for loop in strips]
@@ -289,23 +310,34 @@ def test_no_shift_along_an_edge_shows_more(name):
     assert worth(faces, wide.rotation_rad, wide.x_mm, wide.y_mm) >= chosen
 
 
-def test_between_the_edges_twelfths_of_a_quarter_turn_are_tried():
-    rotations = set()
-    for width in np.arange(20.0, 34.0, 0.5):
-        loop = [(0, 0), (width, 0), (width + 6, 20), (8, 26)]
-        faces, own = [(loop, 1.0)], edge_rotations([region(loop)])
-        along = choose_lattice([region(loop)], HALF, PITCH, WINDOW, search=False)
-        found = choose_lattice([region(loop)], HALF, PITCH, WINDOW)
-        before, after = (
-            worth(faces, one.rotation_rad, one.x_mm, one.y_mm) for one in (along, found)
-        )
-        assert after >= before
-        if after > before:
-            assert found.rotation_rad not in own
-            turned = found.rotation_rad / (np.pi / 2) * 12
-            assert turned == pytest.approx(round(turned))
-            rotations.add(round(turned))
-        else:
-            assert found.rotation_rad == along.rotation_rad
-    assert rotations
-    assert rotations <= set(range(1, 12))
+#: Twelfths of a quarter turn -> a face of which that rotation shows the most.
+TURNED = {
+    1: [(0, 0), (32, 0), (16, 23), (8, 27)],
+    2: [(0, 0), (35, 0), (24, 26), (9, 35)],
+    3: [(0, 0), (17, 0), (44, 23), (12, 37)],
+    4: [(0, 0), (28, 0), (42, 31), (11, 25)],
+    5: [(0, 0), (16, 0), (34, 39), (10, 17)],
+    7: [(0, 0), (26, 0), (44, 39), (5, 20)],
+    8: [(0, 0), (35, 0), (44, 35), (10, 17)],
+    9: [(0, 0), (27, 0), (39, 30), (7, 20)],
+    10: [(0, 0), (26, 0), (16, 31), (6, 29)],
+    11: [(0, 0), (27, 0), (21, 35), (7, 24)],
+}
+
+
+@pytest.mark.parametrize("twelfth", TURNED)
+def test_between_the_edges_twelfths_of_a_quarter_turn_are_tried(twelfth):
+    loop = TURNED[twelfth]
+    faces, steps = [(loop, 1.0)], np.arange(7) * PITCH / 7
+    found = choose_lattice([region(loop)], HALF, PITCH, WINDOW)
+    assert found.rotation_rad == pytest.approx(twelfth * np.pi / 24)
+    chosen = worth(faces, found.rotation_rad, found.x_mm, found.y_mm)
+    for rotation in edge_rotations([region(loop)]):
+        assert chosen > max(worth(faces, rotation, x, y) for x in steps for y in steps)
+    along = choose_lattice([region(loop)], HALF, PITCH, WINDOW, search=False)
+    assert chosen > worth(faces, along.rotation_rad, along.x_mm, along.y_mm)
+    # a rank test that nothing passes changes nothing
+    same = choose_lattice([region(loop)], HALF, PITCH, WINDOW, lambda *_: False)
+    assert (same.rotation_rad, same.x_mm, same.y_mm) == (
+        found.rotation_rad, found.x_mm, found.y_mm
+    )  # fmt: skip

@@ -157,9 +157,65 @@ def test_a_plate_that_comes_down_on_the_bare_face_gives_its_tilt():
     np.testing.assert_allclose(found, gain, atol=2e-3)
 
 
+def test_its_slopes_are_at_most_seventeen_tenths_of_its_depth():
+    gain = np.array([math.log(SCALE), 0.35, -0.63, 0.0])
+    found = tilted_gain(image(tilted(gain)))
+    assert found[1] == pytest.approx(0.35, abs=0.02)
+    assert np.abs(found[2:]).sum() == pytest.approx(1.7 * found[1])
+
+
 def test_it_needs_ten_tactels_of_either_kind():
     gain = np.array([math.log(SCALE), 0.45, -0.3, 0.02])
     forces = tilted(gain)
     assert tilted_gain(image(np.where(np.arange(SIDE) < 8, forces, 0.0))) is None
     assert tilted_gain(image(np.where(np.arange(SIDE) < 8, 0.0, forces))) is None
     assert tilted_gain(image(np.zeros((SIDE, SIDE)))) is None
+
+
+COLUMN = np.tile(np.arange(SIDE), (SIDE, 1))
+ROW = COLUMN.T
+PEAKS = (COLUMN % 2 == 1) & (ROW % 2 == 0)
+
+
+def halves(left, base=0.0, peak=1.0):
+    """Forces: on the left what is given, on the right peaks over a base."""
+    return np.where(COLUMN < 8, left, np.where(PEAKS, peak, base))
+
+
+@pytest.mark.parametrize(
+    ("forces", "comes_down"),
+    [
+        # on the bare face the lowest readings reach three tenths of the highest
+        (halves(np.where(COLUMN % 2, 1.0, 0.31)), True),
+        (halves(np.where(COLUMN % 2, 1.0, 0.29)), False),
+        # and six hundredths of the highest of all
+        (halves(0.061), True),
+        (halves(0.059), False),
+        # beside a plateau they stay below half of these three tenths
+        (halves(1.0, base=0.14), True),
+        (halves(1.0, base=0.16), False),
+        # lowest: a fifth are lower; one column of five may be, two may not
+        (halves(np.where(COLUMN % 5, 1.0, 0.02)), True),
+        (halves(np.where(COLUMN % 5 > 1, 1.0, 0.02)), False),
+    ],
+)
+def test_what_is_taken_for_the_bare_face_and_for_a_plateau(forces, comes_down):
+    assert (tilted_gain(image(forces)) is not None) is comes_down
+
+
+@pytest.mark.parametrize(("share", "counts"), [(0.81, True), (0.79, False)])
+def test_a_tactel_is_on_a_plateau_from_four_fifths_of_the_highest_around_it(share, counts):
+    beside = (COLUMN % 2 == 0) & (ROW % 4 == 0)
+    forces = np.where((COLUMN >= 8) & beside, share, halves(1.0))
+    known = np.where((COLUMN > 4) & (COLUMN < 8) | (COLUMN >= 8) & PEAKS, 0.0, 1.0)
+    assert (tilted_gain(image(forces, trust=known)) is not None) is counts
+
+
+@pytest.mark.parametrize(("few", "enough"), [(10, True), (9, False)])
+@pytest.mark.parametrize("kind", ["bare", "plateau"])
+def test_ten_tactels_of_either_kind_are_enough(kind, few, enough):
+    side = COLUMN < 5 if kind == "bare" else (COLUMN > 9) & PEAKS
+    known = np.where((COLUMN > 4) & (COLUMN < 8), 0.0, 1.0).ravel()
+    known[np.flatnonzero(COLUMN < 8 if kind == "bare" else COLUMN >= 8)] = 0.0
+    known[np.flatnonzero(side)[:few]] = 1.0
+    assert (tilted_gain(image(halves(1.0), trust=known)) is not None) is enough
