@@ -1,15 +1,19 @@
 """Depths and forces by the law written out again, number by number."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from probe.sensor import SensorType
 from recognizer.touch.settings import ReaderSettings
 from recognizer.touch.symbols.gain import (
     Image,
+    bend_image,
     bounded_gain,
     first_gain,
+    image_of_signal,
     normalize_image,
     tilted_gain,
 )
@@ -72,8 +76,9 @@ def test_slopes_are_at_most_so_many_depths(gain, steepest, truth):
 
 
 @pytest.mark.parametrize("newtons", [True, False])
-def test_symbols_all_over_give_the_plane_that_pressed_them(newtons):
-    ink, plane = 0.4, (2.0, 0.3, -0.2)
+@pytest.mark.parametrize("plane", [(2.0, 0.3, -0.2), (0.6, -0.1, 0.07)])
+def test_symbols_all_over_give_the_plane_that_pressed_them(newtons, plane):
+    ink = 0.4
     x, y = (np.indices((SIDE, SIDE))[axis] for axis in (1, 0))
     forces = ink * (plane[0] + plane[1] * (x - HALF) / HALF + plane[2] * (HALF - y) / HALF)
     trust = np.ones((SIDE, SIDE))
@@ -155,6 +160,8 @@ def test_a_plate_that_comes_down_on_the_bare_face_gives_its_tilt():
     gain = np.array([math.log(SCALE), 0.45, -0.3, 0.02])
     found = tilted_gain(image(tilted(gain)))
     np.testing.assert_allclose(found, gain, atol=2e-3)
+    left = tilted_gain(image(tilted(gain)[:, ::-1]))
+    np.testing.assert_allclose(left, [gain[0], gain[1], -gain[2], gain[3]], atol=2e-3)
 
 
 def test_its_slopes_are_at_most_seventeen_tenths_of_its_depth():
@@ -219,3 +226,52 @@ def test_ten_tactels_of_either_kind_are_enough(kind, few, enough):
     known[np.flatnonzero(COLUMN < 8 if kind == "bare" else COLUMN >= 8)] = 0.0
     known[np.flatnonzero(side)[:few]] = 1.0
     assert (tilted_gain(image(halves(1.0), trust=known)) is not None) is enough
+
+
+def test_an_image_of_a_signal_has_a_row_for_each_tactel():
+    sensor = SensorType()
+    forces = np.arange(256.0).reshape(16, 16)
+    trust = np.linspace(0, 1, 256).reshape(16, 16)
+    signal = SimpleNamespace(forces=forces, trust=trust, newtons=True)
+    found = image_of_signal(sensor, signal, 1.0, ReaderSettings())
+    pitch = 1.5875
+    assert found.points_mm.shape == (256, 2)
+    # tactel (2, 5): columns to the right, rows down
+    np.testing.assert_allclose(found.points_mm[37], [(5 - 7.5) * pitch, (7.5 - 2) * pitch])
+    assert found.forces[37] == 37.0
+    assert found.trust[37] == trust[2, 5]
+    assert (found.shape, found.newtons, found.falls) == ((16, 16), True, None)
+    half = np.array(sensor.half_mm)
+    np.testing.assert_allclose(found.plane[37], [1.0, *(found.points_mm[37] / half)])
+    assert np.ptp(found.points_mm[:, 0]) == pytest.approx(15 * pitch)
+
+
+def test_a_round_face_falls_away_under_the_plate():
+    sensor = SensorType()
+    flat = image_of_signal(
+        sensor,
+        SimpleNamespace(forces=np.ones((16, 16)), trust=np.ones((16, 16)), newtons=False),
+        1.0, ReaderSettings(),
+    )  # fmt: skip
+    height = sensor.overlay.height_mm
+    raised = []
+
+    def falls(points):
+        return points[:, 0] ** 2 / 40.0
+
+    def at(symbol):
+        raised.append(symbol)
+        return SimpleNamespace(falls_mm=falls)
+
+    bend = SimpleNamespace(
+        raised=at, unrolled_mm=lambda points, symbol: points * [1.1, 1.0] + symbol
+    )
+    one = bend_image(flat, sensor, bend)
+    points = flat.points_mm
+    np.testing.assert_allclose(one.points_mm, points * [1.1, 1.0] + 1.0)  # symbols of one mm
+    np.testing.assert_allclose(one.falls, [falls(points) / height])
+    assert raised == [pytest.approx(1.0)]
+    two = bend_image(flat, sensor, bend, (0.5, 0.8))
+    np.testing.assert_allclose(
+        two.falls, [0.5 * falls(points) / height, 0.8 * falls(points) / height]
+    )

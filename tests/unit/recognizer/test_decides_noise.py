@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from recognizer.touch.settings import NoiseSettings
-from recognizer.touch.symbols.noise import log_likelihoods
+from recognizer.touch.symbols.noise import log_likelihoods, psi_deviation
 
 
 def psi(response):
@@ -75,3 +75,11 @@ def test_a_tactel_by_hand(seen, value, nats):
     width = math.hypot(0.8, value)
     away = (seen - value) * 1e-3 / 0.15 / width  # where nothing presses hardly anything is told
     assert hung[0, 0, 0] == pytest.approx(-min(away**2 / 2, 8) - math.log(width), abs=1e-5)
+
+
+def test_slopes_count_by_the_square_of_how_far_tactels_are_displaced():
+    # 0.8, 0.6 and a slope of 2 over half a mm: the root of 0.64 + 0.36 + 1
+    table = np.zeros((1, 1, 1, 6), np.float32)
+    table[..., 0], table[..., 1] = 0.6, 2.0
+    width = psi_deviation(table, NoiseSettings(displaced_mm=0.5))
+    assert width[0, 0, 0] == pytest.approx(math.sqrt(2.0))
