@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 CHORD_MM = 0.005
+_MOST = 100_000  # chords of one arc: a sound file has some hundreds
 _ROUND = 0.05  # mm by which the two radii of an arc may differ: files round to 0.001
 
 Point = tuple[float, float]
@@ -49,7 +50,9 @@ def chords(start: Point, end: Point, words: dict[str, float], *, clockwise: bool
         sweep = 2 * math.pi
     sweep += 2 * math.pi * max(0, int(words.get("P", 1)) - 1)
     step = 2 * math.acos(max(0.0, 1 - CHORD_MM / radius))
-    count = max(1, math.ceil(sweep / step))
+    count = max(1, math.ceil(sweep / max(step, 1e-9)))
+    if count > _MOST:
+        raise ArcError(f"an arc of radius {radius:g} mm with {count} chords")
     sign = -1 if clockwise else 1
     angles = (first + sign * sweep * k / count for k in range(1, count))
     points = [(centre[0] + radius * math.cos(a), centre[1] + radius * math.sin(a)) for a in angles]

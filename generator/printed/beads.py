@@ -67,7 +67,7 @@ class Beads:
         )
 
 
-def joined(*beads: Beads) -> Beads:
+def join_beads(*beads: Beads) -> Beads:
     """Return the beads of several sets as one."""
     return Beads(
         np.concatenate([b.start_mm for b in beads]),
@@ -119,7 +119,7 @@ def beads_of(path: Toolpath, *, starved_mm: float = 0.0) -> Beads:
     size = dot_size((volume * share)[dots], path.height_mm[moves][at])
     middle = (start[at] + end[at])[:, :2] / 2
     bottom = (start[at, 2] + end[at, 2]) / 2 - path.height_mm[moves][at]
-    return joined(lines, Beads(middle, middle, bottom + size[1], *size))
+    return join_beads(lines, Beads(middle, middle, bottom + size[1], *size))
 
 
 def section_size(area_mm2: Floats, layer_mm: Floats) -> tuple[Floats, Floats]:

@@ -72,7 +72,7 @@ def check_parts(
     def one(job: tuple[int, Part]) -> tuple[list[SymbolTile], list[str]]:
         nonlocal done
         number, part = job
-        found = _checked(part, profile, faults, np.random.default_rng([seed, number]))
+        found = _check_part(part, profile, faults, np.random.default_rng([seed, number]))
         done += 1
         progress(f"printing {part.name}", done / len(marked))
         return found
@@ -87,7 +87,7 @@ def check_parts(
     )
 
 
-def _checked(
+def _check_part(
     part: Part, profile: PrintProfile, faults: PrintFaults | None, rng: np.random.Generator
 ) -> tuple[list[SymbolTile], list[str]]:
     with tempfile.TemporaryDirectory() as folder:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.printed.beads import Beads, beads_of, joined
+from generator.printed.beads import Beads, beads_of, join_beads
 from generator.printed.faults import PrintFaults, faulty_path
 from generator.printed.slicer import SlicedPart
 from generator.printed.toolpath import LEVEL_MM, Toolpath, role_number
@@ -65,7 +65,7 @@ def deposit(
         found.append(seam_blobs(path, faults.seam_mm))
     if faults.strings > 0:
         found.append(strings(path, faults.strings, faults.string_mm, rng))
-    beads = joined(*found).shifted(shift)
+    beads = join_beads(*found).shifted(shift)
     return Deposit(beads, sliced.low_mm, sliced.high_mm, faults.bow_mm)
 
 

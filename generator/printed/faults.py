@@ -119,7 +119,7 @@ def faulty_path(
     Scale and skew act about `datum_mm`; then backlash, ringing and each layer's jitter move
     what is left, and the flow changes along the path.
     """
-    path = _as_moved(path, faults, datum_mm)
+    path = _scale_and_skew(path, faults, datum_mm)
     if faults.backlash_mm > 0:
         path = _with_backlash(path, faults.backlash_mm)
     if faults.ringing_mm > 0:
@@ -137,18 +137,18 @@ def faulty_path(
     return replace(path, volume_mm3=volume)
 
 
-def _as_moved(path: Toolpath, faults: PrintFaults, datum: tuple[float, float]) -> Toolpath:
+def _scale_and_skew(path: Toolpath, faults: PrintFaults, datum: tuple[float, float]) -> Toolpath:
     lean = math.tan(math.radians(faults.skew_deg))
     A = np.array([[faults.scale_x, faults.scale_x * lean], [0.0, faults.scale_y]])
     if (np.eye(2) == A).all():
         return path
 
-    def moved(points: Floats) -> Floats:
+    def move(points: Floats) -> Floats:
         out = points.copy()
         out[:, :2] = (points[:, :2] - datum) @ A.T + datum
         return out
 
-    return replace(path, start_mm=moved(path.start_mm), end_mm=moved(path.end_mm))
+    return replace(path, start_mm=move(path.start_mm), end_mm=move(path.end_mm))
 
 
 def _with_backlash(path: Toolpath, play: float) -> Toolpath:

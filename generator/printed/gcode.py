@@ -34,6 +34,7 @@ FILAMENT_MM = 1.75  #: diameter where a file does not tell
 _INCH_MM = 25.4
 _AXES = "XYZ"
 _JOINED = re.compile(r"^[GgNn][\d.]+[A-Za-z]|^[Gg]\d.*[\d.][A-Za-z]")  # G1X10Y5: no spaces
+_BRACKETS = re.compile(r"\([^)]*\)")  # comments of another kind
 _HEAD = 4096  # characters of a file in which its slicer gives its name
 # Announced widths are kept to a few percent; filament of 2.85 mm read as 1.75 is out by 2.65.
 _WIDTHS_AGREE = (0.7, 1.5)
@@ -67,7 +68,7 @@ def read_gcode(path: Path | str, *, filament_mm: float | None = None) -> Toolpat
 
 def toolpath_of(text: str, name: str = "G-code", *, filament_mm: float | None = None) -> Toolpath:
     """Return the moves of G-code that was read; `name` stands in errors. See `read_gcode`."""
-    reader = _Reader(name)
+    reader = _Machine(name)
     for number, line in enumerate(io.StringIO(text), 1):
         reader.line_number = number
         reader.line(line)
@@ -94,7 +95,7 @@ def _text(content: bytes, name: str) -> str:
     return content.decode("utf-8", errors="replace")
 
 
-class _Reader:
+class _Machine:
     """The state of a machine while it follows a file."""
 
     def __init__(self, name: str) -> None:
@@ -117,6 +118,8 @@ class _Reader:
         code, mark, comment = line.partition(";")
         if mark:
             self._note(mark + comment.rstrip())
+        if "(" in code:
+            code = _BRACKETS.sub("", code)
         words = _apart(code) if _JOINED.search(code) else code.split()
         if not words:
             return

@@ -93,10 +93,10 @@ def _three(tile: SymbolTile) -> tuple[Pixels, Pixels, Pixels]:
     both[designed & printed] = BOTH_RGB
     both[designed & ~printed] = LOST_RGB
     both[printed & ~designed] = WIDENED_RGB
-    return _shaded(tile.designed, high), _shaded(tile.deposited, high), both
+    return _shade(tile.designed, high), _shade(tile.deposited, high), both
 
 
-def _shaded(heights: Floats, high: float) -> Pixels:
+def _shade(heights: Floats, high: float) -> Pixels:
     """Return heights as a lit relief, coloured from body to symbol."""
     z = np.where(np.isfinite(heights), heights, -high).clip(-high, 2 * high)
     slope_y, slope_x = np.gradient(z, _STEP_MM)

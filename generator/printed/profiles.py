@@ -100,7 +100,7 @@ def settings_of(profile: PrintProfile) -> dict[str, str]:
         A file that is no settings file.
     """
     if profile.file is not None:
-        return _exported(profile.file)
+        return _read_exported(profile.file)
     vendor = next((f for f in VENDOR_FOLDERS if (f / f"{_VENDOR}.ini").is_file()), None)
     if vendor is None:
         return _plain(profile)
@@ -108,9 +108,9 @@ def settings_of(profile: PrintProfile) -> dict[str, str]:
     sections.read(vendor / f"{_VENDOR}.ini", encoding="utf-8")
     try:
         return {
-            **_inherited(sections, "print", profile.vendor_print),
-            **_inherited(sections, "filament", _FILAMENT),
-            **_inherited(sections, "printer", profile.vendor_printer),
+            **_inherit(sections, "print", profile.vendor_print),
+            **_inherit(sections, "filament", _FILAMENT),
+            **_inherit(sections, "printer", profile.vendor_printer),
         }
     except KeyError:  # another year's vendor file
         return _plain(profile)
@@ -127,17 +127,17 @@ def _plain(profile: PrintProfile) -> dict[str, str]:
     }
 
 
-def _inherited(sections: configparser.RawConfigParser, kind: str, name: str) -> dict[str, str]:
+def _inherit(sections: configparser.RawConfigParser, kind: str, name: str) -> dict[str, str]:
     """Return a section's settings over those of the sections that it inherits from."""
     section = sections[f"{kind}:{name}"]
     settings: dict[str, str] = {}
     for base in section.get("inherits", "").split(";"):
         if base.strip():
-            settings |= _inherited(sections, kind, base.strip())
+            settings |= _inherit(sections, kind, base.strip())
     return settings | {key: value for key, value in section.items() if key != "inherits"}
 
 
-def _exported(file: Path) -> dict[str, str]:
+def _read_exported(file: Path) -> dict[str, str]:
     sections = _parser()
     try:
         sections.read_string("[all]\n" + file.read_text(encoding="utf-8"))

@@ -1,6 +1,6 @@
 """What was deposited against what was designed, symbol by symbol, on one face.
 
-PrintedSurface + Embossing -> one SymbolCheck for each symbol. A symbol's footprint is what
+PrintedFace + Embossing -> one SymbolCheck for each symbol. A symbol's footprint is what
 stands higher than half its height above the face around it, as printed; it is compared with
 the outline at half height after both are laid on each other (how far a symbol stands from its
 place is told apart). Symbol frame: its centre, its own axes, mm.
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from generator.alphabet.outline import Ring, Tiers
 from generator.alphabet.rings import distance, points_inside
-from generator.printed.surface import PrintedSurface
+from generator.printed.surface import PrintedFace
 from generator.solid.emboss import turn
 from generator.solid.part import Embossing
 
@@ -87,7 +87,7 @@ class _Design:
 
 
 def survey_face(
-    surface: PrintedSurface,
+    surface: PrintedFace,
     embossing: Embossing,
     *,
     part: str = "",
@@ -109,18 +109,18 @@ def survey_face(
     R = turn(embossing.rotation_rad)
     side = designs[0].footprint.shape if designs else (0, 0)
 
-    def sampled(number: int, moved: Floats) -> Floats:
+    def sample(number: int, moved: Floats) -> Floats:
         at = embossing.centres_mm[number] + (points + moved) @ R.T
         return surface.heights_mm(at).reshape(side)
 
     tiles = []
     for number, label in enumerate(embossing.labels.tolist()):
         design = designs[label]
-        found, base = _over_face(sampled(number, np.zeros(2)), design)
+        found, base = _over_face(sample(number, np.zeros(2)), design)
         moved = np.zeros(2)
         for _ in range(2):  # the first shift changes what lies in the cell
             moved = (moved + _middle(found, design, points)).clip(-limits.moved_mm, limits.moved_mm)
-            found, base = _over_face(sampled(number, moved), design)
+            found, base = _over_face(sample(number, moved), design)
         printed = found > design.height_mm / 2
         rivals = [d.footprint for k, d in enumerate(designs) if k != label]
         pixel = limits.step_mm**2
@@ -141,11 +141,11 @@ def survey_face(
             moved_mm=(float(moved[0]), float(moved[1])),
             verdict="",
         )
-        tiles.append(SymbolTile(_judged(check, limits), design.heights, found))
+        tiles.append(SymbolTile(_judge(check, limits), design.heights, found))
     return tiles
 
 
-def _judged(check: SymbolCheck, limits: SurveyLimits) -> SymbolCheck:
+def _judge(check: SymbolCheck, limits: SurveyLimits) -> SymbolCheck:
     ahead = check.overlap - check.rival_overlap
     height = check.height_mm / check.designed_mm
     verdict = DOUBTFUL

@@ -1,0 +1,102 @@
+"""Print one panel of each profile on several printers in simulation; how symbols come out.
+
+    python tests/campaigns/printed.py [-o docs/printed] [--size 60]
+
+Prints a table (docs/printed.md holds it) and writes one picture for each combination. Needs
+PrusaSlicer. Profile `fine` is planned for resin, so that its 4.5 mm symbols are not refused
+for filament, and printed on filament all the same.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from generator.export.stl import stl_chunks
+from generator.pipeline.files import parts_of
+from generator.pipeline.place import place_object
+from generator.pipeline.plan import ObjectPlan, plan_object
+from generator.printed import PROFILES, deposit, face_surface, print_faults, slice_part
+from generator.printed.picture import check_png
+from generator.printed.survey import LOST, SURVIVES, survey_face
+from generator.solid.part import Part
+from generator.solid.triangulate import triangles
+from generator.spec.read import read_specs
+
+SPECS = ("one-touch", "fine", "thesis", "product")
+PRINTS = ("fdm-0.4-0.2", "fdm-0.4-0.3", "fdm-0.6-0.3")
+FAULTS = ("none", "usual", "bad")
+
+
+def panel(profile: str, size_mm: float, folder: Path) -> tuple[ObjectPlan, Part]:
+    printer = "\nprint: {printer: resin}" if profile == "fine" else ""
+    spec = folder / f"{profile}.yaml"
+    spec.write_text(
+        f"name: {profile}\nshape: {{cube: {size_mm:g} mm}}\nprofile: {profile}{printer}\n"
+    )
+    plan = plan_object(read_specs([spec], database=None)[0])
+    layout = place_object(None, plan, False).layout
+    parts = [part for part in parts_of(plan, layout)[0] if part.symbols]
+    return plan, max(parts, key=lambda part: part.symbols)
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("-o", "--output", type=Path)
+    options.add_argument("--size", type=float, default=60.0)
+    asked = options.parse_args()
+    print("| profile | print | faults | symbols | overlap | worst | lost % | widened % | height mm "
+          "| moved mm | survive | lost |")  # fmt: skip
+    print("| --- " * 12 + "|")
+    spent: dict[str, list[float]] = {"slicing": [], "beads": [], "surface": [], "survey": []}
+    with tempfile.TemporaryDirectory() as name:
+        for profile in SPECS:
+            plan, part = panel(profile, asked.size, Path(name))
+            stl = Path(name) / f"{profile}.stl"
+            stl.write_bytes(b"".join(stl_chunks(triangles(part))))
+            embossing = next(e for e in part.embossings if e.face is not None)
+            for machine in PRINTS:
+                began = time.perf_counter()
+                sliced = slice_part(stl, PROFILES[machine])
+                spent["slicing"].append(time.perf_counter() - began)
+                for faults in FAULTS:
+                    t0 = time.process_time()
+                    made = deposit(sliced, print_faults(faults), np.random.default_rng(1))
+                    t1 = time.process_time()
+                    surface = face_surface(made, embossing.T_part_facet)
+                    t2 = time.process_time()
+                    tiles = survey_face(surface, embossing, part=part.name, face=part.name)
+                    t3 = time.process_time()
+                    spent["beads"].append(t1 - t0)
+                    spent["surface"].append(t2 - t1)
+                    spent["survey"].append(t3 - t2)
+                    checks = [tile.check for tile in tiles]
+                    area = np.mean([c.area_mm2 for c in checks])
+                    print(
+                        f"| {profile} | {machine} | {faults} | {len(checks)} "
+                        f"| {np.mean([c.overlap for c in checks]):.3f} "
+                        f"| {min(c.overlap for c in checks):.3f} "
+                        f"| {100 * np.mean([c.lost_mm2 for c in checks]) / area:.1f} "
+                        f"| {100 * np.mean([c.widened_mm2 for c in checks]) / area:.1f} "
+                        f"| {np.mean([c.height_mm for c in checks]):.2f} "
+                        f"| {max(np.hypot(*c.moved_mm) for c in checks):.2f} "
+                        f"| {sum(c.verdict == SURVIVES for c in checks)} "
+                        f"| {sum(c.verdict == LOST for c in checks)} |",
+                        flush=True,
+                    )
+                    if asked.output:
+                        asked.output.mkdir(parents=True, exist_ok=True)
+                        picture = asked.output / f"{profile}-{machine}-{faults}.png"
+                        names = [glyph.name for glyph in plan.alphabet.glyphs]
+                        title = f"{profile} on {machine}, faults {faults}"
+                        picture.write_bytes(check_png(title, tiles, names))
+    for key, values in spent.items():
+        print(f"{key}: median {np.median(values):.2f} s, most {max(values):.2f} s")
+
+
+if __name__ == "__main__":
+    main()
