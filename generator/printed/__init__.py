@@ -3,10 +3,10 @@
 ::
 
     part's STL --slicer--> G-code --gcode--> Toolpath --faults--> Toolpath
-        --beads, deposit--> Deposit --view (above | sideways)--> PrintedFace
+        --beads, deposit--> Deposit --view (above | sideways)--> PrintedSurface
         --survey, check--> what became of each symbol
 
-Nothing here knows how touches are simulated; a `PrintedFace` is a grid of heights over a
+Nothing here knows how touches are simulated; a `PrintedSurface` is a grid of heights over a
 face. What is modelled and what is not stands in `beads`, `faults` and `view`. mm throughout.
 """
 
@@ -22,7 +22,7 @@ from generator.printed.profiles import (
     profile_of_printer,
 )
 from generator.printed.slicer import SlicedPart, slice_part
-from generator.printed.surface import PrintedFace
+from generator.printed.surface import PrintedSurface
 from generator.printed.view import face_surface, is_seen
 
 __all__ = [
@@ -31,7 +31,7 @@ __all__ = [
     "Deposit",
     "PrintFaults",
     "PrintProfile",
-    "PrintedFace",
+    "PrintedSurface",
     "SlicedPart",
     "deposit",
     "face_surface",

@@ -29,7 +29,7 @@ class Coverage:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PrintedFace:
+class PrintedSurface:
     """Heights of the highest plastic."""
 
     heights: NDArray[np.float32]  #: (ny, nx) mm, at origin + step (column, row)

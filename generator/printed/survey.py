@@ -1,6 +1,6 @@
 """What was deposited against what was designed, symbol by symbol, on one face.
 
-PrintedFace + Embossing -> one SymbolCheck for each symbol. A symbol's footprint is what
+PrintedSurface + Embossing -> one SymbolCheck for each symbol. A symbol's footprint is what
 stands higher than half its height above the face around it, as printed; it is compared with
 the outline at half height after both are laid on each other (how far a symbol stands from its
 place is told apart). Symbol frame: its centre, its own axes, mm.
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from generator.alphabet.outline import Ring, Tiers
 from generator.alphabet.rings import distance, points_inside
-from generator.printed.surface import PrintedFace
+from generator.printed.surface import PrintedSurface
 from generator.solid.emboss import turn
 from generator.solid.part import Embossing
 
@@ -87,7 +87,7 @@ class _Design:
 
 
 def survey_face(
-    surface: PrintedFace,
+    surface: PrintedSurface,
     embossing: Embossing,
     *,
     part: str = "",
@@ -122,7 +122,7 @@ def survey_face(
             moved = (moved + _middle(found, design, points)).clip(-limits.moved_mm, limits.moved_mm)
             found, base = _over_face(sample(number, moved), design)
         printed = found > design.height_mm / 2
-        rivals = [d.footprint for k, d in enumerate(designs) if k != label]
+        rivals = [d for k, d in enumerate(designs) if k != label]
         pixel = limits.step_mm**2
         top = found[design.top]
         height = float(np.median(top)) if len(top) and np.isfinite(base) else 0.0
@@ -201,8 +201,11 @@ def _over_face(found: Floats, design: _Design) -> tuple[Floats, float]:
 
 
 def _middle(found: Floats, design: _Design, points: Floats) -> Floats:
-    """Return how far the printed footprint's middle lies from the designed one's."""
-    printed = (found > design.height_mm / 2).ravel()
+    """Return how far the printed footprint's middle lies from the designed one's.
+
+    What lies further from the foot, such as strings, is not counted.
+    """
+    printed = ((found > design.height_mm / 2) & ~design.around).ravel()
     if not printed.any():
         return np.zeros(2)
     moved: Floats = points[printed].mean(axis=0) - points[design.footprint.ravel()].mean(axis=0)
@@ -214,11 +217,12 @@ def _overlap(a: Mask, b: Mask) -> float:
     return float((a & b).sum()) / union if union else 0.0
 
 
-def _best_overlap(printed: Mask, design: Mask, limits: SurveyLimits) -> float:
+def _best_overlap(printed: Mask, design: _Design, limits: SurveyLimits) -> float:
     """Return the overlap where the middles of both lie on each other, or nearly so."""
-    if not printed.any():
+    near = printed & ~design.around
+    if not near.any():
         return 0.0
     most = round(limits.moved_mm / limits.step_mm)
-    at = [np.argwhere(mask).mean(axis=0) for mask in (printed, design)]
+    at = [np.argwhere(mask).mean(axis=0) for mask in (near, design.footprint)]
     by = np.rint(at[1] - at[0]).astype(np.int64).clip(-most, most)
-    return _overlap(np.roll(printed, by, axis=(0, 1)), design)
+    return _overlap(np.roll(printed, by, axis=(0, 1)), design.footprint)

@@ -1,4 +1,4 @@
-"""Deposit + face -> PrintedFace: the plastic that a touch of one face can meet.
+"""Deposit + face -> PrintedSurface: the plastic that a touch of one face can meet.
 
 Faces that lie level and look up are seen from above, upright ones along the bed. Others are
 refused: they stand on supports or lean, and what a bead does there is not modelled. mm.
@@ -16,7 +16,7 @@ from generator.printed.above import heights_from_above
 from generator.printed.beads import Beads
 from generator.printed.deposit import Deposit
 from generator.printed.sideways import heights_sideways
-from generator.printed.surface import DEPTH_MM, MARGIN_MM, STEP_MM, Coverage, PrintedFace
+from generator.printed.surface import DEPTH_MM, MARGIN_MM, STEP_MM, Coverage, PrintedSurface
 
 Floats = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ def face_surface(
     outline_mm: Floats | None = None,
     step_mm: float = STEP_MM,
     depth_mm: float = DEPTH_MM,
-) -> PrintedFace:
+) -> PrintedSurface:
     """Return the surface over one face.
 
     Parameters
@@ -86,7 +86,7 @@ def face_surface(
     else:
         heights, samples, within = _sideways(near, low, high, shape, step_mm, depth_mm)
     heights[heights < -depth_mm] = -np.inf
-    return PrintedFace(
+    return PrintedSurface(
         heights=heights,
         origin_mm=(float(low[0]), float(low[1])),
         step_mm=step_mm,

@@ -22,7 +22,7 @@ from generator.polyhedron.shapes import cube
 from generator.printed import (
     PROFILES,
     Deposit,
-    PrintedFace,
+    PrintedSurface,
     SlicedPart,
     deposit,
     face_surface,
@@ -68,7 +68,7 @@ def printed(sliced: SlicedPart) -> Deposit:
 
 
 @pytest.fixture(scope="module")
-def surface(part: Part, printed: Deposit) -> PrintedFace:
+def surface(part: Part, printed: Deposit) -> PrintedSurface:
     return face_surface(printed, part.embossings[0].T_part_facet)
 
 
@@ -78,7 +78,7 @@ def test_the_same_part_gives_the_same_moves_again(stl: Path, sliced: SlicedPart)
     assert (again.toolpath.volume_mm3 == sliced.toolpath.volume_mm3).all()
 
 
-def test_every_symbol_is_deposited_as_designed(part: Part, surface: PrintedFace) -> None:
+def test_every_symbol_is_deposited_as_designed(part: Part, surface: PrintedSurface) -> None:
     tiles = survey_face(surface, part.embossings[0])
     assert len(tiles) >= 4
     for tile in tiles:
@@ -89,7 +89,7 @@ def test_every_symbol_is_deposited_as_designed(part: Part, surface: PrintedFace)
 
 
 def test_the_plastic_over_the_face_is_what_was_extruded_over_it(
-    part: Part, sliced: SlicedPart, surface: PrintedFace
+    part: Part, sliced: SlicedPart, surface: PrintedSurface
 ) -> None:
     path = sliced.toolpath
     extruded = path.volume_mm3[path.of_part & (path.end_mm[:, 2] > 3.05)].sum()
@@ -112,7 +112,7 @@ def test_the_extruded_volume_is_that_of_the_whole_part_without_its_sparse_infill
 
 
 def test_heights_are_those_of_the_mesh_away_from_its_walls(
-    part: Part, stl: Path, surface: PrintedFace
+    part: Part, stl: Path, surface: PrintedSurface
 ) -> None:
     mesh = trimesh.load_mesh(stl)
     T = part.embossings[0].T_part_facet

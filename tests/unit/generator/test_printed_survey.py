@@ -10,7 +10,7 @@ import pytest
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
 from generator.alphabet.rings import points_inside
-from generator.printed.surface import Coverage, PrintedFace
+from generator.printed.surface import Coverage, PrintedSurface
 from generator.printed.survey import DOUBTFUL, LOST, SURVIVES, SymbolTile, rings_at, survey_face
 from generator.solid.emboss import turn
 from generator.solid.part import Embossing
@@ -29,7 +29,7 @@ def embossing(rotation: float = 0.0) -> Embossing:
 def surface(
     labels: list[int], *, moved: tuple[float, float] = (0.0, 0.0), high: float = 1.0,
     base: float = 0.0, rotation: float = 0.0,
-) -> PrintedFace:  # fmt: skip
+) -> PrintedSurface:  # fmt: skip
     """The exact CAD surface of some symbols, 17 x 17 mm, every .05 mm; -1 for none."""
     line = np.arange(0, 341) * 0.05
     x, y = np.meshgrid(line, line)
@@ -44,11 +44,11 @@ def surface(
             heights[near] = np.where(within, high * z, heights[near])
     T = np.eye(4)
     T[2, 3] = 3.0
-    return PrintedFace((heights + base).astype(np.float32), (0.0, 0.0), 0.05, np.eye(4), T,
+    return PrintedSurface((heights + base).astype(np.float32), (0.0, 0.0), 0.05, np.eye(4), T,
                           Coverage(0, 0, 0))  # fmt: skip
 
 
-def survey(of: PrintedFace, rotation: float = 0.0) -> list[SymbolTile]:
+def survey(of: PrintedSurface, rotation: float = 0.0) -> list[SymbolTile]:
     return survey_face(of, embossing(rotation), part="P", face="F1")
 
 
@@ -106,3 +106,13 @@ def test_no_symbol_is_lost() -> None:
 def test_no_plastic_at_all() -> None:
     nothing = surface([0, 1, 2, 3], base=-np.inf)
     assert {tile.check.verdict for tile in survey(nothing)} == {LOST}
+
+
+def test_a_string_across_the_cell_moves_nothing() -> None:
+    strung = surface([0, 1, 2, 3])
+    line = np.arange(341) * 0.05
+    strung.heights[np.abs(line - 8.2) < 0.08] = 0.9  # from side to side, above symbols 0 and 1
+    check = survey(strung)[0].check
+    assert check.moved_mm == pytest.approx((0.0, 0.0), abs=0.02)
+    assert check.verdict == SURVIVES
+    assert check.widened_mm2 > 0.9
