@@ -29,8 +29,8 @@ SURVIVES, DOUBTFUL, LOST = "survives", "doubtful", "lost"
 class SurveyLimits:
     """When a symbol survives.
 
-    Measured: symbols of 4.5 mm under the faults `bad` keep an overlap of 0.74 to 0.91, and
-    touches of such prints were named right, 60 of 60 (worlds.md, "Printed surfaces").
+    Measured: symbols of 4.5 mm under the faults `bad` keep an overlap of 0.77 to 0.95, and
+    touches of prints like these were named right, 60 of 60 (docs/printed.md).
     """
 
     overlap: float = 0.70  #: least intersection over union of a symbol that survives
