@@ -18,7 +18,7 @@ from probe.errors import SurfaceError
 from probe.simulate.registered import UP, face_of, registered_object, registered_objects
 from probe.simulate.round import round_part
 from probe.simulate.scene import Scene
-from probe.surface.mesh import part_mesh
+from probe.simulate.written import part_mesh
 from probe.surface.polygon import polygon
 
 

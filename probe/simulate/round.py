@@ -19,10 +19,10 @@ from generator.database.url import normal_url, part_path
 from probe.contact.contract import Touch
 from probe.errors import SurfaceError
 from probe.simulate.scene import Scene
+from probe.simulate.written import written_triangles
 from probe.surface.indenters import FlatPlate
 from probe.surface.mesh import mesh
 from probe.surface.polygon import FaceRegion, polygon
-from probe.surface.stl import read_stl
 
 Array = NDArray[np.float64]
 
@@ -118,7 +118,7 @@ def round_part(
     if face.round is None:
         raise SurfaceError(f"{name} is flat", fix="touch it as a flat face")
     T = part.T_object_part
-    corners = read_stl(file) @ T[:3, :3].T + T[:3, 3]
+    corners = written_triangles(file) @ T[:3, :3].T + T[:3, 3]
     return RoundPart(
         corners_mm=corners,
         low_mm=corners.min(axis=1),

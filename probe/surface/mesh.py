@@ -9,7 +9,6 @@ undersides of a closed mesh.
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -17,7 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from probe.errors import SurfaceError
-from probe.surface.stl import read_stl
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -87,25 +85,6 @@ class MeshSurface:
     @cached_property
     def _bins(self) -> _Bins:
         return _binned(self.corners)
-
-
-def part_mesh(file: str | os.PathLike[str], T_surface_part: ArrayLike | None = None) -> MeshSurface:
-    """Return the height field of a written part.
-
-    Parameters
-    ----------
-    file
-        STL.
-    T_surface_part
-        (4, 4) from the part's frame to the surface frame, whose z axis points at the
-        sensor; without it, the part as it lies in the file.
-
-    Raises
-    ------
-    SurfaceError
-        When the file is no STL or nothing of it can be seen along -z.
-    """
-    return mesh(read_stl(file), T_surface_part, place=str(file))
 
 
 def mesh(

@@ -23,7 +23,7 @@ from probe.simulate.registered import DatabaseUnreadableError, registered_object
 from probe.simulate.source import frames_of, options_of
 from probe.simulate.target import surface_of
 from probe.simulate.touch import Touches, pose_of, random_touches, simulate
-from probe.surface.mesh import part_mesh
+from probe.simulate.written import part_mesh
 
 SET = """
 objects:
@@ -126,7 +126,7 @@ def test_file_alone_is_touched_as_it_lies(lab):
         ("{db}#Cube/top", "faces: F1, F2, F3, F4, F5, F6"),
         ("{db}#", "4 objects, none is named"),
         ("{db}", "write part.stl"),
-        ("nothing.stl", "cannot be read"),
+        ("nothing.stl", "nothing.stl: no such file or directory"),
         ("{other}@{db}", "its STL parts"),
     ],
 )

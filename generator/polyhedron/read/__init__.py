@@ -61,7 +61,7 @@ def read_shape(path: str | Path, scale: float = 1.0) -> Polyhedron:
             place=place,
         )
     try:
-        content = _content(file, place)
+        content = file_content(file, place, LARGEST_BYTES)
         if suffix not in MESHES:
             solid = read_step(content, place, scale)
         else:
@@ -85,12 +85,19 @@ def _check_size(solid: Polyhedron) -> None:
         )
 
 
-def _content(file: Path, place: str) -> bytes:
+def file_content(file: Path, place: str, largest: int) -> bytes:
+    """Return the bytes of a file, at least one and at most `largest` of them.
+
+    Raises
+    ------
+    ShapeError
+        It is not there, cannot be read, is empty, or too large.
+    """
     try:
         size = file.stat().st_size
-        if size > LARGEST_BYTES:
+        if size > largest:
             raise ShapeError(
-                f"the file has {size / 2**20:.0f} MB; {LARGEST_BYTES // 2**20} MB are allowed",
+                f"the file has {size / 2**20:.0f} MB; {largest // 2**20} MB are allowed",
                 fix="simplify the model: planar faces need few triangles",
                 place=place,
             )

@@ -1,8 +1,7 @@
 """STL, binary and ASCII: bytes -> triangles in mm. Normals in the file are not used.
 
-The one reader of STL of `generator`, for models that people bring: it names the line or the
-byte at fault. `probe.surface.stl` reads printed parts of up to 20 million triangles, and
-neither package may import the other's shapes.
+The one reader of STL, for models that people bring and (`generator.database.part_triangles`)
+for written parts: it names the line or the byte at fault.
 """
 
 from __future__ import annotations
@@ -21,9 +20,31 @@ _FRAME = {b"solid", b"facet", b"outer", b"endloop", b"endfacet", b"endsolid"}
 
 def read_stl(content: bytes, place: str) -> Soup:
     """Return the triangles of an STL file; `place` names it in messages."""
+    return soup_of_triangles(stl_triangles(content, place), place)
+
+
+def stl_triangles(
+    content: bytes, place: str, *, most: int = MOST_TRIANGLES, padded: bool = True
+) -> NDArray[np.float64]:
+    """Return the corners (n, 3, 3) of a file's triangles, mm; exactly its numbers.
+
+    Parameters
+    ----------
+    content, place
+        Of the file; `place` names it in messages.
+    most
+        How many triangles are allowed.
+    padded
+        Whether bytes may follow the last triangle of a binary file, as some programs leave.
+
+    Raises
+    ------
+    ShapeError
+        It is no STL, is cut short, too large, or holds NaN or infinity.
+    """
     if _is_ascii(content):
-        return soup_of_triangles(_ascii_triangles(content, place), place)
-    return soup_of_triangles(_binary_triangles(content, place), place)
+        return _ascii_triangles(content, place, most)
+    return _binary_triangles(content, place, most, padded)
 
 
 def _is_ascii(content: bytes) -> bool:
@@ -38,7 +59,7 @@ def _count(content: bytes) -> int:
     return int.from_bytes(content[80:84], "little")
 
 
-def _binary_triangles(content: bytes, place: str) -> NDArray[np.float64]:
+def _binary_triangles(content: bytes, place: str, most: int, padded: bool) -> NDArray[np.float64]:
     if len(content) < _HEAD:
         cause = f"neither ASCII nor binary STL: {len(content)} bytes, and the header alone has 84"
         raise ShapeError(cause, fix=_AGAIN, place=place)
@@ -49,7 +70,14 @@ def _binary_triangles(content: bytes, place: str) -> NDArray[np.float64]:
             f"it announces {count} triangles, but ends at byte {len(content)} after {whole} of them"
         )
         raise ShapeError(cause, fix=_AGAIN, place=place)
-    _check_count(count, place)
+    end = _HEAD + _RECORD * count
+    if len(content) > end and not padded:
+        cause = (
+            f"it announces {count} triangles, which end at byte {end} of {len(content)}; "
+            "nothing may follow"
+        )
+        raise ShapeError(cause, fix=_AGAIN, place=place)
+    _check_count(count, place, most)
     record = np.dtype([("floats", "<f4", (12,)), ("attribute", "<u2")])
     floats = np.frombuffer(content, record, count, _HEAD)["floats"].astype(np.float64)
     corners = floats[:, 3:].reshape(-1, 3, 3)
@@ -61,7 +89,7 @@ def _binary_triangles(content: bytes, place: str) -> NDArray[np.float64]:
     return corners
 
 
-def _ascii_triangles(content: bytes, place: str) -> NDArray[np.float64]:
+def _ascii_triangles(content: bytes, place: str, most: int) -> NDArray[np.float64]:
     corners: list[tuple[float, ...]] = []
     ended, line, in_facet = False, 0, 0
     for line, text in enumerate(content.splitlines(), start=1):
@@ -85,7 +113,7 @@ def _ascii_triangles(content: bytes, place: str) -> NDArray[np.float64]:
         raise ShapeError("it ends without 'endsolid'", fix=_AGAIN, place=f"{place}:{line}")
     if in_facet:
         raise ShapeError("its last facet is not ended", fix=_AGAIN, place=f"{place}:{line}")
-    _check_count(len(corners) // 3, place)
+    _check_count(len(corners) // 3, place, most)
     return np.array(corners, dtype=np.float64).reshape(-1, 3, 3)
 
 
@@ -102,10 +130,10 @@ def _vertex(words: list[bytes], place: str) -> tuple[float, ...]:
     return x, y, z
 
 
-def _check_count(count: int, place: str) -> None:
-    if count > MOST_TRIANGLES:
+def _check_count(count: int, place: str, most: int) -> None:
+    if count > most:
         raise ShapeError(
-            f"{count} triangles; {MOST_TRIANGLES} are allowed",
+            f"{count} triangles; {most} are allowed",
             fix="simplify the model: planar faces need few triangles",
             place=place,
         )

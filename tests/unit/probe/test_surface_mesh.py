@@ -1,7 +1,5 @@
 """Triangles, polygons and files as height fields."""
 
-import struct
-
 import numpy as np
 import pytest
 import shapely
@@ -9,10 +7,9 @@ import shapely
 from probe.errors import SurfaceError
 from probe.surface.face import FaceSurface
 from probe.surface.indenters import FlatPlate, TiltedPlane
-from probe.surface.mesh import mesh, part_mesh
+from probe.surface.mesh import mesh
 from probe.surface.polygon import polygon
 from probe.surface.solids import filled
-from probe.surface.stl import read_stl
 
 SQUARE = np.array([[0.0, 0], [10, 0], [10, 10], [0, 10]])
 HOLE = np.array([[4.0, 4], [4, 6], [6, 6], [6, 4]])
@@ -26,14 +23,6 @@ def box(low, high):
     p = np.array([[x, y, z] for z in (z0, z1) for y in (y0, y1) for x in (x0, x1)])
     quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
     return p[[t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]]
-
-
-def binary(triangles, header=b"solid of a lying header"):
-    """Bytes of a binary STL."""
-    body = b"".join(
-        struct.pack("<12fH", 0, 0, 0, *np.asarray(t, float).ravel(), 0) for t in triangles
-    )
-    return header.ljust(80, b" ") + struct.pack("<I", len(triangles)) + body
 
 
 def test_box_has_its_top_inside_and_nothing_beside():
@@ -146,47 +135,3 @@ def test_face_sees_its_surroundings_beyond_its_edges_and_above_itself():
     assert alone.heights_mm(at).tolist() == [0.0, 0.0, -np.inf, -np.inf]
     over = FaceSurface(None, polygon([SQUARE]), FlatPlate(3.0))
     assert (over.heights_mm(at) == 3.0).all()
-
-
-@pytest.mark.parametrize("kind", ["binary", "ascii"])
-def test_files_are_read_exactly(tmp_path, kind):
-    triangles = np.random.default_rng(0).normal(size=(40, 3, 3)).astype(np.float32)
-    file = tmp_path / "part.stl"
-    if kind == "binary":
-        file.write_bytes(binary(triangles))
-    else:
-        rows = ["solid x"]
-        for t in triangles:
-            rows += ["facet normal 0 0 0", " outer loop"]
-            rows += [f"  vertex {x!r} {y!r} {z!r}" for x, y, z in t.astype(float).tolist()]
-            rows += [" endloop", "endfacet"]
-        file.write_text("\n".join([*rows, "endsolid x"]))
-    assert np.array_equal(read_stl(file), triangles.astype(float))
-    assert part_mesh(file).top_mm == triangles[..., 2].max()
-
-
-@pytest.mark.parametrize(
-    ("content", "match"),
-    [
-        (binary([np.eye(3)])[:-1], "announces 1 triangles"),
-        (binary([np.eye(3)]) + b"x", "announces"),
-        (binary([]), "no triangle"),
-        (binary([np.eye(3) * np.nan]), "NaN"),
-        (b"solid x\nvertex 1 2\nendsolid", "broken corners"),
-        (b"solid x\nendsolid", "no triangle"),
-        (b"solid x\nfacet", "no STL"),
-        (b"\x89PNG", "no STL"),
-        (b"", "no STL"),
-    ],
-)
-def test_what_is_no_stl_is_refused(tmp_path, content, match):
-    file = tmp_path / "bad.stl"
-    file.write_bytes(content)
-    with pytest.raises(SurfaceError, match=match):
-        read_stl(file)
-
-
-def test_missing_files_and_folders_are_refused(tmp_path):
-    for path in (tmp_path / "none.stl", tmp_path):
-        with pytest.raises(SurfaceError, match="cannot be read"):
-            read_stl(path)
