@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 
 from generator.alphabet.known import Alphabet
 from generator.alphabet.nib import Lines, nib_outline, offset_ring
-from generator.alphabet.rings import edges_cross, edges_kept, signed_area
 from generator.alphabet.strokes import Glyph
 from generator.errors import AlphabetError
+from generator.plane.polygon import signed_area
+from generator.plane.rings import edges_cross, edges_kept
 
 Ring = NDArray[
     np.float64

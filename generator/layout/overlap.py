@@ -13,6 +13,8 @@ import numpy as np
 from manifold3d import triangulate
 from numpy.typing import NDArray
 
+from generator.plane.polygon import is_convex, triangle_areas
+
 Points = NDArray[np.float64]
 Triangles = NDArray[np.float64]  # (n, 3, 2), counter-clockwise
 
@@ -20,13 +22,13 @@ Triangles = NDArray[np.float64]  # (n, 3, 2), counter-clockwise
 def triangles_of(loops: Sequence[Points]) -> Triangles:
     """Return triangles (n, 3, 2) that fill a polygon: outer loop, then holes."""
     points = np.concatenate(loops)
-    if len(loops) == 1 and _is_fan(points):
+    if len(loops) == 1 and is_convex(points):
         k = np.arange(1, len(points) - 1)
         corners = points[np.column_stack([np.zeros_like(k), k, k + 1])]
     else:
         corners = points[np.asarray(triangulate([np.asarray(loop) for loop in loops]))]
     size = float(np.ptp(points, axis=0).max())
-    return np.asarray(corners[_double_areas(corners) > 1e-12 * size * size])
+    return np.asarray(corners[triangle_areas(corners) > 0.5e-12 * size * size])
 
 
 def overlap(first: Triangles, second: Triangles, tolerance: float) -> bool:
@@ -56,18 +58,3 @@ def _separation(first: Triangles, second: Triangles) -> Points:
     foot = np.einsum("nki,nki->nk", normal, first)
     reach = np.einsum("nki,mci->nkmc", normal, second).min(axis=-1)
     return np.asarray((reach - foot[..., None]).max(axis=1))
-
-
-def _is_fan(points: Points) -> bool:
-    """Whether the loop is convex, so that the triangles at its first vertex fill it."""
-    side = np.diff(points, axis=0, append=points[:1])
-    following = np.roll(side, -1, axis=0)
-    cross = side[:, 0] * following[:, 1] - side[:, 1] * following[:, 0]
-    dot = np.einsum("ki,ki->k", side, following)
-    turn = np.arctan2(cross, dot)
-    return bool(turn.min() >= 0.0 and turn.max() < np.pi and turn.sum() < 3 * np.pi)
-
-
-def _double_areas(corners: Triangles) -> Points:
-    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

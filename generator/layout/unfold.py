@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from generator.layout.overlap import Triangles, overlap, triangles_of
 from generator.layout.settings import LAYOUT
+from generator.plane.polygon import triangle_areas
 from generator.polyhedron.frame import face_polygon
 from generator.polyhedron.winged import Polyhedron
 
@@ -120,7 +121,7 @@ def _surface(polyhedron: Polyhedron) -> _Surface:
 
 def _trees(polyhedron: Polyhedron, surface: _Surface, seed: int) -> Iterator[tuple[int, Priority]]:
     """Yield the face to begin with and the order of folds, promising ones first."""
-    areas = [_area(triangles) for triangles in surface.triangles]
+    areas = [float(np.sum(triangle_areas(triangles))) for triangles in surface.triangles]
     roots = sorted(range(len(areas)), key=lambda face: (-round(areas[face], 6), face))
     for root in roots[: LAYOUT.breadth_roots]:
         yield root, lambda _edge, depth: float(depth)
@@ -225,8 +226,3 @@ def _hinge_transform(surface: _Surface, parent: int, hinge: _Hinge) -> Points:
     T[:2, :2] = R
     T[:2, 2] = (a + b) / 2 - R @ (c + d) / 2
     return T
-
-
-def _area(triangles: Triangles) -> float:
-    a, b = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-    return float(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])) / 2

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.polyhedron.polygon import (
+from generator.plane.polygon import (
     area_vector,
     closest_pair,
     is_convex,
@@ -17,6 +17,7 @@ from generator.polyhedron.polygon import (
     side_of_polygon,
     signed_area,
 )
+from generator.plane.rings import distance
 from generator.polyhedron.surface import (
     FaceProblem,
     Loops,
@@ -182,16 +183,10 @@ def _in_widened_polygon(
     polygon: list[Vertices], points: Vertices, tolerance: float
 ) -> NDArray[np.bool_]:
     """Whether points lie in a polygon, its boundary widened by the tolerance."""
-    covered = np.zeros(len(points), dtype=bool)
     if len(points) == 0:
-        return covered
-    covered |= side_of_polygon(polygon, points) >= 0
-    for loop in polygon:
-        for a, b in zip(loop, np.roll(loop, -1, axis=0), strict=True):
-            along = b - a
-            t = np.clip((points - a) @ along / (along @ along), 0.0, 1.0)
-            covered |= np.hypot(*(points - a - t[:, None] * along).T) <= tolerance
-    return covered
+        return np.zeros(0, dtype=bool)
+    inside = side_of_polygon(polygon, points) >= 0
+    return inside | (distance(points, polygon) <= tolerance)
 
 
 def _edge(edge: tuple[int, int]) -> str:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.polyhedron.polygon import area_vector, plane_axes
+from generator.plane.polygon import area_vector, plane_axes
 
 Points = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from generator.polyhedron.polygon import (
+from generator.plane.polygon import (
     area_vector,
     side_of_polygon,
     signed_area,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.errors import ShapeError
-from generator.polyhedron.polygon import area_vector, plane_axes
+from generator.plane.polygon import area_vector, plane_axes
 
 Loops = tuple[tuple[int, ...], ...]
 Vertices = NDArray[np.float64]

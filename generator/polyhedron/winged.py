@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from generator.errors import ShapeError
+from generator.plane.polygon import signed_volume
 from generator.polyhedron.check_edges import edge_problems, number_problems
 from generator.polyhedron.check_faces import crossing_problems, face_problems
 from generator.polyhedron.developable import Developable
 from generator.polyhedron.flatten import flatten_faces
-from generator.polyhedron.polygon import signed_volume
 from generator.polyhedron.surface import (
     Loops,
     Surface,

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.alphabet.outline import Tiers, foot_half_mm
-from generator.alphabet.rings import edges_cross, points_inside
 from generator.errors import SolidError
+from generator.plane.polygon import face_vector, points_inside
+from generator.plane.rings import boxes_inside, edges_cross
 from generator.solid.emboss import to_part, turn
-from generator.solid.frame import area_vector, in_frame
-from generator.solid.lattice import inside_by
+from generator.solid.frame import in_frame
 from generator.solid.part import Embossing, Part
 
 Ring = NDArray[np.float64]
@@ -51,7 +51,7 @@ def prove_closed(part: Part) -> None:
             continue  # a triangle is planar
         place = f"{part.name}: {plain.name}"
         corners = [part.vertices[list(loop)] for loop in plain.loops]
-        normal = area_vector(corners)
+        normal = face_vector(corners)
         normal /= np.linalg.norm(normal)
         points = np.concatenate(corners) - corners[0][0]
         if np.abs(points @ normal).max() > FLATNESS * size:
@@ -109,7 +109,7 @@ def _check_inside(embossing: Embossing, corners: list[Ring], place: str) -> None
     for label in np.unique(embossing.labels).tolist():
         chosen = np.flatnonzero(embossing.labels == label)
         half = foot_half_mm(embossing.tiers[label])
-        doubtful = chosen[~inside_by(centres[chosen], half, rings)]
+        doubtful = chosen[~boxes_inside(centres[chosen], half, rings)]
         for symbol in doubtful.tolist():
             foot = embossing.tiers[label].rings[0][0] + centres[symbol]
             if not points_inside(foot, rings).all() or edges_cross([*rings, foot]):

@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from generator.plane.polygon import face_vector
 from generator.solid.emboss import to_part, turn
-from generator.solid.frame import area_vector
 from generator.solid.part import Part
 
 
@@ -74,6 +74,6 @@ def explicit(part: Part) -> Explicit:
     ]
     polygons = []
     for name, outline, number, symbol in body + found:
-        normal = area_vector([vertices[list(loop)] for loop in outline])
+        normal = face_vector([vertices[list(loop)] for loop in outline])
         polygons.append(Polygon(name, outline, normal / np.linalg.norm(normal), number, symbol))
     return Explicit(vertices, tuple(polygons))

@@ -5,28 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from generator.plane.polygon import plane_axes
 from generator.polyhedron.winged import Polyhedron
 
 Frame = NDArray[np.float64]  #: (4, 4), T_to_from
 
 
-def area_vector(loops: list[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Return the vector area of (k, 3) loops, after Newell: its direction is the normal."""
-    total = np.zeros(3)
-    for loop in loops:
-        arms = loop - loop[0]
-        total += np.cross(arms, np.roll(arms, -1, axis=0)).sum(axis=0) / 2
-    return total
-
-
 def plane_frame(origin: NDArray[np.float64], ahead: NDArray[np.float64],
                 normal: NDArray[np.float64]) -> Frame:  # fmt: skip
     """Return the frame at `origin` with z along `normal` and x along `ahead` in the plane."""
-    z = normal / np.linalg.norm(normal)
-    x = ahead - (ahead @ z) * z
-    x = x / np.linalg.norm(x)
     frame = np.eye(4)
-    frame[:3, 0], frame[:3, 1], frame[:3, 2], frame[:3, 3] = x, np.cross(z, x), z, origin
+    frame[:3, :3] = np.stack(plane_axes(normal, ahead), axis=1)
+    frame[:3, 3] = origin
     return frame
 
 

@@ -12,7 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.alphabet.rings import edges_cross, edges_kept, points_inside, signed_area
+from generator.plane.polygon import points_inside, signed_area
+from generator.plane.rings import edges_cross, edges_kept
 
 Ring = NDArray[np.float64]  #: (k, 2) mm
 Insets = NDArray[np.float64]  #: (k,) mm, of edge i from corner i to i + 1

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.alphabet.outline import foot_half_mm
-from generator.alphabet.rings import points_inside, segments
+from generator.plane.rings import boxes_inside
 from generator.solid.emboss import turn
 from generator.solid.part import Embossing
 
@@ -53,7 +53,7 @@ def squares_of(embossing: Embossing, rings: Sequence[Ring]) -> Squares | None:
     on_lattice = np.abs(centres - centres[0] - cells * pitch).max(axis=1) <= TOLERANCE * pitch
     halves = np.array([foot_half_mm(tiers) for tiers in embossing.tiers])
     full = on_lattice & (halves[embossing.labels] < pitch * (0.5 - TOLERANCE))
-    full &= inside_by(centres, pitch * (0.5 + TOLERANCE), rings)
+    full &= boxes_inside(centres, pitch * (0.5 + TOLERANCE), rings)
     cells -= cells.min(axis=0)
     stride = int(cells[:, 1].max()) + 2
     steps = np.array([0, stride, stride + 1, 1])  # lower left, lower right, upper right, upper left
@@ -70,19 +70,6 @@ def squares_of(embossing: Embossing, rings: Sequence[Ring]) -> Squares | None:
     places = np.stack([known // stride, known % stride], axis=1)
     points = origin + (places - 0.5) * pitch
     return Squares(full, corners, points, _outline(corners[full], len(known)))
-
-
-def inside_by(centres: Ring, half: float, rings: Sequence[Ring]) -> NDArray[np.bool_]:
-    """Whether axis-parallel squares lie inside an area: no edge meets them, one point inside."""
-    free = points_inside(centres, rings)
-    starts, ends, _, _ = segments(rings)
-    for p, q in zip(starts, ends, strict=True):
-        low, high = np.minimum(p, q) - half, np.maximum(p, q) + half
-        near = ((centres >= low) & (centres <= high)).all(axis=1)
-        away = np.array([q[1] - p[1], p[0] - q[0]])
-        near &= np.abs((centres - p) @ away) <= half * np.abs(away).sum()
-        free &= ~near
-    return free
 
 
 def _drop_pinches(full: NDArray[np.bool_], keys: Index) -> None:

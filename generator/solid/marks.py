@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from generator.alphabet.figures import BAR, FIGURES, figures_of, needs_bar
 from generator.alphabet.outline import Tiers, engrave
-from generator.alphabet.rings import points_inside, segments
+from generator.plane.rings import boxes_inside
 from generator.printers import Printer
 from generator.solid.emboss import turn
 from generator.solid.part import Embossing
@@ -152,18 +152,7 @@ def _roomy(
 ) -> NDArray[np.bool_]:
     """Whether rectangles at `centres` keep clear of all edges and lie inside."""
     R = turn(angle)
-    at = centres @ R
-    size = np.array(half) + clear
-    turned = [ring @ R for ring in rings]
-    free = points_inside(at, turned)
-    starts, ends, _, _ = segments(turned)
-    for p, q in zip(starts, ends, strict=True):
-        low, high = np.minimum(p, q) - size, np.maximum(p, q) + size
-        near = ((at > low) & (at < high)).all(axis=1)
-        away = np.array([q[1] - p[1], p[0] - q[0]])
-        near &= np.abs((at - p) @ away) < size @ np.abs(away)
-        free &= ~near
-    return free
+    return boxes_inside(centres @ R, np.array(half) + clear, [ring @ R for ring in rings])
 
 
 def _near(one: _Box, other: _Box, clear: float) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.alphabet.outline import Tiers
-from generator.alphabet.rings import signed_area
+from generator.plane.polygon import signed_area
 from generator.solid.emboss import to_part, turn
 from generator.solid.part import Part
 

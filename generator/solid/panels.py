@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from generator.alphabet.outline import Tiers
 from generator.errors import SolidError
 from generator.layout.placement import FaceLayout, Layout
+from generator.plane.polygon import face_vector
 from generator.polyhedron.frame import dihedral, face_frame, face_polygon
 from generator.polyhedron.winged import Polyhedron
 from generator.printers import Printer
 from generator.solid.emboss import embossing_of
-from generator.solid.frame import area_vector, edge_numbers, in_frame, plane_frame
+from generator.solid.frame import edge_numbers, in_frame, plane_frame
 from generator.solid.inset import inset, regular, shared_insets
 from generator.solid.marks import BackMark, marks_on
 from generator.solid.measure import box
@@ -246,7 +247,7 @@ def _numbers(
 ) -> tuple[tuple[Embossing, ...], tuple[str, ...]]:
     """Return the engraved numbers of a plain panel's back, and those without room."""
     corners = [part.vertices[list(loop)] for loop in part.facets[1].loops]
-    T = plane_frame(corners[0][0], corners[0][1] - corners[0][0], area_vector(corners))
+    T = plane_frame(corners[0][0], corners[0][1] - corners[0][0], face_vector(corners))
     rings = [in_frame(T, corner)[:, :2] for corner in corners]
     marks = []
     for ring, edges in zip(rings, numbered, strict=True):

@@ -8,8 +8,8 @@ import numpy as np
 from manifold3d import triangulate as ear_clipped
 from numpy.typing import NDArray
 
-from generator.alphabet.rings import signed_area
 from generator.errors import SolidError
+from generator.plane.polygon import signed_area, triangle_areas
 
 Ring = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -50,8 +50,7 @@ def triangulate_rings(
         # The fast path for convex rings makes triangles of three points on a line.
         found = np.asarray(ear_clipped(list(rings), allow_convex=False), dtype=np.int64)
         found = without_slivers(points, found, flat)
-    u, v = points[found[:, 1]] - points[found[:, 0]], points[found[:, 2]] - points[found[:, 0]]
-    areas = (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
+    areas = triangle_areas(points[found])
     size = float(np.ptp(points, axis=0).max()) ** 2
     wanted = sum(signed_area(ring) for ring in rings)
     if len(found) == 0 or areas.min() < -1e-12 * size or abs(areas.sum() - wanted) > 1e-9 * size:

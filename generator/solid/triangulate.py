@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.errors import SolidError
+from generator.plane.polygon import face_vector
 from generator.solid.emboss import to_part, turn
-from generator.solid.frame import area_vector, in_frame, plane_frame
+from generator.solid.frame import in_frame, plane_frame
 from generator.solid.lattice import Squares, squares_of
 from generator.solid.part import Embossing, Facet, Part
 from generator.solid.polygon import FLAT, triangulate_rings
@@ -116,7 +117,7 @@ class _MeshBuilder:
             T, R = first.T_part_facet, turn(first.rotation_rad)
         else:
             along = corners[0][1] - corners[0][0]
-            T, R = plane_frame(corners[0][0], along, area_vector(corners)), np.eye(2)
+            T, R = plane_frame(corners[0][0], along, face_vector(corners)), np.eye(2)
         rings = [in_frame(T, corner)[:, :2] @ R for corner in corners]
         for number in numbers:
             squares = None

@@ -89,7 +89,7 @@ def scene(symbols: int, draft_rad: float) -> Scene:
 
 def closed_form_mm3(made: Scene) -> float:
     """Return the volume: the cube and, for each symbol, a prismatoid between its outlines."""
-    from generator.polyhedron.polygon import signed_area
+    from generator.plane.polygon import signed_area
 
     def volume(tiers: Tiers) -> float:
         total = 0.0

@@ -16,12 +16,13 @@ import pytest
 
 from generator.alphabet.known import alphabet_from
 from generator.alphabet.outline import outlines
-from generator.alphabet.rings import distance, points_inside
 from generator.array import array_from
 from generator.database.open import open_database
 from generator.database.read import read_object
 from generator.database.transaction import reading
 from generator.pipeline import encode
+from generator.plane.polygon import points_inside
+from generator.plane.rings import distance
 from generator.polyhedron.developable import developable_from
 from generator.polyhedron.development import development
 from generator.spec import read_specs

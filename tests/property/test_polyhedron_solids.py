@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from random_shapes import random_convex, random_nonconvex
 
 from generator.errors import ShapeError
+from generator.plane.polygon import orientation
 from generator.polyhedron import (
     dihedral,
     edge_length,
@@ -22,7 +23,6 @@ from generator.polyhedron import (
     side_of_face,
     volume,
 )
-from generator.polyhedron.polygon import orientation
 
 SEEDS = st.integers(0, 2**32 - 1)
 SOLIDS = st.builds(

@@ -15,9 +15,10 @@ from generator.alphabet import (
     footprint_half_mm,
     outlines,
 )
-from generator.alphabet.rings import distance, edges_cross, points_inside, signed_area
 from generator.errors import AlphabetError, SolidError
 from generator.layout.placement import FaceLayout, Layout, Placement
+from generator.plane.polygon import points_inside, signed_area
+from generator.plane.rings import boxes_inside, distance, edges_cross
 from generator.polyhedron.frame import face_polygon
 from generator.polyhedron.shapes import prism, pyramid
 from generator.printers import PRINTERS
@@ -25,7 +26,6 @@ from generator.solid import explicit, panels, prove_closed, triangles, volume, w
 from generator.solid.closed import edges_once
 from generator.solid.emboss import turn
 from generator.solid.inset import inset, regular
-from generator.solid.lattice import inside_by
 
 ALPHABET = st.sampled_from(list(ALPHABETS.values()))
 STYLE = st.builds(
@@ -88,7 +88,7 @@ def scattered(solid, half, clear, turned, pitch, order, chance):
         places = np.stack(np.meshgrid(np.arange(count[0]), np.arange(count[1])), axis=-1)
         cells = places.reshape(-1, 2)
         centres = low + (cells + chance.random(2)) * pitch
-        keep = inside_by(centres, half + clear, rings) & (chance.random(len(cells)) < 0.8)
+        keep = boxes_inside(centres, half + clear, rings) & (chance.random(len(cells)) < 0.8)
         faces.append(
             FaceLayout(
                 face,

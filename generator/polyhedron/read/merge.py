@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.errors import ShapeError
-from generator.polyhedron.polygon import area_vector
+from generator.plane.polygon import area_vector
 from generator.polyhedron.read.soup import Soup, cluster_labels
 
 DISTANCE = 1e-5  #: coplanar points lie this near to a plane, as a share of the size

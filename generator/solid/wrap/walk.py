@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.alphabet.rings import points_inside, signed_area
 from generator.errors import SolidError
+from generator.plane.polygon import points_inside, signed_area
 
 Loop = tuple[int, ...]
 

@@ -22,8 +22,9 @@ from generator.alphabet import (
 from generator.alphabet.known import line
 from generator.alphabet.outline import engrave
 from generator.alphabet.printable import gap_between_mm, gap_inside_mm
-from generator.alphabet.rings import edges_cross, points_inside, signed_area
 from generator.errors import AlphabetError
+from generator.plane.polygon import points_inside, signed_area
+from generator.plane.rings import edges_cross
 from generator.printers import PRINTERS
 
 FDM = PRINTERS["fdm-0.4"]

@@ -6,6 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from generator.plane.polygon import orientation, side_of_polygon
 from generator.polyhedron import (
     SHAPES,
     Face,
@@ -18,7 +19,6 @@ from generator.polyhedron import (
     polyhedron,
     side_of_face,
 )
-from generator.polyhedron.polygon import orientation, side_of_polygon
 from generator.polyhedron.winged import winged_edges
 
 L_PROFILE = [(0, 0), (80, 0), (80, 20), (20, 20), (20, 60), (0, 60)]

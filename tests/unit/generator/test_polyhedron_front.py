@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from generator.plane.polygon import signed_area
 from generator.polyhedron import SHAPES, face_frame, face_normal, polyhedron
 from generator.polyhedron.front import covered_parts
-from generator.polyhedron.polygon import signed_area
 
 
 def extruded(profile, depth=40.0):

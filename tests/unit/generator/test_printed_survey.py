@@ -9,7 +9,7 @@ import pytest
 
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
-from generator.alphabet.rings import points_inside
+from generator.plane.polygon import points_inside
 from generator.printed.surface import Coverage, PrintedSurface
 from generator.printed.survey import DOUBTFUL, LOST, SURVIVES, SymbolTile, rings_at, survey_face
 from generator.solid.emboss import turn

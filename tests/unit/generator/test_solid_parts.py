@@ -9,6 +9,7 @@ import pytest
 from generator.alphabet import SymbolStyle, alphabet_named, footprint_half_mm, outlines
 from generator.errors import SolidError
 from generator.layout.placement import FaceLayout, Layout, Placement
+from generator.plane.rings import boxes_inside
 from generator.polyhedron.frame import face_polygon
 from generator.polyhedron.frame import volume as body_volume
 from generator.polyhedron.shapes import cube, tetrahedron
@@ -27,7 +28,6 @@ from generator.solid import (
 )
 from generator.solid.closed import edges_once
 from generator.solid.emboss import turn
-from generator.solid.lattice import inside_by
 from generator.solid.measure import symbol_volume
 
 FDM = PRINTERS["fdm-0.4"]
@@ -71,7 +71,7 @@ def filled(solid, pitch, free, *, turned=0.0, shift=(0.0, 0.0), order=4, seed=0)
         cells = np.stack([right.ravel(), down.ravel()], axis=1)
         spare = (high - low) % pitch
         centres = low + spare / 2 + shift + (cells + 0.5) * pitch
-        keep = inside_by(centres, free, rings)
+        keep = boxes_inside(centres, free, rings)
         faces.append(
             FaceLayout(
                 face,

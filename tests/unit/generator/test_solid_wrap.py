@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
-from generator.alphabet.rings import signed_area
 from generator.errors import SolidError
 from generator.layout.placement import FaceLayout, Layout, Placement
+from generator.plane.polygon import signed_area
 from generator.polyhedron.development import development
 from generator.polyhedron.round import cone, cylinder
 from generator.printers import printer_named

@@ -73,6 +73,11 @@ def side_of_polygon(loops: Sequence[Points], points: ArrayLike) -> NDArray[np.in
     return side
 
 
+def points_inside(points: ArrayLike, loops: Sequence[Points]) -> NDArray[np.bool_]:
+    """Whether points (n, 2) lie inside a polygon, its boundary left out; (n,) bool."""
+    return side_of_polygon(loops, points) > 0
+
+
 def area_vector(points: Points) -> Points:
     """Return the vector area of a closed loop in space (Newell): normal times area, (3,) mm^2."""
     d = points - points[0]
@@ -87,6 +92,19 @@ def area_vector(points: Points) -> Points:
     )
 
 
+def face_vector(loops: Sequence[Points]) -> Points:
+    """Return the vector area of a face, (3,) mm^2: of all its loops, so that holes count off.
+
+    Summed arm by arm, which rounds otherwise than `area_vector`: facets of round faces lie in
+    frames of these bits.
+    """
+    vector: Points = np.zeros(3)
+    for loop in loops:
+        arms = loop - loop[0]
+        vector += np.cross(arms, np.roll(arms, -1, axis=0)).sum(axis=0) / 2
+    return vector
+
+
 def signed_volume(vertices: Points, faces: Sequence[Sequence[Sequence[int]]]) -> float:
     """Return the volume inside planar faces, mm^3: positive if their loops face outward."""
     rings = [vertices[list(loop)] - vertices[0] for loops in faces for loop in loops]
@@ -97,6 +115,13 @@ def signed_area(loop: Points) -> float:
     """Return the area of a plane loop (k, 2), mm^2: positive if it runs counter-clockwise."""
     d = loop - loop[0]
     return 0.5 * float(d[:-1, 0] @ d[1:, 1] - d[:-1, 1] @ d[1:, 0])
+
+
+def triangle_areas(corners: Points) -> Points:
+    """Return the areas (n,) of plane triangles (n, 3, 2): positive counter-clockwise."""
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    areas: Points = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
+    return areas
 
 
 def plane_axes(normal: Points, along: Points) -> tuple[Points, Points, Points]:

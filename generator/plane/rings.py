@@ -1,23 +1,15 @@
-"""Plane rings: area, crossings, points inside. Lengths in any unit; (k, 2) corner arrays."""
+"""Plane rings: crossings, distances, room. Lengths in any unit; (k, 2) corner arrays."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from generator.plane.polygon import points_inside
 
 Ring = NDArray[np.float64]
-
-
-def signed_area(ring: Ring) -> float:
-    """Return the area of a ring, positive counter-clockwise.
-
-    Coordinates are taken relative to the first corner, so that a ring far from the
-    origin loses nothing.
-    """
-    x, y = (ring - ring[0]).T
-    return 0.5 * float(x @ np.roll(y, -1) - np.roll(x, -1) @ y)
 
 
 def edges_kept(before: Ring, after: Ring, shortest: float) -> bool:
@@ -93,20 +85,6 @@ def _any_meeting(
     return bool(((np.abs(turn) <= 1e-12 * size) & (dot < 0)).any())
 
 
-def points_inside(points: Ring, rings: Sequence[Ring]) -> NDArray[np.bool_]:
-    """Whether points lie inside an area given by its rings (even-odd), points (n, 2).
-
-    Orientation tests per edge, not sums of areas; a point on the border may fall either way.
-    """
-    starts, ends, _, _ = segments(rings)
-    result = np.zeros(len(points), dtype=np.bool_)
-    for p, q in zip(starts, ends, strict=True):
-        spans = (p[1] <= points[:, 1]) != (q[1] <= points[:, 1])
-        side = (q[0] - p[0]) * (points[:, 1] - p[1]) - (q[1] - p[1]) * (points[:, 0] - p[0])
-        result ^= spans & ((side > 0) == (q[1] > p[1]))
-    return result
-
-
 def distance(points: Ring, rings: Sequence[Ring]) -> NDArray[np.float64]:
     """Return the distance of each of (n, 2) points to the nearest edge of the rings."""
     starts, ends, _, _ = segments(rings)
@@ -117,6 +95,28 @@ def distance(points: Ring, rings: Sequence[Ring]) -> NDArray[np.float64]:
         gap = points - p - t[:, None] * u
         best = np.minimum(best, np.hypot(gap[:, 0], gap[:, 1]))
     return best
+
+
+def boxes_inside(centres: Ring, half: ArrayLike, rings: Sequence[Ring]) -> NDArray[np.bool_]:
+    """Whether axis-parallel boxes lie inside an area: no edge meets them, one point inside.
+
+    Parameters
+    ----------
+    centres
+        (n, 2).
+    half
+        Half sides: one for squares, or two.
+    """
+    free = points_inside(centres, rings)
+    size = np.broadcast_to(np.asarray(half, dtype=np.float64), 2)
+    starts, ends, _, _ = segments(rings)
+    for p, q in zip(starts, ends, strict=True):
+        low, high = np.minimum(p, q) - size, np.maximum(p, q) + size
+        near = ((centres >= low) & (centres <= high)).all(axis=1)
+        away = np.array([q[1] - p[1], p[0] - q[0]])
+        near &= np.abs((centres - p) @ away) <= size @ np.abs(away)
+        free &= ~near
+    return free
 
 
 def _side(p: Ring, q: Ring, r: Ring) -> NDArray[np.float64]:

@@ -1,0 +1,1 @@
+"""Plane geometry, the same for every stage: sides, areas, crossings, distances."""
