@@ -33,7 +33,8 @@ Floats = NDArray[np.float64]
 NAMES = ("prusa-slicer", "PrusaSlicer", "prusa-slicer-console")
 TIMEOUT_S = 600
 _BED_MARGIN_MM = 20.0  # around the part: skirt, brim, purge line
-_AGREE_MM = 0.25  # the box of the printed plastic and the part's: a seam's share of a width
+_AGREE_MM = 0.25  # by which plastic may reach beyond the part's box: half a bead, and seams
+_POINTED_WIDTHS = 3.0  # by which it may fall short: beads are round in corners of 20 degrees
 _KINDS = (".stl", ".3mf", ".obj", ".amf")
 
 # The machine's own business: nothing of it is on the part.
@@ -218,11 +219,13 @@ def _check_place(sliced: SlicedPart, file: Path) -> None:
     ends = np.stack([path.start_mm[laid], path.end_mm[laid]]) + T[:3, 3]
     low = (ends[..., :2] - half[:, None]).min(axis=(0, 1))
     high = (ends[..., :2] + half[:, None]).max(axis=(0, 1))
-    off = np.abs(np.concatenate([low - sliced.low_mm[:2], high - sliced.high_mm[:2]]))
+    beyond = float(np.concatenate([sliced.low_mm[:2] - low, high - sliced.high_mm[:2]]).max())
+    short = float(np.concatenate([low - sliced.low_mm[:2], sliced.high_mm[:2] - high]).max())
     layer = float(np.median(height))
-    above = abs(float(ends[..., 2].max()) - sliced.high_mm[2])
-    if off.max() > _AGREE_MM or above > layer + 1e-3:
-        by = max(float(off.max()), above)
+    off = abs(float(ends[..., 2].max()) - sliced.high_mm[2])
+    pointed = _POINTED_WIDTHS * 2 * float(np.median(half))
+    if beyond > _AGREE_MM or short > pointed or off > layer + 1e-3:
+        by = max(beyond, short, off)
         raise PrintError(
             f"the plastic reaches {by:.2f} mm beyond or short of the part",
             fix="print profiles must not scale, turn or add; say which one you gave",
