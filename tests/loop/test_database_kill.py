@@ -25,8 +25,9 @@ import numpy as np
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle
 from generator.array.profiles import PROFILES
+from generator.database.cells import occupied_cells
 from generator.database.open import open_database
-from generator.database.register import Registration, find_array, occupied, register
+from generator.database.register import ObjectRecord, find_array, register
 from generator.database.transaction import writing
 from generator.layout.placement import FaceLayout, Layout, Placement
 from generator.polyhedron.shapes import cube
@@ -37,7 +38,7 @@ solid = cube(60.0)
 def write(url, name, symbols):
     # The first cells that are free, as a layout would choose them: a race on purpose.
     with writing(open_database(url)) as connection:
-        taken_rows, taken_columns = occupied(connection, find_array(connection, array))
+        taken_rows, taken_columns = occupied_cells(connection, find_array(connection, array))
         taken = taken_rows * array.columns + taken_columns
         free = np.setdiff1d(np.arange(array.rows * array.columns), taken)[: 6 * symbols]
         faces = []
@@ -47,7 +48,7 @@ def write(url, name, symbols):
             labels = array.symbols(rows, columns)
             placement = Placement(0, 0, 0.0, 0.0, 0.0)
             faces.append(FaceLayout(face, placement, rows, columns, labels, centres, 1))
-        register(connection, Registration(
+        register(connection, ObjectRecord(
             name, solid, Layout("faces", 7.0, tuple(faces)), array, "large",
             alphabet_named("dense-4"), SymbolStyle(), {"name": name}, "0"))
 
