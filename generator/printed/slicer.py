@@ -43,6 +43,7 @@ _WITHOUT = {
     "end_gcode": "M84",
     "before_layer_gcode": "",
     "layer_gcode": "G92 E0",
+    "use_relative_e_distances": "1",
     "toolchange_gcode": "",
     "start_filament_gcode": '""',
     "end_filament_gcode": '""',

@@ -23,6 +23,7 @@ from generator.solid.part import Embossing
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+_GOLDEN = (5**0.5 - 1) / 2
 SURVIVES, DOUBTFUL, LOST = "survives", "doubtful", "lost"
 
 
@@ -164,6 +165,10 @@ def _designs(embossing: Embossing, limits: SurveyLimits) -> tuple[Floats, list[_
     count = int(half / limits.step_mm)
     line = np.arange(-count, count + 1) * limits.step_mm
     x, y = np.meshgrid(line, line)
+    # Rows and columns are shifted by parts of a step, or all places along a straight edge would
+    # fall on the same side of it.
+    shift = (np.arange(len(line)) * _GOLDEN % 1 - 0.5) * limits.step_mm
+    x, y = x + shift[:, None], y + shift
     points = np.stack([x.ravel(), y.ravel()], axis=1)
     side = (len(line), len(line))
     return points, [_design(tiers, points, side, limits) for tiers in embossing.tiers]
