@@ -31,7 +31,7 @@ SURVIVES, DOUBTFUL, LOST = "survives", "doubtful", "lost"
 class SurveyLimits:
     """When a symbol survives.
 
-    Measured: symbols of 4.5 mm under the faults `bad` keep an overlap of 0.77 to 0.95, and
+    Measured: symbols of 4.5 mm under the faults `bad` keep an overlap of 0.76 to 0.95, and
     touches of prints like these were named right, 60 of 60 (docs/printed.md).
     """
 
