@@ -185,7 +185,10 @@ def passes(module: str, source: str, tests: tuple[str, ...], *, loud: bool = Fal
         while True:
             done, status = os.waitpid(child, os.WNOHANG)
             if done:
-                return os.waitstatus_to_exitcode(status) == 0
+                code = os.waitstatus_to_exitcode(status)
+                if code in (4, 5):  # pytest: wrong usage, no tests
+                    raise SystemExit(f"{module}: {tests} cannot be run")
+                return code == 0
             if time.monotonic() > end:
                 raise TimeoutError
             time.sleep(0.02)
