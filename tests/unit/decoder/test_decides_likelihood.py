@@ -242,6 +242,8 @@ def test_as_many_candidates_as_are_asked_for_answered_or_not():
     assert not found.answered.all()
     for i, own in enumerate(scores):
         ranked = bayes(BINARY, own)[0][:5]
+        second = found[i].runner_up
+        assert (second.row, second.column) == ranked[1][:2]
         assert [(c.row, c.column, c.rotation) for c in found[i].candidates] == [
             one[:3] for one in ranked
         ]
