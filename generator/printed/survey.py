@@ -31,8 +31,8 @@ SURVIVES, DOUBTFUL, LOST = "survives", "doubtful", "lost"
 class SurveyLimits:
     """When a symbol survives.
 
-    Measured: symbols of 4.5 mm under the faults `bad` keep an overlap of 0.76 to 0.95, and
-    touches of prints like these were named right, 60 of 60 (docs/printed.md).
+    Set by hand: symbols of 4.5 mm under the faults `bad` keep an overlap of 0.76 and more, and
+    touches of such prints were named right in another simulation (docs/printed.md).
     """
 
     overlap: float = 0.70  #: least intersection over union of a symbol that survives
