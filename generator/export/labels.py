@@ -13,13 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from generator.export.settings import PREVIEW
+
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]
-
-HALF_HEIGHT = 13.0  #: of a label, px
-_GAP = 3.0  # px between two labels
-_LEAST = 8  # places of the map at which a face must be seen
-_FAR = 0.7  # what a label loses by standing as far from the middle as the face is large
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,18 +55,23 @@ def label_places(
     # Small faces first: large ones have other places left.
     for number in sorted(range(len(wanted)), key=lambda k: spans[k][1] - spans[k][0]):
         one, (first, end) = wanted[number], spans[number]
-        if end - first < _LEAST:
+        if end - first < PREVIEW.label_least:
             continue
         at_x, at_y = x[first:end], y[first:end]
         free = np.abs(at_x - seen.shape[1] * step / 2) <= seen.shape[1] * step / 2 - one.half_width
         for other_x, other_y, other_half in taken:
-            beside = np.abs(at_x - other_x) >= one.half_width + other_half + _GAP
-            free &= beside | (np.abs(at_y - other_y) >= 2 * HALF_HEIGHT + _GAP)
+            beside = np.abs(at_x - other_x) >= one.half_width + other_half + PREVIEW.label_gap
+            free &= beside | (
+                np.abs(at_y - other_y) >= 2 * PREVIEW.label_half_height + PREVIEW.label_gap
+            )
         if not free.any():
             continue
         size = max(float(np.ptp(at_x)), float(np.ptp(at_y)), step)
         away = np.hypot(at_x - one.x, at_y - one.y) / size
-        score = _own_share(seen == one.face, at_x, at_y, step, one.half_width) - _FAR * away
+        score = (
+            _own_share(seen == one.face, at_x, at_y, step, one.half_width)
+            - PREVIEW.label_far * away
+        )
         best = int(np.argmax(np.where(free, score, -np.inf)))
         place = (float(at_x[best]), float(at_y[best]))
         found[number] = place
@@ -87,9 +89,9 @@ def _own_share(
     """Return which share of a label at each place lies on its own face, by summed areas."""
     sums = np.zeros((own.shape[0] + 1, own.shape[1] + 1))
     sums[1:, 1:] = own.cumsum(axis=0).cumsum(axis=1)
-    top = np.rint((y - HALF_HEIGHT) / step).astype(np.int64).clip(0, own.shape[0])
-    bottom = np.rint((y + HALF_HEIGHT) / step).astype(np.int64).clip(0, own.shape[0])
+    top = np.rint((y - PREVIEW.label_half_height) / step).astype(np.int64).clip(0, own.shape[0])
+    bottom = np.rint((y + PREVIEW.label_half_height) / step).astype(np.int64).clip(0, own.shape[0])
     left = np.rint((x - half_width) / step).astype(np.int64).clip(0, own.shape[1])
     right = np.rint((x + half_width) / step).astype(np.int64).clip(0, own.shape[1])
     inside = sums[bottom, right] - sums[top, right] - sums[bottom, left] + sums[top, left]
-    return np.asarray(inside * step**2 / (4 * half_width * HALF_HEIGHT))
+    return np.asarray(inside * step**2 / (4 * half_width * PREVIEW.label_half_height))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from PIL import Image, ImageDraw, ImageFont
 
-from generator.export.labels import HALF_HEIGHT
+from generator.export.settings import PREVIEW
 
 Font = ImageFont.ImageFont | ImageFont.FreeTypeFont
 
@@ -72,8 +72,8 @@ def write_lettering(
         draw.text(((2 * i + 1) * width // 4, height - 24), text, GREY, small, anchor="mm")
     for label in labels:
         x, y, half = label.x, label.y, label.half_width
-        outline = (x - half, y - HALF_HEIGHT, x + half, y + HALF_HEIGHT)
-        draw.rounded_rectangle(outline, HALF_HEIGHT, (255, 255, 255), INK)
+        outline = (x - half, y - PREVIEW.label_half_height, x + half, y + PREVIEW.label_half_height)
+        draw.rounded_rectangle(outline, PREVIEW.label_half_height, (255, 255, 255), INK)
         draw.text((x, y), label.text, INK, medium, anchor="mm")
     length = next(
         digit * 10.0**power

@@ -27,27 +27,15 @@ from generator.export.faces import (
 from generator.export.labels import Wanted, label_places
 from generator.export.lettering import FONT_SIZES, MARGIN, Font, Label, plain, write_lettering
 from generator.export.raster import Visible, visible
+from generator.export.settings import PREVIEW
 from generator.solid.part import Facet, Part
 from generator.solid.triangulate import Mesh
 
 Points = NDArray[np.float64]
 Colours = NDArray[np.uint32]  # 0xXXBBGGRR
 
-WIDTH, HEIGHT = 1200, 700  #: pixels
-_SAMPLES = 2  # a side for each pixel
-_COARSE = 4  # pixels between the places where a name may stand
-_TOP, _BOTTOM = 84, 46  # pixels above and below the views
 # Directions towards the eye, the best first; the second view looks from the opposite side.
 _EYES = tuple(np.array([x, -1.0, z]) for z in (0.62, 0.45, 0.8) for x in (0.62, 0.45, 0.8, 0.3))
-_LIGHT = np.array([-0.48, 0.56, 0.67])  # towards the light; screen axes: right, up, eye
-_AMBIENT = 0.42
-_APART = 0.10  # of the object's size: how far panels are moved
-_FACING = 0.12  # least cosine at which a face gets its name
-_BACK = -0.999  # greatest cosine to the face at which a facet is the back of its panel
-_OPEN = 0.2  # least cosine that a good view has on every face
-_LINE = (51, 65, 85)
-_BLOCK = 131_072  # triangles shaded at once: bounds the memory
-_PAPER = ((250, 251, 253), (224, 230, 238))  # top and bottom
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,26 +66,29 @@ def preview_png(
     parts, meshes
         The parts and the mesh of each, part frame, mm.
     """
-    rows = np.linspace(0.0, 1.0, HEIGHT * _SAMPLES)[:, None]
-    fade = np.rint((1 - rows) * np.array(_PAPER[0]) + rows * np.array(_PAPER[1]))
-    picture = np.repeat(_pack_colours(fade)[:, None], WIDTH * _SAMPLES, axis=1)
+    samples, width, top = PREVIEW.samples, PREVIEW.width, PREVIEW.top
+    bottom = PREVIEW.height - PREVIEW.bottom
+    rows = np.linspace(0.0, 1.0, PREVIEW.height * samples)[:, None]
+    above, below = np.array(PREVIEW.paper_rgb)
+    fade = np.rint((1 - rows) * above + rows * below)
+    picture = np.repeat(_pack_colours(fade)[:, None], width * samples, axis=1)
     apart = len(parts) > 1
     closed = _scene(parts, meshes, 0.0)
-    scenes = (closed, _scene(parts, meshes, _APART) if apart else closed)
+    scenes = (closed, _scene(parts, meshes, PREVIEW.apart) if apart else closed)
     eye = _best_eye(scenes[0].normals)
     cameras = (_axes(eye), _axes(-eye))
-    room = (WIDTH // 2 - 2 * MARGIN, HEIGHT - _TOP - _BOTTOM - MARGIN)
+    room = (width // 2 - 2 * MARGIN, bottom - top - MARGIN)
     scale = min(
         _scale_to_fit(scene, axes, room) for scene, axes in zip(scenes, cameras, strict=True)
     )
-    memory = np.empty(((HEIGHT - _BOTTOM - _TOP) * _SAMPLES, WIDTH // 2 * _SAMPLES), np.int64)
+    memory = np.empty(((bottom - top) * samples, width // 2 * samples), np.int64)
     fonts = [ImageFont.load_default(size) for size in FONT_SIZES]
     labels = []
     for i, (scene, axes) in enumerate(zip(scenes, cameras, strict=True)):
-        box = (i * WIDTH // 2, _TOP, (i + 1) * WIDTH // 2, HEIGHT - _BOTTOM)
+        box = (i * width // 2, top, (i + 1) * width // 2, bottom)
         labels += _draw_view(picture, scene, axes, scale, box, memory, fonts[1])
     image = Image.frombuffer("RGBX", picture.shape[::-1], picture, "raw", "RGBX", 0, 1)
-    image = image.reduce(_SAMPLES).convert("RGB")
+    image = image.reduce(samples).convert("RGB")
     write_lettering(image, _subtitle(size_mm, parts), name, labels, scale, fonts, apart=apart)
     return _png(np.asarray(image))
 
@@ -138,7 +129,7 @@ def _scene(parts: Sequence[Part], meshes: Sequence[Mesh], apart: float) -> _Scen
         numbers = np.arange(len(part.facets))
         if len(parts) > 1 and not apart:
             towards = [centre_and_normal(body, facet)[1] @ shapes[0][1] for facet in part.facets]
-            numbers = np.flatnonzero(np.array(towards) > _BACK)
+            numbers = np.flatnonzero(np.array(towards) > PREVIEW.back)
         belongs = object_faces(part) if len(parts) == 1 else np.arange(len(part.facets))
         shown = np.isin(mesh.facets, numbers)
         vertices.append(mesh.vertices @ T[:3, :3].T + (T[:3, 3] + shift))
@@ -181,7 +172,7 @@ def _edges(facets: Sequence[tuple[Facet, int]]) -> NDArray[np.int64]:
 def _best_eye(normals: Points) -> Points:
     """Return the first direction from which, or from behind which, no face is seen edge-on."""
     least = [float(np.abs(normals @ (eye / np.linalg.norm(eye))).min()) for eye in _EYES]
-    good = [eye for eye, cosine in zip(_EYES, least, strict=True) if cosine >= _OPEN]
+    good = [eye for eye, cosine in zip(_EYES, least, strict=True) if cosine >= PREVIEW.open]
     return good[0] if good else _EYES[int(np.argmax(least))]
 
 
@@ -210,8 +201,8 @@ def _draw_view(
     font: Font,
 ) -> list[Label]:
     """Draw one view into its box (pixels); return the names of the faces seen."""
-    left, top, right, bottom = (_SAMPLES * value for value in box)
-    fine = scale * _SAMPLES
+    left, top, right, bottom = (PREVIEW.samples * value for value in box)
+    fine = scale * PREVIEW.samples
     flat: Points = scene.vertices @ axes.T
     middle = (flat.min(axis=0) + flat.max(axis=0)) / 2
     offset = np.array([(right - left) / 2, (bottom - top) / 2, 0.0])
@@ -226,13 +217,14 @@ def _draw_view(
     _draw_edges(view, screen(scene.edges @ axes.T), seen, 0.6 * fine)
     texts = [plain(name) for name in scene.names]
     halves = [font.getlength(text) / 2 + 9 for text in texts]
-    middles = screen(scene.centres @ axes.T)[:, :2] / _SAMPLES
-    facing = np.flatnonzero(scene.normals @ axes[2] > _FACING).tolist()
+    middles = screen(scene.centres @ axes.T)[:, :2] / PREVIEW.samples
+    facing = np.flatnonzero(scene.normals @ axes[2] > PREVIEW.facing).tolist()
     wanted = [
         Wanted(face, float(middles[face, 0]), float(middles[face, 1]), halves[face])
         for face in facing
     ]
-    places = label_places(seen.coarse(scene.faces, _COARSE * _SAMPLES), _COARSE, wanted)
+    step = PREVIEW.label_step
+    places = label_places(seen.coarse(scene.faces, step * PREVIEW.samples), step, wanted)
     return [
         Label(texts[one.face], box[0] + place[0], box[1] + place[1], one.half_width)
         for one, place in zip(wanted, places, strict=True)
@@ -242,18 +234,18 @@ def _draw_view(
 
 def _shade(scene: _Scene, flat: Points) -> Colours:
     """Return the colour of each triangle under the light; `flat` in screen axes."""
-    light = _LIGHT / np.linalg.norm(_LIGHT)
+    light = np.array(PREVIEW.light) / np.linalg.norm(PREVIEW.light)
     tints = np.array([BODY_RGB, SYMBOL_RGB], np.float64)
     colours = np.empty(len(scene.triangles), np.uint32)
-    for start in range(0, len(colours), _BLOCK):
-        some = slice(start, start + _BLOCK)
+    for start in range(0, len(colours), PREVIEW.block):
+        some = slice(start, start + PREVIEW.block)
         a, b, c = (flat[scene.triangles[some, i]].T for i in range(3))
         (ux, uy, uz), (vx, vy, vz) = b - a, c - a
         normals = np.array([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx])
         lengths = np.sqrt((normals * normals).sum(axis=0))
         cosine = light @ normals / np.where(lengths > 0, lengths, 1.0)
         # Half of the way round the object still gets some light, so that no face is black.
-        shade = _AMBIENT + (1.0 - _AMBIENT) * (0.5 + 0.5 * cosine)
+        shade = PREVIEW.ambient + (1.0 - PREVIEW.ambient) * (0.5 + 0.5 * cosine)
         tint = tints[scene.symbols[some].astype(np.int64)]
         colours[some] = _pack_colours(np.minimum(np.rint(1.06 * tint * shade[:, None]), 255.0))
     return colours
@@ -269,7 +261,7 @@ def _pack_colours(rgb: Points) -> Colours:
 def _draw_edges(view: Colours, edges: Points, seen: Visible, slack: float) -> None:
     """Draw the edges of the bodies where nothing lies in front of them."""
     height, width = view.shape
-    line = _pack_colours(np.array([_LINE]))
+    line = _pack_colours(np.array([PREVIEW.line_rgb]))
     for start, end in edges:
         steps = int(np.abs(end - start)[:2].max()) + 2
         points = start + np.linspace(0.0, 1.0, steps)[:, None] * (end - start)

@@ -18,6 +18,7 @@ from generator.plane.polygon import (
     signed_area,
 )
 from generator.plane.rings import distance
+from generator.polyhedron.settings import SOLID
 from generator.polyhedron.surface import (
     FaceProblem,
     Loops,
@@ -27,13 +28,10 @@ from generator.polyhedron.surface import (
     face_axes,
 )
 
-PLANARITY = 1e-4  #: most a vertex may lie off its face's plane, as a share of the size
-CLOSENESS = 1e-6  #: two points, or a point and an edge, nearer than this touch; same share
-
 
 def face_problems(surface: Surface) -> list[FaceProblem]:
     """Return what is wrong with single faces: repeated points, slivers, bends, crossings."""
-    tolerance = CLOSENESS * surface.size
+    tolerance = SOLID.closeness * surface.size
     problems = _duplicate_vertices(surface, tolerance)
     if problems:
         return problems  # every other measure would only repeat it
@@ -47,7 +45,7 @@ def crossing_problems(surface: Surface) -> list[FaceProblem]:
 
     A convex solid has no vertex in front of any face and is done after one product.
     """
-    tolerance = CLOSENESS * surface.size
+    tolerance = SOLID.closeness * surface.size
     vertices, problems = surface.vertices, []
     edges = np.array(sorted({(min(e), max(e)) for f in surface.faces for e in directed_edges(f)}))
     for name, loops in zip(surface.names, surface.faces, strict=True):
@@ -119,7 +117,7 @@ def _loop_problems(
     every = [v for loop in loops for v in loop]
     height = (vertices[every] - outer.mean(axis=0)) @ z
     worst = int(np.abs(height).argmax())
-    allowed = PLANARITY * surface.size
+    allowed = SOLID.planarity * surface.size
     if abs(height[worst]) > allowed:
         return [
             FaceProblem(

@@ -14,12 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.plane.polygon import area_vector, plane_axes
+from generator.polyhedron.settings import SOLID
 
 Points = NDArray[np.float64]
-
-EXACT = 2e-15  #: vertices this near to their planes, as a share of the size, stay as they are
-LARGEST = 3000  #: equations; beyond this the coordinates are left as given
-STEPS = 6
 
 
 def flatten_faces(
@@ -37,15 +34,15 @@ def flatten_faces(
     face_of, vertex_of = _incidences(faces)
     moved = vertices
     best = np.abs(_residual(vertices, faces, face_of, vertex_of)[0]).max()
-    if best <= EXACT * size or len(face_of) > LARGEST:
+    if best <= SOLID.planar_exactly * size or len(face_of) > SOLID.most_equations:
         return vertices.copy(), 0.0
-    for _ in range(STEPS):
+    for _ in range(SOLID.flatten_steps):
         trial = _step(moved, faces, face_of, vertex_of, size)
         worst = np.abs(_residual(trial, faces, face_of, vertex_of)[0]).max()
         if not worst < 0.5 * best:
             break
         moved, best = trial, worst
-        if best <= EXACT * size:
+        if best <= SOLID.planar_exactly * size:
             break
     distance = float(np.linalg.norm(moved - vertices, axis=1).max())
     if distance > 1e-3 * size:

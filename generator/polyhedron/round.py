@@ -19,11 +19,9 @@ import numpy as np
 
 from generator.errors import ShapeError
 from generator.polyhedron.developable import Developable
+from generator.polyhedron.settings import SOLID
 from generator.polyhedron.shapes import check_lengths
 from generator.polyhedron.winged import Face, Polyhedron, polyhedron
-
-CHORD_ERROR_MM = 0.02  #: a tenth of a printed layer
-FACETS = (24, 240)  #: fewest and most
 
 
 def cylinder(diameter: float, height: float) -> Polyhedron:
@@ -62,8 +60,8 @@ def cone(diameter: float, height: float, top_diameter: float = 0.0) -> Polyhedro
 
 def _count(radius: float) -> int:
     """Return the number of facets, a multiple of four."""
-    wanted = math.pi * math.sqrt(radius / (3.0 * CHORD_ERROR_MM))
-    return min(max(4 * math.ceil(wanted / 4.0), FACETS[0]), FACETS[1])
+    wanted = math.pi * math.sqrt(radius / (3.0 * SOLID.chord_error_mm))
+    return min(max(4 * math.ceil(wanted / 4.0), SOLID.facets[0]), SOLID.facets[1])
 
 
 def _round(

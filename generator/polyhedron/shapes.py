@@ -23,12 +23,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from generator.errors import ShapeError
+from generator.polyhedron.settings import SOLID
 from generator.polyhedron.winged import FaceLike, Polyhedron, polyhedron
-
-SHORTEST_MM = 1.0
-LONGEST_MM = 5000.0
-RATIO = 200.0  #: most a length may exceed another one of the same solid
-MOST_SIDES = 64
 
 VERTEX_LETTERS = {"tetrahedron": "A", "box": "B", "cube": "C", "triangular_prism": "D"}
 
@@ -191,9 +187,9 @@ def _cap(points: NDArray[np.float64], normal: NDArray[np.float64]) -> tuple[int,
 
 def _side(shape: str, sides: int, side: float | None, radius: float | None) -> float:
     """Return the side of a regular polygon of which the side or the circumradius is given."""
-    if isinstance(sides, bool) or not isinstance(sides, int) or not 3 <= sides <= MOST_SIDES:
+    if isinstance(sides, bool) or not isinstance(sides, int) or not 3 <= sides <= SOLID.most_sides:
         fix = "give a whole number; a cylinder needs no more than 64 sides"
-        raise ShapeError(f"{shape} has 3 to {MOST_SIDES} sides, not {sides!r}", fix=fix)
+        raise ShapeError(f"{shape} has 3 to {SOLID.most_sides} sides, not {sides!r}", fix=fix)
     if side is not None and radius is None:
         return side
     if radius is not None and side is None:
@@ -208,16 +204,16 @@ def check_lengths(shape: str, **lengths: float) -> None:
     for name, length in lengths.items():
         if isinstance(length, bool) or not isinstance(length, int | float | np.floating):
             raise ShapeError(f"{shape}: {name} is {length!r}, not a length", fix="write 60 mm")
-        if not SHORTEST_MM <= length <= LONGEST_MM:
+        if not SOLID.shortest_mm <= length <= SOLID.longest_mm:
             raise ShapeError(
-                f"{shape}: {name} is {length:.6g} mm; allowed are {SHORTEST_MM:g} to "
-                f"{LONGEST_MM:g} mm",
+                f"{shape}: {name} is {length:.6g} mm; allowed are {SOLID.shortest_mm:g} to "
+                f"{SOLID.longest_mm:g} mm",
                 fix=f"give {name} in that range, with its unit",
             )
     short, long = min(lengths, key=lengths.__getitem__), max(lengths, key=lengths.__getitem__)
-    if lengths[long] > RATIO * lengths[short]:
+    if lengths[long] > SOLID.length_ratio * lengths[short]:
         raise ShapeError(
-            f"{shape}: {long} of {lengths[long]:.6g} mm is more than {RATIO:g} times {short} of "
-            f"{lengths[short]:.6g} mm",
-            fix=f"set {short} to {lengths[long] / RATIO:.4g} mm or more",
+            f"{shape}: {long} of {lengths[long]:.6g} mm is more than "
+            f"{SOLID.length_ratio:g} times {short} of {lengths[short]:.6g} mm",
+            fix=f"set {short} to {lengths[long] / SOLID.length_ratio:.4g} mm or more",
         )

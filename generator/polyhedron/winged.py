@@ -20,6 +20,7 @@ from generator.polyhedron.check_edges import edge_problems, number_problems
 from generator.polyhedron.check_faces import crossing_problems, face_problems
 from generator.polyhedron.developable import Developable
 from generator.polyhedron.flatten import flatten_faces
+from generator.polyhedron.settings import SOLID
 from generator.polyhedron.surface import (
     Loops,
     Surface,
@@ -29,9 +30,6 @@ from generator.polyhedron.surface import (
 )
 
 Loop = tuple[int, ...]
-
-FLAT = 1e-7  #: least volume of a solid, as a share of the cube of its size
-NOTED = 2e-7  #: vertices moved farther than this share of the size are reported
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +126,7 @@ def polyhedron(kind: str, vertices: ArrayLike, faces: Sequence[FaceLike]) -> Pol
 
     notes = []
     volume = signed_volume(points, surface.faces)
-    if abs(volume) <= FLAT * surface.size**3:
+    if abs(volume) <= SOLID.least_volume * surface.size**3:
         raise ShapeError(
             f"the solid is flat: its volume is {abs(volume):.2g} mm^3",
             fix="give it a thickness",
@@ -140,7 +138,7 @@ def polyhedron(kind: str, vertices: ArrayLike, faces: Sequence[FaceLike]) -> Pol
         )
         notes.append("all faces pointed inward and were turned outward")
     points, moved = flatten_faces(points, loops_of)
-    if moved > NOTED * surface.size:
+    if moved > SOLID.noted_move * surface.size:
         notes.append(f"vertices were moved by up to {moved:.2g} mm to make every face planar")
     raise_problems(crossing_problems(Surface(points, surface.names, loops_of)))
 

@@ -21,11 +21,9 @@ from generator.plane.rings import boxes_inside, edges_cross
 from generator.solid.emboss import to_part, turn
 from generator.solid.frame import in_frame
 from generator.solid.part import Embossing, Part
+from generator.solid.settings import EMBOSS
 
 Ring = NDArray[np.float64]
-
-#: Points may lie off their plane by this share of the part's size.
-FLATNESS = 1e-9
 
 
 def prove_closed(part: Part) -> None:
@@ -54,12 +52,12 @@ def prove_closed(part: Part) -> None:
         normal = face_vector(corners)
         normal /= np.linalg.norm(normal)
         points = np.concatenate(corners) - corners[0][0]
-        if np.abs(points @ normal).max() > FLATNESS * size:
+        if np.abs(points @ normal).max() > EMBOSS.planarity * size:
             raise SolidError("a facet is not planar", fix="check the shape", place=place)
         for embossing in on.get(facet, []):
             flat = in_frame(embossing.T_part_facet, np.concatenate(corners))[:, 2]
             upright = float(embossing.T_part_facet[:3, 2] @ normal)
-            if np.abs(flat).max() > FLATNESS * size or upright < 1 - FLATNESS:
+            if np.abs(flat).max() > EMBOSS.planarity * size or upright < 1 - EMBOSS.planarity:
                 raise SolidError("symbols do not stand on their facet", place=place)
             _check_inside(embossing, corners, place)
         _check_apart(on.get(facet, []), place)

@@ -6,7 +6,6 @@ same corners, each on two moved lines, so that sides between two insets are plan
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,12 +13,10 @@ from numpy.typing import NDArray
 
 from generator.plane.polygon import points_inside, signed_area
 from generator.plane.rings import edges_cross, edges_kept
+from generator.solid.settings import EMBOSS
 
 Ring = NDArray[np.float64]  #: (k, 2) mm
 Insets = NDArray[np.float64]  #: (k,) mm, of edge i from corner i to i + 1
-
-#: Neighbours that turn by less than this share one inset where theirs would push the corner far.
-FLAT_TURN_RAD = math.radians(15)
 
 
 def shared_insets(ring: Ring, insets: Insets) -> Insets:
@@ -35,7 +32,7 @@ def shared_insets(ring: Ring, insets: Insets) -> Insets:
     )
     shorter = np.minimum(length, np.roll(length, 1))
     slack = np.abs(np.sin(turn)) * shorter / 8
-    flat = np.abs(turn) < FLAT_TURN_RAD
+    flat = np.abs(turn) < EMBOSS.flat_turn_rad
     result = insets.astype(np.float64)
     for _ in range(len(ring)):
         previous = np.roll(result, 1)

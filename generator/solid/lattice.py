@@ -16,12 +16,10 @@ from generator.alphabet.outline import foot_half_mm
 from generator.plane.rings import boxes_inside
 from generator.solid.emboss import turn
 from generator.solid.part import Embossing
+from generator.solid.settings import EMBOSS
 
 Index = NDArray[np.int64]
 Ring = NDArray[np.float64]
-
-#: A centre lies on the lattice, and a square inside its facet, within this share of the pitch.
-TOLERANCE = 1e-6
 
 
 @dataclass(slots=True)
@@ -50,10 +48,12 @@ def squares_of(embossing: Embossing, rings: Sequence[Ring]) -> Squares | None:
         return None
     centres = embossing.centres_mm @ turn(embossing.rotation_rad)
     cells = np.rint((centres - centres[0]) / pitch).astype(np.int64)
-    on_lattice = np.abs(centres - centres[0] - cells * pitch).max(axis=1) <= TOLERANCE * pitch
+    on_lattice = (
+        np.abs(centres - centres[0] - cells * pitch).max(axis=1) <= EMBOSS.on_lattice * pitch
+    )
     halves = np.array([foot_half_mm(tiers) for tiers in embossing.tiers])
-    full = on_lattice & (halves[embossing.labels] < pitch * (0.5 - TOLERANCE))
-    full &= boxes_inside(centres, pitch * (0.5 + TOLERANCE), rings)
+    full = on_lattice & (halves[embossing.labels] < pitch * (0.5 - EMBOSS.on_lattice))
+    full &= boxes_inside(centres, pitch * (0.5 + EMBOSS.on_lattice), rings)
     cells -= cells.min(axis=0)
     stride = int(cells[:, 1].max()) + 2
     steps = np.array([0, stride, stride + 1, 1])  # lower left, lower right, upper right, upper left

@@ -21,15 +21,9 @@ from generator.plane.rings import boxes_inside
 from generator.printers import Printer
 from generator.solid.emboss import turn
 from generator.solid.part import Embossing
+from generator.solid.settings import EMBOSS
 
 Ring = NDArray[np.float64]
-
-#: Lattice unit of the figures, in strokes; the smallest keeps a gap of one stroke.
-SIZES = (2.0, 1.5, 1.25, 1.0)
-#: Where along its edge a number may stand, best first.
-PLACES = (0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.1, 0.9)
-#: Depth over stroke: a fifth of the stroke is left as a floor.
-DEPTH = 0.4
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,11 +84,11 @@ def marks_on(
         Gives the stroke.
     """
     stroke = printer.stroke_min_mm
-    depth = min(DEPTH * stroke, wall_mm / 3)
+    depth = min(EMBOSS.mark_depth * stroke, wall_mm / 3)
     best: list[_Box] = []
-    pen = _Pen(SIZES[-1] * stroke, stroke, stroke)
+    pen = _Pen(EMBOSS.mark_sizes[-1] * stroke, stroke, stroke)
     edges = [mark for mark in marks if (mark.start != mark.end).any()]
-    for size in SIZES:
+    for size in EMBOSS.mark_sizes:
         trial = _Pen(size * stroke, stroke, stroke)
         boxes = _place_marks(edges, rings, trial)
         if len(boxes) > len(best) or not edges:
@@ -126,7 +120,7 @@ def _place_marks(
             inward = np.array([-axis[1], axis[0]])
             angle = math.atan2(axis[1], axis[0])
             lift = (half[1] + pen.clear * (1 + 1e-6)) * inward
-            centres = mark.start + np.array(PLACES)[:, None] * along + lift
+            centres = mark.start + np.array(EMBOSS.mark_places)[:, None] * along + lift
         else:
             angle = 0.0
             centres = _middles(mark.start, rings)

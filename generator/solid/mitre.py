@@ -13,13 +13,7 @@ import math
 from dataclasses import dataclass
 
 from generator.printers import Printer
-
-#: Gap between two assembled panels' back edges and the bisecting plane, each, mm.
-ASSEMBLY_GAP_MM = 0.1
-#: A reflex edge's back reaches out at most this many walls (theta up to 307 degrees).
-REFLEX_LIMIT = 2.0
-#: Angles up to this much over a right angle count as a right angle.
-_RIGHT = math.pi / 2 + 1e-6
+from generator.solid.settings import EMBOSS
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +26,7 @@ class Mitre:
 
 
 def mitre(
-    theta_rad: float, wall_mm: float, printer: Printer, gap_mm: float = ASSEMBLY_GAP_MM
+    theta_rad: float, wall_mm: float, printer: Printer, gap_mm: float = EMBOSS.assembly_gap_mm
 ) -> Mitre:
     """Return the side along an edge with interior dihedral angle `theta_rad`.
 
@@ -40,9 +34,9 @@ def mitre(
     at most `printer.overhang_max_rad`.
     """
     slope = _cotangent_of_half(theta_rad)
-    back = max(wall_mm * slope, -REFLEX_LIMIT * wall_mm) + gap_mm
+    back = max(wall_mm * slope, -EMBOSS.reflex_limit * wall_mm) + gap_mm
     steepest = math.tan(printer.overhang_max_rad)
-    if theta_rad > _RIGHT:
+    if theta_rad > EMBOSS.right_rad:
         return Mitre(max(0.0, back - wall_mm * steepest), 0.0, back)
     land = min(printer.layer_mm, wall_mm / 4)
     top = max(back - (wall_mm - land) * steepest, land * slope)

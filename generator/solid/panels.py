@@ -25,13 +25,12 @@ from generator.solid.frame import edge_numbers, in_frame, plane_frame
 from generator.solid.inset import inset, regular, shared_insets
 from generator.solid.marks import BackMark, marks_on
 from generator.solid.measure import box
-from generator.solid.mitre import ASSEMBLY_GAP_MM, Mitre, mitre
+from generator.solid.mitre import Mitre, mitre
 from generator.solid.part import Embossing, Facet, Part
+from generator.solid.settings import EMBOSS
 from generator.solid.whole import move_part
 
 Ring = NDArray[np.float64]
-
-_TOLD = 3  # kinds of missing numbers that a warning lists in full
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +57,7 @@ def panels(
     printer: Printer,
     *,
     name: str = "",
-    gap_mm: float = ASSEMBLY_GAP_MM,
+    gap_mm: float = EMBOSS.assembly_gap_mm,
     numbers: bool = True,
 ) -> Panels:
     """Return one panel per face.
@@ -272,9 +271,9 @@ def _no_room(missing: dict[str, tuple[str, ...]]) -> str:
         backs.setdefault(" and ".join(what), []).append(face)
     told = [
         f"of {what} on the back{'s' if len(faces) > 1 else ''} of {', '.join(faces)}"
-        for what, faces in list(backs.items())[:_TOLD]
+        for what, faces in list(backs.items())[: EMBOSS.listed_marks]
     ]
-    rest = [face for faces in list(backs.values())[_TOLD:] for face in faces]
+    rest = [face for faces in list(backs.values())[EMBOSS.listed_marks :] for face in faces]
     told += [f"of others on the back{'s' if len(rest) > 1 else ''} of {', '.join(rest)}"] * bool(
         rest
     )

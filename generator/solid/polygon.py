@@ -10,17 +10,14 @@ from numpy.typing import NDArray
 
 from generator.errors import SolidError
 from generator.plane.polygon import signed_area, triangle_areas
+from generator.solid.settings import EMBOSS
 
 Ring = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 
-#: Triangles thinner than this share of their longest side are taken for flat.
-FLAT = 1e-9
-
-
 def triangulate_rings(
-    rings: Sequence[Ring], numbers: Index, name: str, flat: float = FLAT
+    rings: Sequence[Ring], numbers: Index, name: str, flat: float = EMBOSS.flat
 ) -> Index:
     """Return the (m, 3) triangles of an area bounded by rings.
 
@@ -63,7 +60,7 @@ def triangulate_rings(
     return named
 
 
-def without_slivers(points: Ring, triangles: Index, share: float = FLAT) -> Index:
+def without_slivers(points: Ring, triangles: Index, share: float = EMBOSS.flat) -> Index:
     """Return a triangulation in which triangles of three points on a line are flipped away.
 
     Such a triangle has its longest side in common with another one; exchanging that side

@@ -20,13 +20,11 @@ from generator.solid.emboss import to_part, turn
 from generator.solid.frame import in_frame, plane_frame
 from generator.solid.lattice import Squares, squares_of
 from generator.solid.part import Embossing, Facet, Part
-from generator.solid.polygon import FLAT, triangulate_rings
+from generator.solid.polygon import triangulate_rings
+from generator.solid.settings import EMBOSS
 from generator.solid.template import SymbolSolid, closed_template, template_of
 
 Index = NDArray[np.int64]
-
-#: As `polygon.FLAT`, for pieces of symbols on round faces.
-BENT_FLAT = 1e-5
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +131,7 @@ class _MeshBuilder:
         name = self.part.facets[facet].name
         # On a round face what was a straight line bends a little: rounding could turn triangles
         # along it that are not quite flat.
-        share = BENT_FLAT if "/" in name else FLAT
+        share = EMBOSS.bent_flat if "/" in name else EMBOSS.flat
         found = triangulate_rings(rings, np.concatenate(loops), name, share)
         self.found.append((found, facet, -1, None))
 

@@ -14,14 +14,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from generator.errors import ShapeError
+from generator.polyhedron.read.settings import MODEL
 from generator.polyhedron.read.strip import run_of
-
-CHORD_ERROR_MM = 0.02  #: of the largest cylinder or cone
-BLANK_ERROR_MM = 0.1  #: of other faces, which carry no symbols: half a printed layer
-STEPS = (24, 240)  #: fewest and most to a full circle
-INTERIOR_RAD = 0.35  #: between triangles of faces that carry no symbols
-COARSER = (1.0, 2.0, 5.0, 10.0)  #: times these errors, until there are few enough facets
-MOST_FACETS = 6000
+from generator.polyhedron.settings import SOLID
 
 _REMAKE = "check the model in a CAD program, make that face anew, and export it again"
 
@@ -61,22 +56,23 @@ def curved_faces(solid: Any, faces: list[Any], kinds: list[str]) -> dict[str, An
         There are too many facets, or the kernel cannot divide a face.
     """
     counts: list[int] = []
-    for coarser in COARSER:
+    for coarser in MODEL.coarser:
         found = _divide(solid, faces, kinds, coarser)
         counts.append(len(found.faces))
-        if counts[-1] <= MOST_FACETS:
+        if counts[-1] <= MODEL.most_facets:
             break
     else:
         raise ShapeError(
-            f"its round faces need {min(counts)} facets, to {BLANK_ERROR_MM * COARSER[-1]:g} mm; "
-            f"{MOST_FACETS} are allowed",
+            f"its round faces need {min(counts)} facets, to "
+            f"{MODEL.blank_error_mm * MODEL.coarser[-1]:g} mm; {MODEL.most_facets} are allowed",
             fix="leave out threads, small fillets and other round parts that carry no symbols",
         )
     notes = []
     if coarser > 1.0:
         notes.append(
-            f"round faces were divided to {BLANK_ERROR_MM * coarser:g} mm, those with symbols to "
-            f"{CHORD_ERROR_MM * coarser:g} mm: finer, they have {counts[-2]} facets"
+            f"round faces were divided to {MODEL.blank_error_mm * coarser:g} mm, those with "
+            f"symbols to {SOLID.chord_error_mm * coarser:g} mm: finer, they have {counts[-2]} "
+            "facets"
         )
     return {
         "points": [list(map(float, point)) for point in found.points],
@@ -86,7 +82,7 @@ def curved_faces(solid: Any, faces: list[Any], kinds: list[str]) -> dict[str, An
         "blank": found.blank,
         "kinds": found.kinds,
         "notes": notes,
-        "error_mm": BLANK_ERROR_MM * coarser,
+        "error_mm": MODEL.blank_error_mm * coarser,
     }
 
 
@@ -99,10 +95,10 @@ def _divide(solid: Any, faces: list[Any], kinds: list[str], coarser: float) -> _
     step, radius = _step(faces, kinds, coarser)
     limits = IMeshTools_Parameters()
     # On circles of cylinders and cones the angle alone may count, so that those of a cone match.
-    limits.Deflection = max(BLANK_ERROR_MM * coarser, 2.0 * _chord_error(radius, step))
+    limits.Deflection = max(MODEL.blank_error_mm * coarser, 2.0 * _chord_error(radius, step))
     limits.DeflectionInterior = limits.Deflection
     limits.Angle = 2.0 * step  # which the kernel halves on edges
-    limits.AngleInterior = INTERIOR_RAD * math.sqrt(coarser)
+    limits.AngleInterior = MODEL.interior_rad * math.sqrt(coarser)
     limits.MinSize = 1e-6
     BRepTools.Clean_s(solid)
     BRepMesh_IncrementalMesh(solid, limits)
@@ -151,9 +147,9 @@ def _step(faces: list[Any], kinds: list[str], coarser: float) -> tuple[float, fl
             ends = (surface.FirstVParameter(), surface.LastVParameter())
             sine = math.sin(surface.Cone().SemiAngle())
             radii += [abs(surface.Cone().RefRadius() + v * sine) for v in ends]
-    steps = math.pi / math.acos(max(0.0, 1.0 - coarser * CHORD_ERROR_MM / max(radii)))
-    fewest = STEPS[0] / math.sqrt(coarser)
-    wanted = min(4 * math.ceil(max(steps, fewest) / 4), STEPS[1])
+    steps = math.pi / math.acos(max(0.0, 1.0 - coarser * SOLID.chord_error_mm / max(radii)))
+    fewest = SOLID.facets[0] / math.sqrt(coarser)
+    wanted = min(4 * math.ceil(max(steps, fewest) / 4), SOLID.facets[1])
     return 2.0 * math.pi / wanted * (1.0 + 1e-9), max(radii)  # so that a rounding adds no step
 
 

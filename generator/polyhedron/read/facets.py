@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from generator.errors import ShapeError
 from generator.polyhedron.developable import developable_from
+from generator.polyhedron.read.settings import MODEL
 from generator.polyhedron.read.soup import weld
 from generator.polyhedron.winged import Face, Polyhedron, polyhedron
-
-WELD = 1e-5  #: points nearer than this share of the size are one
 
 Loops = list[list[int]]
 
@@ -61,7 +60,7 @@ def _weld(
 ) -> tuple[NDArray[np.float64], list[Loops], list[int]]:
     """Join near points; return points, the faces that are left and their old numbers."""
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
-    welded, number = weld(points, WELD * size)
+    welded, number = weld(points, MODEL.facet_weld * size)
     if len(welded) == len(points):
         return points, faces, list(range(len(faces)))
     left, kept = [], []

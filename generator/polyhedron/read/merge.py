@@ -13,12 +13,8 @@ from numpy.typing import NDArray
 
 from generator.errors import ShapeError
 from generator.plane.polygon import area_vector
+from generator.polyhedron.read.settings import MODEL
 from generator.polyhedron.read.soup import Soup, cluster_labels
-
-DISTANCE = 1e-5  #: coplanar points lie this near to a plane, as a share of the size
-ANGLE_RAD = 1e-3  #: coplanar polygons turn by no more than this, besides the noise
-SLIVER = 8.0  #: a polygon thinner than this many times the noise has no direction
-MOST_FACES = 400
 
 _REPAIR = "repair the mesh (PrusaSlicer, MeshLab or the program that made it) and export it again"
 
@@ -103,7 +99,7 @@ def _coplanar_groups(soup: Soup, twin: Integers) -> Integers:
     longest = np.zeros(count)
     np.maximum.at(longest, soup.face, np.linalg.norm(end - start, axis=1))
     width = area / longest
-    sliver = width <= SLIVER * soup.noise
+    sliver = width <= MODEL.sliver * soup.noise
     normal = vector / np.where(area > 0.0, area, 1.0)[:, None]
 
     half = np.flatnonzero(np.arange(len(twin)) < twin)
@@ -114,7 +110,9 @@ def _coplanar_groups(soup: Soup, twin: Integers) -> Integers:
     off = _farthest(soup, large, small, normal, corner)
     cross = np.linalg.norm(np.cross(normal[large], normal[small]), axis=1)
     turn = np.arctan2(cross, np.einsum("ij,ij->i", normal[large], normal[small]))
-    allowed = np.maximum(ANGLE_RAD, 4.0 * soup.noise / np.maximum(width[small], soup.noise))
+    allowed = np.maximum(
+        MODEL.coplanar_rad, 4.0 * soup.noise / np.maximum(width[small], soup.noise)
+    )
     flat = (off <= tolerance) & (turn <= allowed) & ~sliver[large] & ~sliver[small]
     group = cluster_labels(np.arange(count), large[flat], small[flat])
     group = _with_slivers(group, sliver, large, small, off, turn, tolerance)
@@ -124,7 +122,7 @@ def _coplanar_groups(soup: Soup, twin: Integers) -> Integers:
 
 def _distance(soup: Soup) -> float:
     size = float(np.linalg.norm(np.ptp(soup.points[soup.origin], axis=0)))
-    return DISTANCE * size + soup.noise
+    return MODEL.coplanar * size + soup.noise
 
 
 def _farthest(
@@ -177,10 +175,10 @@ def _check_groups(soup: Soup, group: Integers, vector: Floats, corner: Integers)
     total = np.zeros((len(numbers), 3))
     np.add.at(total, compact, vector)
     area = np.linalg.norm(total, axis=1)
-    if len(numbers) > MOST_FACES:
+    if len(numbers) > MODEL.most_faces:
         raise ShapeError(
             f"{len(numbers)} planar faces, the smallest of {area.min():.2g} mm^2: the surface "
-            f"is curved; {MOST_FACES} faces are allowed",
+            f"is curved; {MODEL.most_faces} faces are allowed",
             fix="encode a model whose faces are planar, or export round parts more coarsely",
         )
     face = compact[soup.face]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from generator.errors import ShapeError
+from generator.polyhedron.read.settings import MODEL
 from generator.polyhedron.read.soup import Soup, soup_of_loops
 
-MOST_FACES = 500_000
 _AGAIN = "export the model again as a mesh of polygons"
 # fmt: off
 _IGNORED = frozenset([
@@ -38,8 +38,8 @@ def read_obj(content: bytes, place: str) -> Soup:
             raise ShapeError(cause, fix=_AGAIN, place=where)
         elif word and word not in _IGNORED:
             raise ShapeError(f"'{word[:20]}' is no word of OBJ", fix=_AGAIN, place=where)
-    if len(faces) > MOST_FACES:
-        cause = f"{len(faces)} polygons; {MOST_FACES} are allowed"
+    if len(faces) > MODEL.most_polygons:
+        cause = f"{len(faces)} polygons; {MODEL.most_polygons} are allowed"
         raise ShapeError(cause, fix="simplify the model", place=place)
     return soup_of_loops(np.array(points, dtype=np.float64).reshape(-1, 3), faces, place)
 

@@ -13,10 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.errors import ShapeError
-
-WELD = 1e-6  #: points nearer than this share of the size are one point
-DIGITS = 1e-6  #: coordinates have seven digits, in float32 as in ASCII STL (%e)
-LARGEST_MM = 1e6  #: no object is larger than this; larger numbers are garbage
+from generator.polyhedron.read.settings import MODEL
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,14 +55,14 @@ def _soup(
         raise ShapeError("the file holds no faces", fix="export the solid as a mesh", place=place)
     used = points[starts]
     reach = float(np.abs(used).max()) if np.isfinite(used).all() else np.inf
-    if reach > LARGEST_MM:
+    if reach > MODEL.largest_coordinate_mm:
         raise ShapeError(
-            f"a coordinate is {reach:.3g} mm; {LARGEST_MM:.0e} mm are allowed",
+            f"a coordinate is {reach:.3g} mm; {MODEL.largest_coordinate_mm:.0e} mm are allowed",
             fix="check the unit of the export, or export the model again",
             place=place,
         )
     size = float(np.linalg.norm(np.ptp(used, axis=0)))
-    noise = WELD * size + DIGITS * reach
+    noise = MODEL.weld * size + MODEL.digits * reach
     welded, number = weld(points, noise)
     origin = number[starts]
     loop = np.repeat(np.arange(len(lengths)), lengths)

@@ -17,10 +17,10 @@ from encoded_objects.errors import install_line
 from generator.errors import ShapeError
 from generator.polyhedron.read.facets import polyhedron_of_facets
 from generator.polyhedron.read.merge import merge_triangles
+from generator.polyhedron.read.settings import MODEL
 from generator.polyhedron.read.soup import soup_of_loops
 from generator.polyhedron.winged import Polyhedron, polyhedron
 
-LONGEST_S = 300.0
 KERNEL = "generator.polyhedron.read.kernel"
 _AGAIN = "export the model again; the file may be cut off or damaged"
 _START, _END = b"ISO-10303-21;", b"END-ISO-10303-21;"
@@ -73,12 +73,12 @@ def _ask_kernel(content: bytes, place: str, scale: float) -> dict[str, Any]:
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
-                timeout=LONGEST_S,
+                timeout=MODEL.longest_s,
                 check=True,
             )
             found: dict[str, Any] = json.loads(answer.read_text())
         except subprocess.TimeoutExpired:
-            cause = f"the CAD kernel did not finish in {LONGEST_S:.0f} s"
+            cause = f"the CAD kernel did not finish in {MODEL.longest_s:.0f} s"
             raise ShapeError(cause, fix="simplify the model", place=place) from None
         except (subprocess.CalledProcessError, OSError, ValueError):
             cause = "the CAD kernel broke down on it"

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-SAME = 1e-6  #: share of the size within which lines and circles are what they seem
+from generator.polyhedron.read.settings import MODEL
 
 
 def run_of(
@@ -72,7 +72,7 @@ class _Side:
         height = place @ ahead
         radial = place - height[:, None] * ahead
         radius = np.linalg.norm(radial, axis=1)
-        slack = SAME * max(1.0, float(np.abs(place).max()))
+        slack = MODEL.same * max(1.0, float(np.abs(place).max()))
         if len(numbers) > 2 and np.ptp(height) <= slack and np.ptp(radius) <= slack:
             return cls("circle", numbers)
         if len(numbers) == 2 and _upright(radial, radius):
@@ -82,7 +82,7 @@ class _Side:
 
 def _upright(radial: Any, radius: Any) -> bool:
     """Whether both ends of a straight edge lie on one side of the axis; the tip counts."""
-    if radius.min() <= SAME * radius.max():
+    if radius.min() <= MODEL.same * radius.max():
         return True
     cosine = float(radial[0] @ radial[1]) / float(radius[0] * radius[1])
     return cosine > 1.0 - 1e-9

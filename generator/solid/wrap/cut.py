@@ -2,8 +2,8 @@
 
 Tiers at their place -> the pieces of foot, sides and top on each facet. Every cut point is
 made once and shared by all pieces that meet there, so the pieces close up as the symbol did.
-A corner nearer to a line than `NUDGE_MM` is moved to that distance, on its own side: no point
-lies on a line, no edge runs along one, and no piece is thinner. Lengths in mm.
+A corner nearer to a line than `nudge_mm` is moved to that distance, on its own side: no
+point lies on a line, no edge runs along one, and no piece is thinner. Lengths in mm.
 """
 
 from __future__ import annotations
@@ -15,10 +15,9 @@ from itertools import pairwise
 import numpy as np
 
 from generator.errors import SolidError
+from generator.solid.settings import EMBOSS
 from generator.solid.wrap.strip import Points, Strip
 from generator.solid.wrap.walk import Loop, loops_of, with_holes
-
-NUDGE_MM = 0.005  #: far below what prints or is felt, far above the rounding of STL
 
 
 @dataclass(slots=True)
@@ -70,9 +69,9 @@ class _Knife:
             raise SolidError("a symbol lies beside its face", place=place)
         foot = np.concatenate([ring for tier in rings for ring in tier])
         first, last = home, home + 1  # lines around the symbol, neither of which it meets
-        while first > 0 and strip.beside(first, foot).min() < NUDGE_MM:
+        while first > 0 and strip.beside(first, foot).min() < EMBOSS.nudge_mm:
             first -= 1
-        while last < strip.facets and strip.beside(last, foot).max() > -NUDGE_MM:
+        while last < strip.facets and strip.beside(last, foot).max() > -EMBOSS.nudge_mm:
             last += 1
         if strip.beside(first, foot).min() <= 0.0 or strip.beside(last, foot).max() >= 0.0:
             raise SolidError("a symbol reaches over the side of its face", place=place)
@@ -107,7 +106,9 @@ class _Knife:
         for line in self.lines:
             beside = self.strip.beside(line, ring)
             off = np.where(
-                beside < 0.0, np.minimum(beside, -NUDGE_MM), np.maximum(beside, NUDGE_MM)
+                beside < 0.0,
+                np.minimum(beside, -EMBOSS.nudge_mm),
+                np.maximum(beside, EMBOSS.nudge_mm),
             )
             ring += (off - beside)[:, None] * self.strip.right[line]
             facet = np.where(off > 0.0, line, facet)

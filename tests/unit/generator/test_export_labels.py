@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from generator.export.labels import HALF_HEIGHT, Wanted, label_places
+from generator.export.labels import Wanted, label_places
+from generator.export.settings import PREVIEW
 
 STEP = 4.0
 
@@ -36,7 +37,8 @@ def test_a_covered_middle_gives_way_to_what_is_seen() -> None:
     x, y = place
     assert the_map()[int(y / STEP), int(x / STEP)] == 0
     own = the_map()[
-        int((y - HALF_HEIGHT) / STEP) : int((y + HALF_HEIGHT) / STEP) + 1,
+        int((y - PREVIEW.label_half_height) / STEP) : int((y + PREVIEW.label_half_height) / STEP)
+        + 1,
         int((x - 20) / STEP) : int((x + 20) / STEP) + 1,
     ]
     assert (own == 0).mean() > 0.8
@@ -52,7 +54,7 @@ def test_labels_do_not_overlap() -> None:
     assert len(found) >= 5
     for k, (x, y) in enumerate(found):
         for other_x, other_y in found[:k]:
-            assert abs(x - other_x) >= 36 or abs(y - other_y) >= 2 * HALF_HEIGHT
+            assert abs(x - other_x) >= 36 or abs(y - other_y) >= 2 * PREVIEW.label_half_height
 
 
 def test_a_label_stays_in_the_picture() -> None:

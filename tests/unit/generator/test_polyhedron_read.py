@@ -3,6 +3,7 @@
 import itertools
 import struct
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from generator.errors import ShapeError
 from generator.polyhedron import SHAPES, dihedral, face_area, polyhedron, surface_area, volume
 from generator.polyhedron.read import read_shape
+from generator.polyhedron.read.settings import MODEL
 
 SHAPES_FOLDER = Path(__file__).parents[3] / "fixtures" / "shapes"
 HEXAGON = 1.5 * 3**0.5 * 12**2
@@ -288,7 +290,7 @@ def test_missing_and_large_files(tmp_path, monkeypatch):
     assert refused(tmp_path / "none.stl").cause == "no such file or directory"
     (tmp_path / "folder.stl").mkdir()
     assert "directory" in refused(tmp_path / "folder.stl").cause
-    monkeypatch.setattr("generator.polyhedron.read.LARGEST_BYTES", 100)
+    monkeypatch.setattr("generator.polyhedron.read.MODEL", replace(MODEL, largest_bytes=100))
     assert "MB are allowed" in refused(SHAPES_FOLDER / "l_bracket.stl").cause
 
 

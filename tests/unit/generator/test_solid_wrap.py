@@ -21,8 +21,9 @@ from generator.printers import printer_named
 from generator.solid import body_mesh, prove_closed, symbol_meshes, triangles, volume, whole
 from generator.solid.closed import edges_once
 from generator.solid.measure import symbol_volume
+from generator.solid.settings import EMBOSS
 from generator.solid.wrap import bend_problem
-from generator.solid.wrap.cut import NUDGE_MM, cut_symbol
+from generator.solid.wrap.cut import cut_symbol
 from generator.solid.wrap.strip import strip_of
 
 STYLE = SymbolStyle()
@@ -112,7 +113,7 @@ def test_pieces_of_a_symbol_cover_it_wherever_it_stands(x, y, rotation, label):
         area = sum(signed_area(flat[list(loop)]) for _, loops in pieces for loop in loops)
         length = sum(float(np.hypot(*(ring - np.roll(ring, 1, 0)).T).sum()) for ring in tier)
         wanted = sum(signed_area(ring) for ring in tier)
-        assert area == pytest.approx(wanted, abs=2 * NUDGE_MM * length)
+        assert area == pytest.approx(wanted, abs=2 * EMBOSS.nudge_mm * length)
     for number, line in enumerate(cut.line):
         if line >= 0:
             assert abs(strip.beside(line, flat[number : number + 1])[0]) < 1e-9

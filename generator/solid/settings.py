@@ -1,0 +1,58 @@
+"""How bodies, panels and their symbols are cut: every number that decides their form."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class EmbossingSettings:
+    """Tolerances, gaps and sizes of solids."""
+
+    # mitre.py
+    assembly_gap_mm: float = 0.1
+    """Between two assembled panels' back edges and the bisecting plane, each."""
+    reflex_limit: float = 2.0
+    """A reflex edge's back reaches out at most this many walls (angles up to 307 degrees)."""
+    right_rad: float = math.pi / 2 + 1e-6
+    """Angles up to this count as a right angle."""
+
+    # inset.py
+    flat_turn_rad: float = math.radians(15)
+    """Neighbours that turn by less share one inset where theirs would push the corner far."""
+
+    # marks.py
+    mark_sizes: tuple[float, ...] = (2.0, 1.5, 1.25, 1.0)
+    """Lattice unit of a back's figures, in strokes; the smallest keeps a gap of one stroke."""
+    mark_places: tuple[float, ...] = (0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.1, 0.9)
+    """Where along its edge a number may stand, best first."""
+    mark_depth: float = 0.4
+    """Of a figure, over its stroke: a fifth of the stroke is left as a floor."""
+
+    # panels.py
+    listed_marks: int = 3
+    """Kinds of missing numbers that a warning lists in full."""
+
+    # lattice.py
+    on_lattice: float = 1e-6
+    """A centre is on the lattice, and a square inside its facet, within this share of the pitch."""
+
+    # closed.py
+    planarity: float = 1e-9
+    """Points may lie off their plane by this share of the part's size."""
+
+    # polygon.py
+    flat: float = 1e-9
+    """Triangles thinner than this share of their longest side are taken for flat."""
+
+    # triangulate.py
+    bent_flat: float = 1e-5
+    """As `flat`, for pieces of symbols on round faces."""
+
+    # cut.py
+    nudge_mm: float = 0.005
+    """Far below what prints or is felt, far above the rounding of STL."""
+
+
+EMBOSS = EmbossingSettings()
