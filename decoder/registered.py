@@ -16,8 +16,9 @@ from decoder.errors import DecoderError
 from generator.array import FoldedArray, ProductArray, array_from
 from generator.array.contract import Labels
 from generator.database.cells import faces_at, occupied_cells
+from generator.database.entries import list_objects
 from generator.database.open import open_database
-from generator.database.read import list_objects, read_array, read_object
+from generator.database.read import read_array, read_object
 from generator.database.transaction import reading
 
 

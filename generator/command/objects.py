@@ -33,8 +33,8 @@ def list_(database: Database = LAB, as_json: Json = False) -> Action:
 
     def action() -> int:
         from generator.command import object_report
+        from generator.database.entries import list_objects
         from generator.database.open import open_database
-        from generator.database.read import list_objects
         from generator.database.transaction import reading
         from generator.spec.option import database_option
 
@@ -184,7 +184,7 @@ def import_(
 def _confirm(engine: Engine, names: list[str], *, as_json: bool) -> None:
     """Ask before cells are freed; leave when the answer is no."""
     from generator.command import object_report
-    from generator.database.read import object_entry
+    from generator.database.entries import object_entry
     from generator.database.transaction import reading
 
     with reading(engine) as connection:

@@ -11,6 +11,7 @@
     race.py         place and register in one transaction; who loses a race does it anew
     register.py     an object -> its rows, all or none
     retire.py       an object out of use, its cells kept or freed
+    entries.py      which objects there are: a line for each
     read.py         rows -> objects and layouts, bit for bit
     cells.py        which cells are taken, and by which object and face
     occupancy.py    taken cells as bits, in tiles, for the placing of the next object

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from sqlalchemy import URL, Connection, Table, insert, select
+from sqlalchemy import URL, Connection, insert
 
 from generator.database import tables
 from generator.database.carry_check import (
@@ -24,10 +24,10 @@ from generator.database.carry_check import (
     rows_of,
     same_object,
 )
+from generator.database.entries import find_object, list_objects, object_entry
 from generator.database.occupancy import take_cells
-from generator.database.read import find_object, list_objects, object_entry
 from generator.database.registered import ObjectEntry
-from generator.database.rows import insert_rows
+from generator.database.rows import definition_number, definition_of, insert_rows
 from generator.database.transaction import place_of
 from generator.database.url import part_file, part_path
 from generator.errors import DatabaseError
@@ -140,8 +140,10 @@ def _copy_object(
     rows = geometry(source, entry.object_id)
     check_cells(target, name, here, rows[tables.cells])
 
-    array_id = _number(source, target, tables.arrays, "array_id", row["array_id"])
-    alphabet_id = _number(source, target, tables.alphabets, "alphabet_id", row["alphabet_id"])
+    array_id, alphabet_id = (
+        definition_number(target, table, **definition_of(source, table, row))
+        for table in (tables.arrays, tables.alphabets)
+    )
     del row["object_id"]
     row |= {"name": name, "array_id": array_id, "alphabet_id": alphabet_id}
     inserted = insert(tables.objects).values(row).returning(tables.objects.c.object_id)
@@ -160,19 +162,6 @@ def _copy_object(
     provenance = rows_of(source, tables.provenance, entry.object_id)
     insert_rows(target, tables.provenance, [row | new | came for row in provenance])
     return True
-
-
-def _number(source: Connection, target: Connection, table: Table, key: str, number: int) -> int:
-    """Return the number of a definition in `target`; insert it where it is new."""
-    row = source.execute(select(table).where(table.c[key] == number)).one()._asdict()
-    found: int | None = target.execute(
-        select(table.c[key]).where(table.c.definition_sha256 == row["definition_sha256"])
-    ).scalar_one_or_none()
-    if found is not None:
-        return found
-    del row[key]
-    inserted: int = target.execute(insert(table).values(row).returning(table.c[key])).scalar_one()
-    return inserted
 
 
 def _refusal(refused: Sequence[Refused], place: str) -> DatabaseError:

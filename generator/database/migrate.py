@@ -1,9 +1,9 @@
 """Bring a database of an earlier schema version to this one: whole, or not at all.
 
-A new version is `migrations/vN.py`; Alembic carries its operations out. The version is
-`meta.schema_version`, and all versions in between are one transaction, so that a killed
-migration leaves the database as it was. A SQLite file is copied first (`lab.v1.db` beside
-`lab.db`); of a server's database the copies are its administrator's.
+A new version is `migrations/vN.py`. The version is `meta.schema_version`, and all versions in
+between are one transaction, so that a killed migration leaves the database as it was. A SQLite
+file is copied first (`lab.v1.db` beside `lab.db`); of a server's database the copies are its
+administrator's.
 """
 
 from __future__ import annotations
@@ -68,13 +68,8 @@ def migrate(engine: Engine, version_of: Callable[[Connection], int | None], *, k
 
 def upgrade(connection: Connection, version: int) -> None:
     """Carry out all migrations after `version`, in the transaction of the connection."""
-    # Alembic loads only where a database is older.
-    from alembic.migration import MigrationContext
-    from alembic.operations import Operations
-
-    operations = Operations(MigrationContext.configure(connection))
     for number in range(version + 1, SCHEMA_VERSION + 1):
-        import_module(f"generator.database.migrations.v{number}").upgrade(operations)
+        import_module(f"generator.database.migrations.v{number}").upgrade(connection)
     connection.execute(
         update(meta).where(meta.c.key == "schema_version").values(value=str(SCHEMA_VERSION))
     )

@@ -7,7 +7,7 @@ the winner left::
 
     def placed_and_registered(connection: Connection) -> int:
         taken = occupancy(connection, array)
-        return register(connection, Registration(..., layout=lay_out(..., taken)))
+        return register(connection, ObjectRecord(..., layout=lay_out(..., taken)))
 
     number = in_turn(engine, placed_and_registered)
 """

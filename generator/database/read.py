@@ -8,16 +8,15 @@ from __future__ import annotations
 
 import json
 from collections import defaultdict
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import Connection, Select, Table, func, literal, select
+from sqlalchemy import Connection, Select, Table, literal, select
 
 from generator.alphabet.outline import SymbolStyle
 from generator.database import tables
-from generator.database.cells import faces_at
+from generator.database.entries import object_entry
 from generator.database.registered import (
     ObjectEntry,
     RegisteredArray,
@@ -27,56 +26,10 @@ from generator.database.registered import (
     RegisteredStyle,
 )
 from generator.database.round_face import round_face
-from generator.database.transaction import place_of
-from generator.errors import DatabaseError
 from generator.layout.placement import FaceLayout, Layout, Placement
 from generator.polyhedron.developable import Developable, developable_from
 from generator.polyhedron.frame import face_frame, face_polygon
 from generator.polyhedron.winged import Face, Polyhedron, WingedEdge
-
-__all__ = [
-    "faces_at",
-    "find_object",
-    "list_objects",
-    "object_entry",
-    "object_names",
-    "read_array",
-    "read_layout",
-    "read_object",
-    "read_parts",
-    "read_styles",
-    "read_surfaces",
-]
-
-
-def list_objects(connection: Connection) -> tuple[ObjectEntry, ...]:
-    """Return one entry per object, in the order of their names."""
-    return tuple(_entries(connection, _select_entries().order_by(tables.objects.c.name)))
-
-
-def object_names(connection: Connection) -> tuple[str, ...]:
-    """Return the names of all objects, in order; without the counts of `list_objects`."""
-    names = tables.objects.c.name
-    return tuple(connection.execute(select(names).order_by(names)).scalars())
-
-
-def find_object(connection: Connection, name: str) -> ObjectEntry | None:
-    """Return the entry of the object called `name`, None if there is none."""
-    found = _entries(connection, _select_entries().where(tables.objects.c.name == name))
-    return next(iter(found), None)
-
-
-def object_entry(connection: Connection, name: str) -> ObjectEntry:
-    """Return the entry of the object called `name`; raises as `read_object`."""
-    entry = find_object(connection, name)
-    if entry is None:
-        known = ", ".join(object_names(connection)[:8]) or "none yet"
-        raise DatabaseError(
-            f"no object is called '{name}'",
-            fix=f"registered objects: {known}",
-            place=place_of(connection.engine.url),
-        )
-    return entry
 
 
 def read_object(connection: Connection, name: str) -> RegisteredObject:
@@ -232,52 +185,6 @@ def read_parts(connection: Connection, object_id: int) -> tuple[RegisteredPart, 
             select(tables.parts).where(parts.object_id == object_id).order_by(parts.position)
         )
     )
-
-
-def _select_entries() -> Select[Any]:
-    objects, arrays, provenance = tables.objects.c, tables.arrays.c, tables.provenance.c
-    faces = (
-        select(func.count())
-        .select_from(tables.faces)
-        .where(tables.faces.c.object_id == objects.object_id)
-        .where(tables.faces.c.name.not_like("%.%"))  # F2.2, F2.3, ...: facets of round F2
-        .scalar_subquery()
-    )
-    symbols = (
-        select(func.count())
-        .select_from(tables.cells)
-        .where(tables.cells.c.object_id == objects.object_id)
-        .scalar_subquery()
-    )
-    return (
-        select(
-            objects.object_id,
-            objects.name,
-            objects.object_type,
-            objects.number_of_vertices,
-            objects.number_of_faces,
-            faces,
-            symbols,
-            objects.array_id,
-            arrays.profile,
-            arrays.rows,
-            arrays.columns,
-            objects.pitch_mm,
-            provenance.spec_hash,
-            provenance.tool_version,
-            provenance.utc,
-            func.coalesce(objects.retired_utc, ""),
-            func.coalesce(provenance.imported_from, ""),
-            func.coalesce(provenance.imported_utc, ""),
-        )
-        .select_from(tables.objects)
-        .join(tables.arrays)
-        .join(tables.provenance)
-    )
-
-
-def _entries(connection: Connection, query: Select[Any]) -> Iterable[ObjectEntry]:
-    return (ObjectEntry(*row) for row in connection.execute(query))
 
 
 def _of(table: Table, entry: ObjectEntry, *order: str) -> Select[Any]:

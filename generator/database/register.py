@@ -5,7 +5,7 @@
     with writing(engine) as connection:                 # nobody else writes from here on
         known = find_object(connection, name)
         layout = lay_out(..., occupancy(connection, array))  # beside what is taken
-        register(connection, Registration(...))
+        register(connection, ObjectRecord(...))
                                                         # committed here, undone on any error
 
 Polyhedron + Layout + array + alphabet -> rows of every table of `tables.py`. The primary
@@ -21,36 +21,24 @@ from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
-from sqlalchemy import Connection, Table, delete, func, insert, select
+from sqlalchemy import Connection, delete, func, insert, select
 
 from generator.alphabet.known import Alphabet
 from generator.alphabet.outline import SymbolStyle
 from generator.array.contract import SymbolArray
 from generator.database import tables
 from generator.database.canonical import canonical, digest
-from generator.database.cells import array_key, cells_of, find_array, occupied_cells
+from generator.database.cells import array_key, cells_of
+from generator.database.entries import find_object
 from generator.database.occupancy import free_cells, take_cells
-from generator.database.read import find_object, read_layout
+from generator.database.read import read_layout
 from generator.database.registered import ObjectEntry, RegisteredPart
-from generator.database.rows import insert_rows, layout_rows, polyhedron_rows
-from generator.database.transaction import place_of, writing
+from generator.database.rows import definition_number, insert_rows, layout_rows, polyhedron_rows
+from generator.database.transaction import place_of
 from generator.errors import DatabaseError
 from generator.layout.occupancy import Cells
 from generator.layout.placement import Layout
 from generator.polyhedron.winged import Polyhedron
-
-__all__ = [
-    "ObjectRecord",
-    "find_array",
-    "find_object",
-    "occupied_cells",
-    "record_parts",
-    "register",
-    "remove_object",
-    "require_same_spec",
-    "same_layout",
-    "writing",
-]
 
 _LARGEST = 2**63 - 1  #: of a whole number in the database
 
@@ -258,11 +246,10 @@ def _insert_object(
     """Return the numbers of array and object."""
     array, style = registration.array, registration.style
     window_rows, window_columns = array.window
-    array_id = _number_of(
+    array_id = definition_number(
         connection,
         tables.arrays,
-        "array_id",
-        array_key(array),
+        definition_sha256=array_key(array),
         definition=canonical(array.definition()),
         profile=registration.profile,
         rows=array.rows,
@@ -272,11 +259,10 @@ def _insert_object(
         order=array.order,
     )
     alphabet = canonical(registration.alphabet.definition())
-    alphabet_id = _number_of(
+    alphabet_id = definition_number(
         connection,
         tables.alphabets,
-        "alphabet_id",
-        digest(alphabet),
+        definition_sha256=digest(alphabet),
         definition=alphabet,
         name=registration.alphabet.name,
     )
@@ -300,14 +286,3 @@ def _insert_object(
     objects = tables.objects
     inserted = insert(objects).values(values).returning(objects.c.object_id)
     return array_id, connection.execute(inserted).scalar_one()
-
-
-def _number_of(connection: Connection, table: Table, number: str, key: str, **values: Any) -> int:
-    """Return the number of the row with this definition; insert it where there is none."""
-    found = connection.execute(select(table.c[number]).where(table.c.definition_sha256 == key))
-    known: int | None = found.scalar_one_or_none()
-    if known is not None:
-        return known
-    new = insert(table).values(definition_sha256=key, **values).returning(table.c[number])
-    inserted: int = connection.execute(new).scalar_one()
-    return inserted

@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 
 from sqlalchemy import Connection, update
 
-from generator.database.read import object_entry
+from generator.database.entries import object_entry
 from generator.database.register import remove_object
 from generator.database.registered import ObjectEntry
 from generator.database.tables import objects

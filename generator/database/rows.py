@@ -5,7 +5,7 @@ Each function yields tables with their rows in an order that foreign keys allow.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from sqlalchemy import Connection, Table, bindparam, func, insert, select
@@ -17,7 +17,8 @@ from generator.layout.placement import FaceLayout, Layout
 from generator.polyhedron.frame import edge_length, face_area, face_polygon
 from generator.polyhedron.winged import Polyhedron
 
-Rows = list[dict[str, Any]]
+Row = dict[str, Any]
+Rows = list[Row]
 
 
 def polyhedron_rows(object_id: int, polyhedron: Polyhedron) -> Iterator[tuple[Table, Rows]]:
@@ -123,6 +124,24 @@ def insert_rows(connection: Connection, table: Table, rows: Rows) -> None:
         for name in names
     ]
     connection.execute(insert(table).from_select(names, select(*map(func.unnest, columns))))
+
+
+def definition_number(connection: Connection, table: Table, **values: Any) -> int:
+    """Return the number of an array or alphabet by its digest; insert it where it is new."""
+    (number,) = table.primary_key.columns
+    same = table.c.definition_sha256 == values["definition_sha256"]
+    known: int | None = connection.execute(select(number).where(same)).scalar_one_or_none()
+    if known is not None:
+        return known
+    new: int = connection.execute(insert(table).values(values).returning(number)).scalar_one()
+    return new
+
+
+def definition_of(connection: Connection, table: Table, of_object: Mapping[str, Any]) -> Row:
+    """Return the array or alphabet that a row of `objects` names, without its number."""
+    (number,) = table.primary_key.columns
+    found = connection.execute(select(table).where(number == of_object[number.name])).one()
+    return {name: value for name, value in found._asdict().items() if name != number.name}
 
 
 def _cell_rows(object_id: int, array_id: int, face: FaceLayout) -> Rows:

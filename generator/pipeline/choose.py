@@ -17,7 +17,7 @@ from sqlalchemy import Connection
 from generator.array.contract import SymbolArray
 from generator.array.profiles import DEFAULT_PROFILE, PROFILES, Profile, next_larger
 from generator.database.cells import occupancy
-from generator.database.read import find_object
+from generator.database.entries import find_object
 from generator.errors import ArrayError, GeneratorError, LayoutError
 from generator.layout.placement import Layout
 from generator.pipeline.place import NO_CELLS, lay_out_object

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from sqlalchemy import Connection, Engine
 
-from generator.database.read import find_object
+from generator.database.entries import find_object
 from generator.database.register import ObjectRecord, register
 from generator.database.transaction import LostRaceError, writing
 from generator.database.url import part_file

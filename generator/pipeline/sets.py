@@ -16,8 +16,9 @@ from pathlib import Path
 from sqlalchemy import Connection, Engine
 
 from encoded_objects.errors import install_line
+from generator.database.entries import find_object
 from generator.database.part_state import part_state
-from generator.database.read import find_object, read_layout, read_parts
+from generator.database.read import read_layout, read_parts
 from generator.database.register import require_in_use
 from generator.database.transaction import reading
 from generator.export.overview import can_draw

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection
 
 from generator.database import DatabaseError
+from generator.database.entries import find_object, object_names
 from generator.database.open import open_database
-from generator.database.read import find_object, object_names, read_object
+from generator.database.read import read_object
 from generator.database.registered import RegisteredFace, RegisteredObject
 from generator.database.transaction import reading
 from probe.errors import SurfaceError

@@ -8,8 +8,9 @@ from typing import Any
 from fastapi import APIRouter
 from fastapi.responses import FileResponse
 
+from generator.database.entries import object_entry
 from generator.database.open import open_database
-from generator.database.read import object_entry, read_parts
+from generator.database.read import read_parts
 from generator.database.transaction import reading
 from recognizer.bench.errors import UnknownError
 from recognizer.bench.files import part_to_send

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection, select
 
 from generator.database import tables
-from generator.database.read import list_objects, read_object
+from generator.database.entries import list_objects
+from generator.database.read import read_object
 from generator.database.registered import RegisteredObject
 from probe.surface.solids import filled, symbol_triangles
 from probe.surface.symbols import Relief, embossed

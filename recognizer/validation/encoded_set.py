@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from generator.database import DatabaseError
+from generator.database.entries import list_objects
 from generator.database.open import open_database
-from generator.database.read import list_objects, read_parts
+from generator.database.read import read_parts
 from generator.database.transaction import reading
 from recognizer.validation.errors import SetError
 

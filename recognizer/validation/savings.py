@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from generator.database.entries import object_names
 from generator.database.open import open_database
-from generator.database.read import object_names, read_object
+from generator.database.read import read_object
 from generator.database.transaction import reading
 from probe.contact.press import LEVELS, level_for, table
 from probe.contact.tips import Tips, tip_points

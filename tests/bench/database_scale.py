@@ -40,9 +40,10 @@ from generator.alphabet.outline import SymbolStyle
 from generator.array.profiles import next_larger, profile
 from generator.database import tables
 from generator.database.cells import faces_at, find_array, occupancy
+from generator.database.entries import list_objects
 from generator.database.open import open_database
 from generator.database.race import in_turn
-from generator.database.read import list_objects, read_layout
+from generator.database.read import read_layout
 from generator.database.register import ObjectRecord, register
 from generator.database.retire import remove
 from generator.database.transaction import reading, writing

@@ -13,8 +13,9 @@ import pytest
 from sqlalchemy import text
 
 from generator.database.cells import held_cells, occupied_cells
+from generator.database.entries import list_objects
 from generator.database.open import open_database
-from generator.database.read import list_objects, read_layout
+from generator.database.read import read_layout
 from generator.database.transaction import reading, writing
 
 # One process loads everything and forks a writer per line that it reads, so that a kill
@@ -25,9 +26,9 @@ import numpy as np
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle
 from generator.array.profiles import PROFILES
-from generator.database.cells import occupied_cells
+from generator.database.cells import find_array, occupied_cells
 from generator.database.open import open_database
-from generator.database.register import ObjectRecord, find_array, register
+from generator.database.register import ObjectRecord, register
 from generator.database.transaction import writing
 from generator.layout.placement import FaceLayout, Layout, Placement
 from generator.polyhedron.shapes import cube

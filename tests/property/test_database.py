@@ -9,18 +9,11 @@ from generator.alphabet.known import ALPHABETS
 from generator.alphabet.outline import SymbolStyle
 from generator.array.profiles import PROFILES
 from generator.database.canonical import canonical
-from generator.database.cells import held_cells
+from generator.database.cells import faces_at, find_array, held_cells, occupied_cells
+from generator.database.entries import find_object, list_objects, object_names
 from generator.database.open import open_database
-from generator.database.read import faces_at, list_objects, object_names, read_object
-from generator.database.register import (
-    ObjectRecord,
-    find_array,
-    find_object,
-    occupied_cells,
-    register,
-    remove_object,
-    same_layout,
-)
+from generator.database.read import read_object
+from generator.database.register import ObjectRecord, register, remove_object, same_layout
 from generator.database.registered import RegisteredPart
 from generator.database.transaction import reading, writing
 from generator.errors import DatabaseError

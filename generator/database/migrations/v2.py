@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from alembic.operations import Operations
 from sqlalchemy import (
     BigInteger,
     Column,
@@ -11,24 +10,31 @@ from sqlalchemy import (
     ForeignKey,
     Integer,
     LargeBinary,
+    MetaData,
     PrimaryKeyConstraint,
-    String,
     Table,
-    Text,
     insert,
     text,
 )
 
 TILE = 64  #: rows and columns of a tile
 
+COLUMNS = {
+    "objects": ("retired_utc VARCHAR(32)",),
+    "provenance": ("imported_from TEXT", "imported_utc VARCHAR(32)"),
+}  #: that are new
 
-def upgrade(operations: Operations) -> None:
+
+def upgrade(connection: Connection) -> None:
     """Bring a database of version 1 to version 2."""
-    operations.add_column("objects", Column("retired_utc", String(32)))
-    operations.add_column("provenance", Column("imported_from", Text))
-    operations.add_column("provenance", Column("imported_utc", String(32)))
-    occupancy = operations.create_table(
+    for table, columns in COLUMNS.items():
+        for column in columns:
+            connection.execute(text(f"ALTER TABLE {table} ADD COLUMN {column}"))
+    metadata = MetaData()
+    Table("arrays", metadata, autoload_with=connection)
+    occupancy = Table(
         "occupancy",
+        metadata,
         Column("array_id", Integer, ForeignKey("arrays.array_id"), nullable=False),
         Column("tile_row", BigInteger, nullable=False),
         Column("tile_column", BigInteger, nullable=False),
@@ -36,7 +42,8 @@ def upgrade(operations: Operations) -> None:
         PrimaryKeyConstraint("array_id", "tile_row", "tile_column"),
         sqlite_with_rowid=False,
     )
-    _fill(operations.get_bind(), occupancy)
+    occupancy.create(connection)
+    _fill(connection, occupancy)
 
 
 def _fill(connection: Connection, occupancy: Table) -> None:

@@ -19,9 +19,10 @@ from sqlalchemy import select, text
 from generator.array.definition import array_from
 from generator.database import migrate, tables
 from generator.database.cells import held_cells, occupied_cells
+from generator.database.entries import list_objects
 from generator.database.migrations import v2
 from generator.database.open import database_exists, open_database
-from generator.database.read import list_objects, read_array, read_layout, read_object
+from generator.database.read import read_array, read_layout, read_object
 from generator.database.transaction import reading, writing
 from generator.errors import DatabaseError
 
@@ -149,8 +150,8 @@ def test_a_migration_that_fails_changes_nothing(first_version, monkeypatch):
     class NoMemoryError(Exception):
         pass
 
-    def failing(operations):
-        done(operations)
+    def failing(connection):
+        done(connection)
         raise NoMemoryError
 
     done = v2.upgrade
@@ -194,8 +195,8 @@ def forked(action):
 def test_a_migration_killed_before_its_commit_leaves_the_old_version(first_version, monkeypatch):
     done = v2.upgrade
 
-    def killing(operations):
-        done(operations)
+    def killing(connection):
+        done(connection)
         os.kill(os.getpid(), signal.SIGKILL)
 
     with monkeypatch.context() as patched:
@@ -211,8 +212,8 @@ def test_many_may_open_an_older_database_at_once(first_version, monkeypatch):
     done = v2.upgrade
     upgraded, note = os.pipe()
 
-    def noting(operations):
-        done(operations)
+    def noting(connection):
+        done(connection)
         os.write(note, b"1")
 
     monkeypatch.setattr(v2, "upgrade", noting)

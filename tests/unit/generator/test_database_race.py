@@ -10,9 +10,9 @@ from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle
 from generator.array.profiles import PROFILES
 from generator.database.cells import find_array, held_cells, occupied_cells
+from generator.database.entries import find_object, list_objects
 from generator.database.open import open_database
 from generator.database.race import in_turn
-from generator.database.read import find_object, list_objects
 from generator.database.register import ObjectRecord, register
 from generator.database.transaction import LostRaceError, reading, writing
 from generator.errors import DatabaseError
