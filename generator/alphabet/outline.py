@@ -21,7 +21,7 @@ from generator.alphabet.nib import Lines, nib_outline, offset_ring
 from generator.alphabet.strokes import Glyph
 from generator.errors import AlphabetError
 from generator.plane.polygon import signed_area
-from generator.plane.rings import edges_cross, edges_kept
+from generator.plane.rings import edges_cross, keeps_edges
 
 Ring = NDArray[
     np.float64
@@ -235,7 +235,7 @@ def _regular(lines: list[Lines], distances: list[float], stroke_mm: float) -> bo
     for distance in distances:
         rings = [offset_ring(ring, distance) for ring in lines]
         short = SHORTEST_EDGE * stroke_mm
-        if not all(edges_kept(a, b, short) for a, b in zip(normal, rings, strict=True)):
+        if not all(keeps_edges(a, b, short) for a, b in zip(normal, rings, strict=True)):
             return False
         if edges_cross(rings):
             return False

@@ -72,7 +72,7 @@ def unfold(polyhedron: Polyhedron, *, seed: int = 0) -> Net:
     best: Net | None = None
     work = 0
     for root, priority in _trees(polyhedron, surface, seed):
-        net = _laid_flat(surface, root, priority)
+        net = _lay_flat(surface, root, priority)
         if best is None or len(net.pieces) < len(best.pieces):
             best = net
         work += len(polyhedron.faces)
@@ -168,7 +168,7 @@ def _steepest(polyhedron: Polyhedron, direction: Points) -> NDArray[np.bool_]:
     return cut
 
 
-def _laid_flat(surface: _Surface, root: int, priority: Priority) -> Net:
+def _lay_flat(surface: _Surface, root: int, priority: Priority) -> Net:
     """Lay face after face at the edges of those that lie already, leaving out what overlaps."""
     count = len(surface.points)
     transforms = np.tile(np.eye(3), (count, 1, 1))

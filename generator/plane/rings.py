@@ -12,7 +12,7 @@ from generator.plane.polygon import points_inside
 Ring = NDArray[np.float64]
 
 
-def edges_kept(before: Ring, after: Ring, shortest: float) -> bool:
+def keeps_edges(before: Ring, after: Ring, shortest: float) -> bool:
     """Whether every edge of `after` still runs along that of `before`, at least `shortest` long."""
     old = np.roll(before, -1, axis=0) - before
     new = np.roll(after, -1, axis=0) - after
@@ -41,12 +41,14 @@ def edges_cross(rings: Sequence[Ring]) -> bool:
     starts, ends, a, b = segments(rings)
     n = len(starts)
     if n > 512:
-        return _crossing_swept(starts, ends, a, b)
+        return _edges_cross_swept(starts, ends, a, b)
     i, j = np.triu_indices(n, 1)
     return _any_meeting(starts, ends, a, b, i, j)
 
 
-def _crossing_swept(starts: Ring, ends: Ring, a: NDArray[np.int64], b: NDArray[np.int64]) -> bool:
+def _edges_cross_swept(
+    starts: Ring, ends: Ring, a: NDArray[np.int64], b: NDArray[np.int64]
+) -> bool:
     """`edges_cross` for many edges: only pairs whose x ranges overlap."""
     low = np.minimum(starts[:, 0], ends[:, 0])
     high = np.maximum(starts[:, 0], ends[:, 0])

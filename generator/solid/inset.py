@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.plane.polygon import points_inside, signed_area
-from generator.plane.rings import edges_cross, edges_kept
+from generator.plane.rings import edges_cross, keeps_edges
 from generator.solid.settings import EMBOSS
 
 Ring = NDArray[np.float64]  #: (k, 2) mm
@@ -71,7 +71,7 @@ def regular(before: Sequence[Ring], after: Sequence[Ring], shortest_mm: float) -
     """Whether an inset kept every edge, crosses nowhere, and keeps its holes inside."""
     if not all(np.isfinite(ring).all() for ring in after):
         return False
-    if not all(edges_kept(a, b, shortest_mm) for a, b in zip(before, after, strict=True)):
+    if not all(keeps_edges(a, b, shortest_mm) for a, b in zip(before, after, strict=True)):
         return False
     if edges_cross(after) or signed_area(after[0]) <= 0:
         return False
