@@ -41,14 +41,12 @@ def edges_cross(rings: Sequence[Ring]) -> bool:
     starts, ends, a, b = segments(rings)
     n = len(starts)
     if n > 512:
-        return _edges_cross_swept(starts, ends, a, b)
+        return _sweep_crosses(starts, ends, a, b)
     i, j = np.triu_indices(n, 1)
     return _any_meeting(starts, ends, a, b, i, j)
 
 
-def _edges_cross_swept(
-    starts: Ring, ends: Ring, a: NDArray[np.int64], b: NDArray[np.int64]
-) -> bool:
+def _sweep_crosses(starts: Ring, ends: Ring, a: NDArray[np.int64], b: NDArray[np.int64]) -> bool:
     """`edges_cross` for many edges: only pairs whose x ranges overlap."""
     low = np.minimum(starts[:, 0], ends[:, 0])
     high = np.maximum(starts[:, 0], ends[:, 0])
