@@ -1,4 +1,9 @@
-"""A page to draw on, and its file: no window, no user's settings, no date in it."""
+"""A page to draw on, and its file: no window, no user's settings, no date in it.
+
+matplotlib draws. Its pyplot is left out: it chooses a backend by the display, keeps every
+figure until it is closed, and takes the user's matplotlibrc, so the same picture would not be
+the same bytes everywhere.
+"""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@
     layout, names                    datasets and attributes, file names
     write, lock                      one file while it is written, and who writes it
     opened, superblock, checked      why a file cannot be opened, what it must hold
-    mended                           a file without its end, seen as if it were whole
+    padded                           a file without its end, seen as if it were whole
 
 While frames come in, a recording is called `touch.part.h5`; it gets its name when it is
 closed. So a file under its final name is whole, and a part file whose writer is gone is

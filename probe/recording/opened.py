@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 from probe.errors import RecordingError
 from probe.recording.lock import is_locked
-from probe.recording.mended import MendedFile
 from probe.recording.names import final_of, is_part, part_of
+from probe.recording.padded import PaddedFile
 from probe.recording.superblock import Superblock, superblock_of
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def opened_anyhow(path: Path) -> Iterator[tuple[h5py.File, Superblock]]:
         if head is None:
             raise _no_hdf5(path)
         with explained(path, "open"):
-            source = path if head.whole else MendedFile(stream, head)
+            source = path if head.whole else PaddedFile(stream, head)
             file = stack.enter_context(h5py.File(source, "r"))
         yield file, head
 
