@@ -11,7 +11,7 @@ apply      counts -> newtons, and back
 drift      whether a calibration still holds
 """
 
-from probe.calibration.apply import Calibrated, calibrated, expected_counts
+from probe.calibration.apply import Calibrated, calibrate_image, expected_counts
 from probe.calibration.condition import ConditionThresholds
 from probe.calibration.drift import Drift, drift_of
 from probe.calibration.file import calibration_hash, read_calibration, write_calibration
@@ -26,7 +26,7 @@ __all__ = [
     "Condition",
     "ConditionThresholds",
     "Drift",
-    "calibrated",
+    "calibrate_image",
     "calibration_from",
     "calibration_hash",
     "drift_of",

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from probe.calibration.law import law_s
 from probe.calibration.value import Calibration, Condition, Image
-from probe.circuit import Inverted, inverted
-from probe.circuit.readout import scanned, shares
+from probe.circuit import Inverted, invert_readings
+from probe.circuit.readout import scan_shares, shares
 from probe.errors import CalibrationError
 from probe.frame import Frame
 
@@ -33,7 +33,7 @@ class Calibrated:
     unit: Literal["N", "counts"]
 
 
-def calibrated(image: Frame | ArrayLike, calibration: Calibration | None = None) -> Calibrated:
+def calibrate_image(image: Frame | ArrayLike, calibration: Calibration | None = None) -> Calibrated:
     """Return the forces that an image shows.
 
     Parameters
@@ -58,7 +58,7 @@ def calibrated(image: Frame | ArrayLike, calibration: Calibration | None = None)
 
     Examples
     --------
-    >>> read = calibrated(np.full((16, 16), 7))
+    >>> read = calibrate_image(np.full((16, 16), 7))
     >>> read.unit, float(read.values[0, 0])
     ('counts', 7.0)
     """
@@ -88,7 +88,7 @@ def calibrated(image: Frame | ArrayLike, calibration: Calibration | None = None)
 
 
 def expected_counts(forces_n: ArrayLike, calibration: Calibration) -> Image:
-    """Return what the calibrated sensor reads under forces: the inverse of `calibrated`.
+    """Return what the calibrated sensor reads under forces: the inverse of `calibrate_image`.
 
     Parameters
     ----------
@@ -114,14 +114,14 @@ def expected_counts(forces_n: ArrayLike, calibration: Calibration) -> Image:
     else:
         if c.board.readout == "floating":
             g = g + _LEAK_S
-        read = scanned(shares(g, c.board), c.board) * c.full + c.bias_counts
+        read = scan_shares(shares(g, c.board), c.board) * c.full + c.bias_counts
     return np.clip(read, 0.0, float(c.full))
 
 
 def _conductances(counts: Image, c: Calibration) -> Inverted:
     """Return conductances by the board, or counts above the bias where there is none."""
     if c.board is not None:
-        return inverted(counts, c.board, bias_counts=c.bias_counts)
+        return invert_readings(counts, c.board, bias_counts=c.bias_counts)
     above = counts - c.bias_counts
     sigma = np.broadcast_to(np.sqrt(c.noise_counts**2 + 1.0 / 12.0), above.shape)
     lost = above < sigma

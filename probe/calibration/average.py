@@ -33,7 +33,7 @@ class Average:
     frames: int
 
 
-def averaged(counts: ArrayLike, name: str = "frames") -> Average:
+def average_frames(counts: ArrayLike, name: str = "frames") -> Average:
     """Average frames of a steady load.
 
     Parameters

@@ -42,14 +42,14 @@ def common_bias(rest: Average) -> float:
     return float(np.median(rest.mean))
 
 
-def raised(rest: Average, full: int, thresholds: ConditionThresholds) -> NDArray[np.bool_]:
+def raised_tactels(rest: Average, full: int, thresholds: ConditionThresholds) -> NDArray[np.bool_]:
     """Say which tactels read more than the common bias at rest."""
     least = np.maximum(thresholds.raised_counts, thresholds.sigmas * rest.sigma)
     high: NDArray[np.bool_] = (rest.mean - common_bias(rest) > least) | (rest.highest >= full)
     return high
 
 
-def judged(
+def judge_tactels(
     force_n: Array,
     read_s: Array,
     sigma_s: Array,
@@ -64,7 +64,7 @@ def judged(
     force_n, read_s, sigma_s, saturated
         (L + 1, rows, columns); the first is rest. Conductances nan where contradictory.
     high
-        (rows, columns) of `raised`.
+        (rows, columns) of `raised_tactels`.
 
     Raises
     ------
@@ -75,8 +75,8 @@ def judged(
     unloaded = force_n.max(axis=0) < t.felt_n
     if unloaded.any():
         raise CalibrationError(
-            f"{named(unloaded)} carried less than {t.felt_n:g} N in every load, so that nothing "
-            "tells a dead one from one that was not pressed",
+            f"{tactel_words(unloaded)} carried less than {t.felt_n:g} N in every load, so that "
+            "nothing tells a dead one from one that was not pressed",
             fix=f"add a load of {t.felt_n:g} N or more on each of them",
         )
     rise = read_s[1:] - read_s[0]
@@ -120,7 +120,7 @@ class UnloadedCheck:
         return ~(self.highest_n >= thresholds.ratio * self.lowest_n)
 
 
-def felt(force_n: Array, firm: NDArray[np.bool_]) -> UnloadedCheck:
+def check_loads(force_n: Array, firm: NDArray[np.bool_]) -> UnloadedCheck:
     """Sum up the loads (L, rows, columns) that are `firm`."""
     ordered = np.sort(np.where(firm, force_n, np.nan), axis=0)  # nan last
     steps = ordered[1:] > 1.05 * ordered[:-1]
@@ -131,7 +131,7 @@ def felt(force_n: Array, firm: NDArray[np.bool_]) -> UnloadedCheck:
     )
 
 
-def demanded(
+def demand_loads(
     known: UnloadedCheck,
     force_n: Array,
     saturated: NDArray[np.bool_],
@@ -150,7 +150,7 @@ def demanded(
     if full.any():
         least = np.where(saturated & (force_n > 0), force_n, np.inf)[:, full].min()
         raise CalibrationError(
-            f"{named(full)} saturated, and too few loads are left",
+            f"{tactel_words(full)} saturated, and too few loads are left",
             fix=f"add {max(1, t.levels - int(levels[full].min()))} below {least:.3g} N on each of "
             "them, or lower the load or feedback resistance of the board",
         )
@@ -158,7 +158,7 @@ def demanded(
     if few.any():
         most = int(levels[few].min())
         raise CalibrationError(
-            f"{named(few)} felt only {most} different loads clearly, a law needs {t.levels}",
+            f"{tactel_words(few)} felt only {most} different loads clearly, a law needs {t.levels}",
             fix=f"add {t.levels - most} on them, {t.felt_n:g} N or more, over a ratio of "
             f"{t.ratio:g}, or record more frames of each",
         )
@@ -166,13 +166,13 @@ def demanded(
     if near.any():
         low, high = lowest[near].min(), highest[near].max()
         raise CalibrationError(
-            f"{named(near)} felt loads of {low:.3g} ... {high:.3g} N only; they do not span the "
-            f"law, the largest must be {t.ratio:g} times the smallest",
+            f"{tactel_words(near)} felt loads of {low:.3g} ... {high:.3g} N only; they do not span "
+            f"the law, the largest must be {t.ratio:g} times the smallest",
             fix=f"add a load of {t.ratio * low:.3g} N or more on each of them",
         )
 
 
-def named(tactels: NDArray[np.bool_]) -> str:
+def tactel_words(tactels: NDArray[np.bool_]) -> str:
     """Return tactels in words: how many, and the first few as (row, column)."""
     places = [f"({r}, {c})" for r, c in np.argwhere(tactels)[:SHOWN]]
     number = int(tactels.sum())

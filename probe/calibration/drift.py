@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from probe.calibration.apply import calibrated
-from probe.calibration.average import averaged
-from probe.calibration.condition import named
+from probe.calibration.apply import calibrate_image
+from probe.calibration.average import average_frames
+from probe.calibration.condition import tactel_words
 from probe.calibration.load import CalibrationLoad
 from probe.calibration.value import Calibration, Image
 from probe.errors import CalibrationError
@@ -52,7 +52,7 @@ def drift_of(
     CalibrationError
         If the frames are of another shape, or too few.
     """
-    rest = averaged(rest_counts, "rest")
+    rest = average_frames(rest_counts, "rest")
     if rest.mean.shape != calibration.shape:
         raise CalibrationError(
             f"frames of {rest.mean.shape}, the calibration is for {calibration.shape}",
@@ -63,7 +63,7 @@ def drift_of(
     said = []
     if moved.any():
         worst = float(np.abs(shift[moved]).max())
-        said.append(f"the bias of {named(moved)} moved by up to {worst:.3g} counts")
+        said.append(f"the bias of {tactel_words(moved)} moved by up to {worst:.3g} counts")
     ratios = [_ratios(calibration, load) for load in loads]
     felt = np.concatenate(ratios) if ratios else np.zeros(0)
     gain = float(np.median(felt)) - 1.0 if felt.size else float("nan")
@@ -74,7 +74,7 @@ def drift_of(
 
 def _ratios(calibration: Calibration, load: CalibrationLoad) -> Image:
     """Return measured over known force, of the tactels that tell it well."""
-    read = calibrated(load.read.mean, calibration)
+    read = calibrate_image(load.read.mean, calibration)
     well = ~read.bad & (load.forces_n > 0) & (read.values > 5.0 * read.sigma)
     ratios: Image = read.values[well] / load.forces_n[well]
     return ratios

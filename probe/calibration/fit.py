@@ -11,21 +11,21 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from probe.calibration.average import Average, averaged
+from probe.calibration.average import Average, average_frames
 from probe.calibration.condition import (
     ConditionThresholds,
+    check_loads,
     common_bias,
-    demanded,
-    felt,
-    judged,
-    named,
-    raised,
+    demand_loads,
+    judge_tactels,
+    raised_tactels,
+    tactel_words,
 )
-from probe.calibration.law import fitted
+from probe.calibration.law import fit_laws
 from probe.calibration.load import CalibrationLoad
-from probe.calibration.pooled import pooled
+from probe.calibration.pooled import shrink_laws
 from probe.calibration.value import Calibration, Condition, Image
-from probe.circuit import Electronics, inverted
+from probe.circuit import Electronics, invert_readings
 from probe.errors import CalibrationError
 
 _UPPER = np.triu_indices(3)
@@ -67,7 +67,7 @@ def calibration_from(
         If the loads do not tell, or do not determine, the law of a tactel that is alive.
     """
     t = thresholds or ConditionThresholds()
-    rest = averaged(rest_counts, "rest")
+    rest = average_frames(rest_counts, "rest")
     for load in loads:
         if load.read.mean.shape != rest.mean.shape:
             raise CalibrationError(
@@ -79,36 +79,36 @@ def calibration_from(
             "no loads were given", fix=f"give {t.levels} or more, over a ratio of {t.ratio:g}"
         )
     top = board.full if board else full
-    high = raised(rest, top, t)
+    high = raised_tactels(rest, top, t)
     bias = np.where(high, common_bias(rest), rest.mean)
     reads = [rest, *(load.read for load in loads)]
     force = np.stack([np.zeros(rest.mean.shape), *(load.forces_n for load in loads)])
     saturated = np.stack([read.highest >= top for read in reads])
     read, sigma = _conductances(reads, bias, board)
-    condition = judged(force, read, sigma, high, saturated, t)
+    condition = judge_tactels(force, read, sigma, high, saturated, t)
     error = np.hypot(sigma, t.law * read)
     usable = np.isfinite(read) & np.isfinite(error) & ~saturated
     firm = usable & (read > t.told * error) & (force > 0)
-    known = felt(force, firm)
+    known = check_loads(force, firm)
     shorted = ((condition == Condition.STUCK) & saturated[0]).any(axis=0)
     able = np.isin(condition, (Condition.SOUND, Condition.PRELOADED))
     condition[able & shorted & (known.few(t) | known.near(t))] = Condition.HIDDEN
     live = able & (condition != Condition.HIDDEN)
-    demanded(known, force, saturated, live, t)
+    demand_loads(known, force, saturated, live, t)
     usable[0] &= condition == Condition.PRELOADED
-    law = fitted(
+    law = fit_laws(
         force[:, live],
         np.where(usable, read, 0.0)[:, live],
         np.where(usable, error, 1.0)[:, live],
         usable[:, live],
         (condition == Condition.PRELOADED)[live],
     )
-    law = pooled(law, (condition == Condition.SOUND)[live])
+    law = shrink_laws(law, (condition == Condition.SOUND)[live])
     if not np.isfinite(law.covariance).all():
         unknown = np.zeros_like(live)
         unknown[live] = ~np.isfinite(law.covariance).all(axis=(1, 2))
         raise CalibrationError(
-            f"the loads do not determine the law of {named(unknown)}",
+            f"the loads do not determine the law of {tactel_words(unknown)}",
             fix="add lighter and heavier loads on them",
         )
 
@@ -145,5 +145,5 @@ def _conductances(
     sigma = np.stack([read.sigma for read in reads])
     if board is None:
         return mean - bias, sigma
-    found = inverted(mean, board, bias_counts=bias, sigma_counts=sigma)
+    found = invert_readings(mean, board, bias_counts=bias, sigma_counts=sigma)
     return found.conductance_s, found.sigma_s

@@ -41,7 +41,7 @@ def law_s(force_n: Array, gain_s: Array, exponent: Array, break_n: Array) -> Arr
     return conductance
 
 
-def fitted(force_n: Array, read_s: Array, error_s: Array, used: NDArray[np.bool_],
+def fit_laws(force_n: Array, read_s: Array, error_s: Array, used: NDArray[np.bool_],
            preloaded: NDArray[np.bool_]) -> FittedLaw:  # fmt: skip
     """Fit the law of every tactel.
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from probe.calibration.average import Average, averaged
+from probe.calibration.average import Average, average_frames
 from probe.errors import CalibrationError
 
 
@@ -42,7 +42,7 @@ def known_load(counts: ArrayLike, forces_n: ArrayLike, name: str = "") -> Calibr
     """
     forces = np.asarray(forces_n, dtype=np.float64)
     label = name or f"{forces.sum():.4g} N"
-    read = averaged(counts, f"load {label}")
+    read = average_frames(counts, f"load {label}")
     if forces.shape != read.mean.shape or not np.isfinite(forces).all() or (forces < 0).any():
         raise CalibrationError(
             f"load {label}: forces of shape {forces.shape} for frames of {read.mean.shape}, or "

@@ -20,7 +20,7 @@ _FLOOR = np.array([0.02, 0.005, 0.001])  # ln gain, exponent, N: no sensor is mo
 _OUTLYING = 4.0  # robust deviations; what lies farther out is not pooled
 
 
-def pooled(law: FittedLaw, alike: NDArray[np.bool_]) -> FittedLaw:
+def shrink_laws(law: FittedLaw, alike: NDArray[np.bool_]) -> FittedLaw:
     """Draw laws together as far as their own loads leave open.
 
     Parameters

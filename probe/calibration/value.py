@@ -75,7 +75,7 @@ class Calibration:
                     fix="give one value per tactel",
                 )
             if item.name != "condition":
-                array = rounded(array)
+                array = round_digits(array)
             array.setflags(write=False)
             object.__setattr__(self, item.name, array)
         for name in ("scatter", "repeat"):
@@ -93,7 +93,7 @@ class Calibration:
         return ~np.isin(self.condition, (Condition.SOUND, Condition.PRELOADED))
 
 
-def rounded(values: NDArray[Any]) -> NDArray[np.float64]:
+def round_digits(values: NDArray[Any]) -> NDArray[np.float64]:
     """Return values with `DIGITS` significant digits, as the file holds them."""
     flat = [float(f"{v:.{DIGITS}g}") for v in values.ravel()]
     return np.array(flat, dtype=np.float64).reshape(values.shape)

@@ -12,10 +12,10 @@ inverse      counts -> conductances, and what is lost
 
 from probe.circuit.electronics import QUIET, Electronics, Noise, Readout
 from probe.circuit.fsr import FilmState, Fsr, conductances, fsr_of
-from probe.circuit.inverse import Inverted, inverted
+from probe.circuit.inverse import Inverted, invert_readings
 from probe.circuit.network import effective_resistances, transconductances
 from probe.circuit.reading import read_counts, read_sequence
-from probe.circuit.spread import DATASHEET, MEASURED, Spread, drawn
+from probe.circuit.spread import DATASHEET, MEASURED, Spread, draw_fsr
 
 __all__ = [
     "DATASHEET",
@@ -29,10 +29,10 @@ __all__ = [
     "Readout",
     "Spread",
     "conductances",
-    "drawn",
+    "draw_fsr",
     "effective_resistances",
     "fsr_of",
-    "inverted",
+    "invert_readings",
     "read_counts",
     "read_sequence",
     "transconductances",

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.circuit.fsr import Image
-from probe.circuit.network import Network, eliminated
+from probe.circuit.network import Network, eliminate
 from probe.errors import CircuitError
 
 Vector = NDArray[np.float64]
@@ -49,7 +49,7 @@ class FloatingSolution:
     steps: int
 
 
-def solved(resistance_ohm: Image, tolerance: float = 1e-9) -> FloatingSolution:
+def solve_floating(resistance_ohm: Image, tolerance: float = 1e-9) -> FloatingSolution:
     """Find the conductances of a network from all its resistances.
 
     Parameters
@@ -73,7 +73,7 @@ def solved(resistance_ohm: Image, tolerance: float = 1e-9) -> FloatingSolution:
     scale = float(np.exp(np.log(resistance_ohm).mean()))
     measured = resistance_ohm / scale
     y = np.full(measured.size, (sum(shape) - 1) / measured.size)
-    network = eliminated(y.reshape(shape) / measured)
+    network = eliminate(y.reshape(shape) / measured)
     free = np.ones(y.size, dtype=np.bool_)
     for steps in range(1, STEPS + 1):
         gradient = 1.0 - (network.resistances_ohm / measured).ravel()
@@ -149,7 +149,7 @@ def _searched(
     for _ in range(_HALVINGS):
         there = np.maximum(y + length * move, 0.0)
         try:
-            ahead = eliminated(there.reshape(measured.shape) / measured)
+            ahead = eliminate(there.reshape(measured.shape) / measured)
         except CircuitError:
             length /= 2
             continue

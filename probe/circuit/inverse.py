@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from probe.circuit.electronics import Electronics
-from probe.circuit.floating import FloatingSolution, solved
+from probe.circuit.floating import FloatingSolution, solve_floating
 from probe.circuit.fsr import Image
 from probe.circuit.network import transconductances, transfers
-from probe.circuit.readout import unscanned
+from probe.circuit.readout import unscan_shares
 from probe.errors import CircuitError
 
 STEPS = 30  #: most Newton steps with a row resistance
@@ -50,7 +50,7 @@ class Inverted:
         )
 
 
-def inverted(
+def invert_readings(
     counts: ArrayLike,
     electronics: Electronics,
     *,
@@ -78,10 +78,10 @@ def inverted(
 
     Examples
     --------
-    >>> from probe.circuit import Electronics, inverted
+    >>> from probe.circuit import Electronics, invert_readings
     >>> counts = np.full((16, 16), 4.0)
     >>> counts[3, 4] = 300
-    >>> found = inverted(counts, Electronics())
+    >>> found = invert_readings(counts, Electronics())
     >>> bool(found.lost[3, 4]), int(found.rank)
     (False, 1)
     """
@@ -97,7 +97,7 @@ def inverted(
     sigma = _sample_sigma(read - bias, e) if sigma_counts is None else np.asarray(sigma_counts)
     beyond = max(e.volts_ratio - 1.0, 1.0) / np.sqrt(12.0)
     spread = np.where(saturated, beyond, np.maximum(sigma, 1e-12) / e.full)
-    share = unscanned((read - bias) / e.full, e)
+    share = unscan_shares((read - bias) / e.full, e)
     found = (_floating if e.readout == "floating" else _driven)(share, spread, e)
     found.sigma_s[saturated] = np.inf
     found.lost[saturated] = True
@@ -188,7 +188,7 @@ def _floating(share: Image, spread: Image, e: Electronics) -> Inverted:
         resistance = e.volts_ratio * e.load_ohm / offered - series
         ratio = e.volts_ratio * e.load_ohm / (offered**2 * resistance)
         relative = np.minimum(spread[index] * ratio, 1.0).ravel()
-        found = solved(resistance)
+        found = solve_floating(resistance)
         deviation, rank[index] = _determined(found, relative)
         g[index] = found.conductance_s
         sigma[index] = (deviation / resistance.ravel()).reshape(shape[-2:])

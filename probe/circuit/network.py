@@ -54,7 +54,7 @@ class Network:
         return transfer
 
 
-def eliminated(conductance_s: ArrayLike) -> Network:
+def eliminate(conductance_s: ArrayLike) -> Network:
     """Eliminate a network whose terminals are all open.
 
     Raises
@@ -96,7 +96,7 @@ def effective_resistances(conductance_s: ArrayLike) -> Image:
     ----------
     Foster: the sum of conductance times resistance is rows + columns - 1.
     """
-    return eliminated(conductance_s).resistances_ohm
+    return eliminate(conductance_s).resistances_ohm
 
 
 def transconductances(

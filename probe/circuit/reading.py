@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from probe.circuit.electronics import Electronics
 from probe.circuit.fsr import FilmState, Fsr, Image, checked_forces, conductances
-from probe.circuit.readout import scanned, shares
+from probe.circuit.readout import scan_shares, shares
 from probe.errors import CircuitError
 
 Counts = NDArray[np.uint16]
@@ -66,7 +66,7 @@ def read_counts(
     fresh = state is None
     conductance, now = conductances(fsr, forces_n, state, passed)
     flutter = _fluttered(now.flutter, electronics, fresh, passed, rng)
-    offered = scanned(shares(conductance, electronics), electronics) * electronics.full
+    offered = scan_shares(shares(conductance, electronics), electronics) * electronics.full
     counts = _sampled(offered, flutter, electronics, rng)
     return counts, FilmState(now.effective_n, now.age_s, flutter)
 

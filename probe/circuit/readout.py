@@ -28,7 +28,7 @@ def shares(conductance_s: Image, electronics: Electronics) -> Image:
     )
 
 
-def scanned(share: Image, electronics: Electronics) -> Image:
+def scan_shares(share: Image, electronics: Electronics) -> Image:
     """Add what the scan leaves from tactel to tactel, and what columns couple."""
     k = electronics.coupling
     settled = _cyclic(share, electronics.residue, inverse=False)
@@ -36,8 +36,8 @@ def scanned(share: Image, electronics: Electronics) -> Image:
     return coupled
 
 
-def unscanned(share: Image, electronics: Electronics) -> Image:
-    """Undo `scanned`."""
+def unscan_shares(share: Image, electronics: Electronics) -> Image:
+    """Undo `scan_shares`."""
     k, rows = electronics.coupling, share.shape[-2]
     total = share.sum(axis=-2, keepdims=True) / (1.0 + k * (rows - 1))
     settled = (share - k * total) / (1.0 - k)

@@ -53,7 +53,7 @@ DATASHEET = Spread(
 )  # fmt: skip
 
 
-def drawn(
+def draw_fsr(
     rng: np.random.Generator, spread: Spread = MEASURED, rows: int = 16, columns: int = 16
 ) -> Fsr:
     """Draw one sensor.
@@ -63,7 +63,7 @@ def drawn(
 
     Examples
     --------
-    >>> fsr = drawn(np.random.default_rng(1))
+    >>> fsr = draw_fsr(np.random.default_rng(1))
     >>> int(fsr.dead.sum()), int((fsr.stuck_s > 0).sum()), int((fsr.preload_n > 0).sum())
     (147, 1, 5)
     """

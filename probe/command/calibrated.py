@@ -20,10 +20,10 @@ from probe.calibration import (
     read_calibration,
     write_calibration,
 )
-from probe.calibration.average import averaged
-from probe.calibration.condition import ConditionThresholds, common_bias, raised
+from probe.calibration.average import average_frames
+from probe.calibration.condition import ConditionThresholds, common_bias, raised_tactels
 from probe.circuit import Electronics
-from probe.command.laws import condition_map, described, places
+from probe.command.laws import condition_map, describe_laws, places
 from probe.command.listen import Counts, frames_of
 from probe.command.loads import Given
 from probe.errors import CalibrationError, CircuitError
@@ -42,8 +42,8 @@ def report_bias(
 ) -> int:
     """Say what an unloaded sensor reads; returns the exit code."""
     counts, name = frames_of(source, sensor, seconds)
-    rest = averaged(counts, source)
-    high = raised(rest, _FULL, ConditionThresholds())
+    rest = average_frames(counts, source)
+    high = raised_tactels(rest, _FULL, ConditionThresholds())
     values: dict[str, Any] = {
         "source": source,
         "sensor": name,
@@ -110,7 +110,7 @@ def calibrate_loads(
     when = made or datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
     found = calibration_from(counts, loads, sensor=name, made=when, board=board)
     digest = write_calibration(found, output)
-    values, lines = described(found, digest, str(output))
+    values, lines = describe_laws(found, digest, str(output))
     if as_json:
         write_json(values)
     else:

@@ -140,10 +140,10 @@ def calibration(name: str) -> Described:
         When it is none, or was changed.
     """
     from probe.calibration import calibration_hash, read_calibration
-    from probe.command.laws import described
+    from probe.command.laws import describe_laws
 
     held = read_calibration(name)
-    return described(held, calibration_hash(held), name)
+    return describe_laws(held, calibration_hash(held), name)
 
 
 def _gaps(seq: NDArray[np.int64], t_ns: NDArray[np.int64]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from encoded_objects.console.files import refuse_taken, staged
 from encoded_objects.console.output import number, write, write_json
 from encoded_objects.errors import require
-from probe.calibration import Calibration, calibrated, read_calibration
+from probe.calibration import Calibration, calibrate_image, read_calibration
 from probe.errors import CalibrationError, RecordingError
 from probe.frame import median_filter
 from probe.recording.read import Recording
@@ -136,14 +136,14 @@ def _newtons(
     counts: NDArray[np.uint16], known: Calibration, pad_mm: float | None
 ) -> NDArray[np.float64]:
     """Return the forces (n, rows, columns) on the tactels, or on top of a pad over them."""
-    read = calibrated(counts, known)
+    read = calibrate_image(counts, known)
     if pad_mm is None:
         return read.values
-    from probe.contact.deblur import deblurred
+    from probe.contact.deblur import deblur
 
     sensor = SensorType(overlay=Overlay(kind="pad", height_mm=pad_mm))
     noise_n = float(np.sqrt(np.mean(np.square(read.sigma[np.isfinite(read.sigma)]))))
-    return np.array([deblurred(image, sensor, noise_n=noise_n).forces_n for image in read.values])
+    return np.array([deblur(image, sensor, noise_n=noise_n).forces_n for image in read.values])
 
 
 def _array(

@@ -8,13 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.calibration import Calibration, Condition, calibrated, expected_counts
-from probe.calibration.condition import named
+from probe.calibration import Calibration, Condition, calibrate_image, expected_counts
+from probe.calibration.condition import tactel_words
 
 _SHARES = (0.1, 0.3, 1.0)  # of the largest load: where the uncertainty is stated
 
 
-def described(found: Calibration, digest: str, name: str) -> tuple[dict[str, Any], dict[str, str]]:
+def describe_laws(
+    found: Calibration, digest: str, name: str
+) -> tuple[dict[str, Any], dict[str, str]]:
     """Return a calibration as values, and as lines to read."""
     alive = ~found.bad
     most_n = float(np.nanmedian(found.most_n)) if alive.any() else math.nan
@@ -67,7 +69,7 @@ def condition_map(found: Calibration) -> str:
 def _uncertainty(found: Calibration, force_n: float) -> tuple[float, float, float]:
     """Return a force, and its relative error in one frame: median, and 95 % of the tactels."""
     forces = np.full(found.shape, force_n)
-    read = calibrated(expected_counts(forces, found), found)
+    read = calibrate_image(expected_counts(forces, found), found)
     told = (read.sigma / force_n)[~read.bad]
     if not told.size:
         return force_n, math.inf, math.inf
@@ -76,4 +78,4 @@ def _uncertainty(found: Calibration, force_n: float) -> tuple[float, float, floa
 
 def places(where: NDArray[np.bool_]) -> str:
     """Return tactels in words; empty if there are none."""
-    return named(where) if where.any() else ""
+    return tactel_words(where) if where.any() else ""

@@ -19,7 +19,7 @@ from probe.calibration import read_calibration
 from probe.client.stream import Stream, name_of
 from probe.command.keys import Pressed, keys
 from probe.command.live_state import LiveState
-from probe.command.live_view import line_of, rendered
+from probe.command.live_view import line_of, render_frame
 
 PER_SECOND = 15  #: pictures
 
@@ -69,7 +69,7 @@ def _on_terminal(state: LiveState, stream: Stream, interrupted: Event, until_s: 
                 state.notice = "; ".join(notices[-3:])
             counts, ident = stream.client.statistics(), stream.client.ident
             height = console.size.height
-            picture = rendered(state, counts, ident, height=height, colours=colours)
+            picture = render_frame(state, counts, ident, height=height, colours=colours)
             view.update(picture, refresh=True)
             if not _obey(state, stream, pressed):
                 break

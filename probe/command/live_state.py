@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from encoded_objects.console.files import staged
 from encoded_objects.errors import MissingExtraError, require
-from probe.calibration import Calibration, calibrated, calibration_hash, drift_of
+from probe.calibration import Calibration, calibrate_image, calibration_hash, drift_of
 from probe.calibration.average import BIAS_FRAMES
 from probe.frame import Frame, median_filter
 from probe.recording.names import next_free
@@ -76,7 +76,7 @@ class LiveState:
         if self.frame is None:
             return None
         if self.calibration is not None:
-            image = calibrated(self.frame, self.calibration).values
+            image = calibrate_image(self.frame, self.calibration).values
         else:
             image = self.frame.counts.astype(np.float64)
             if self.bias is not None:

@@ -47,7 +47,7 @@ class LivePicture:
             yield from line
 
 
-def rendered(
+def render_frame(
     state: LiveState,
     counts: ClientStatistics,
     ident: IdentPacket | None,

@@ -49,7 +49,7 @@ class Deblurred:
     arrives: float  #: share of a wave at the tactels' Nyquist frequency that the pad passes
 
 
-def deblurred(forces_n: ArrayLike, sensor: SensorType, *, noise_n: float) -> Deblurred:
+def deblur(forces_n: ArrayLike, sensor: SensorType, *, noise_n: float) -> Deblurred:
     """Return the forces on top of the pad.
 
     Parameters

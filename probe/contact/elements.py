@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from probe.contact.contract import Contact, Touch
 from probe.contact.elements_line import Array
-from probe.contact.elements_pad import CondensedPad, PadLines, condensed
+from probe.contact.elements_pad import CondensedPad, PadLines, condense
 from probe.contact.elements_seen import heights_at, refuse_unseen
 from probe.contact.elements_unilateral import rest, tips
 from probe.errors import ContactError
@@ -157,7 +157,7 @@ def _condensed(
             fix="take fewer elements per tactel or layers, or raise memory_gb",
         )
     edges = _edges(sensor.columns, pitch), _edges(sensor.rows, pitch)
-    return condensed(lines, overlay.young_mpa, overlay.poisson, edges)
+    return condense(lines, overlay.young_mpa, overlay.poisson, edges)
 
 
 def _edges(tactels: int, pitch: float) -> Array:

@@ -95,7 +95,7 @@ def quadratic(boundaries: Array) -> Quadratic:
     )
 
 
-def mirrored(half: Array) -> Array:
+def mirror(half: Array) -> Array:
     """Take places from 0 up to the whole line, symmetric about 0."""
     return np.concatenate([-half[:0:-1], half])
 
@@ -119,7 +119,7 @@ def per_tactel(boundaries: Array, edges: Array, parity: int) -> sp.csr_matrix:
     -------
     (ceil(tactels / 2), 2 n + 1) for the tactels of the half, that in the middle included.
     """
-    whole = quadratic(mirrored(boundaries))
+    whole = quadratic(mirror(boundaries))
     middles = whole.nodes[1::2]
     inside = (middles > edges[:-1, None]) & (middles < edges[1:, None])
     taken = sp.csr_matrix(inside.astype(np.float64)) @ whole.average[0]

@@ -21,7 +21,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from probe.contact.elements_line import Array, Quadratic, mirrored, per_tactel, quadratic
+from probe.contact.elements_line import Array, Quadratic, mirror, per_tactel, quadratic
 
 PARITIES = ((1, 1), (1, -1), (-1, 1), (-1, -1))  #: of w under x -> -x, and under y -> -y
 COMPRESSIBLE = 1e-7  #: 1 - 2 nu counts as at least this; bulk over shear modulus 1e7
@@ -46,7 +46,7 @@ class PadLines:
         return (2 * self.x.size - 1) * (2 * self.y.size - 1)
 
     def bytes_needed(self, tactels: int) -> int:
-        """Return what `condensed` holds at its peak, for so many tactels on the quarter."""
+        """Return what `condense` holds at its peak, for so many tactels on the quarter."""
         right = self.top_nodes + tactels
         block = 12 * (2 * self.y.size - 1) * (self.z.size - 1)
         sweep = 5 * block * block + 3 * block * right + 2 * right * right
@@ -113,7 +113,7 @@ class CondensedPad:
         return grid
 
 
-def condensed(
+def condense(
     lines: PadLines,
     young: float,
     poisson: float,
@@ -146,7 +146,7 @@ def condensed(
         compliance.append(load_response / 4)
         felt = felt.reshape(to_tactels[0][px].shape[0], to_tactels[1][py].shape[0], -1)
         tactels.append(np.ascontiguousarray(felt.transpose(1, 0, 2)) / 4)
-    whole = [mirrored(part.nodes) for part in along[:2]]
+    whole = [mirror(part.nodes) for part in along[:2]]
     return CondensedPad(
         whole[0], whole[1], tuple(compliance), tuple(tactels), rows, columns, lines.unknowns
     )

@@ -13,7 +13,7 @@ import numpy as np
 
 from probe.contact.contract import Contact, Touch
 from probe.contact.plate import PlatePose, checked_load, load_of
-from probe.contact.tabs import asked
+from probe.contact.tabs import heights_under
 from probe.contact.tips import Tips, tip_points
 from probe.errors import ContactError
 from probe.sensor import SensorType
@@ -68,7 +68,7 @@ def footprint(
         raise ContactError(f"a depth of {depth:g} mm", fix="give a finite depth >= 0")
     points, drop = tip_points(sensor, tips or _PLAIN)
     unloaded = PlatePose(0.0, touch.tilt_x_rad, touch.tilt_y_rad)
-    level = asked(surface, touch, points) - drop - unloaded.heights_mm(points)
+    level = heights_under(surface, touch, points) - drop - unloaded.heights_mm(points)
     highest = float(level.max())
     cover = (level >= highest - depth).mean(axis=1)
     forces = touch.force_n * (cover / cover.sum()).reshape(shape)

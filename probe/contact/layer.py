@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from probe.contact.contract import Contact, Touch
 from probe.contact.layer_active_set import Pressed, deep_mm, equilibrium
-from probe.contact.layer_descent import descended
+from probe.contact.layer_descent import descend
 from probe.contact.layer_influence import Influence, influence
 from probe.contact.layer_kernel import layer_compliance
-from probe.contact.layer_levels import Levels, Look, leveled
+from probe.contact.layer_levels import Levels, Look, levels_of
 from probe.contact.layer_patch import LayerPatch, centres_mm, patch_under
 from probe.contact.layer_solve import plate_of
 from probe.contact.neo_hooke import Linear
@@ -127,7 +127,7 @@ def _settled(patch: LayerPatch, grid: Influence, touch: Touch) -> tuple[Pressed,
         some = above >= min(floor, float(above.max()))
         patch = patch.with_cells(np.flatnonzero(patch.neighbours(some)))
         looks.append(Look(pose, floor))
-        levels = leveled(patch, grid, looks[-1], looks[:-1])
+        levels = levels_of(patch, grid, looks[-1], looks[:-1])
         pressed, held = _pressed(levels, touch)
         turn = float(np.abs(pressed.plate[1:]).max()) / levels.reach_mm
         b = min(1.0, FARTHEST_RAD / max(turn, 1e-300)) * pressed.plate
@@ -163,7 +163,7 @@ def _pressed(levels: Levels, touch: Touch) -> tuple[Pressed, bool]:
     pressed = equilibrium(levels, plate)
     if pressed.converged:
         return pressed, False
-    return descended(pressed, plate.held(levels.reach_mm)), True
+    return descend(pressed, plate.held(levels.reach_mm)), True
 
 
 def _foreseen(patch: LayerPatch, touch: Touch) -> tuple[PlatePose, float]:

@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.contact.layer_levels import Levels
-from probe.contact.layer_solve import RigidPlate, glued, solved
+from probe.contact.layer_solve import RigidPlate, glued_system, solve_glued
 
 Array = NDArray[np.float64]
 
@@ -85,7 +85,7 @@ def equilibrium(levels: Levels, plate: RigidPlate) -> Pressed:
             loosest = tolerance = FINE
             seen.clear()
         seen.add(key)
-        pressures, b = solved(glued(levels, touching), plate, pressures, b, tolerance)
+        pressures, b = solve_glued(glued_system(levels, touching), plate, pressures, b, tolerance)
         springs = springs_mm(levels, pressures, b)
         total, wrong = _judged(levels, springs, touching)
         if wrong > TOLERANCE * total:

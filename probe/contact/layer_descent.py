@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from probe.contact.layer_active_set import Pressed, deep_mm
 from probe.contact.layer_levels import Levels
-from probe.contact.layer_solve import RigidPlate, answers, glued, pseudo_inverse
+from probe.contact.layer_solve import RigidPlate, answers, glued_system, pseudo_inverse
 from probe.errors import ContactError
 
 Array = NDArray[np.float64]
@@ -93,7 +93,7 @@ class _Springs:
         raise _no_rest()
 
 
-def descended(begun: Pressed, plate: RigidPlate) -> Pressed:
+def descend(begun: Pressed, plate: RigidPlate) -> Pressed:
     """Return the contact in equilibrium, begun at the plane of the levels.
 
     Raises
@@ -126,7 +126,7 @@ def descended(begun: Pressed, plate: RigidPlate) -> Pressed:
             pressures = (levels.shares * f).sum(axis=0) / edge
             return Pressed(levels, f > 0, pressures, b, iteration, converged=True)
         if (f > 0).any():
-            system = glued(levels, f > 0)
+            system = glued_system(levels, f > 0)
             R = system.levers[free]
             stiff = area * (R @ answers(system, R.T, _HESSIAN)) + np.diag(K[free])
             step = -pseudo_inverse((stiff + stiff.T) / 2) @ gradient

@@ -70,7 +70,9 @@ class Look:
         return depths
 
 
-def leveled(patch: LayerPatch, grid: Influence, look: Look, earlier: Sequence[Look] = ()) -> Levels:
+def levels_of(
+    patch: LayerPatch, grid: Influence, look: Look, earlier: Sequence[Look] = ()
+) -> Levels:
     """Return the levels of the cells of a patch that were sampled in full.
 
     Parameters

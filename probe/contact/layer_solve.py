@@ -94,7 +94,7 @@ def plate_of(touch: Touch, levels: Levels) -> RigidPlate:
     return RigidPlate(touch.force_n, start, stiffness / reach**2)
 
 
-def glued(levels: Levels, touching: NDArray[np.bool_]) -> Glued:
+def glued_system(levels: Levels, touching: NDArray[np.bool_]) -> Glued:
     """Return the system of the levels in touch (levels, cells)."""
     some = np.flatnonzero(touching.any(axis=0))
     touching = touching[:, some]
@@ -105,7 +105,7 @@ def glued(levels: Levels, touching: NDArray[np.bool_]) -> Glued:
     return Glued(levels, some, soft, moment / share, levels.levers[:, some])
 
 
-def solved(
+def solve_glued(
     system: Glued, plate: RigidPlate, pressures: Array, b: Array, tolerance: float
 ) -> tuple[Array, Array]:
     """Return pressures (of all cells of the levels,) and plate (3,) in balance.

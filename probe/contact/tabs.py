@@ -73,13 +73,13 @@ def tabs(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips | None
         )
     tips = tips or _PLAIN
     points, drop = tip_points(sensor, tips)
-    heights = asked(surface, touch, points) - drop
+    heights = heights_under(surface, touch, points) - drop
     stiffness = min(touch.wrist.tilt_x_nmm_rad, touch.wrist.tilt_y_nmm_rad)
     if touch.force_n * sensor.reach_mm > _HOPELESS_RAD * stiffness > 0:
         # Springs tell for any force whether it would turn the plate over.
         law = Linear(overlay.young_mpa * sensor.pitch_mm**2 / overlay.height_mm)
         _standing(rest(points.reshape(-1, 2), heights.ravel(), law, load).pose, _HOPELESS_RAD)
-    found, forces = settled(points, heights, overlay, load)
+    found, forces = tabs_at_rest(points, heights, overlay, load)
     _standing(found.pose, STEEPEST_RAD)
     if by_chance := _met_by_chance(heights, forces, overlay):
         finer = next((q for q in _FINER if q > tips.points), None)
@@ -126,7 +126,7 @@ def _met_by_chance(heights_mm: Array, forces_n: Array, overlay: Overlay) -> int:
     return few if few > max(1, _MOST * np.count_nonzero(near < q)) else 0
 
 
-def asked(surface: HeightMap, touch: Touch, points_mm: Array) -> Array:
+def heights_under(surface: HeightMap, touch: Touch, points_mm: Array) -> Array:
     """Return the heights under points (..., 2) of the sensor.
 
     Refused where they are no numbers, or nothing at all lies under the points.
@@ -147,7 +147,7 @@ def asked(surface: HeightMap, touch: Touch, points_mm: Array) -> Array:
     return heights.reshape(points_mm.shape[:-1])
 
 
-def settled(
+def tabs_at_rest(
     points_mm: Array, heights_mm: Array, overlay: Overlay, load: PlateLoad
 ) -> tuple[PlateRest, Array]:
     """Return the plate at rest and the force (n,) of each tab; what hangs free is left out.

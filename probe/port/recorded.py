@@ -35,13 +35,13 @@ def open_recording(address: Address) -> Port:
     again = number(address, "loop", 0.0) > 0
     frames = read_frames(address.target)
     if again:
-        frames = repeated(lambda: read_frames(address.target))
+        frames = endless_frames(lambda: read_frames(address.target))
     # Recordings of other sensors may hold readings of up to 16 bits.
     ident = IdentPacket(seq=0, t_us=0, bits=16, settling_us=0.0, baud=0, name="replay")
     return SoftwareProbe(address.url, frames, ident, speed=speed)
 
 
-def repeated(opened: Callable[[], Iterator[Frame]]) -> Iterator[Frame]:
+def endless_frames(opened: Callable[[], Iterator[Frame]]) -> Iterator[Frame]:
     """Yield the frames of a recording again and again, numbers and times rising on.
 
     A recording without frames ends at once.

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from probe.errors import RecordingError
 from probe.frame import COLUMNS, ROWS
-from probe.recording.opened import explained, opened
+from probe.recording.opened import explain_errors, open_recording
 
 if TYPE_CHECKING:
     import h5py
@@ -67,20 +67,20 @@ def arrays_of(path: Path) -> Iterator[list[Found]]:
     RecordingError
         No such file, or no file of these kinds.
     """
-    with explained(path, "read"), open(path, "rb") as file:
+    with explain_errors(path, "read"), open(path, "rb") as file:
         head = file.read(128)
     if head.startswith(b"\x93NUMPY") or zipfile.is_zipfile(path):
         yield _numpy(path)
     elif head.startswith(b"MATLAB 5.0") or (path.suffix == ".mat" and b"MATLAB 7.3" not in head):
         yield _matlab(path)
     else:
-        with opened(path) as hdf5:
+        with open_recording(path) as hdf5:
             yield _hdf5(hdf5)
 
 
 def _numpy(path: Path) -> list[Found]:
     try:
-        with explained(path, "read"):
+        with explain_errors(path, "read"):
             loaded = np.load(path, mmap_mode="r", allow_pickle=False)
             if isinstance(loaded, np.ndarray):
                 return [_in_memory(path.stem, loaded)]
@@ -101,7 +101,7 @@ def _matlab(path: Path) -> list[Found]:
     from scipy.io.matlab import MatReadError
 
     try:
-        with explained(path, "read"):
+        with explain_errors(path, "read"):
             variables = loadmat(path, appendmat=False)
     except MatReadError as error:
         raise RecordingError(
@@ -127,14 +127,14 @@ def _hdf5(file: h5py.File) -> list[Found]:
         if isinstance(item, h5py.Dataset) and item.shape is not None:
             found.append(_dataset(name, item))
 
-    with explained(Path(file.filename), "read"):
+    with explain_errors(Path(file.filename), "read"):
         file.visititems(note)
     return found
 
 
 def _dataset(name: str, dataset: h5py.Dataset) -> Found:
     def part(slices: tuple[slice, ...]) -> NDArray[Any]:
-        with explained(Path(dataset.file.filename), "read"):
+        with explain_errors(Path(dataset.file.filename), "read"):
             read: NDArray[Any] = dataset[slices[::-1]].T if reverse else dataset[slices]
         return read
 

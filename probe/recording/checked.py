@@ -22,7 +22,7 @@ from probe.recording.layout import (
     FrameBlock,
     RecordingOrigin,
 )
-from probe.recording.opened import explained, opened
+from probe.recording.opened import explain_errors, open_recording
 
 if TYPE_CHECKING:
     import h5py
@@ -51,7 +51,7 @@ def look(path: Path, *, live: bool = False) -> CheckedFile:
     RecordingError
         It is none, is of a newer format, damaged, or not closed (and not `live`).
     """
-    with opened(path, live=live) as file:
+    with open_recording(path, live=live) as file:
         seen = look_at(file, path)
     if seen.own and not seen.even and not live:
         raise RecordingError(
@@ -62,7 +62,7 @@ def look(path: Path, *, live: bool = False) -> CheckedFile:
 
 def look_at(file: h5py.File, path: Path) -> CheckedFile:
     """Check that an open file is a recording; see `look`."""
-    with explained(path, "read"):
+    with explain_errors(path, "read"):
         attributes = {name: _plain(value) for name, value in file.attrs.items()}
         names = [name for name in DATASETS if name in file]
         others = ", ".join(sorted(file)) or "nothing"
@@ -106,7 +106,7 @@ def read_block(file: h5py.File, path: Path, start: int, stop: int) -> FrameBlock
         The place is damaged, or a value is no count, time, number or pose.
     """
     values: dict[str, Any] = {}
-    with explained(path, "read"):
+    with explain_errors(path, "read"):
         for name in DATASETS:
             if name in file:
                 values[name] = file[name][start:stop]
@@ -143,7 +143,7 @@ def _length(file: h5py.File, path: Path, name: str) -> int:
     import h5py
 
     shape = DATASETS[name][0]
-    with explained(path, "read"):
+    with explain_errors(path, "read"):
         found = file[name]
         is_array = isinstance(found, h5py.Dataset) and found.shape is not None
         has = f"{found.dtype} {found.shape}" if is_array else "no array"

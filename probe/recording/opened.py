@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def opened(path: Path, *, live: bool = False) -> Iterator[h5py.File]:
+def open_recording(path: Path, *, live: bool = False) -> Iterator[h5py.File]:
     """Open an HDF5 file for reading.
 
     Parameters
@@ -39,7 +39,7 @@ def opened(path: Path, *, live: bool = False) -> Iterator[h5py.File]:
     RecordingError
         No such file, no HDF5 file, truncated, not closed, damaged.
     """
-    with explained(path, "read"):
+    with explain_errors(path, "read"):
         head = superblock_of(path)
     if is_part(path) and _blank(head):
         raise _nothing_yet(path)
@@ -58,7 +58,7 @@ def opened(path: Path, *, live: bool = False) -> Iterator[h5py.File]:
 
 
 @contextmanager
-def opened_anyhow(path: Path) -> Iterator[tuple[h5py.File, Superblock]]:
+def open_anyhow(path: Path) -> Iterator[tuple[h5py.File, Superblock]]:
     """Open an HDF5 file in whatever state, if the library can; parts may be missing.
 
     Raises
@@ -69,14 +69,14 @@ def opened_anyhow(path: Path) -> Iterator[tuple[h5py.File, Superblock]]:
     import h5py
 
     with ExitStack() as stack:
-        with explained(path, "read"):
+        with explain_errors(path, "read"):
             stream = stack.enter_context(open(path, "rb"))
             head = superblock_of(path)
         if is_part(path) and _blank(head):
             raise _nothing_yet(path)
         if head is None:
             raise _no_hdf5(path)
-        with explained(path, "open"):
+        with explain_errors(path, "open"):
             source = path if head.whole else PaddedFile(stream, head)
             file = stack.enter_context(h5py.File(source, "r"))
         yield file, head
@@ -86,7 +86,7 @@ def opened_anyhow(path: Path) -> Iterator[tuple[h5py.File, Superblock]]:
 def _open(path: Path, head: Superblock) -> Iterator[h5py.File]:
     import h5py
 
-    with explained(path, "open"):
+    with explain_errors(path, "open"):
         try:
             file = h5py.File(path, "r", swmr=head.writing)
         except OSError:
@@ -101,12 +101,12 @@ def _open(path: Path, head: Superblock) -> Iterator[h5py.File]:
 
 def is_blank(part: Path) -> bool:
     """Tell whether nothing in a part file has reached the disk yet."""
-    with explained(part, "read"):
+    with explain_errors(part, "read"):
         return _blank(superblock_of(part))
 
 
 @contextmanager
-def explained(path: Path, action: str) -> Iterator[None]:
+def explain_errors(path: Path, action: str) -> Iterator[None]:
     """Turn errors of the system and of the HDF5 library into one that says the way out."""
     try:
         yield

@@ -17,7 +17,7 @@ from probe.frame import Frame
 from probe.recording.checked import look, read_block
 from probe.recording.layout import FrameBlock, RecordingOrigin
 from probe.recording.names import part_of, series_of
-from probe.recording.opened import is_blank, opened
+from probe.recording.opened import is_blank, open_recording
 
 _AT_ONCE: Final = 256  #: frames read at a time
 
@@ -102,7 +102,7 @@ class Recording:
         stop = len(self) if stop is None else min(stop, len(self))
         for file in self.files:
             if start < min(stop, file.frames):
-                with opened(file.path, live=self.live) as source:
+                with open_recording(file.path, live=self.live) as source:
                     for first in range(start, min(stop, file.frames), size):
                         end = min(first + size, stop, file.frames)
                         yield read_block(source, file.path, first, end)

@@ -19,7 +19,7 @@ from probe.recording.checked import CheckedFile, look_at, read_block
 from probe.recording.layout import CHUNK, FrameBlock
 from probe.recording.lock import is_locked
 from probe.recording.names import final_of, is_part, part_of, piece_of, series_of
-from probe.recording.opened import explained, opened_anyhow
+from probe.recording.opened import explain_errors, open_anyhow
 from probe.recording.write import FileWriter
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def repair(path: Path | str) -> Repaired:
         raise RecordingError(
             "it is still being written", fix="stop the recording first", place=str(path)
         )
-    with opened_anyhow(path) as (source, head):
+    with open_anyhow(path) as (source, head):
         seen = look_at(source, path)
         target = _free_name(path, seen) if is_part(path) else path
         if head.whole and seen.even and _readable(source, path, seen) == seen.frames:
@@ -72,7 +72,7 @@ def repair(path: Path | str) -> Repaired:
     if not frames and seen.frames:
         copy.unlink()
         raise RecordingError("no frame in it can be read", fix="copy it again", place=str(path))
-    with explained(path, "replace"):
+    with explain_errors(path, "replace"):
         if lost or not seen.own:
             damaged = _first_free(target.with_name(f"{target.stem}.damaged{target.suffix}"))
             os.link(path, damaged)
@@ -109,7 +109,7 @@ def _blocks(source: h5py.File, path: Path, seen: CheckedFile) -> Iterator[FrameB
 
 def _renamed(path: Path, target: Path, seen: CheckedFile) -> Repaired:
     if path != target:
-        with explained(path, "rename"):
+        with explain_errors(path, "rename"):
             os.rename(path, target)
     return Repaired(target, seen.frames, 0, changed=path != target)
 

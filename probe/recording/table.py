@@ -14,7 +14,7 @@ import numpy as np
 
 from probe.frame import COLUMNS, ROWS, WRIST
 from probe.recording.layout import FrameBlock
-from probe.recording.opened import explained
+from probe.recording.opened import explain_errors
 from probe.recording.read import Recording
 
 
@@ -38,7 +38,7 @@ def export_csv(path: Path | str, out: Path | str, *, live: bool = False) -> int:
     recording, out = Recording(path, live=live), Path(out)
     draft = out.with_name(f".{out.name}.{os.getpid()}")
     try:
-        with explained(out, "write"):
+        with explain_errors(out, "write"):
             with open(draft, "x", encoding="ascii", newline="") as stream:
                 write_csv(recording, stream)
             os.replace(draft, out)

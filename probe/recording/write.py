@@ -28,7 +28,7 @@ from probe.recording.layout import (
     RecordingOrigin,
 )
 from probe.recording.lock import is_locked, take_lock
-from probe.recording.opened import explained
+from probe.recording.opened import explain_errors
 from probe.recording.superblock import superblock_of
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ class FileWriter:
         self._reserved = 0
         self._descriptor = _made(path)
         try:
-            with explained(path, "write"):
+            with explain_errors(path, "write"):
                 self._reserve(0)
                 self._file = h5py.File(path, "w", libver=_FILE_FORMAT, rdcc_nbytes=4 * _STEP)
                 self._reserved = 0  # the library emptied the file
@@ -89,7 +89,7 @@ class FileWriter:
         first, end = self.frames, self.frames + len(block)
         if not self._sets:
             self._start(block.pose is not None)
-        with explained(self.path, "write"):
+        with explain_errors(self.path, "write"):
             if len(block) > CHUNK:
                 self._reserve(len(block) * 1024)
             values = block.datasets()
@@ -98,7 +98,7 @@ class FileWriter:
                 dataset[first:end] = np.nan if values[name] is None else values[name]
             self._file.flush()
         self.frames = end
-        with explained(self.path, "write"):
+        with explain_errors(self.path, "write"):
             self._reserve(0)
 
     def close(self) -> None:
@@ -107,7 +107,7 @@ class FileWriter:
             return
         if not self._sets:
             self._start(poses=False)
-        with explained(self.path, "close"):
+        with explain_errors(self.path, "close"):
             self._file.close()
             head = superblock_of(self.path)
             if head is not None:
@@ -155,7 +155,7 @@ class FileWriter:
 def _made(path: Path) -> int:
     """Make the file, lock it, and return its descriptor."""
     try:
-        with explained(path, "make"):
+        with explain_errors(path, "make"):
             descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
     except RecordingError as error:
         if not isinstance(error.__cause__, FileExistsError):

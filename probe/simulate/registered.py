@@ -26,11 +26,11 @@ from probe.errors import SurfaceError
 from probe.simulate.round import round_scene
 from probe.simulate.scene import Scene
 from probe.surface.face import FaceSurface
-from probe.surface.lattice import LatticeSurface, listed
+from probe.surface.lattice import LatticeSurface, list_lookup
 from probe.surface.mesh import MeshSurface, mesh
 from probe.surface.polygon import polygon
-from probe.surface.solids import filled, symbol_triangles
-from probe.surface.symbols import Relief, SymbolReliefs, embossed
+from probe.surface.solids import symbol_triangles, triangulate
+from probe.surface.symbols import Relief, SymbolReliefs, emboss
 from probe.surface.template import template
 
 Array = NDArray[np.float64]
@@ -147,7 +147,7 @@ def _surface(held: RegisteredObject, face: RegisteredFace) -> FaceSurface:
         columns, rows = np.rint(at / (pitch, -pitch) - 0.5).T
         lattice = LatticeSurface(
             template(symbols, pitch),
-            listed(rows, columns, cells.labels),
+            list_lookup(rows, columns, cells.labels),
             place.rotation_rad,
             place.x_mm,
             place.y_mm,
@@ -163,7 +163,7 @@ def _symbols(held: RegisteredObject) -> SymbolReliefs:
     glyphs = tuple(
         tuple((tuple(a), tuple(b)) for a, b in glyph["strokes"]) for glyph in definition["glyphs"]
     )
-    return embossed(glyphs, definition["reach"] * style.pitch_mm, relief)
+    return emboss(glyphs, definition["reach"] * style.pitch_mm, relief)
 
 
 def _around(
@@ -183,7 +183,7 @@ def _around(
             loops = held.polyhedron.faces[other.face_id].loops
             corners = _moved(held.polyhedron.vertices, T_face_object)
             numbers = np.concatenate([np.array(loop) for loop in loops])
-            found.append(corners[numbers[filled(other.polygon_mm)]])
+            found.append(corners[numbers[triangulate(other.polygon_mm)]])
         if other.placement is None or T[2, 2] < -0.5:
             continue
         cells = held.layout.faces[other.face_id]

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from probe.surface.contract import HeightMap
-from probe.surface.lattice import Index, LabelAt, LatticeSurface, computed, repeated
+from probe.surface.lattice import Index, LabelAt, LatticeSurface, call_lookup, tile_lookup
 from probe.surface.polygon import FaceRegion
-from probe.surface.symbols import Relief, Strokes, embossed
+from probe.surface.symbols import Relief, Strokes, emboss
 from probe.surface.template import template
 
 Array = NDArray[np.float64]
@@ -83,6 +83,6 @@ def endless(
     SurfaceError
         When the symbols overlap or collapse.
     """
-    symbols = embossed(tuple(glyphs), unit_mm, relief or Relief())
-    label_at: LabelAt = computed(labels) if callable(labels) else repeated(labels)
+    symbols = emboss(tuple(glyphs), unit_mm, relief or Relief())
+    label_at: LabelAt = call_lookup(labels) if callable(labels) else tile_lookup(labels)
     return FaceSurface(LatticeSurface(template(symbols, pitch_mm), label_at))

@@ -68,7 +68,7 @@ class LatticeSurface:
 _BELOW_ONE = np.nextafter(1.0, 0.0)
 
 
-def listed(rows: ArrayLike, columns: ArrayLike, labels: ArrayLike) -> LabelAt:
+def list_lookup(rows: ArrayLike, columns: ArrayLike, labels: ArrayLike) -> LabelAt:
     """Return the look-up of a finite list of symbols; every other cell is empty.
 
     Parameters
@@ -110,7 +110,7 @@ def listed(rows: ArrayLike, columns: ArrayLike, labels: ArrayLike) -> LabelAt:
     return label_at
 
 
-def repeated(labels: ArrayLike) -> LabelAt:
+def tile_lookup(labels: ArrayLike) -> LabelAt:
     """Return the look-up of an array (rows, columns) that repeats in both directions."""
     grid = np.array(labels, dtype=np.int64)
     height, width = grid.shape
@@ -122,7 +122,7 @@ def repeated(labels: ArrayLike) -> LabelAt:
     return label_at
 
 
-def computed(label: Callable[[Index, Index], ArrayLike]) -> LabelAt:
+def call_lookup(label: Callable[[Index, Index], ArrayLike]) -> LabelAt:
     """Return the look-up of an array that is a function; it is asked once for each cell in view.
 
     Parameters

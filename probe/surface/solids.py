@@ -34,11 +34,11 @@ def symbol_triangles(symbols: SymbolReliefs, label: int) -> Array:
         for upper, lower in pairwise(tiers):
             above, below = np.roll(upper, -1, axis=0), np.roll(lower, -1, axis=0)
             found += [np.stack([lower, below, above], 1), np.stack([lower, above, upper], 1)]
-    found.append(np.concatenate(tops)[filled([top[:, :2] for top in tops])])
+    found.append(np.concatenate(tops)[triangulate([top[:, :2] for top in tops])])
     return np.concatenate(found)
 
 
-def filled(loops_mm: Sequence[Array]) -> NDArray[np.int64]:
+def triangulate(loops_mm: Sequence[Array]) -> NDArray[np.int64]:
     """Return triangles (m, 3) over the points of all loops, one loop after the other.
 
     Parameters

@@ -123,7 +123,7 @@ class SymbolReliefs:
 
 
 @lru_cache(maxsize=32)
-def embossed(glyphs: tuple[Strokes, ...], unit_mm: float, relief: Relief) -> SymbolReliefs:
+def emboss(glyphs: tuple[Strokes, ...], unit_mm: float, relief: Relief) -> SymbolReliefs:
     """Return the symbols of an alphabet.
 
     Parameters

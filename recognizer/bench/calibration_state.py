@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.calibration import Calibration, calibrated, drift_of
+from probe.calibration import Calibration, calibrate_image, drift_of
 from probe.calibration.average import BIAS_FRAMES
 from probe.errors import ProbeError
 from probe.frame import Frame
@@ -55,7 +55,7 @@ class CalibrationState:
         """
         if self.calibration is None:
             return frame.counts.astype(np.float64), False
-        return calibrated(frame, self.calibration).values, True
+        return calibrate_image(frame, self.calibration).values, True
 
     def switch_bias(self, *, on: bool) -> str:
         """Begin to take the bias, or do without it."""

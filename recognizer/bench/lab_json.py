@@ -18,8 +18,8 @@ from generator.database import tables
 from generator.database.entries import list_objects
 from generator.database.read import read_object
 from generator.database.registered import RegisteredObject
-from probe.surface.solids import filled, symbol_triangles
-from probe.surface.symbols import Relief, embossed
+from probe.surface.solids import symbol_triangles, triangulate
+from probe.surface.symbols import Relief, emboss
 from recognizer.touch.lab import EmbossedArray, Lab
 
 DIGITS = 4  #: after the point, of mm: a tenth of a micrometre
@@ -70,7 +70,7 @@ def object_json(connection: Connection, name: str) -> dict[str, Any]:
 
 def _face(held: RegisteredObject, number: int) -> dict[str, Any]:
     face, cells = held.faces[number], held.layout.faces[number]
-    triangles = filled(face.polygon_mm)
+    triangles = triangulate(face.polygon_mm)
     return {
         "name": face.name,
         "T_object_face": _nested(face.T_object_face, 9),
@@ -89,7 +89,7 @@ def _glyphs(held: RegisteredObject) -> list[list[float]]:
     relief = Relief(style.height_mm, style.stroke_mm, style.draft_rad, style.chamfer_mm)
     glyphs = held.alphabet["glyphs"]
     strokes = tuple(tuple((tuple(a), tuple(b)) for a, b in glyph["strokes"]) for glyph in glyphs)
-    symbols = embossed(strokes, held.alphabet["reach"] * style.pitch_mm, relief)
+    symbols = emboss(strokes, held.alphabet["reach"] * style.pitch_mm, relief)
     return [
         np.round(symbol_triangles(symbols, label), DIGITS).ravel().tolist()
         for label in range(len(strokes))

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.errors import EncodedObjectsError
-from probe.calibration import Calibration, calibrated
+from probe.calibration import Calibration, calibrate_image
 from probe.errors import ProbeError
 from probe.frame import Frame
 from probe.sensor import SensorType
@@ -177,7 +177,7 @@ def _signal(pending: PendingFrame) -> Signal:
     if pending.calibration is None:
         return signal_of(counts)
     try:
-        found = calibrated(counts, pending.calibration)
+        found = calibrate_image(counts, pending.calibration)
     except ProbeError:  # another sensor's readings: beyond the board's range
         return signal_of(counts)
     trust = 1.0 - found.bad.astype(np.float64)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from probe.calibration import Calibration, calibrated
+from probe.calibration import Calibration, calibrate_image
 from probe.recording.read import Recording
 from recognizer.errors import TouchError
 from recognizer.touch.prepare import PreparedLab
@@ -110,7 +110,7 @@ class Reader(PreparedLab):
             )
         if calibration is None:
             return signal_of(values, trust=known, settings=self.settings.signal)
-        found = calibrated(values, calibration)
+        found = calibrate_image(values, calibration)
         good = np.where(found.bad, 0.0, 1.0) * (1.0 if known is None else known)
         return signal_of(found.values, trust=good, newtons=True, settings=self.settings.signal)
 

@@ -31,15 +31,15 @@ from probe.circuit import (
     QUIET,
     Electronics,
     Noise,
-    drawn,
+    draw_fsr,
     effective_resistances,
-    inverted,
+    invert_readings,
     read_counts,
     read_sequence,
     transconductances,
 )
-from probe.circuit.floating import solved
-from probe.circuit.readout import scanned, shares
+from probe.circuit.floating import solve_floating
+from probe.circuit.readout import scan_shares, shares
 
 X = np.arange(16) - 7.5
 RADIUS = np.hypot(X, X[:, None])
@@ -99,10 +99,10 @@ def network(seed: int) -> None:
         for name, g in scenes(decades, seed).items():
             truth = exact(g)
             forward = np.abs(effective_resistances(g) / truth - 1).max()
-            found = solved(truth)
+            found = solve_floating(truth)
             back = np.abs(found.conductance_s / g - 1).max()
             print(f"{name:<17}{decades:>8}{forward:>10.1e}{timed(effective_resistances, g):>7.2f}"
-                  f"{back:>10.1e}{found.steps:>7}{timed(solved, truth):>7.1f}"
+                  f"{back:>10.1e}{found.steps:>7}{timed(solve_floating, truth):>7.1f}"
                   f"{found.own.min():>10.1e}")  # fmt: skip
 
 
@@ -127,14 +127,14 @@ def contrast(seed: int, repeats: int) -> None:
         for _ in range(repeats):
             g = pressed(number, rng)
             for readout, e in boards.items():
-                read = scanned(shares(g, e), e) * 1023 + 4 + 0.3 * rng.standard_normal(g.shape)
+                read = scan_shares(shares(g, e), e) * 1023 + 4 + 0.3 * rng.standard_normal(g.shape)
                 counts = np.clip(np.rint(read), 0, 1023)
                 if readout == "floating":
                     share = np.maximum((counts - 4) / 1023, 0.5 / 1023)
                     face = 1 / (e.load_ohm * (1 / share - 1))
                     rows.setdefault("floating, face value", []).append(judged(face, g, 0.0))
                 start = time.process_time()
-                found = inverted(counts, e)
+                found = invert_readings(counts, e)
                 spent = time.process_time() - start
                 rows.setdefault(readout, []).append(judged(found.conductance_s, g, spent))
         for name, values in rows.items():
@@ -160,7 +160,9 @@ def multiplexer() -> None:
             supply_v=1.0, reference_v=1.0, feedback_ohm=0.95 / MAX_S,
         )  # fmt: skip
         read = transconductances(g, ohm, ohm)
-        back = inverted(scanned(shares(g, e), e) * e.full + e.bias_lsb * e.lsb, e).conductance_s
+        back = invert_readings(
+            scan_shares(shares(g, e), e) * e.full + e.bias_lsb * e.lsb, e
+        ).conductance_s
         print(f"  resistance x conductance {ratio:g}: {np.abs(read / g - 1)[on].max():.2e} / "
               f"{np.abs(back / g - 1)[on].max():.1e}")  # fmt: skip
 
@@ -176,9 +178,9 @@ def noise(seed: int) -> None:
             readout="floating", bits=bits, supply_v=1.0, reference_v=1.0, load_ohm=1 / MAX_S,
             noise=Noise(idle, 0.0, 0.05, 0.0, 0.0),
         )  # fmt: skip
-        clean = scanned(shares(g, e), e) * e.full + e.bias_lsb * e.lsb
+        clean = scan_shares(shares(g, e), e) * e.full + e.bias_lsb * e.lsb
         read = np.rint(clean + idle * e.lsb * rng.standard_normal(g.shape))
-        found = inverted(np.clip(read, 0, e.full), e)
+        found = invert_readings(np.clip(read, 0, e.full), e)
         on, kept = g > 0.1 * MAX_S, ~found.lost & (g > 0.1 * MAX_S)
         error = np.abs(found.conductance_s / g - 1)[kept]
         off = (np.abs(found.conductance_s - g) / found.sigma_s)[~on]
@@ -192,14 +194,14 @@ def board(seed: int) -> None:
     rng = np.random.default_rng(seed)
     forces = np.where(rng.random((16, 16)) < 0.25, rng.uniform(0.1, 1.5, (16, 16)), 0.0)
     for readout in ("grounded", "virtual", "floating"):
-        e, fsr = Electronics(readout=readout), drawn(rng, DATASHEET)
+        e, fsr = Electronics(readout=readout), draw_fsr(rng, DATASHEET)
         counts, _ = read_sequence(np.broadcast_to(forces, (1000, 16, 16)), e, fsr, None, rng)
         away = counts - np.median(counts, axis=0)
         deviation = np.nanstd(np.where(np.abs(away) > 50, np.nan, away), axis=0)
         active = deviation[forces > 0]
         quiet = deviation[forces == 0]
         spikes = (np.abs(away[:, forces == 0]) > 50).mean()
-        worn = [read_counts(forces, e, drawn(rng, MEASURED), None, rng)[0] for _ in range(200)]
+        worn = [read_counts(forces, e, draw_fsr(rng, MEASURED), None, rng)[0] for _ in range(200)]
         saturated = (np.stack(worn) >= e.full).mean()
         one = timed(lambda f, e=e, fsr=fsr: read_counts(f, e, fsr, None, rng), forces)
         many = np.broadcast_to(forces, (200, 16, 16))

@@ -31,9 +31,9 @@ from probe.contact.contract import Touch, WristStiffness
 from probe.contact.layer import layer, press_patch
 from probe.contact.layer_active_set import equilibrium
 from probe.contact.layer_influence import influence
-from probe.contact.layer_levels import Look, leveled
+from probe.contact.layer_levels import Look, levels_of
 from probe.contact.layer_patch import patch_under
-from probe.contact.layer_solve import glued, plate_of, solved
+from probe.contact.layer_solve import glued_system, plate_of, solve_glued
 from probe.contact.plate import PlatePose
 from probe.errors import ContactError
 from probe.sensor import Overlay, SensorType
@@ -111,7 +111,7 @@ def left_out(given):
                 above = patch.highest_mm - plane.heights_mm(patch.centres_mm) >= -depth
                 patch = patch.with_cells(np.flatnonzero(patch.neighbours(above | (not few))))
                 rest = () if few else (Look(plane, -1e9),)
-                levels = leveled(patch, grid, Look(plane, -depth), rest)
+                levels = levels_of(patch, grid, Look(plane, -depth), rest)
                 return levels, equilibrium(levels, plate_of(t, levels))
 
             (levels, pressed), some = cpu(lambda f=seen: f(few=True), given.repeat)
@@ -121,14 +121,14 @@ def left_out(given):
             press_patch(patch, touch)
             _, again = cpu(lambda p=patch, o=other: press_patch(p, o), given.repeat)
             _, new = cpu(lambda c=cells: influence.__wrapped__(PAD, c), given.repeat)
-            system = glued(levels, pressed.touching)
+            system = glued_system(levels, pressed.touching)
             (factor, _), factored = cpu(lambda s=system, g=grid: gathered(s, g), 1)
             _, cached = cpu(
                 lambda f=factor, s=system: scipy.linalg.cho_solve(f, s.levers.T), given.repeat
             )
             start = np.zeros(len(levels.cells))
             _, gradients = cpu(
-                lambda s=system, t=touch, v=levels, p=start: solved(
+                lambda s=system, t=touch, v=levels, p=start: solve_glued(
                     s, plate_of(t, v), p, np.zeros(3), 1e-5
                 ),
                 given.repeat,

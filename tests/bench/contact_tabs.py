@@ -24,7 +24,7 @@ from probe.contact.contract import Touch
 from probe.contact.plate import load_of, rest
 from probe.contact.plate_newton import Columns
 from probe.contact.tab_law import tip_laws
-from probe.contact.tabs import TOLERANCE, asked, settled, tabs
+from probe.contact.tabs import TOLERANCE, heights_under, tabs, tabs_at_rest
 from probe.contact.tips import Tips, tip_points
 from probe.sensor import SensorType
 from probe.surface.face import endless
@@ -81,12 +81,12 @@ def line(surface, touches, fine, number, repeats) -> str:
     points, drop = tip_points(SENSOR, tips)
     whole, surfaces, plates, full = [], [], [], []
     for touch in touches:
-        heights = asked(surface, touch, points) - drop
+        heights = heights_under(surface, touch, points) - drop
         load = load_of(touch)
         whole.append(best(lambda t=touch: tabs(surface, SENSOR, t, tips), repeats))
-        surfaces.append(best(lambda t=touch: asked(surface, t, points), repeats))
+        surfaces.append(best(lambda t=touch: heights_under(surface, t, points), repeats))
         plates.append(
-            best(lambda h=heights, a=load: settled(points, h, SENSOR.overlay, a), repeats)
+            best(lambda h=heights, a=load: tabs_at_rest(points, h, SENSOR.overlay, a), repeats)
         )
         full.append(best(lambda h=heights, a=load: unculled(points, h, a), repeats))
     found = [tabs(surface, SENSOR, touch, tips) for touch in touches]

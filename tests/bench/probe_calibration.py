@@ -28,7 +28,7 @@ from probe.calibration import (
     Calibration,
     CalibrationLoad,
     Condition,
-    calibrated,
+    calibrate_image,
     calibration_from,
     known_load,
 )
@@ -38,7 +38,7 @@ from probe.circuit import (
     QUIET,
     Electronics,
     Fsr,
-    drawn,
+    draw_fsr,
     fsr_of,
     read_counts,
     read_sequence,
@@ -69,7 +69,7 @@ def main() -> None:
                 for sensor in range(options.sensors):
                     rng = np.random.default_rng([options.seed, sensor])
                     try:
-                        rows.append(tried(drawn(rng, spread), BOARDS[board], number, rng))
+                        rows.append(tried(draw_fsr(rng, spread), BOARDS[board], number, rng))
                     except CalibrationError:
                         refused += 1
                 if not rows:
@@ -97,15 +97,15 @@ def tried(fsr: Fsr, board: Electronics, number: int, rng: np.random.Generator) -
         clean = read_counts(forces, quiet, fsr, None, rng)[0]
         frames = recorded(fsr, forces, board, rng)
         start = time.process_time()
-        single = calibrated(frames[0], calibration)
+        single = calibrate_image(frames[0], calibration)
         spent.append(time.process_time() - start)
         told = (forces > 0) & ~calibration.bad & ~single.bad
         share = np.where(told, forces, 1.0)
         for key, values in (
-            ("law", calibrated(clean, exact).values),
-            ("plain", calibrated(clean, ideal).values),
+            ("law", calibrate_image(clean, exact).values),
+            ("plain", calibrate_image(clean, ideal).values),
             ("frame", single.values),
-            ("second", calibrated(frames.mean(axis=0), calibration).values),
+            ("second", calibrate_image(frames.mean(axis=0), calibration).values),
         ):
             errors.setdefault(key, []).append((values / share - 1)[told])
         errors.setdefault("sigmas", []).append(((single.values - forces) / single.sigma)[told])

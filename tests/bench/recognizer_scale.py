@@ -28,9 +28,9 @@ from generator.array import next_larger, profile  # noqa: E402
 from probe.contact.contract import Touch  # noqa: E402
 from probe.sensor import SensorType  # noqa: E402
 from probe.surface.face import FaceSurface  # noqa: E402
-from probe.surface.lattice import LatticeSurface, listed  # noqa: E402
+from probe.surface.lattice import LatticeSurface, list_lookup  # noqa: E402
 from probe.surface.polygon import polygon  # noqa: E402
-from probe.surface.symbols import Relief, embossed  # noqa: E402
+from probe.surface.symbols import Relief, emboss  # noqa: E402
 from probe.surface.template import template  # noqa: E402
 from recognizer.touch.lab import EmbossedArray, EncodedFace, Lab, cell_keys  # noqa: E402
 from recognizer.touch.reader import Reader  # noqa: E402
@@ -102,12 +102,12 @@ def measured(faces: int, touches: int) -> str:
     rng = np.random.default_rng(1)
     relief = Relief(STYLE.height_mm, STYLE.stroke_mm, STYLE.draft_rad, STYLE.chamfer_mm)
     glyphs = tuple(glyph.strokes for glyph in ALPHABET.glyphs)
-    drawn = template(embossed(glyphs, ALPHABET.reach * STYLE.pitch_mm, relief), STYLE.pitch_mm)
+    drawn = template(emboss(glyphs, ALPHABET.reach * STYLE.pitch_mm, relief), STYLE.pitch_mm)
     counts, ms = Counter(), []
     for _ in range(touches):
         number = int(rng.integers(faces))
         held = encoding.known[number]
-        lattice = LatticeSurface(drawn, listed(R, C, held.labels), 0.0, -2.0, -58.0)
+        lattice = LatticeSurface(drawn, list_lookup(R, C, held.labels), 0.0, -2.0, -58.0)
         x, y = rng.uniform(12, 48, 2)
         touch = Touch(x, y, rng.uniform(-math.pi, math.pi), rng.uniform(20, 120))
         image, _ = read_sensor(

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from probe.calibration import (
     Calibration,
-    calibrated,
+    calibrate_image,
     calibration_from,
     calibration_hash,
     expected_counts,
@@ -18,7 +18,7 @@ from probe.calibration import (
     read_calibration,
     write_calibration,
 )
-from probe.calibration.law import fitted, law_s
+from probe.calibration.law import fit_laws, law_s
 from probe.circuit import Electronics
 from probe.errors import CalibrationError
 
@@ -72,7 +72,7 @@ def test_a_file_gives_back_what_was_written(calibration):
 def test_what_is_expected_of_a_force_reads_as_that_force(calibration, seed):
     forces = np.random.default_rng(seed).uniform(0.3, 1.0, calibration.shape)
     counts = expected_counts(forces, calibration)
-    read = calibrated(counts, calibration)
+    read = calibrate_image(counts, calibration)
     assert np.isfinite(read.values).all()
     assert (read.values >= 0).all()
     assert (read.bad >= calibration.bad).all()
@@ -94,7 +94,7 @@ def test_a_clean_law_is_found(seed, gain, exponent, broken, number):
     force = (0.1 * 30 ** ((force - force[0]) / (force[-1] - force[0])))[:, None]
     read = law_s(force, np.array([10**gain]), np.array([exponent]), np.array([0.1 * broken]))
     used = np.ones(read.shape, bool)
-    found = fitted(force, read, 0.001 * read, used, np.zeros(1, bool))
+    found = fit_laws(force, read, 0.001 * read, used, np.zeros(1, bool))
     law = law_s(force, found.gain_s, found.exponent, found.break_n)
     np.testing.assert_allclose(law, read, rtol=0.003)
     assert np.isfinite(found.covariance).all()
@@ -117,7 +117,7 @@ def test_loads_either_determine_every_law_or_are_refused(seed, levels, noise):
     assert len({round(f, 6) for f in levels}) >= 3
     live = ~calibration.bad
     assert np.isfinite(calibration.covariance[live]).all()
-    read = calibrated(frames(1.0)[0], calibration)
+    read = calibrate_image(frames(1.0)[0], calibration)
     assert np.isfinite(read.values).all()
     near = live & (calibration.most_n > 1) & ~read.bad
     assert (np.abs(read.values - 1.0) < 8 * read.sigma + 0.1)[near].all()

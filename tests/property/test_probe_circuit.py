@@ -11,14 +11,14 @@ from probe.circuit import (
     Electronics,
     Spread,
     conductances,
-    drawn,
+    draw_fsr,
     effective_resistances,
-    inverted,
+    invert_readings,
     read_counts,
     transconductances,
 )
-from probe.circuit.floating import solved
-from probe.circuit.readout import scanned, shares, unscanned
+from probe.circuit.floating import solve_floating
+from probe.circuit.readout import scan_shares, shares, unscan_shares
 
 seeds = st.integers(0, 2**32)
 sizes = st.tuples(st.integers(2, 9), st.integers(2, 9))
@@ -57,7 +57,7 @@ def test_a_driven_row_never_gives_more_current_than_its_tactels_into_a_short(g, 
 @settings(deadline=None, max_examples=40)
 @given(matrices())
 def test_floating_rows_give_back_what_they_were_made_from(g):
-    found = solved(effective_resistances(g))
+    found = solve_floating(effective_resistances(g))
     np.testing.assert_allclose(found.conductance_s, g, rtol=1e-7)
 
 
@@ -65,7 +65,7 @@ def test_floating_rows_give_back_what_they_were_made_from(g):
 @given(matrices(8.0), seeds, st.floats(-6, 1))
 def test_contradictory_resistances_still_settle_within_the_bounds(g, seed, noise):
     wrong = np.exp(10**noise * np.random.default_rng(seed).standard_normal(g.shape))
-    found = solved(effective_resistances(g) * wrong)
+    found = solve_floating(effective_resistances(g) * wrong)
     assert (found.conductance_s >= 0).all()
     assert (found.own <= 1 + 1e-6).all()
     assert np.isclose(found.own.sum(), sum(g.shape) - 1, rtol=1e-6)
@@ -85,8 +85,8 @@ def test_every_board_is_inverted(g, readout, row, column, load):
         readout=readout, supply_v=1.0, reference_v=1.0, load_ohm=load * one, noise=QUIET,
         feedback_ohm=0.5 * one, row_ohm=row * one / 10, column_ohm=column * one / 10, bits=16,
     )  # fmt: skip
-    read = scanned(shares(g, e), e) * e.full + e.bias_lsb * e.lsb
-    found = inverted(np.clip(read, 0, e.full), e, sigma_counts=1e-3)
+    read = scan_shares(shares(g, e), e) * e.full + e.bias_lsb * e.lsb
+    found = invert_readings(np.clip(read, 0, e.full), e, sigma_counts=1e-3)
     saturated = read >= e.full
     if not saturated.any():
         np.testing.assert_allclose(found.conductance_s, g, rtol=1e-5)
@@ -98,14 +98,14 @@ def test_every_board_is_inverted(g, readout, row, column, load):
 def test_the_scan_is_undone(seed, shape, settled, coupling):
     e = replace(Electronics(), settling_s=settled * 5e-6, coupling=coupling)
     share = np.random.default_rng(seed).random((3, *shape))
-    np.testing.assert_allclose(unscanned(scanned(share, e), e), share, atol=1e-10)
+    np.testing.assert_allclose(unscan_shares(scan_shares(share, e), e), share, atol=1e-10)
 
 
 @settings(deadline=None, max_examples=40)
 @given(seeds, st.floats(-6, 9), st.sampled_from(["floating", "grounded", "virtual"]))
 def test_any_force_on_any_sensor_gives_counts_in_range(seed, decade, readout):
     rng = np.random.default_rng(seed)
-    fsr = drawn(rng, Spread(dead=0.1, stuck=0.1, preloaded=0.1))
+    fsr = draw_fsr(rng, Spread(dead=0.1, stuck=0.1, preloaded=0.1))
     forces = 10**decade * rng.random((16, 16))
     counts, state = read_counts(forces, Electronics(readout=readout), fsr, None, rng)
     assert counts.max() <= 1023
@@ -115,7 +115,7 @@ def test_any_force_on_any_sensor_gives_counts_in_range(seed, decade, readout):
 @settings(deadline=None, max_examples=40)
 @given(seeds, st.lists(st.floats(0, 100), min_size=2, max_size=12))
 def test_a_reading_lies_between_the_way_up_and_the_hysteresis(seed, path):
-    fsr = replace(drawn(np.random.default_rng(seed)), drift=0.0)
+    fsr = replace(draw_fsr(np.random.default_rng(seed)), drift=0.0)
     one, state = np.ones((16, 16)), None
     for force in path:
         g, state = conductances(fsr, force * one, state, 0.1)

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from shapely.geometry import MultiPoint
 
 from probe.errors import SurfaceError
-from probe.surface.lattice import LatticeSurface, listed
+from probe.surface.lattice import LatticeSurface, list_lookup
 from probe.surface.mesh import mesh
 from probe.surface.outline import outline
 from probe.surface.polygon import polygon
 from probe.surface.solids import symbol_triangles
-from probe.surface.symbols import Relief, embossed
+from probe.surface.symbols import Relief, emboss
 from probe.surface.template import template
 
 NODE = st.tuples(st.integers(-1, 1), st.integers(-1, 1))
@@ -60,7 +60,7 @@ def counter_clockwise(loop):
 def test_symbol_heights_are_those_of_its_triangles(glyph, width, draft, chamfer, seed):
     relief = Relief(0.5, width, draft, chamfer if chamfer > 0.01 else 0.0)
     try:
-        symbols = embossed((glyph,), 1.0, relief)
+        symbols = emboss((glyph,), 1.0, relief)
         corners = symbol_triangles(symbols, 0)
     except SurfaceError:
         assume(False)
@@ -82,13 +82,13 @@ def test_symbol_heights_are_those_of_its_triangles(glyph, width, draft, chamfer,
 def test_lattice_gives_the_heights_of_every_symbol_by_itself(alphabet, turn, seed):
     random = np.random.default_rng(seed)
     try:
-        known = template(embossed(tuple(alphabet), 1.0, Relief(0.5, 0.4, 0.2)), 4.0)
+        known = template(emboss(tuple(alphabet), 1.0, Relief(0.5, 0.4, 0.2)), 4.0)
     except SurfaceError:
         assume(False)
     cells = np.unique(random.integers(-3, 3, (12, 2)), axis=0)
     labels = random.integers(0, len(alphabet), len(cells))
     shift = random.uniform(-9, 9, 2)
-    lattice = LatticeSurface(known, listed(cells[:, 0], cells[:, 1], labels), turn, *shift)
+    lattice = LatticeSurface(known, list_lookup(cells[:, 0], cells[:, 1], labels), turn, *shift)
     points = random.uniform(-30, 30, (1500, 2))
     c, s = math.cos(turn), math.sin(turn)
     at = points @ np.array([[c, s], [-s, c]]) + shift

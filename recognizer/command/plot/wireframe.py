@@ -13,7 +13,7 @@ from generator.database.registered import Polyhedron
 from generator.database.transaction import reading
 from probe.plot.touch import MARK
 from probe.sensor import SensorType
-from probe.surface.solids import filled
+from probe.surface.solids import triangulate
 from recognizer.command.plot.window import FACE
 from recognizer.touch.lab import EmbossedArray
 
@@ -44,7 +44,7 @@ def draw_object(
     if touched is not None:
         loops = solid.faces[touched.face_id].loops
         corners = solid.vertices[np.concatenate([np.array(loop) for loop in loops])]
-        _fill(axes, corners, filled(touched.polygon_mm), FACE, 0.4, 1)
+        _fill(axes, corners, triangulate(touched.polygon_mm), FACE, 0.4, 1)
     if len(solid.vertices) <= MANY:
         for number, at in enumerate(solid.vertices.tolist()):
             axes.text(*at, str(number), fontsize=7, color="#404040", zorder=6)

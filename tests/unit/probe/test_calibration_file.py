@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from probe.calibration import (
-    calibrated,
+    calibrate_image,
     calibration_from,
     calibration_hash,
     drift_of,
@@ -16,7 +16,7 @@ from probe.calibration import (
     read_calibration,
     write_calibration,
 )
-from probe.circuit import Electronics, Spread, drawn, read_sequence
+from probe.circuit import Electronics, Spread, draw_fsr, read_sequence
 from probe.errors import CalibrationError
 from probe.frame import frame_from
 
@@ -26,7 +26,7 @@ BOARD = Electronics()
 
 @pytest.fixture(scope="module")
 def sensor():
-    return drawn(np.random.default_rng(3), Spread(dead=0.05, stuck=0.01, preloaded=0.01))
+    return draw_fsr(np.random.default_rng(3), Spread(dead=0.05, stuck=0.01, preloaded=0.01))
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,9 @@ def test_a_file_gives_back_its_calibration_and_its_bytes(made, tmp_path):
     for name in ("gain_s", "exponent", "break_n", "covariance", "condition"):
         np.testing.assert_array_equal(getattr(back, name), getattr(made, name))
     counts = recorded_counts()
-    np.testing.assert_array_equal(calibrated(counts, back).values, calibrated(counts, made).values)
+    np.testing.assert_array_equal(
+        calibrate_image(counts, back).values, calibrate_image(counts, made).values
+    )
 
 
 def recorded_counts():
@@ -139,19 +141,21 @@ def test_a_failed_writing_keeps_the_old_file(made, tmp_path, monkeypatch):
 def test_frames_and_plain_counts_are_read_alike(made):
     counts = recorded_counts()
     frame = frame_from(counts, t_ns=0, seq=0)
-    np.testing.assert_array_equal(calibrated(frame, made).values, calibrated(counts, made).values)
-    raw = calibrated(frame)
+    np.testing.assert_array_equal(
+        calibrate_image(frame, made).values, calibrate_image(counts, made).values
+    )
+    raw = calibrate_image(frame)
     assert raw.unit == "counts"
     np.testing.assert_array_equal(raw.values, counts)
     with pytest.raises(CalibrationError, match="calibration of bench-1"):
-        calibrated(np.zeros((8, 8)), made)
+        calibrate_image(np.zeros((8, 8)), made)
 
 
 def test_bad_and_saturated_tactels_tell_no_force(made):
     counts = np.full((16, 16), 200.0)
     sound = np.argwhere(made.condition == 0)[0]
     counts[tuple(sound)] = 1023
-    read = calibrated(counts, made)
+    read = calibrate_image(counts, made)
     assert read.bad[tuple(sound)]
     assert (read.bad >= made.bad).all()
     assert (read.values[read.bad] == 0).all()
@@ -161,7 +165,7 @@ def test_bad_and_saturated_tactels_tell_no_force(made):
 
 def test_rest_reads_as_no_force(made, sensor):
     for seed in range(5):
-        read = calibrated(recorded(sensor, NONE, seed)[0], made)
+        read = calibrate_image(recorded(sensor, NONE, seed)[0], made)
         assert (read.values[~read.bad] > 0).mean() < 0.02
 
 
@@ -183,7 +187,7 @@ def test_drift_of_bias_and_gain_warns_and_nothing_else_does(made, sensor):
 
 def test_counts_and_forces_are_each_other_s_inverse(made):
     forces = np.random.default_rng(2).uniform(0.3, 1.5, (3, 16, 16))
-    read = calibrated(expected_counts(forces, made), made)
+    read = calibrate_image(expected_counts(forces, made), made)
     np.testing.assert_allclose(read.values[~read.bad], forces[~read.bad], rtol=1e-5)
     for bad in (np.zeros((8, 8)), NONE - 1, NONE + np.nan):
         with pytest.raises(CalibrationError):

@@ -8,22 +8,22 @@ import pytest
 from probe.calibration import (
     Condition,
     ConditionThresholds,
-    calibrated,
+    calibrate_image,
     calibration_from,
     even_load,
     expected_counts,
     known_load,
 )
-from probe.calibration.average import averaged
-from probe.calibration.law import FittedLaw, fitted, law_s
-from probe.calibration.pooled import pooled
+from probe.calibration.average import average_frames
+from probe.calibration.law import FittedLaw, fit_laws, law_s
+from probe.calibration.pooled import shrink_laws
 from probe.circuit import (
     DATASHEET,
     MEASURED,
     Electronics,
     Noise,
     Spread,
-    drawn,
+    draw_fsr,
     fsr_of,
     read_counts,
     read_sequence,
@@ -55,17 +55,17 @@ def test_an_average_leaves_spikes_out_and_knows_slow_noise():
     plain = np.rint(100 + 3 * rng.standard_normal((400, 4, 4)))
     spiked = plain.copy()
     spiked[rng.random(plain.shape) < 0.01] += 200
-    assert np.abs(averaged(spiked).mean - averaged(plain).mean).max() < 0.2
-    np.testing.assert_allclose(averaged(plain).sigma, 3 / 20, rtol=0.5)
+    assert np.abs(average_frames(spiked).mean - average_frames(plain).mean).max() < 0.2
+    np.testing.assert_allclose(average_frames(plain).sigma, 3 / 20, rtol=0.5)
     slow = np.repeat(plain[:20], 20, axis=0)
-    assert np.median(averaged(slow).sigma) > 3 * np.median(averaged(plain).sigma)
+    assert np.median(average_frames(slow).sigma) > 3 * np.median(average_frames(plain).sigma)
 
 
 def test_a_law_without_noise_is_found_exactly():
     force = np.repeat(np.array([0.05, 0.1, 0.4, 1.0, 2.5])[:, None], 3, axis=1)
     gain, exponent, broken = np.array([1e-4, 3e-5, 2e-4]), np.array([1, 0.7, 1.4]), [0.01, 0, 0.03]
     read = law_s(force, gain, exponent, np.array(broken))
-    found = fitted(force, read, 1e-3 * read, read > 0, np.zeros(3, bool))
+    found = fit_laws(force, read, 1e-3 * read, read > 0, np.zeros(3, bool))
     np.testing.assert_allclose(found.gain_s, gain, rtol=1e-4)
     np.testing.assert_allclose(found.exponent, exponent, rtol=1e-4)
     np.testing.assert_allclose(found.break_n, broken, atol=1e-5)
@@ -75,7 +75,7 @@ def test_the_covariance_is_the_scatter_of_repeated_fits():
     rng = np.random.default_rng(0)
     force = np.repeat(np.array([0.1, 0.2, 0.5, 1.0, 2.0])[:, None], 3000, axis=1)
     clean = law_s(force, np.full(3000, 1e-4), np.full(3000, 1.0), np.full(3000, 0.03))
-    found = fitted(force, clean * (1 + 0.01 * rng.standard_normal(clean.shape)),
+    found = fit_laws(force, clean * (1 + 0.01 * rng.standard_normal(clean.shape)),
                    0.01 * clean, clean > 0, np.zeros(3000, bool))  # fmt: skip
     for values, index in ((np.log(found.gain_s), 0), (found.exponent, 1)):
         expected = np.sqrt(np.median(found.covariance[:, index, index]))
@@ -83,7 +83,7 @@ def test_the_covariance_is_the_scatter_of_repeated_fits():
 
 
 def test_the_condition_of_every_tactel_is_found():
-    fsr = drawn(np.random.default_rng(4), replace(MEASURED, preload_n=0.5))
+    fsr = draw_fsr(np.random.default_rng(4), replace(MEASURED, preload_n=0.5))
     condition = calibration_of(fsr).condition
     np.testing.assert_array_equal(condition == Condition.DEAD, fsr.dead)
     assert ((condition == Condition.HIDDEN) <= (fsr.stuck_s > 1e-4).any(axis=0)).all()
@@ -95,16 +95,18 @@ def test_the_condition_of_every_tactel_is_found():
 @pytest.mark.parametrize("readout", ["grounded", "virtual"])
 def test_forces_of_held_out_touches(readout):
     board = Electronics(readout=readout, feedback_ohm=1000.0)
-    fsr = drawn(np.random.default_rng(5), Spread(dead=0.1))
+    fsr = draw_fsr(np.random.default_rng(5), Spread(dead=0.1))
     calibration = calibration_of(fsr, np.geomspace(0.1, 2.5, 6), board)
     rng = np.random.default_rng(6)
     errors, scaled = [], []
     for seed in range(6):
         forces = np.where(rng.random((16, 16)) < 0.3, rng.uniform(0.2, 2.0, (16, 16)), 0.0)
-        read = calibrated(recorded(fsr, forces, [6, seed], board, 100).mean(axis=0), calibration)
+        read = calibrate_image(
+            recorded(fsr, forces, [6, seed], board, 100).mean(axis=0), calibration
+        )
         well = ~read.bad & (forces > 0)
         errors.append((read.values / np.where(well, forces, 1) - 1)[well])
-        single = calibrated(recorded(fsr, forces, [7, seed], board, 1)[0], calibration)
+        single = calibrate_image(recorded(fsr, forces, [7, seed], board, 1)[0], calibration)
         scaled.append(((single.values - forces) / single.sigma)[~single.bad & (forces > 0)])
     assert np.median(np.abs(np.concatenate(errors))) < 0.06
     usual = np.abs(np.concatenate(scaled))
@@ -122,7 +124,9 @@ def test_a_preloaded_tactel_has_a_negative_break_force():
     assert calibration.break_n[3, 4] == pytest.approx(-0.39, abs=0.02)
     assert calibration.break_n[5, 5] == pytest.approx(0.01, abs=0.01)
     assert calibration.exponent[3, 4] == pytest.approx(1.0, abs=0.02)
-    assert calibrated(recorded(fsr, NONE, 1, board).mean(axis=0), calibration).values[3, 4] < 0.02
+    assert (
+        calibrate_image(recorded(fsr, NONE, 1, board).mean(axis=0), calibration).values[3, 4] < 0.02
+    )
 
 
 def test_without_a_board_counts_stand_for_the_conductance():
@@ -134,7 +138,7 @@ def test_without_a_board_counts_stand_for_the_conductance():
     ]
     rest = np.rint(4 + rng.normal(size=(50, 16, 16))).clip(0)
     calibration = calibration_from(rest, loads, sensor="mat")
-    read = calibrated(NONE + 4 + 90, calibration)
+    read = calibrate_image(NONE + 4 + 90, calibration)
     np.testing.assert_allclose(read.values, 1.0, rtol=0.05)
     np.testing.assert_allclose(expected_counts(NONE + 1, calibration), 94, rtol=0.05)
 
@@ -183,7 +187,7 @@ def test_a_load_on_a_corner_alone_says_which_tactels_it_missed():
 def test_frames_that_are_none_are_refused():
     for bad in (np.zeros((3, 16, 16)), np.zeros((16, 16)), np.full((30, 16, 16), np.nan)):
         with pytest.raises(CalibrationError, match="shape"):
-            averaged(bad)
+            average_frames(bad)
     frames = np.zeros((20, 16, 16))
     for forces in (np.zeros((4, 4)), NONE - 1):
         with pytest.raises(CalibrationError, match="forces"):
@@ -200,7 +204,7 @@ def test_a_stricter_law_needs_more_loads():
 
 
 def test_the_reading_expected_of_a_force_is_the_reading_that_comes():
-    fsr = drawn(np.random.default_rng(8), Spread(dead=0.05, stuck=0.01, preloaded=0.02))
+    fsr = draw_fsr(np.random.default_rng(8), Spread(dead=0.05, stuck=0.01, preloaded=0.02))
     calibration = calibration_of(fsr, np.geomspace(0.1, 2.5, 6))
     forces = NONE + 1.0
     board = replace(BOARD, noise=Noise(0, 0, 0.05, 0, 0))
@@ -213,7 +217,7 @@ def test_the_reading_expected_of_a_force_is_the_reading_that_comes():
 
 
 def test_tactels_that_are_alike_help_each_other_where_loads_are_few():
-    fsr = drawn(np.random.default_rng(2), DATASHEET)
+    fsr = draw_fsr(np.random.default_rng(2), DATASHEET)
     calibration = calibration_of(fsr, (0.2, 0.6, 1.8))
     truth = np.log(fsr.gain_s / fsr.gain_s.mean())
     found = np.log(calibration.gain_s / np.exp(np.log(calibration.gain_s).mean()))
@@ -228,9 +232,9 @@ def test_few_or_unlike_tactels_are_left_as_they_are():
         np.exp(rng.normal(size=40)), 1 + 0.1 * rng.normal(size=40), 0.1 * rng.random(40),
         np.broadcast_to(1e-4 * np.eye(3), (40, 3, 3)), np.ones(40),
     )  # fmt: skip
-    few = pooled(law, np.arange(40) < 20)
+    few = shrink_laws(law, np.arange(40) < 20)
     np.testing.assert_array_equal(few.gain_s, law.gain_s)
     apart = replace(law, gain_s=np.r_[law.gain_s[:39], 1e9])
-    together = pooled(apart, np.ones(40, bool))
+    together = shrink_laws(apart, np.ones(40, bool))
     assert together.gain_s[39] == pytest.approx(1e9)
     np.testing.assert_allclose(together.gain_s[:39], law.gain_s[:39], rtol=0.05)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from probe.circuit import DATASHEET, MEASURED, Spread, conductances, drawn, fsr_of
+from probe.circuit import DATASHEET, MEASURED, Spread, conductances, draw_fsr, fsr_of
 from probe.errors import CircuitError
 
 
@@ -82,7 +82,7 @@ def test_dead_stuck_and_preloaded_tactels():
 def test_drawn_sensors_are_at_least_as_bad_as_the_measured_one():
     assert MEASURED.dead * 256 >= 147
     assert MEASURED.preloaded * 256 >= 5
-    fsr = drawn(np.random.default_rng(2))
+    fsr = draw_fsr(np.random.default_rng(2))
     assert fsr.dead.sum() == 147
     assert (fsr.preload_n > fsr.break_n.min()).sum() == 5
     assert 0.2 < np.log(fsr.gain_s).std() < 0.4
@@ -90,12 +90,12 @@ def test_drawn_sensors_are_at_least_as_bad_as_the_measured_one():
 
 
 def test_the_same_seed_draws_the_same_sensor_and_a_sound_one_has_no_faults():
-    a, b = (drawn(np.random.default_rng(5), DATASHEET) for _ in range(2))
+    a, b = (draw_fsr(np.random.default_rng(5), DATASHEET) for _ in range(2))
     np.testing.assert_array_equal(a.gain_s, b.gain_s)
     assert not a.dead.any()
     assert not a.stuck_s.any()
     assert not a.preload_n.any()
-    assert drawn(np.random.default_rng(5), rows=4, columns=6).shape == (4, 6)
+    assert draw_fsr(np.random.default_rng(5), rows=4, columns=6).shape == (4, 6)
 
 
 def test_what_is_refused():

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from probe.circuit import QUIET, Electronics, Noise, effective_resistances, inverted
-from probe.circuit.floating import solved
-from probe.circuit.readout import scanned, shares
+from probe.circuit import QUIET, Electronics, Noise, effective_resistances, invert_readings
+from probe.circuit.floating import solve_floating
+from probe.circuit.readout import scan_shares, shares
 from probe.errors import CircuitError
 
 READOUTS = ["floating", "grounded", "virtual"]
@@ -36,7 +36,7 @@ def board(readout, **changes):
 
 
 def offered(g, e):
-    return scanned(shares(g, e), e) * e.full + e.bias_lsb * e.lsb
+    return scan_shares(shares(g, e), e) * e.full + e.bias_lsb * e.lsb
 
 
 def digitised(g, e, seed):
@@ -49,7 +49,7 @@ def digitised(g, e, seed):
 def test_exact_without_noise_or_rounding(readout, row, column):
     g = 1e-4 * few(60, 1)
     e = board(readout, row_ohm=row, column_ohm=column)
-    found = inverted(offered(g, e), e)
+    found = invert_readings(offered(g, e), e)
     np.testing.assert_allclose(found.conductance_s, g, rtol=2e-7)
 
 
@@ -57,7 +57,7 @@ def test_exact_without_noise_or_rounding(readout, row, column):
 def test_floating_rows_over_six_decades(decades):
     for g in (washer(decades), 10 ** np.random.default_rng(1).uniform(-decades, 0, (16, 16))):
         for scale in (1.0, 1e-9):
-            found = solved(effective_resistances(scale * g))
+            found = solve_floating(effective_resistances(scale * g))
             assert np.abs(found.conductance_s / (scale * g) - 1).max() <= 1e-8
             assert found.steps <= 12
             assert found.own.sum() == pytest.approx(31, rel=1e-9)
@@ -74,7 +74,7 @@ def test_the_errors_of_a_10_bit_board_at_a_contrast_of_1000(pressed, median):
         for readout, load, known in (("floating", 1e4, errors["floating"]),
                                      ("grounded", 5e3, errors["grounded"])):  # fmt: skip
             e = board(readout, load_ohm=load)
-            found = inverted(digitised(g, e, seed), e)
+            found = invert_readings(digitised(g, e, seed), e)
             known.append(np.median(np.abs(found.conductance_s / g - 1)[on]))
             assert not found.lost[on].any()
             assert found.conductance_s[~on].max() <= 0.03 * g.max()
@@ -87,7 +87,7 @@ def test_the_errors_of_a_10_bit_board_at_a_contrast_of_1000(pressed, median):
 def test_sigma_is_the_deviation_of_repeated_readings(readout, row):
     g = 1e-4 * few(40, 3, contrast=30)
     e = board(readout, row_ohm=row, column_ohm=100.0, bits=12)
-    frames = [inverted(digitised(g, e, seed), e) for seed in range(15)]
+    frames = [invert_readings(digitised(g, e, seed), e) for seed in range(15)]
     away = np.stack([f.conductance_s for f in frames]) - g
     scale = away / np.stack([f.sigma_s for f in frames])
     assert 0.8 <= np.sqrt((scale[:, g > 1e-5] ** 2).mean()) <= 1.2
@@ -98,13 +98,13 @@ def test_what_lies_under_the_noise_is_lost_and_what_does_not_is_not(readout):
     g = np.full((16, 16), 1e-9)
     g[4:8, 4:8] = 1e-4
     e = board(readout)
-    found = inverted(digitised(g, e, 1), e)
+    found = invert_readings(digitised(g, e, 1), e)
     assert not found.lost[4:8, 4:8].any()
     assert found.lost[g < 1e-8].mean() > 0.5
     assert (found.conductance_s <= 5 * found.sigma_s + 1e-9)[g < 1e-8].all()
     assert 16 <= found.rank < 200
     assert "not determined" in found.reason()
-    sharp = inverted(offered(1e-4 * few(60, 1), e), e, sigma_counts=1e-7)
+    sharp = invert_readings(offered(1e-4 * few(60, 1), e), e, sigma_counts=1e-7)
     assert sharp.reason() == ""
     assert sharp.rank == 256
 
@@ -114,7 +114,7 @@ def test_a_hidden_tactel_of_floating_rows_is_named():
     g = np.full((16, 16), 1e-8)
     g[[2, 2, 9], [2, 9, 2]] = 1e-4
     e = board("floating", bits=16)
-    found = inverted(digitised(g, e, 1), e)
+    found = invert_readings(digitised(g, e, 1), e)
     assert found.lost[9, 9]
     assert not found.lost[2, 2]
 
@@ -126,7 +126,7 @@ def test_saturated_readings_are_bounds_only():
         counts = digitised(g, e, 1)
         full = counts == e.full
         assert full.any()
-        found = inverted(counts, e)
+        found = invert_readings(counts, e)
         assert found.lost[full].all()
         assert np.isinf(found.sigma_s[full]).all()
 
@@ -135,7 +135,7 @@ def test_a_column_that_carries_more_than_the_supply_can_give_is_refused():
     e = board("grounded", noise=QUIET)
     counts = np.full((16, 16), e.bias_lsb * e.lsb)
     counts[:, 3] = 400
-    found = inverted(counts, e)
+    found = invert_readings(counts, e)
     assert np.isnan(found.conductance_s[:, 3]).all()
     assert found.lost[:, 3].all()
     assert np.isfinite(np.delete(found.conductance_s, 3, axis=1)).all()
@@ -145,9 +145,9 @@ def test_a_column_that_carries_more_than_the_supply_can_give_is_refused():
 def test_frames_side_by_side_are_inverted_as_alone(readout):
     e = board(readout, row_ohm=5.0)
     counts = np.stack([digitised(1e-4 * few(20, seed), e, seed) for seed in range(3)])
-    together = inverted(counts, e)
+    together = invert_readings(counts, e)
     for i in range(3):
-        alone = inverted(counts[i], e)
+        alone = invert_readings(counts[i], e)
         np.testing.assert_allclose(together.conductance_s[i], alone.conductance_s, rtol=1e-9)
         np.testing.assert_array_equal(together.lost[i], alone.lost)
         assert together.rank[i] == alone.rank
@@ -157,6 +157,6 @@ def test_what_is_refused():
     e = Electronics()
     for bad in (np.full((16, 16), 1024), np.full((16, 16), -1), np.full((16, 16), np.nan), [1, 2]):
         with pytest.raises(CircuitError):
-            inverted(bad, e)
+            invert_readings(bad, e)
     with pytest.raises(CircuitError, match="not above 0"):
-        solved(np.zeros((16, 16)))
+        solve_floating(np.zeros((16, 16)))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from probe.circuit import effective_resistances, transconductances
-from probe.circuit.network import eliminated, transfers
+from probe.circuit.network import eliminate, transfers
 from probe.errors import CircuitError
 
 
@@ -81,7 +81,7 @@ def test_the_logarithm_of_the_determinant_has_the_resistances_as_gradient():
         up, down = g.copy(), g.copy()
         up[r, c] *= 1.001
         down[r, c] *= 0.999
-        slope = (eliminated(up).logdet - eliminated(down).logdet) / (up - down)[r, c]
+        slope = (eliminate(up).logdet - eliminate(down).logdet) / (up - down)[r, c]
         assert slope == pytest.approx(resistance[r, c], rel=1e-5)
 
 

@@ -11,13 +11,13 @@ from probe.circuit import (
     Electronics,
     Noise,
     conductances,
-    drawn,
+    draw_fsr,
     effective_resistances,
     fsr_of,
     read_counts,
     read_sequence,
 )
-from probe.circuit.readout import scanned, unscanned
+from probe.circuit.readout import scan_shares, unscan_shares
 from probe.errors import CircuitError
 
 IDEAL = Electronics(noise=QUIET, settling_s=1.0, coupling=0.0, bias_lsb=0.0)
@@ -68,22 +68,22 @@ def test_the_tactel_before_is_seen_as_much_as_the_settling_leaves():
     board = replace(IDEAL, settling_s=10e-6, tau_s=5e-6)
     share = np.zeros((16, 16))
     share[4, 15] = 1.0
-    seen = scanned(share, board)
+    seen = scan_shares(share, board)
     rest = np.exp(-2.0)
     assert seen[4, 15] == pytest.approx(1 - rest)
     assert seen[5, 0] == pytest.approx((1 - rest) * rest)
     assert seen[4, 14] == pytest.approx(0, abs=1e-12)
-    np.testing.assert_allclose(unscanned(seen, board), share, atol=1e-12)
+    np.testing.assert_allclose(unscan_shares(seen, board), share, atol=1e-12)
 
 
 def test_columns_couple_and_are_parted_again():
     board = replace(IDEAL, coupling=-1e-3)
     share = np.zeros((16, 16))
     share[4, 7] = 1.0
-    seen = scanned(share, board)
+    seen = scan_shares(share, board)
     assert seen[9, 7] == pytest.approx(-1e-3)
     assert seen[9, 8] == 0
-    np.testing.assert_allclose(unscanned(seen, board), share, atol=1e-15)
+    np.testing.assert_allclose(unscan_shares(seen, board), share, atol=1e-15)
 
 
 def test_the_default_board_is_at_least_as_bad_as_the_measured_one():
@@ -93,7 +93,7 @@ def test_the_default_board_is_at_least_as_bad_as_the_measured_one():
     counts, _ = read_sequence(
         np.broadcast_to(forces, (1500, 16, 16)),
         board,
-        drawn(np.random.default_rng(1), DATASHEET),
+        draw_fsr(np.random.default_rng(1), DATASHEET),
         None,
         np.random.default_rng(2),
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from probe.contact.contract import Touch, WristStiffness
-from probe.contact.deblur import LEAST, arriving, blur_of, deblurred, thickest_mm
+from probe.contact.deblur import LEAST, arriving, blur_of, deblur, thickest_mm
 from probe.contact.layer import layer
 from probe.contact.layer_influence import influence
 from probe.errors import ContactError
@@ -46,7 +46,7 @@ def test_what_arrives_of_the_shortest_wave(height, passed):
 @pytest.mark.parametrize("height", [4.0, 6.0, 20.0])
 def test_pads_of_4_mm_and_more_are_refused(height):
     with pytest.raises(ContactError, match="passes") as caught:
-        deblurred(np.ones((16, 16)), pad(height), noise_n=0.01)
+        deblur(np.ones((16, 16)), pad(height), noise_n=0.01)
     assert "at most 3.75 mm" in caught.value.fix
 
 
@@ -55,16 +55,16 @@ def test_the_thickest_pad_is_where_the_refusal_begins(poisson):
     most = thickest_mm(pad(2.0, poisson=poisson))
     assert arriving(pad(most, poisson=poisson)) == pytest.approx(LEAST, rel=1e-6)
     read = np.ones((16, 16))
-    assert deblurred(read, pad(0.99 * most, poisson=poisson), noise_n=0.1).arrives > LEAST
+    assert deblur(read, pad(0.99 * most, poisson=poisson), noise_n=0.1).arrives > LEAST
     with pytest.raises(ContactError, match="at most"):
-        deblurred(read, pad(1.01 * most, poisson=poisson), noise_n=0.1)
+        deblur(read, pad(1.01 * most, poisson=poisson), noise_n=0.1)
 
 
 @pytest.mark.parametrize("height", [0.05, 1.0, 2.0, 3.0])
 def test_without_noise_the_forces_come_back(height):
     true = np.random.default_rng(1).exponential(0.1, (16, 16))
     true[3:9, 4] = 0
-    found = deblurred(blurred(pad(height), true), pad(height), noise_n=0.0)
+    found = deblur(blurred(pad(height), true), pad(height), noise_n=0.0)
     assert found.forces_n == pytest.approx(true, abs=1e-6)
     assert found.resolved == 256
 
@@ -76,7 +76,7 @@ def test_noise_is_held_down_and_told(height):
     sensor, noise = pad(height), 0.01
     true = np.kron(rng.exponential(0.3, (4, 4)), np.ones((4, 4)))
     clean = blurred(sensor, true)
-    found = deblurred(clean + noise * rng.normal(size=(16, 16)), sensor, noise_n=noise)
+    found = deblur(clean + noise * rng.normal(size=(16, 16)), sensor, noise_n=noise)
     assert (found.forces_n >= 0).all()
     assert found.noise_n <= 10 * noise
     error = np.linalg.norm(found.forces_n - true) / np.linalg.norm(true)
@@ -86,7 +86,7 @@ def test_noise_is_held_down_and_told(height):
 
 def test_directions_are_lost_as_pads_grow():
     read = np.random.default_rng(3).exponential(0.1, (16, 16))
-    resolved = [deblurred(read, pad(h), noise_n=0.01).resolved for h in (1.0, 2.0, 3.0, 3.7)]
+    resolved = [deblur(read, pad(h), noise_n=0.01).resolved for h in (1.0, 2.0, 3.0, 3.7)]
     assert resolved[0] == 256
     assert all(np.diff(resolved) < 0)
     assert resolved[-1] < 128
@@ -108,13 +108,13 @@ def test_the_washer_of_figure_4_10_is_sharper(noise):
     def likeness(image):
         return np.corrcoef(image.ravel(), cover.ravel())[0, 1]
 
-    found = deblurred(read, sensor, noise_n=noise)
+    found = deblur(read, sensor, noise_n=noise)
     assert likeness(found.forces_n) > likeness(read) + 0.01
     assert found.forces_n.sum() == pytest.approx(20.0, rel=0.15)
 
 
 def test_nothing_felt_is_nothing():
-    found = deblurred(np.zeros((16, 16)), pad(2.0), noise_n=0.01)
+    found = deblur(np.zeros((16, 16)), pad(2.0), noise_n=0.01)
     assert not found.forces_n.any()
     assert found.resolved == 0
 
@@ -131,4 +131,4 @@ def test_nothing_felt_is_nothing():
 )
 def test_what_is_refused(read, sensor, noise, match):
     with pytest.raises(ContactError, match=match):
-        deblurred(read, sensor, noise_n=noise)
+        deblur(read, sensor, noise_n=noise)

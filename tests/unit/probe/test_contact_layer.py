@@ -8,9 +8,9 @@ import pytest
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.layer import DEEPEST, STEEPEST_RAD, layer, press_patch
 from probe.contact.layer_active_set import deep_mm, equilibrium, springs_mm
-from probe.contact.layer_descent import descended
+from probe.contact.layer_descent import descend
 from probe.contact.layer_influence import influence
-from probe.contact.layer_levels import COUNT, Look, leveled
+from probe.contact.layer_levels import COUNT, Look, levels_of
 from probe.contact.layer_patch import patch_under
 from probe.contact.layer_solve import plate_of
 from probe.contact.plate import PlatePose
@@ -49,7 +49,7 @@ def posed(surface, sensor, touch, cells=2, plane=None, floor=-1.0):
     grid = influence(sensor, cells)
     patch = patch_under(surface, sensor, touch, cells_per_tactel=cells)
     patch = patch.with_cells(np.arange(grid.rows * grid.columns)[: patch.coarse_mm.size])
-    levels = leveled(patch, grid, Look(plane or PlatePose(0.0, 0.0, 0.0), floor))
+    levels = levels_of(patch, grid, Look(plane or PlatePose(0.0, 0.0, 0.0), floor))
     return levels, plate_of(touch, levels)
 
 
@@ -75,7 +75,7 @@ def test_no_tension_no_penetration_and_balance(scene, poisson, method):
     found = equilibrium(levels, plate)
     assert found.converged
     if method == "descent":
-        found = descended(found, plate)
+        found = descend(found, plate)
     springs = springs_mm(levels, found.pressures, found.plate)
     deepest = deep_mm(levels, found.plate).max()
     pressed = np.maximum(springs, 0.0)
@@ -140,7 +140,7 @@ def test_an_independent_solver_finds_the_same(scene, poisson):
     )
     pressures = np.bincount(cell, np.array(solver.solve().x), minlength=n)
     begun = equilibrium(levels, plate)
-    for found in (begun, descended(begun, plate)):
+    for found in (begun, descend(begun, plate)):
         error = np.linalg.norm(found.pressures - pressures) / np.linalg.norm(pressures)
         assert error <= 3e-4
     assert count <= COUNT + 1

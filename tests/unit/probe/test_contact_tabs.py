@@ -11,7 +11,7 @@ from probe.contact.contract import Touch, WristStiffness
 from probe.contact.plate import PlatePose, load_of, rest
 from probe.contact.plate_newton import Columns
 from probe.contact.tab_law import BETA, tip_laws
-from probe.contact.tabs import asked, settled, tabs
+from probe.contact.tabs import heights_under, tabs, tabs_at_rest
 from probe.contact.tips import NUMBERS, Tips, rings, square, tip_points
 from probe.errors import ContactError
 from probe.sensor import Overlay, SensorType
@@ -113,7 +113,7 @@ def test_two_heights_under_one_tip_agree_with_the_column_solved_alone():
     touch = Touch(0.0, 0.0, 0.0, 1.5, wrist=RIGID)
     surface = HalfPlane(floor_mm=-0.4)
     found = tabs(surface, ONE_TAB, touch, Tips(37))
-    heights = asked(surface, touch, tip_points(ONE_TAB, Tips(37))[0])
+    heights = heights_under(surface, touch, tip_points(ONE_TAB, Tips(37))[0])
     forces, _ = level(heights, -found.z_mm)
     assert -found.z_mm > 0.4
     assert forces.sum() == pytest.approx(1.5, rel=1e-5)
@@ -150,11 +150,11 @@ def test_forces_and_moments_balance(name, tilt):
 def test_what_is_left_out_changes_nothing(name):
     touch = Touch(0.7, -0.4, 0.3, 60.0, 0.02, 0.01)
     points, drop = tip_points(SENSOR, Tips())
-    heights = asked(SCENES[name], touch, points) - drop
+    heights = heights_under(SCENES[name], touch, points) - drop
     skin, column = tip_laws(SENSOR.overlay, 19)
     columns = Columns(column, np.arange(256) * 19, np.arange(4864) // 19, np.zeros(256))
     whole = rest(points.reshape(-1, 2), heights.ravel(), skin, load_of(touch), columns=columns)
-    found, forces = settled(points, heights, SENSOR.overlay, load_of(touch))
+    found, forces = tabs_at_rest(points, heights, SENSOR.overlay, load_of(touch))
     assert found.pose.z_mm == pytest.approx(whole.pose.z_mm, abs=2e-6)
     assert found.pose.tilt_x_rad == pytest.approx(whole.pose.tilt_x_rad, abs=1e-6)
     np.testing.assert_allclose(forces, whole.forces_n.reshape(256, 19).sum(axis=1), atol=4e-5)

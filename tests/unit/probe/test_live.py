@@ -11,7 +11,7 @@ from probe.calibration.average import BIAS_FRAMES
 from probe.circuit import Electronics, fsr_of, read_sequence
 from probe.client import ClientStatistics
 from probe.command.live_state import LiveState
-from probe.command.live_view import KEYS, SHADES, heat_map, line_of, rendered
+from probe.command.live_view import KEYS, SHADES, heat_map, line_of, render_frame
 from probe.frame import frame_from
 from probe.protocol import IdentPacket
 from probe.recording.names import next_free
@@ -38,7 +38,7 @@ def shown(state, *, width=100, height=30, colours=False, ident=IDENT):
     console = Console(width=width, height=height, color_system="truecolor" if colours else None,
                       no_color=not colours, force_terminal=True)  # fmt: skip
     with console.capture() as capture:
-        console.print(rendered(state, COUNTS, ident, height=height, colours=colours))
+        console.print(render_frame(state, COUNTS, ident, height=height, colours=colours))
     return capture.get()
 
 

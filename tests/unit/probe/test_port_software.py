@@ -9,7 +9,7 @@ import pytest
 from probe.frame import Frame, frame_from
 from probe.port import open_port
 from probe.port.pattern import moving_pattern
-from probe.port.recorded import repeated
+from probe.port.recorded import endless_frames
 from probe.port.software import SoftwareProbe
 from probe.protocol import FramePacket, IdentPacket, Splitter, StatisticsPacket, decode
 
@@ -122,10 +122,10 @@ def test_a_late_reader_makes_the_device_wait():
 
 
 def test_a_recording_repeats_with_rising_numbers_and_times():
-    seen = list(islice(repeated(lambda: iter([frame(7, 5), frame(9, 25)])), 5))
+    seen = list(islice(endless_frames(lambda: iter([frame(7, 5), frame(9, 25)])), 5))
     assert [f.seq for f in seen] == [0, 2, 3, 5, 6]
     assert [f.t_ns for f in seen] == [0, 20, 10_000_020, 10_000_040, 20_000_040]
-    assert list(repeated(lambda: iter([]))) == []
+    assert list(endless_frames(lambda: iter([]))) == []
 
 
 def test_the_pattern_moves_and_tells_up_from_down():

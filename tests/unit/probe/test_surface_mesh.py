@@ -9,7 +9,7 @@ from probe.surface.face import FaceSurface
 from probe.surface.indenters import FlatPlate, TiltedPlane
 from probe.surface.mesh import mesh
 from probe.surface.polygon import polygon
-from probe.surface.solids import filled
+from probe.surface.solids import triangulate
 
 SQUARE = np.array([[0.0, 0], [10, 0], [10, 10], [0, 10]])
 HOLE = np.array([[4.0, 4], [4, 6], [6, 6], [6, 4]])
@@ -117,13 +117,13 @@ def test_what_is_no_polygon_is_refused(loops):
 
 
 def test_filled_loops_cover_their_area_once():
-    points, triangles = np.concatenate([SQUARE, HOLE]), filled([SQUARE, HOLE])
+    points, triangles = np.concatenate([SQUARE, HOLE]), triangulate([SQUARE, HOLE])
     a, b, c = np.moveaxis(points[triangles], 1, 0)
     areas = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
     assert areas.min() > 0
     assert areas.sum() / 2 == pytest.approx(96.0)
     with pytest.raises(SurfaceError, match="cover"):
-        filled([SQUARE[::-1]])
+        triangulate([SQUARE[::-1]])
 
 
 def test_face_sees_its_surroundings_beyond_its_edges_and_above_itself():

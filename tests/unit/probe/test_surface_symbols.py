@@ -9,10 +9,10 @@ from shapely.geometry import MultiPoint
 
 from probe.errors import SurfaceError
 from probe.surface.face import endless
-from probe.surface.lattice import LatticeSurface, computed, listed, repeated
+from probe.surface.lattice import LatticeSurface, call_lookup, list_lookup, tile_lookup
 from probe.surface.outline import outline
 from probe.surface.solids import symbol_triangles
-from probe.surface.symbols import Relief, embossed
+from probe.surface.symbols import Relief, emboss
 from probe.surface.template import template
 
 # An L, a glyph with a closed loop, one with a shallow diagonal, and strokes that only touch.
@@ -67,7 +67,7 @@ def test_outline_bounds_the_union_of_the_strokes(glyph):
 @pytest.mark.parametrize("relief", RELIEFS)
 @pytest.mark.parametrize("label", range(len(GLYPHS)))
 def test_heights_are_those_of_the_moved_outline(label, relief):
-    symbols = embossed(GLYPHS, UNIT, relief)
+    symbols = emboss(GLYPHS, UNIT, relief)
     x, y = np.random.default_rng(label).uniform(-PITCH / 2, PITCH / 2, (2, 3000))
     ours = symbols.heights_mm(np.full(3000, label), x, y)
     theirs = heights(GLYPHS[label], relief, x, y)
@@ -81,7 +81,7 @@ def test_heights_are_those_of_the_moved_outline(label, relief):
 
 @pytest.mark.parametrize("relief", RELIEFS)
 def test_table_gives_the_exact_heights(relief):
-    symbols = embossed(GLYPHS, UNIT, relief)
+    symbols = emboss(GLYPHS, UNIT, relief)
     known = template(symbols, PITCH)
     rng = np.random.default_rng(3)
     labels = rng.integers(-1, len(GLYPHS), 60_000)
@@ -94,7 +94,7 @@ def test_table_gives_the_exact_heights(relief):
 
 
 def test_triangles_of_a_symbol_stand_under_its_heights():
-    symbols = embossed(GLYPHS, UNIT, Relief(chamfer_mm=0.1))
+    symbols = emboss(GLYPHS, UNIT, Relief(chamfer_mm=0.1))
     for label in range(len(GLYPHS)):
         corners = symbol_triangles(symbols, label)
         middle = corners.mean(axis=1)
@@ -113,7 +113,7 @@ def test_triangles_of_a_symbol_stand_under_its_heights():
 )
 def test_impossible_reliefs_are_refused(relief, match):
     with pytest.raises(SurfaceError, match=match):
-        embossed(GLYPHS, UNIT, relief)
+        emboss(GLYPHS, UNIT, relief)
 
 
 @pytest.mark.parametrize(
@@ -127,7 +127,7 @@ def test_strokes_that_draw_nothing_are_refused(strokes, width):
 
 def test_symbols_wider_than_their_cell_are_refused():
     with pytest.raises(SurfaceError, match="overlap"):
-        template(embossed(GLYPHS, UNIT, Relief()), 5.0)
+        template(emboss(GLYPHS, UNIT, Relief()), 5.0)
 
 
 def cell_heights(lattice, row, column, x, y):
@@ -137,14 +137,14 @@ def cell_heights(lattice, row, column, x, y):
 
 
 def test_lattice_puts_each_label_into_its_cell():
-    symbols = embossed(GLYPHS, UNIT, Relief())
+    symbols = emboss(GLYPHS, UNIT, Relief())
     grid = np.random.default_rng(0).integers(-1, 3, (4, 5))
     rows, columns = np.nonzero(grid >= 0)
     x, y = np.random.default_rng(1).uniform(-3.49, 3.49, (2, 500))
     finite = LatticeSurface(
-        template(symbols, PITCH), listed(rows - 7, columns + 2, grid[rows, columns])
+        template(symbols, PITCH), list_lookup(rows - 7, columns + 2, grid[rows, columns])
     )
-    endless_ = LatticeSurface(template(symbols, PITCH), repeated(grid))
+    endless_ = LatticeSurface(template(symbols, PITCH), tile_lookup(grid))
     for r, c in np.ndindex(4, 5):
         label = grid[r, c]
         want = symbols.heights_mm(np.full(500, label), x, y) if label >= 0 else np.zeros(500)
@@ -156,14 +156,14 @@ def test_lattice_puts_each_label_into_its_cell():
 
 
 def test_turned_lattice_is_the_turned_surface():
-    symbols = embossed(GLYPHS, UNIT, Relief())
+    symbols = emboss(GLYPHS, UNIT, Relief())
     grid = np.random.default_rng(0).integers(0, 3, (9, 9))
     points = np.random.default_rng(1).uniform(-30, 30, (2000, 2))
     turn, x, y = 0.7, 3.3, -1.2
-    turned = LatticeSurface(template(symbols, PITCH), repeated(grid), turn, x, y)
+    turned = LatticeSurface(template(symbols, PITCH), tile_lookup(grid), turn, x, y)
     c, s = math.cos(turn), math.sin(turn)
     there = points @ np.array([[c, s], [-s, c]]) + (x, y)
-    straight = LatticeSurface(template(symbols, PITCH), repeated(grid))
+    straight = LatticeSurface(template(symbols, PITCH), tile_lookup(grid))
     close = np.abs(turned.heights_mm(points) - straight.heights_mm(there))
     assert np.sort(close)[-3] < 1e-9  # upright steps excepted: a point may fall on either side
 
@@ -182,11 +182,11 @@ def test_array_as_a_function_is_asked_once_for_every_cell_in_view():
     assert len(asked) == 1
     table = endless((np.arange(3)[:, None] * 7 + np.arange(3)) % 3, GLYPHS)
     assert np.array_equal(heights, table.heights_mm(points))
-    assert computed(label)(np.zeros(0, int), np.zeros(0, int)).shape == (0,)
+    assert call_lookup(label)(np.zeros(0, int), np.zeros(0, int)).shape == (0,)
 
 
 def test_two_symbols_in_one_cell_are_refused():
     with pytest.raises(SurfaceError, match="share a cell"):
-        listed([1, 1], [2, 2], [0, 1])
+        list_lookup([1, 1], [2, 2], [0, 1])
     with pytest.raises(SurfaceError, match="one face"):
-        listed([0, 10**6], [0, 10**6], [0, 1])
+        list_lookup([0, 10**6], [0, 10**6], [0, 1])
