@@ -157,7 +157,7 @@ def test_a_misused_option_is_named(asked, words, said):
         (["calibrate", "bias", "gone.h5"], 2, "there is no such recording"),
         (["calibrate", "loads", "gone.h5", "-o", "a.json"], 2, "write gone.h5=NEWTONS"),
         (["calibrate", "loads", "gone.h5=0", "-o", "a.txt"], 2, "write a.json"),
-        (["simulate", "gone.stl"], 2, "name an STL file"),
+        (["simulate", "gone.stl"], 2, "a file that you can read"),
         (["simulate", "cube"], 2, "write part.stl, or database#object/face"),
         (["simulate", "gone.db#Cube/F1"], 4, "this database does not exist"),
         (["simulate", "washer", "--x", "99", "-o", "a.h5"], 2, "move the sensor over the object"),
