@@ -24,8 +24,8 @@ class Frame:
 
     Examples
     --------
-    >>> from encoded_objects import Recording
-    >>> frame = next(Recording("touch.h5").frames())
+    >>> import numpy as np
+    >>> frame = frame_from(np.zeros((16, 16), np.uint16), t_ns=0, seq=0)
     >>> frame.counts.shape, frame.counts.dtype.name, frame.seq, frame.pose
     ((16, 16), 'uint16', 0, None)
     """
