@@ -5,10 +5,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Event
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from encoded_objects.console import FAILED, INTERRUPTED
 from encoded_objects.console.files import refuse_taken, staged, taken
@@ -26,6 +26,7 @@ from recognizer.command.scanning import (
     Belief,
     Joints,
     belief_for,
+    edges_of,
     pose_during,
     read_joints,
     refuse_single,
@@ -37,6 +38,9 @@ from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import NO_CONTACT, Recognition
 from recognizer.touch.robot import ObjectPose
 from recognizer.touch.source import TouchSource, source_of
+
+if TYPE_CHECKING:
+    from recognizer.thesis.edges.line import Edge
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +74,7 @@ class Answer:
     found: Recognition
     in_base: ObjectPose | None
     touches: int | None = None  #: of a scan, that it rests on
+    edges: tuple[Edge, ...] | None = None  #: that the touch feels; None: not asked for
 
 
 def recognize_touches(options: RecognizeOptions) -> int:
@@ -152,6 +157,8 @@ def _print_answers(
             entry = report.entry(answer.touch, answer.found, answer.in_base)
             if answer.touches is not None:
                 entry["touches"] = answer.touches
+            if answer.edges is not None:
+                entry["edges"] = [report.edge_entry(edge, answer.found) for edge in answer.edges]
             if lines:
                 write_json(entry, line=True)
                 out.flush()
@@ -203,6 +210,8 @@ def _answers(
             pose = pose_during(touch, count, by_touch, options.joint_error_deg)
             found = belief.add(signal, pose, seq=touch.seq)
         answer, trouble = _answer(options, touch, found, own, belief)
+        if options.scan == "thesis":
+            answer = replace(answer, edges=edges_of(reader, signal))
         if trouble and trouble != warned:
             warning(f"touch {touch.seq}: the place in the robot's base is not known: {trouble}")
             warned = trouble
@@ -218,7 +227,8 @@ def _answers(
         if last is not None and last.found is belief.answer:
             yield last
         else:
-            yield _answer(options, touch, belief.answer, own, belief)[0]
+            late, _ = _answer(options, touch, belief.answer, own, belief)
+            yield replace(late, edges=answer.edges)
 
 
 def _answer(
@@ -245,7 +255,8 @@ def _sentence(answer: Answer, needed: int) -> str:
     if not answer.found and answer.found.reason != NO_CONTACT:
         more = f"; go on: about {needed} touches" if answer.touches < needed else ""
         said = f"{answer.touch.seq}: not yet: {answer.found.reason}{more}"
-    return f"{said} ({answer.touches} {'touch' if answer.touches == 1 else 'touches'})"
+    said = f"{said} ({answer.touches} {'touch' if answer.touches == 1 else 'touches'})"
+    return "; ".join((said, *map(report.edge_words, answer.edges or ())))
 
 
 def _show_count(frames: Iterator[Frame], bar: ProgressBar) -> Iterator[Frame]:

@@ -22,7 +22,8 @@ from recognizer.thesis.edges.points import STEEP, edge_points
 from recognizer.thesis.edges.response import BLURS_MM
 from recognizer.thesis.edges.syntax import SyntaxRules, fused, vertices
 from recognizer.thesis.filters import magnified, median, unbiased
-from recognizer.touch.tactile_image import TactileImage
+from recognizer.touch.signal import Signal
+from recognizer.touch.tactile_image import TactileImage, touch_image
 
 Array = NDArray[np.float64]
 
@@ -96,6 +97,17 @@ def face_edges(
     True
     """
     return outline(image, sensor, finding).edges
+
+
+def touch_edges(sensor: SensorType, signal: Signal) -> tuple[Edge, ...]:
+    """Return the edges that a touch feels, in the sensor frame, as a reader gets its signal.
+
+    Of a face without symbols these are the edges of the face. Of one with symbols they are lines
+    along which symbols end, and seldom any: what is pressed there is no even plane.
+    """
+    if not signal.contact:
+        return ()
+    return face_edges(touch_image(sensor, signal.forces, signal.trust), sensor)
 
 
 def outline(image: TactileImage, sensor: SensorType, finding: Finding | None = None) -> Outline:

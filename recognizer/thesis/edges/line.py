@@ -37,6 +37,27 @@ class Edge:
         """Length of the part that is seen."""
         return float(np.linalg.norm(self.end_mm - self.start_mm))
 
+    @property
+    def middle_mm(self) -> Array:
+        """Middle (2,) of the part that is seen."""
+        return (self.start_mm + self.end_mm) / 2
+
+    @property
+    def direction_deg(self) -> float:
+        """Where the edge runs with the face to its left, -180 to 180 from the image's x."""
+        return math.degrees(math.remainder(self.angle_rad - math.pi / 2, math.tau))
+
+    @property
+    def across_mm(self) -> float:
+        """Standard deviation of the middle across the edge."""
+        lever = np.array([self.middle_mm @ (-self.normal[1], self.normal[0]), -1.0])
+        return math.sqrt(float(lever @ self.covariance @ lever))
+
+    @property
+    def turn_deg(self) -> float:
+        """Standard deviation of the direction."""
+        return math.degrees(math.sqrt(float(self.covariance[0, 0])))
+
     def inside_mm(self, points_mm: Array) -> Array:
         """Return how far points (..., 2) lie on the face's side of the line."""
         return np.asarray(points_mm @ self.normal - self.offset_mm)

@@ -16,7 +16,6 @@ from recognizer.thesis.edges.find import Finding, classical_edges, face_edges, o
 from recognizer.thesis.edges.hough import segments
 from recognizer.thesis.edges.line import meeting, through
 from recognizer.thesis.edges.points import EdgePoints, edge_points
-from recognizer.thesis.edges.pose import corner_poses
 from recognizer.thesis.edges.response import BLURS_MM, REACH_MM, felt_at, responses
 from recognizer.thesis.edges.syntax import fused, vertices
 from recognizer.touch.tactile_image import tactile_image, touch_image
@@ -130,27 +129,6 @@ def test_edges_that_turn_make_a_vertex_and_parallel_ones_none():
     assert meeting(edges[0], edges[0]) is None
 
 
-def test_corner_of_a_known_face_gives_the_pose():
-    T = np.eye(4)  # T_face_probe
-    c, s = math.cos(0.7), math.sin(0.7)
-    T[:2, :2], T[:2, 3] = [[c, -s], [s, c]], [76.0, 5.0]
-    back = np.linalg.inv(T)
-
-    def seen(a, b):
-        ends = np.array([[*a, 0, 1], [*b, 0, 1]], float) @ back.T
-        way = ends[1, :2] - ends[0, :2]
-        normal = np.array([-way[1], way[0]]) / np.linalg.norm(way)
-        return through(ends[:, :2], np.tile(normal, (2, 1)), 0.1)
-
-    corner = meeting(seen((80, 0), (80, 12)), seen((70, 0), (80, 0)))
-    poses = corner_poses(corner, [SQUARE])
-    assert len(poses) == 4  # a square's corners are alike
-    right = next(pose for pose in poses if pose.vertex == 1)
-    assert right.T_face_probe == pytest.approx(T, abs=1e-9)
-    assert np.linalg.eigvalsh(right.covariance).min() > 0
-    assert len(corner_poses(corner, [np.array([[0, 0], [90, 0], [45, 77.9]])])) == 0
-
-
 # --- response ---------------------------------------------------------------------------
 
 
@@ -230,9 +208,6 @@ def test_a_corner_is_found_with_both_edges():
         c, s = math.cos(touch.theta_rad), math.sin(touch.theta_rad)
         at = (-c * touch.x_mm - s * touch.y_mm, s * touch.x_mm - c * touch.y_mm)
         errors.append(math.dist(at, corner.at_mm))
-        first = corner_poses(corner, [SQUARE])
-        nearest = min(math.dist(p.T_face_probe[:2, 3], (touch.x_mm, touch.y_mm)) for p in first)
-        assert nearest == pytest.approx(errors[-1], abs=0.6)
     assert len(errors) >= 7
     assert np.median(errors) < 0.3
 
