@@ -22,9 +22,10 @@ from recognizer.touch.belief import null_log_likelihood, unworn_labels_at, weigh
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.locate import (
     Hypothesis,
+    coincide,
     find_hypotheses,
+    find_rivals,
     log_likelihood,
-    neighbours,
     under_centre,
 )
 from recognizer.touch.reader import Reader
@@ -72,10 +73,10 @@ class LocatedComposite:
         return held.object, held.face
 
     def same(self, other: LocatedComposite) -> bool:
-        """Whether two say the same place, up to a cell's rounding."""
-        if self.encoding is not other.encoding or self.place.face != other.place.face:
-            return False
-        return neighbours(self.encoding, self.index, other.index)
+        """Whether two say the same place."""
+        return self.encoding is other.encoding and coincide(
+            self.encoding, self.fit, self.place, other.fit, other.place
+        )
 
 
 def located(
@@ -94,10 +95,23 @@ def located(
         listed = replace(
             fit, cells=fit.cells[telling], scores=fit.scores[telling], seen=fit.seen[telling]
         )
-        for place in find_hypotheses(encoding, (listed,), settings):
+        places = find_hypotheses(encoding, (listed,), settings)
+        if places:  # what a few telling cells do not point to, all cells may
+            best = max(places, key=lambda one: log_likelihood(encoding, fit, one, settings))
+            places += find_rivals(encoding, fit, best, 0, settings)
+        for place in places:
             score = log_likelihood(encoding, fit, place, settings)
             found.append(LocatedComposite(encoding, each, replace(place, score=score), fit, score))
     return found
+
+
+def distinct_places(found: Sequence[LocatedComposite]) -> list[LocatedComposite]:
+    """Return the likeliest place and its rivals, best first.
+
+    Told before the best one is posed: its touch may then lie where others lead to expect it.
+    """
+    ranked = sorted(found, key=lambda item: -item.score)
+    return [item for n, item in enumerate(ranked) if n == 0 or not ranked[0].same(item)]
 
 
 def posed(
@@ -146,7 +160,7 @@ def answered(
     *,
     by_hand: bool = False,
 ) -> Recognition:
-    """Return the answer; `found` is sorted, the best place first and posed.
+    """Return the answer; `found` are the places of `distinct_places`, the first of them posed.
 
     Where nobody measured the steps (`by_hand`), a touch may lie whole pitches from where images
     lay it, and several touches must agree with the database the better.
@@ -154,16 +168,48 @@ def answered(
     if not found:
         return refusal(seq, TOO_FEW)
     best = found[0]
-    other = next((item for item in found[1:] if not best.same(item)), None)
+    other = found[1] if len(found) > 1 else None
     margin = math.inf if other is None else best.score - other.score
     runner_up = None
     if other is not None:
         runner_up = RunnerUp(*other.face, other.index)
+    if by_hand:
+        margin = min(margin, _shift_margin(best, limits, reader.settings.hypotheses))
     return answer_at(
         best.encoding, best.fit, best.place, reader.settings.belief, seq,
         reason=_doubt(reader, best, margin, limits, by_hand=by_hand),
         margin=margin, runner_up=runner_up,
     )  # fmt: skip
+
+
+def _shift_margin(
+    best: LocatedComposite, limits: ScanSettings, settings: HypothesisSettings
+) -> float:
+    """Return by how many nats the last touch's own cells tell its place from whole pitches beside.
+
+    The cells of all touches say where the face was touched, not whether the last image was laid
+    on them in the right place; only its own cells do.
+    """
+    last, place, array = best.composite.last, best.place, best.encoding.array
+    if last is None:
+        return 0.0
+    reach = range(-limits.shifts_by_hand, limits.shifts_by_hand + 1)
+    scores = {
+        (down, along): log_likelihood(
+            best.encoding,
+            last,
+            replace(
+                place,
+                row=(place.row + down) % array.rows,
+                column=(place.column + along) % array.columns,
+            ),
+            settings,
+        )
+        for down in reach
+        for along in reach
+    }
+    own = scores.pop((0, 0))
+    return own - max(scores.values())
 
 
 def _doubt(
@@ -183,6 +229,9 @@ def _doubt(
         return NOT_ENCODED
     if (cells.against > belief.clearly).sum() > max(belief.contradicted, limits.wrong * told):
         return NOT_ENCODED
+    agreeing = int((best.composite.agreement.chosen >= 0).sum())
+    if by_hand and 2 * agreeing <= len(best.composite.agreement.chosen):
+        return TOO_FEW  # what few of the touches say together, any touches may by chance
     if best.score - chance < surprise or told < belief.least_inliers:
         return TOO_FEW
     return AMBIGUOUS if margin < belief.margin else ""

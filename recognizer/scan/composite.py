@@ -28,6 +28,7 @@ class Composite:
     agreement: Agreement
     fit: Fit  #: of all touches; its pose is that of the last one
     looks: Array  #: (cells,) by how many touches a cell is seen, in effect
+    last: Fit | None  #: of the last touch by itself, its cells as here; None: it does not agree
 
 
 def composite(
@@ -57,6 +58,7 @@ def composite(
     if view >= 0:
         pose = views.poses[view] - np.append(agreement.shifts[last] * pitch_mm, 0.0)
         covariance = views.covariances[view]
+    own = replace(shown, cells=shown.cells - agreement.shifts[last]) if view >= 0 else None
     used = agreement.chosen[agreement.chosen >= 0]
     fit = Fit(
         x_mm=float(pose[0]),
@@ -71,7 +73,7 @@ def composite(
         value=float(most.sum()) + agreement.score + float(views.values.sum()),
         covariance=covariance,
     )
-    return Composite(agreement, fit, looks)
+    return Composite(agreement, fit, looks, own)
 
 
 def expected_fit(found: Composite, stands: Stands) -> Fit:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.scan.answer import LocatedComposite, answered, located, posed
+from recognizer.scan.answer import LocatedComposite, answered, distinct_places, located, posed
 from recognizer.scan.composite import Composite, composite, expected_fit
 from recognizer.scan.lattice import PlaneLattice, agreed, alike, expected_at, seeded
 from recognizer.scan.mosaic.touch import PlacedTouch
@@ -123,7 +123,7 @@ def extend_scan(scan: ScanBelief, touch: PlacedTouch) -> ScanBelief:
         lattices.append(tuple(item.agreement.lattice for item in sums))
         found += located(encoding, sums, limits, reader.settings.hypotheses)
         images.append(image)
-    found.sort(key=lambda item: -item.score)
+    found = distinct_places(found)
     answer = answered(reader, found, limits, touch.seq, by_hand=by_hand)
     agrees = bool(found) and bool(found[0].composite.agreement.chosen[-1] >= 0)
     if answer:

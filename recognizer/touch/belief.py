@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from generator.database.registered import Bend
 from recognizer.touch.lab import EmbossedArray
-from recognizer.touch.locate import Hypothesis, labels_at, neighbours, under_centre
+from recognizer.touch.locate import Hypothesis, coincide, labels_at, neighbours, under_centre
 from recognizer.touch.settings import BeliefSettings
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.gain import Image
@@ -79,6 +79,12 @@ class VerifiedHypothesis:
         if self.embossed is not other.embossed or self.hypothesis.face != other.hypothesis.face:
             return False
         return neighbours(self.embossed, self.index, other.index)
+
+    def coincides(self, other: VerifiedHypothesis) -> bool:
+        """Whether both say the same place: not one a pitch beside either."""
+        return self.embossed is other.embossed and coincide(
+            self.embossed, self.fit, self.hypothesis, other.fit, other.hypothesis
+        )
 
     def support(self) -> Support:
         """Return what speaks for it."""

@@ -120,6 +120,26 @@ def neighbours(embossed: EmbossedArray, a: tuple[int, int], b: tuple[int, int]) 
     return (a[0] - b[0] + 1) % array.rows <= 2 and (a[1] - b[1] + 1) % array.columns <= 2
 
 
+def coincide(
+    embossed: EmbossedArray, fit: Fit, a: Hypothesis, other_fit: Fit, b: Hypothesis
+) -> bool:
+    """Whether two hypotheses put the sensor's centre in one place: half a pitch, an eighth turn.
+
+    The cells under the centre do not tell: between two cells they differ by one where fits
+    differ by nothing, as they do of two places that lie one pitch apart.
+    """
+    array, pitch = embossed.array, embossed.style.pitch_mm
+    down = a.row - b.row - (fit.y_mm - other_fit.y_mm) / pitch
+    along = a.column - b.column + (fit.x_mm - other_fit.x_mm) / pitch
+    turn = math.remainder(fit.theta_rad - other_fit.theta_rad, math.tau)
+    return (
+        a.face == b.face
+        and abs(math.remainder(down, array.rows)) < 0.5
+        and abs(math.remainder(along, array.columns)) < 0.5
+        and abs(turn) < math.pi / 4
+    )
+
+
 def _bounded_scores(fit: Fit, settings: HypothesisSettings) -> Array:
     """Return scores (m, q + 1) in which a registered symbol may be worn away, or read wrong.
 

@@ -18,6 +18,8 @@ from probe.scan.raster import raster
 from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from probe.simulate.touch import pose_of
+from probe.surface.face import FaceSurface
+from probe.surface.polygon import polygon
 from recognizer.command import run as recognize_object
 
 SPECS = Path(__file__).parents[2] / "fixtures" / "specs"
@@ -98,9 +100,9 @@ def check(entries, truth, name, face):
     ("profile", "face", "seed", "most", "poses"),
     [
         ("thesis", "F4", 3, 10, True),
-        ("thesis", "F1", 0, 16, False),
+        ("thesis", "F5", 1010, 11, False),
         ("product", "F2", 2, 10, True),
-        ("product", "F2", 2, 10, False),
+        ("product", "F1", 1005, 10, False),
     ],
 )
 def test_a_scan_is_recognised(labs, asked, tmp_path, profile, face, seed, most, poses):
@@ -125,6 +127,42 @@ def test_the_thesis_reads_a_whole_face(labs, asked, tmp_path):
     assert entries[0]["object"] is None
     assert entries[-1]["touches"] > len(truth) / 2
     check(entries, truth, "Cube thesis", "F1")
+
+
+def test_the_thesis_says_which_edges_a_touch_feels(labs, asked, capsys, tmp_path):
+    """A cube without symbols at its edge x = 0: where the edge runs, against the truth."""
+    url = f"sqlite:///{labs['thesis'] / 'lab.db'}"
+    face = FaceSurface(None, polygon([np.array([[0.0, 0], [80, 0], [80, 80], [0, 80]])]))
+    touched, rng, board = tmp_path / "edge.h5", np.random.default_rng(4), Electronics(noise=Noise())
+    places = [(1.0, 40.0, 0.0), (3.0, 35.0, 0.5)]
+    with Recorder(touched, sensor="simulated/tab", attributes={"frames_per_touch": 1}) as recorder:
+        for seq, place in enumerate(places):
+            felt = press(face, SENSOR, Touch(*place, 70.0)).forces_n
+            counts, _ = read_counts(felt, board, fsr_of(SENSOR.rows, SENSOR.columns), None, rng)
+            recorder.append(frame_from(counts, t_ns=round(seq * board.frame_s * 1e9), seq=seq))
+    _, entries, _ = asked(touched, "--database", url, "--method", "thesis")
+    assert len(entries) == 2
+    for (x, _, theta), entry in zip(places, entries, strict=True):
+        (edge,) = entry["edges"]
+        normal = np.array([math.cos(theta), -math.sin(theta)])  # of the face's inside, sensor frame
+        assert abs(normal @ edge["position_mm"] + x) < max(0.25, 4 * edge["position_sd_mm"])
+        direction = -90.0 - math.degrees(theta)
+        assert abs(edge["direction_deg"] - direction) < 3.0
+        assert 0 < edge["position_sd_mm"] < 0.3
+        assert 0 < edge["direction_sd_deg"] < 2
+        assert "object_position_mm" not in edge
+    recognize_object([str(touched), "--database", url, "--method", "thesis"])
+    assert capsys.readouterr().out.count("an edge at (") == 2
+
+
+def test_the_first_touch_of_a_product_scan_is_not_answered_a_pitch_beside(labs, asked, tmp_path):
+    """One row off only a corner of a cell differs: both places are kept, neither is answered."""
+    url = f"sqlite:///{labs['product'] / 'lab.db'}"
+    touched = tmp_path / "one.h5"
+    record_scan(touched, url, "Cube product", "F1", seed=0, most=1)
+    code, entries, _ = asked(touched, "--database", url)
+    assert (code, entries[0]["object"], entries[0]["reason"]) == (1, None, "ambiguous")
+    assert entries[0]["margin"] < 5
 
 
 def test_what_is_no_scan_is_refused_and_what_needs_one_is_told(labs, asked, tmp_path):

@@ -186,3 +186,8 @@ def test_two_hypotheses_are_one_place_up_to_a_cell(small):
     assert not one.same_place(of(here, lab=small.two_faces()))
     assert one.same_place(of(replace(here, row=7), y_mm=8.0))  # (5, 4) is still under the centre
     assert not one.same_place(of(here, x_mm=15.0))
+    assert one.coincides(of(replace(here, fit=3, score=-9.0)))
+    assert one.coincides(of(replace(here, row=6), y_mm=one.fit.y_mm + 7.0))
+    assert not one.coincides(of(replace(here, row=6)))  # a pitch beside
+    assert not one.coincides(of(replace(here, face=1)))
+    assert not one.coincides(of(here, lab=small.two_faces()))

@@ -1,5 +1,6 @@
 """Places of the database: against a walk over every place, and costs worked by hand."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from recognizer.touch.locate import (
     Hypothesis,
+    coincide,
     find_hypotheses,
     find_rivals,
     labels_at,
@@ -434,3 +436,21 @@ def test_neighbours_are_cells_at_most_one_apart_round_the_array(small):
         ((0, 0), (9, 0), False), ((0, 0), (0, 11), False), ((5, 5), (7, 7), False),
     ):  # fmt: skip
         assert neighbours(embossed, a, b) is near
+
+
+def test_one_place_is_within_half_a_pitch_and_an_eighth_turn_round_the_array(small):
+    embossed = small.two_faces().embossed  # 11 x 13, pitch 7
+
+    def fit(x=3.0, y=3.0, theta=0.2):
+        return small.fit_of([(0, 0)], [[0.0] * 5], x_mm=x, y_mm=y, theta_rad=theta)
+
+    for row, column, other, same in (
+        (9, 12, fit(), True), (8, 12, fit(), False), (9, 11, fit(), False),
+        (9, 12, fit(x=6.4), True), (9, 12, fit(x=6.6), False), (9, 12, fit(x=-0.4), True),
+        (9, 12, fit(y=6.4), True), (9, 12, fit(y=-0.6), False), (9, 11, fit(x=10.0), True),
+        (10, 12, fit(y=10.0), True), (10, 12, fit(y=-4.0), False), (9, 0, fit(x=-4.0), True),
+        (0, 12, fit(y=17.0), True), (0, 12, fit(y=3.0), False), (9, 12, fit(theta=0.98), True),
+        (9, 12, fit(theta=0.99), False), (9, 12, fit(theta=0.2 - math.tau), True),
+    ):  # fmt: skip
+        assert coincide(embossed, fit(), at(9, 12, 1), other, at(row, column, 1)) is same
+    assert not coincide(embossed, fit(), at(9, 12, 1), fit(), at(9, 12, 0))

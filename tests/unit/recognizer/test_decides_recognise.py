@@ -37,6 +37,7 @@ class Found:
     speaks: Support = SURE
     face: int = 0
     index: tuple = (3, 4)
+    shift: int = 0  # pitches
 
     @property
     def hypothesis(self):
@@ -44,6 +45,9 @@ class Found:
 
     def same_place(self, other):
         return self.place == other.place
+
+    def coincides(self, other):
+        return self.place == other.place and self.shift == other.shift
 
     def support(self):
         return self.speaks
@@ -107,6 +111,22 @@ def test_a_touch_that_is_not_numbered_is_the_first(reads):
     nothing = SimpleNamespace(contact=False)
     assert recognise(READER, nothing).seq == 0
     assert recognise_with_hypothesis(READER, nothing)[0].seq == 0
+
+
+@pytest.mark.parametrize(
+    ("behind", "reason", "margin"),
+    [(3.0, AMBIGUOUS, 3.0), (9.9, AMBIGUOUS, 9.9), (13.9, "", 13.9), (14.0, "", math.inf)],
+)
+def test_a_place_one_pitch_beside_is_a_rival_where_it_comes_near(reads, behind, reason, margin):
+    best, beside = reads.one(inliers=16), replace(reads.one(score=-behind), shift=1)
+    answer, _, _ = reads.read([best, beside], [best, beside])
+    assert (answer.reason, answer.margin) == (reason, pytest.approx(margin))
+
+
+def test_two_tries_one_pitch_apart_are_no_answer(reads):
+    best = reads.one(inliers=8)
+    answer, _, _ = reads.read([best], [replace(best, shift=1)])
+    assert (answer.reason, answer.margin) == (AMBIGUOUS, 0.0)
 
 
 def test_where_nothing_is_found_there_are_too_few_symbols(reads):

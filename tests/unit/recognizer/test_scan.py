@@ -123,7 +123,7 @@ def test_touches_of_another_thing_do_not_make_an_answer(lab, reader):
 
 def test_steps_without_an_arm_are_enough(lab, reader):
     surface = registered_surface(lab.url, "Cube", "F2").surface
-    places = [(x, 40.0 + 7 * n) for n in (0, 1) for x in (24, 30, 36, 42, 48)[:: (-1) ** n]]
+    places = [(x, 40.0 + 7 * n) for n in (0, 1) for x in (24, 30, 36, 42, 48, 54)[:: (-1) ** n]]
     touches, true = scanned(surface, places, 0.0, TYPICAL, 4)
     rng = np.random.default_rng(4)
     spread = (0.8, 0.8, 0.01)
