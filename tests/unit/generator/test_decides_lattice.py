@@ -4,8 +4,19 @@ import numpy as np
 import pytest
 import shapely
 
+from generator.layout import lattice as lattices
 from generator.layout.footprint import move_region, region_of
-from generator.layout.lattice import choose_lattice, edge_rotations
+from generator.layout.lattice import (
+    Lattice,
+    _Candidate,
+    _candidates,
+    _centre,
+    _Set,
+    _unique_sets,
+    _with_places,
+    choose_lattice,
+    edge_rotations,
+)
 
 HALF, PITCH = 2.7, 7.0
 WINDOW = (3, 2)  # rows and columns
@@ -341,3 +352,133 @@ def test_between_the_edges_twelfths_of_a_quarter_turn_are_tried(twelfth):
     assert (same.rotation_rad, same.x_mm, same.y_mm) == (
         found.rotation_rad, found.x_mm, found.y_mm
     )  # fmt: skip
+
+
+def test_the_turn_that_shows_a_place_on_more_faces_is_taken():
+    # rows x columns 6 x 3 and 2 x 3: a window of 3 x 2 fits 8 and 0 times, of 2 x 3 5 and 1 times
+    large = rectangle(room(3, 0.5), room(6, 0.5))
+    small = rectangle(room(3, 0.5), room(2, 0.5), x=10 * PITCH)
+    found = choose_lattice([region(large), region(small)], HALF, PITCH, WINDOW, search=False)
+    assert (found.places, found.quarter) == ((5, 1), 1)
+
+
+def block(rows, columns):
+    return np.argwhere(np.ones((rows, columns), dtype=bool))
+
+
+def test_no_number_of_places_outweighs_a_face_that_shows_one():
+    cells = block(70_000, 3), block(2, 3)
+    found = _with_places(Lattice(0.0, 0.0, 0.0, cells, (), 0, 0.0), WINDOW, None)
+    assert (found.places, found.quarter) == ((69_999, 1), 1)
+
+
+def test_cells_that_fit_at_no_shift_but_the_first_are_found():
+    loop = rectangle(21.5, 21.5, x=-3.75, y=-3.75)  # centres at 0, 7 and 14 and nowhere else
+    found = choose_lattice([region(loop)], 2.75, PITCH, WINDOW, search=False)
+    assert len(found.cells[0]) == 9
+
+
+def test_shifts_that_show_less_are_left_out():
+    # a single cell has a place of its own; most shifts show none
+    loop = rectangle(room(1, 1.0), room(1, 1.0))
+    found = choose_lattice([region(loop)], HALF, PITCH, (1, 1), search=False)
+    assert (found.places, len(found.cells[0])) == ((1,), 1)
+    assert found.margin_mm == pytest.approx(0.5, abs=1e-5)
+
+
+def looks(monkeypatch, regions, answers=()):
+    """(rotation, steps, best so far) of every look at a rotation, answered as is told."""
+    calls, left = [], list(answers)
+
+    def look(regions, half, pitch, window, rotation, steps, best):
+        calls.append((rotation, steps, best))
+        score = left.pop(0) if left else None
+        return [_Candidate(*score, rotation, ())] if score else []
+
+    monkeypatch.setattr(lattices, "_best_shifts", look)
+    found = _candidates(regions, HALF, PITCH, WINDOW, search=True)
+    return calls, [(one.worth, one.cells) for one in found]
+
+
+@pytest.mark.parametrize(
+    ("faces", "steps"),
+    [
+        # steps^2 (2 area + 8) <= 2^17, area in squares of the pitch; at least 4, at most 16
+        ([(2, 2)], 16),
+        ([(14, 18)], 16),  # 2 x 252 + 8 = 512 = 2^17 / 16^2
+        ([(10, 10), (8, 19)], 16),
+        ([(11, 23)], 15),
+        ([(40, 50)], 5),
+        ([(62, 66)], 4),  # 2 x 4092 + 8 = 8192 = 2^17 / 4^2
+        ([(100, 100)], 4),
+    ],
+)
+def test_small_faces_are_looked_at_in_finer_steps(monkeypatch, faces, steps):
+    regions = [region(rectangle(PITCH * a, PITCH * b, x=-30, y=55)) for a, b in faces]
+    calls, _ = looks(monkeypatch, regions)
+    assert calls[0] == (0.0, steps, (0, 0))
+    assert {coarse for _, coarse, _ in calls[1:]} == {4}
+
+
+def test_between_edges_a_coarse_look_decides_whether_a_fine_one_is_worth_it(monkeypatch):
+    # three edges show nothing, two rotations cells alone, the third one a place
+    answers = [None, None, None, (0, 3), (0, 2), (5, 7), (6, 7), (8, 7), None, (9, 1)]
+    calls, found = looks(monkeypatch, [region(TRIANGLE)], answers)
+    edges = edge_rotations([region(TRIANGLE)])
+    twelfths = [np.pi / 24 * k for k in range(1, 12)]
+    assert [c[0] for c in calls] == pytest.approx(
+        [*edges, *twelfths[:4], twelfths[3], *twelfths[4:6], twelfths[5], *twelfths[6:]]
+    )
+    assert [c[1] for c in calls] == [16, 16, 16, 4, 4, 4, 4, 16, 4, 4, 16, *([4] * 5)]
+    assert [c[2] for c in calls] == [
+        *([(0, 0)] * 4), (0, 3), (0, 3), (5, 7), (5, 7), (8, 7), (8, 7), (8, 7), *([(8, 7)] * 5)
+    ]  # fmt: skip
+    assert found == [(0, 3), (0, 2), (5, 7), (8, 7)]
+
+
+def test_the_best_of_all_edges_so_far_has_to_be_reached(monkeypatch):
+    calls, _ = looks(monkeypatch, [region(TRIANGLE)], [(0, 5), (9, 4)])
+    assert [best for *_, best in calls] == [(0, 0), (0, 5), *([(9, 4)] * 12)]
+
+
+def unique_sets(numbers):
+    """Which shifts are kept of some along x that show these sets of cells, as binary numbers."""
+    free = np.array([[n >> bit & 1 for n in numbers] for bit in range(8)], dtype=bool)
+    grids = [(free[None, None], (0, 0))]
+    at = np.array([(0, k) for k in range(len(numbers))])
+    return [int(one.x) for one in _unique_sets(grids, at, np.zeros(1), np.arange(len(numbers)))]
+
+
+def test_of_many_shifts_64_are_looked_at_and_eight_sets_compared():
+    assert unique_sets(range(1, 65)) == list(range(8))
+    # every 99 / 63 of a hundred
+    assert unique_sets(range(1, 101)) == [0, 1, 3, 4, 6, 7, 9, 11]
+    # of 72 the ninth is passed over
+    assert unique_sets([1] * 8 + [2] + [1] * 63) == [0]
+    assert unique_sets([1] * 9 + [2] + [1] * 62) == [0, 9]
+
+
+def test_a_lattice_is_centred_in_three_passes():
+    # legs along the axes: the centre may be anywhere with x, y >= 2 and x + y <= 16
+    loop = [(0, 0), (20, 0), (0, 20)]
+    face = region_of([np.array(loop, float)], [np.array([1.0, 2**0.5, 1.0])])
+    found = _centre([face], 1.0, PITCH, 0.0, _Set(2.5, 3.0, (np.array([[0, 0]]),)))
+    x, y, margin = 3.0, 2.5, 0.0
+    for _ in range(3):
+        x, across = (2 + 16 - y) / 2, 16 - y - 2
+        y, down = (2 + 16 - x) / 2, 16 - x - 2
+        margin = min(across, down) / 2
+    assert (found.x_mm, found.y_mm) == pytest.approx((x, y), abs=1e-6)
+    assert found.margin_mm == pytest.approx(margin, abs=1e-5)
+    assert y == pytest.approx(6 - 3.5 / 64)  # a quarter of the error is left by each
+
+
+def test_faces_that_share_a_lattice_bound_its_play_together():
+    loops = rectangle(10, 6), rectangle(10, 6, x=21 + 0.3, y=0.4)
+    cells = (np.array([[0, 0]]), np.array([[0, 3]]))
+    regions = [region(loop) for loop in loops]
+    for order in (slice(None), slice(None, None, -1)):
+        found = _centre(regions[order], 1.0, PITCH, 0.0, _Set(2.5, 3.0, cells[order]))
+        # x from 2.3 to 8, y from 2.4 to 4
+        assert (found.x_mm, found.y_mm) == pytest.approx((5.15, 3.2))
+        assert found.margin_mm == pytest.approx(0.8, abs=1e-5)

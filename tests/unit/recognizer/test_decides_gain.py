@@ -228,6 +228,29 @@ def test_ten_tactels_of_either_kind_are_enough(kind, few, enough):
     assert (tilted_gain(image(halves(1.0), trust=known)) is not None) is enough
 
 
+def test_single_tactels_in_empty_surroundings_are_no_plateaus():
+    lone = (COLUMN % 3 == 1) & (ROW % 3 == 0)  # twelve known, of 25 around each at most 3 press
+    known = np.where((COLUMN > 4) & (COLUMN < 10), 0.0, 1.0)
+    forces = np.where(COLUMN < 8, 1.0, np.where((COLUMN > 9) & lone, 1.0, 0.0))
+    assert tilted_gain(image(forces, trust=known)) is None
+
+
+@pytest.mark.parametrize("peak", [1.0, 2.0])
+def test_where_the_scale_is_not_known_plateaus_are_as_deep_as_usual(peak):
+    found = tilted_gain(image(halves(1.0, peak=peak), newtons=False))
+    assert found[0] == pytest.approx(math.log(peak / force(0.25)))
+
+
+def test_a_plane_that_hangs_over_the_centre_is_no_tilt():
+    # 1.15 deep in the first two columns, hardly at all in the seventh and ninth
+    peaks = (COLUMN >= 6) & (COLUMN % 2 == 0) & (ROW % 2 == 0)
+    forces = np.where(COLUMN < 4, 30.0, np.where(peaks, 0.1, 0.0))
+    known = (COLUMN < 2) | (COLUMN <= 6) & peaks | (COLUMN == 8) & peaks & (ROW < 6)
+    assert tilted_gain(image(forces, trust=np.where(known, 1.0, 0.0))) is None
+    near = np.where(COLUMN < 4, 30.0, np.where(peaks, 4.0, 0.0))
+    assert tilted_gain(image(near, trust=np.where(known, 1.0, 0.0)))[1] > 0
+
+
 def test_an_image_of_a_signal_has_a_row_for_each_tactel():
     sensor = SensorType()
     forces = np.arange(256.0).reshape(16, 16)
