@@ -311,8 +311,9 @@ def test_the_index_is_the_one_congruent_to_row_and_column(name):
         assert (found.row, found.column, found.t) == (r, c, truth)
 
 
-def test_the_index_of_an_array_of_2_to_the_64_cells():
-    array = array_from({"family": "prba", "order": 2, "degree": 64})
+@pytest.mark.parametrize("degree", [48, 64])
+def test_the_index_of_an_array_of_2_to_the_48_and_64_cells(degree):
+    array = array_from({"family": "prba", "order": 2, "degree": degree})
     cell = (array.rows - 2, array.columns - 3)
     a, b = np.indices((9, 9)).astype(np.uint64)
     rows = (np.uint64(cell[0]) + a) % np.uint64(array.rows)
