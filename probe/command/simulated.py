@@ -17,7 +17,7 @@ from encoded_objects.console.output import message, write, write_json
 from encoded_objects.console.progress import progress_bar
 from encoded_objects.errors import require
 from probe.command.recorded import check_output
-from probe.simulate.simulation import SimulatedProbe, SimulatedTouch
+from probe.simulate.simulated_probe import SimulatedProbe, SimulatedTouch
 
 
 def simulate_touches(
