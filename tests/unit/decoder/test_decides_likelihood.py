@@ -9,6 +9,7 @@ import pytest
 import decoder.joint
 import decoder.likelihood
 from decoder import Likelihood, WindowError, decode_likelihood
+from decoder.places import Places
 from decoder.ranked import Ranked, best_of, best_of_all
 from decoder.ranking import ranking_of
 from decoder.score import hard_scores, unrelated_score
@@ -279,6 +280,21 @@ def test_a_prior_is_taken_round_the_torus_and_each_place_once():
     assert found.doubts[0] == pytest.approx(doubt, rel=1e-3)
 
 
+def places_of(count, shape, row=18, column=21):
+    """Weigh one place that is given so many times."""
+    return Places(BINARY, shape, np.broadcast_to(np.array([row, column]), (count, 2)))
+
+
+def test_a_prior_holds_a_million_places_and_half_a_gigabyte_at_most():
+    # 2^20 places, and 2^27 numbers: places times rows times columns times two symbols
+    found = places_of(1 << 20, (16, 4))
+    assert (found.size, found.work) == (1, 1)
+    assert (found.rows.tolist(), found.columns.tolist()) == ([3], [4])
+    for count, shape in (((1 << 20) + 1, (1, 1)), (1 << 20, (65, 1)), (1 << 20, (1, 65))):
+        with pytest.raises(WindowError):
+            places_of(count, shape)
+
+
 def test_windows_of_a_large_batch_are_weighed_as_one_by_one(monkeypatch):
     rng = np.random.default_rng(7)
     scores = rng.normal(size=(23, 3, 3, 2)).astype(np.float32)
@@ -401,3 +417,17 @@ def test_a_window_of_a_product_array_is_searched_as_it_is_weighed(monkeypatch):
         assert [(r, c) for r, c, _, _ in ranked[:2]] == list(
             zip(exact.rows[i, :2].tolist(), exact.columns[i, :2].tolist(), strict=True)
         )
+
+
+def test_places_that_are_too_many_to_be_tried_weigh_as_many_on_the_average():
+    array = array_from({"family": "prba", "order": 2, "degree": 20})  # beyond the transform
+    scores = drawn(array, (6, 6), 4, 0.35)
+    scores -= scores.max(axis=-1, keepdims=True)
+    found = ranking_of(array, (6, 6)).rank(scores.reshape(1, 36, 2).astype(np.float32), 2)
+    labels = array.symbols(*np.indices((array.rows, array.columns)))
+    every = sum(scores[a, b][np.roll(labels, (-a, -b), (0, 1))] for a in range(6) for b in range(6))
+    best = every[int(found.rows[0, 0]), int(found.columns[0, 0])]
+    assert found.values[0, 0] == pytest.approx(best, abs=1e-3)
+    assert found.rest[0] == pytest.approx(np.exp(every - best).sum() - 1, rel=0.05)
+    # with weights that tell little, what is not tried is nearly all of it
+    assert found.rest[0] > 100
