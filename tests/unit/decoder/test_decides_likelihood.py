@@ -2,6 +2,7 @@
 
 import math
 from functools import lru_cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ import pytest
 import decoder.joint
 import decoder.likelihood
 from decoder import Likelihood, WindowError, decode_likelihood
+from decoder.errors import MethodError
+from decoder.joint import Joint
 from decoder.places import Places
 from decoder.ranked import Ranked, best_of, best_of_all
 from decoder.ranking import ranking_of
@@ -431,3 +434,22 @@ def test_places_that_are_too_many_to_be_tried_weigh_as_many_on_the_average():
     assert found.rest[0] == pytest.approx(np.exp(every - best).sum() - 1, rel=0.05)
     # with weights that tell little, what is not tried is nearly all of it
     assert found.rest[0] > 100
+
+
+@pytest.mark.parametrize("column", [-1, -6, -40])
+def test_a_prior_next_to_the_end_of_a_cycle_of_2_to_the_64(column):
+    array = array_from({"family": "prbs", "order": 2, "degree": 64})
+    cycle = 2**64 - 1
+    steps = [(cycle + column + k) % cycle for k in range(90)]
+    prior = np.array([[0, 5], [0, cycle + column]], dtype=np.uint64)
+    scores = hard_scores(array.symbols([0] * 90, steps), 2)[None]
+    found = Places(array, (1, 90), prior).rank(scores, 2)
+    assert found.columns[0].tolist() == [cycle + column, 5]
+    assert found.values[0, 0] == 0.0
+    assert found.values[0, 1] < 0.0
+
+
+@pytest.mark.parametrize(("rows", "columns"), [((1 << 17) - 1, 3), (3, (1 << 17) - 1)])
+def test_product_arrays_of_more_than_2_to_the_16_rows_or_columns_are_refused(rows, columns):
+    with pytest.raises(MethodError):
+        Joint(SimpleNamespace(rows=rows, columns=columns), (3, 3))
