@@ -453,3 +453,17 @@ def test_a_prior_next_to_the_end_of_a_cycle_of_2_to_the_64(column):
 def test_product_arrays_of_more_than_2_to_the_16_rows_or_columns_are_refused(rows, columns):
     with pytest.raises(MethodError):
         Joint(SimpleNamespace(rows=rows, columns=columns), (3, 3))
+
+
+@pytest.mark.parametrize("number", [2, 16])
+@pytest.mark.parametrize("shape", [(3, 5), (5, 3)])
+def test_every_window_of_a_product_array_is_found_row_by_row(monkeypatch, shape, number):
+    monkeypatch.setattr(decoder.joint, "_PAIRS", 15)  # one row
+    places, shown = hypotheses(PRODUCT, shape)
+    labels = shown.reshape(len(places), 15, -1).argmax(axis=2)
+    found = ranking_of(PRODUCT, shape).rank(hard_scores(labels, PRODUCT.order, 0.1), number)
+    first = (found.rows[:, 0] * PRODUCT.columns + found.columns[:, 0]).astype(int)
+    np.testing.assert_array_equal(labels[first], labels)
+    wrong = (labels[:, None] != labels).sum(axis=2)
+    listed = np.sort(wrong, axis=1)[:, :number]
+    np.testing.assert_allclose(found.values, -listed * math.log(0.9 * 3 / 0.1), rtol=1e-5)
