@@ -6,6 +6,7 @@
     filters    median, Sobel, background; edges/   lines of an image and its pose by them
     skeleton/  image -> strokes -> symbols
     grid       symbols -> rows and columns
+    settings   the numbers that decide, one frozen value a stage
     read       window -> place of the database; scan   the same over a recording
 
 Kept as published, to be compared with `recognizer.touch` and `recognizer.scan`. Thesis 4.3, 6,

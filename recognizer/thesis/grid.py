@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from recognizer.thesis.settings import Acceptance
 from recognizer.thesis.skeleton.symbols import Symbol
 
 Array = NDArray[np.float64]
@@ -28,17 +29,6 @@ Ints = NDArray[np.int64]
 Cell = tuple[int, int]
 
 SIDES: tuple[Cell, ...] = ((1, 0), (0, 1), (-1, 0), (0, -1))
-
-
-@dataclass(frozen=True, slots=True)
-class Acceptance:
-    """When a symbol is the neighbour that was expected."""
-
-    off: float = 0.25  #: pitches from where it is expected
-    turn_rad: float = math.radians(25)  #: of its axes against the grid's
-    gap: float = 3.5  #: cells from the nearest member, beyond which the lattice expects nothing
-    place_mm: float = 0.2  #: standard deviation of a symbol's place, at least
-    axes_rad: float = math.radians(4)  #: of its axes
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,10 +11,8 @@ is the mean of their magnified images.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,22 +22,10 @@ from recognizer.scan.mosaic.planar import between, composed, inverse, moved, pla
 from recognizer.scan.mosaic.raster import MAGNIFIED
 from recognizer.thesis.filters import magnified
 from recognizer.thesis.product import product_shift
+from recognizer.thesis.settings import ROUNDING, Merging
 from recognizer.touch.tactile_image import ImageError, TactileImage, tactile_image, touch_image
 
 Array = NDArray[np.float64]
-
-Placing = Literal["product", "bounded", "believed"]
-
-
-@dataclass(frozen=True, slots=True)
-class Merging:
-    """How touches are laid on each other."""
-
-    placing: Placing = "product"  #: by products around the step, around the pose, or as believed
-    window_tactels: float = 0.75  #: how far a belief is searched around, both ways
-    overlap: float = 0.5  #: least share of the sensor's width and height in common
-    turn_rad: float = math.radians(3)  #: touches turned further against each other
-    faint: float = 0.2  #: of the strongest reading; zones without more show nothing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,7 +150,7 @@ def _nearest(sensor: SensorType, believed: Array, k: int, merging: Merging) -> i
     if not fit.any():
         return None
     common = np.where(fit, share.prod(axis=1), 0.0)
-    return int(np.flatnonzero(common >= common.max() - _EQUAL)[-1])
+    return int(np.flatnonzero(common >= common.max() - ROUNDING.samples)[-1])
 
 
 def _shift(
@@ -187,8 +173,8 @@ def _asked(image: TactileImage, at_mm: Array) -> tuple[Array, Array]:
     rows, columns = image.values.shape
     column = (at_mm[..., 0] - image.corner_mm[0]) / image.step_mm
     row = (image.corner_mm[1] - at_mm[..., 1]) / image.step_mm
-    inside = (column >= -_EQUAL) & (column <= columns - 1 + _EQUAL)
-    inside &= (row >= -_EQUAL) & (row <= rows - 1 + _EQUAL)
+    inside = (column >= -ROUNDING.samples) & (column <= columns - 1 + ROUNDING.samples)
+    inside &= (row >= -ROUNDING.samples) & (row <= rows - 1 + ROUNDING.samples)
     j = np.clip(np.floor(column).astype(np.intp), 0, columns - 2)
     i = np.clip(np.floor(row).astype(np.intp), 0, rows - 2)
     right, down = np.clip(column - j, 0, 1), np.clip(row - i, 0, 1)
@@ -203,6 +189,3 @@ def _asked(image: TactileImage, at_mm: Array) -> tuple[Array, Array]:
         value += known_here * image.values[i + di, j + dj]
         known += known_here
     return value, known
-
-
-_EQUAL = 1e-6

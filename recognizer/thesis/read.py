@@ -14,8 +14,7 @@ needs strokes that stand apart in the image, and knows a symbol or does not.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +30,9 @@ from decoder import (
 )
 from generator.array import ProductArray
 from recognizer.thesis.filters import median, unbiased
-from recognizer.thesis.grid import Acceptance, Grid, grid
-from recognizer.thesis.skeleton.symbols import SkeletonSettings, Symbol, symbols
+from recognizer.thesis.grid import Grid, grid
+from recognizer.thesis.settings import ThesisSettings
+from recognizer.thesis.skeleton.symbols import Symbol, symbols
 from recognizer.touch.lab import EmbossedArray, Lab
 from recognizer.touch.locate import Hypothesis
 from recognizer.touch.pose import face_covariance, face_pose, inside_mm, pose_on_object
@@ -51,21 +51,6 @@ from recognizer.touch.tactile_image import TactileImage
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-Conversion = Literal["likelihood", "good tuple", "exact"]
-
-
-@dataclass(frozen=True, slots=True)
-class ThesisSettings:
-    """How the stages work, and when an answer is given."""
-
-    median: bool = True  #: where strokes are wide enough to survive it
-    symbols: SkeletonSettings = field(default_factory=SkeletonSettings)
-    acceptance: Acceptance = field(default_factory=Acceptance)
-    conversion: Conversion = "likelihood"
-    error: float = 0.02  #: probability that a symbol is read wrong (likelihood)
-    strangers: float = 0.1  #: share of the symbols that the face may not hold
-    rim_mm: float = 2.0  #: how far the probe's centre may lie beyond the face
 
 
 @dataclass(frozen=True, slots=True, eq=False)

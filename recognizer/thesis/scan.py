@@ -21,8 +21,9 @@ from recognizer.scan.mosaic.grow import added
 from recognizer.scan.mosaic.mosaic import no_touches
 from recognizer.scan.session import TouchPlaces
 from recognizer.scan.settings import ScanSettings
-from recognizer.thesis.image import MergedImage, Merging, merged
-from recognizer.thesis.read import ClassicalReading, ThesisSettings, read_classically
+from recognizer.thesis.image import MergedImage, merged
+from recognizer.thesis.read import ClassicalReading, read_classically
+from recognizer.thesis.settings import Merging, ThesisSettings
 from recognizer.touch.lab import Lab
 from recognizer.touch.recognition import NO_CONTACT, TOO_FEW, Recognition, refusal
 from recognizer.touch.signal import Signal, signal_of

@@ -38,9 +38,10 @@ from recognizer.scan.mosaic.planar import between, moved
 from recognizer.thesis.edges.find import classical_edges, outline
 from recognizer.thesis.filters import median, unbiased
 from recognizer.thesis.grid import grid
-from recognizer.thesis.image import Merging, merged
+from recognizer.thesis.image import merged
 from recognizer.thesis.read import read_classically
 from recognizer.thesis.scan import read_while_scanning, spatial_pose
+from recognizer.thesis.settings import Merging
 from recognizer.thesis.skeleton.symbols import symbols
 from recognizer.touch.lab import open_lab
 from recognizer.touch.tactile_image import touch_image

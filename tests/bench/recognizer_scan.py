@@ -39,8 +39,8 @@ from probe.simulate.registered import registered_surface
 from recognizer.scan.grow import begin_scan, extend_scan
 from recognizer.scan.mosaic.planar import inverse, moved, planar_covariance, planar_pose
 from recognizer.scan.mosaic.touch import PlacedTouch, placed
-from recognizer.thesis.image import Merging
 from recognizer.thesis.scan import read_scan as read_classically
+from recognizer.thesis.settings import Merging
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise

@@ -9,40 +9,23 @@ symbols are not felt themselves, only their symbols are; there, edges are those 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import SensorType
-from recognizer.thesis.edges.fit import FittedEdges, Fitting, fitted
-from recognizer.thesis.edges.hough import HoughSettings, segments
+from recognizer.thesis.edges.fit import FittedEdges, fitted
+from recognizer.thesis.edges.hough import segments
 from recognizer.thesis.edges.line import Corner, Edge, meeting
-from recognizer.thesis.edges.points import STEEP, edge_points
-from recognizer.thesis.edges.response import BLURS_MM
-from recognizer.thesis.edges.syntax import SyntaxRules, fused, vertices
+from recognizer.thesis.edges.points import edge_points
+from recognizer.thesis.edges.syntax import fused, vertices
 from recognizer.thesis.filters import magnified, median, unbiased
+from recognizer.thesis.settings import EDGE_RESPONSE, EdgeSearchSettings, SyntaxRules
 from recognizer.touch.signal import Signal
 from recognizer.touch.tactile_image import TactileImage, touch_image
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """How edges are found."""
-
-    median: bool = True
-    doublings: int = 2  #: of the image before its slopes are taken; a mosaic is fine already
-    steep: float = STEEP
-    hough: HoughSettings = field(default_factory=HoughSettings)
-    rules: SyntaxRules = field(default_factory=SyntaxRules)
-    fitting: Fitting = field(default_factory=Fitting)
-    most: int = 3  #: edges that are fitted at once
-    beyond: float = 0.15  #: of what is felt inside an edge, that may be felt beyond it
-    firm: float = 0.25  #: of what is felt most, that must be felt inside an edge
-    moved_mm: float = 2.0  #: by a fit, at the ends of what is seen; edges moved further are none
-    off: float = 3.0  #: expected standard deviations that a fit may leave unexplained
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +38,9 @@ class Outline:
     off: float  #: rms of what is not explained, in expected standard deviations; NaN: not fitted
 
 
-def classical_edges(image: TactileImage, finding: Finding | None = None) -> tuple[Edge, ...]:
+def classical_edges(
+    image: TactileImage, finding: EdgeSearchSettings | None = None
+) -> tuple[Edge, ...]:
     """Return the edges in an image by the thesis's way, the longest first.
 
     Parameters
@@ -63,7 +48,7 @@ def classical_edges(image: TactileImage, finding: Finding | None = None) -> tupl
     image
         Readings of a touch or a mosaic.
     """
-    chosen = finding or Finding()
+    chosen = finding or EdgeSearchSettings()
     over = unbiased(image)
     if chosen.median:
         over = median(over)
@@ -72,7 +57,7 @@ def classical_edges(image: TactileImage, finding: Finding | None = None) -> tupl
 
 
 def face_edges(
-    image: TactileImage, sensor: SensorType, finding: Finding | None = None
+    image: TactileImage, sensor: SensorType, finding: EdgeSearchSettings | None = None
 ) -> tuple[Edge, ...]:
     """Return the edges of a blank face that one touch feels, in the sensor frame.
 
@@ -110,9 +95,11 @@ def touch_edges(sensor: SensorType, signal: Signal) -> tuple[Edge, ...]:
     return face_edges(touch_image(sensor, signal.forces, signal.trust), sensor)
 
 
-def outline(image: TactileImage, sensor: SensorType, finding: Finding | None = None) -> Outline:
+def outline(
+    image: TactileImage, sensor: SensorType, finding: EdgeSearchSettings | None = None
+) -> Outline:
     """Return edges and corners that one touch feels, in the sensor frame; see `face_edges`."""
-    chosen = finding or Finding()
+    chosen = finding or EdgeSearchSettings()
     over = unbiased(image)
     rough = tuple(edge for edge in classical_edges(image, chosen) if _bounds(over, edge, chosen))[
         : chosen.most
@@ -134,14 +121,19 @@ def outline(image: TactileImage, sensor: SensorType, finding: Finding | None = N
 
 
 def _best(
-    image: TactileImage, sensor: SensorType, edges: tuple[Edge, ...], finding: Finding
+    image: TactileImage, sensor: SensorType, edges: tuple[Edge, ...], finding: EdgeSearchSettings
 ) -> FittedEdges | None:
     """Return the fit of a face inside of all edges, or of any, whichever explains more."""
     reflex = False
     if len(edges) > 1:
         ways = [
             fitted(
-                image, sensor, edges, reflex=way, blurs_mm=BLURS_MM[1:2], fitting=finding.fitting
+                image,
+                sensor,
+                edges,
+                reflex=way,
+                blurs_mm=EDGE_RESPONSE.blurs_mm[1:2],
+                fitting=finding.fitting,
             )
             for way in (False, True)
         ]
@@ -150,7 +142,7 @@ def _best(
     return fitted(image, sensor, edges, reflex=reflex, fitting=finding.fitting)
 
 
-def _bounds(image: TactileImage, edge: Edge, finding: Finding) -> bool:
+def _bounds(image: TactileImage, edge: Edge, finding: EdgeSearchSettings) -> bool:
     """Whether a face that is pressed ends here.
 
     Beyond other edges something is felt, too: folds of the pressure. Where the plate lifts off

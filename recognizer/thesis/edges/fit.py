@@ -21,26 +21,12 @@ from numpy.typing import NDArray
 
 from probe.sensor import SensorType
 from recognizer.thesis.edges.line import Edge
-from recognizer.thesis.edges.response import BLURS_MM, felt_at, responses
+from recognizer.thesis.edges.response import felt_at, responses
+from recognizer.thesis.settings import EDGE_RESPONSE, EdgeFitSettings
 from recognizer.touch.tactile_image import TactileImage
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-
-@dataclass(frozen=True, slots=True)
-class Fitting:
-    """How edges are fitted."""
-
-    rounds: int = 3  #: of pressure and edges in turns
-    steps: int = 3  #: of the edges in each
-    band_mm: float = 3.0  #: tactels so near to an edge tell where it is
-    inner_mm: float = 1.2  #: tactels so far inside tell the pressure
-    gain: float = 0.15  #: standard deviation of tactels' gains
-    floor: float = 0.07  #: of noise and of tabs off their places, over the pressure
-    farthest: float = 3.0  #: standard deviations, beyond which a reading counts ever less
-    model_mm: float = 0.06  #: standard deviation of an edge that the model alone makes
-    model_rad: float = math.radians(0.4)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,8 +46,8 @@ def fitted(
     edges: tuple[Edge, ...],
     *,
     reflex: bool = False,
-    blurs_mm: Sequence[float] = BLURS_MM,
-    fitting: Fitting | None = None,
+    blurs_mm: Sequence[float] = EDGE_RESPONSE.blurs_mm,
+    fitting: EdgeFitSettings | None = None,
 ) -> FittedEdges | None:
     """Fit one, two or more edges at once.
 
@@ -76,13 +62,13 @@ def fitted(
     reflex
         Whether a tactel is on the face that is inside of any, not of all edges.
     blurs_mm
-        Those of `BLURS_MM` that are tried.
+        Those that are tried, of `EdgeResponseSettings.blurs_mm`.
 
     Returns
     -------
     None where too few tactels lie on the face to tell.
     """
-    chosen = fitting or Fitting()
+    chosen = fitting or EdgeFitSettings()
     rows, columns = np.indices(image.values.shape)
     at = image.xy_mm(rows, columns)[image.defined]
     readings = image.values[image.defined]
@@ -90,7 +76,7 @@ def fitted(
     lines = np.array([[edge.angle_rad, edge.offset_mm] for edge in edges])
     best: tuple[float, Array, float, Array] | None = None
     for blur in blurs_mm:
-        table = tables[BLURS_MM.index(blur)]
+        table = tables[EDGE_RESPONSE.blurs_mm.index(blur)]
         found = _settled(at, readings, table, lines, reflex, chosen)
         if found is not None and (best is None or found[0] < best[0]):
             best = (found[0], found[1], blur, found[2])
@@ -110,10 +96,11 @@ def fitted(
 
 
 def _settled(
-    at: Array, readings: Array, table: Array, lines: Array, reflex: bool, fitting: Fitting
+    at: Array, readings: Array, table: Array, lines: Array, reflex: bool, fitting: EdgeFitSettings
 ) -> tuple[float, Array, Array] | None:
     """Return the mean cost, lines and information (2 k, 2 k) with one blur."""
     information = np.zeros((lines.size, lines.size))
+    most = np.array(fitting.most)
     cost = math.inf
     for _ in range(fitting.rounds):
         pressure = _pressure(at, readings, lines, reflex, fitting)
@@ -125,11 +112,11 @@ def _settled(
         for _ in range(fitting.steps):
             rest = (over - _response(near, table, lines, reflex)) / sigma
             trust = 1 / np.maximum(1.0, np.abs(rest) / fitting.farthest)
-            slopes = _slopes(near, table, lines, reflex) / sigma[:, None]
+            slopes = _slopes(near, table, lines, reflex, fitting) / sigma[:, None]
             information = slopes.T @ (slopes * trust[:, None])
-            damped = information + np.diag(np.tile(_DAMPING, len(lines)))
+            damped = information + np.diag(np.tile(fitting.damping, len(lines)))
             step = np.linalg.solve(damped, slopes.T @ (trust * rest)).reshape(lines.shape)
-            lines = lines + np.clip(step, -_MOST, _MOST)
+            lines = lines + np.clip(step, -most, most)
         rest = np.abs((over - _response(near, table, lines, reflex)) / sigma)
         far = fitting.farthest
         cost = float(np.where(rest <= far, rest**2, far * (2 * rest - far)).mean())
@@ -137,17 +124,19 @@ def _settled(
 
 
 def _pressure(
-    at: Array, readings: Array, lines: Array, reflex: bool, fitting: Fitting
+    at: Array, readings: Array, lines: Array, reflex: bool, fitting: EdgeFitSettings
 ) -> Array | None:
     """Return what each tactel would read if the face reached everywhere; None if unknown."""
     inside = _joined(_inside(at, lines), reflex)
     well = (inside > fitting.inner_mm) & (readings > 0)
-    if well.sum() < _FEW:
+    if well.sum() < fitting.least_tactels:
         return None
-    x, y = at.T / _SCALE_MM
+    x, y = at.T / fitting.scale_mm
     terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1)
     level = readings[well].max()
-    weights = np.exp(-inside[well] / _SCALE_MM) * np.minimum(1.0, readings[well] / (0.1 * level))
+    weights = np.exp(-inside[well] / fitting.scale_mm) * np.minimum(
+        1.0, readings[well] / (0.1 * level)
+    )
     a = terms[well] * weights[:, None]
     b = np.log(np.maximum(readings[well], 1e-3 * level)) * weights
     # bends are told only where there are tactels enough, and do not run away beyond them
@@ -172,16 +161,16 @@ def _response(at: Array, table: Array, lines: Array, reflex: bool) -> Array:
     return np.asarray(1 - (1 - each).prod(axis=1) if reflex else each.prod(axis=1))
 
 
-def _slopes(at: Array, table: Array, lines: Array, reflex: bool) -> Array:
+def _slopes(at: Array, table: Array, lines: Array, reflex: bool, fitting: EdgeFitSettings) -> Array:
     """Return derivatives (n, 2 k) by angle and offset of each edge.
 
     Steps are as wide as half the gap between two tabs, in which nothing changes: an edge there
     is known no better than that.
     """
     slopes = np.empty((len(at), lines.size))
-    turn = _STEP_MM / max(1.0, float(np.abs(at).max()) / 2)
+    turn = fitting.slope_mm / max(1.0, float(np.abs(at).max()) / 2)
     for k in range(len(lines)):
-        for m, step in ((0, turn), (1, _STEP_MM)):
+        for m, step in ((0, turn), (1, fitting.slope_mm)):
             ahead, back = lines.copy(), lines.copy()
             ahead[k, m] += step
             back[k, m] -= step
@@ -190,7 +179,7 @@ def _slopes(at: Array, table: Array, lines: Array, reflex: bool) -> Array:
     return slopes
 
 
-def _band(at: Array, lines: Array, fitting: Fitting) -> Mask:
+def _band(at: Array, lines: Array, fitting: EdgeFitSettings) -> Mask:
     return np.asarray(np.abs(_inside(at, lines)).min(axis=1) < fitting.band_mm)
 
 
@@ -206,10 +195,3 @@ def _moved(edge: Edge, line: Array, covariance: Array) -> Edge:
         end - float(moved.inside_mm(end)) * moved.normal for end in (edge.start_mm, edge.end_mm)
     ]
     return replace(moved, start_mm=ends[0], end_mm=ends[1])
-
-
-_FEW = 12  # tactels from which the pressure is told
-_SCALE_MM = 6.0  # over which the pressure changes
-_STEP_MM = 0.16
-_DAMPING = np.array([30.0, 0.3])  # of angle (1/rad^2) and offset (1/mm^2)
-_MOST = np.array([0.1, 0.5])  # that a step may change angle (rad) and offset (mm)

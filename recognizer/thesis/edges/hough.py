@@ -19,21 +19,9 @@ from numpy.typing import NDArray
 
 from recognizer.thesis.edges.line import Edge, through
 from recognizer.thesis.edges.points import EdgePoints
+from recognizer.thesis.settings import HoughSettings
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class HoughSettings:
-    """What makes a segment."""
-
-    turn_rad: float = math.radians(35)  #: of a point's slope against the segment's normal
-    near_mm: float = 0.7  #: of a point from the line
-    gap_mm: float = 4.0  #: between points of one unbroken run
-    least_points: int = 3
-    least_mm: float = 2.0  #: length of a segment
-    spread_mm: float = 0.2  #: standard deviation of a point across the line, at least
-    longest: int = 12  #: segments at most
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,11 +65,12 @@ def segments(points: EdgePoints, settings: HoughSettings | None = None) -> list[
 
 def _peaks(points: EdgePoints, settings: HoughSettings) -> list[tuple[float, float]]:
     """Return angle and offset of the fullest lines, refined."""
-    reach = float(np.abs(points.at_mm).max()) * math.sqrt(2) + _COARSE_MM
-    angles = (np.arange(_DIRECTIONS) + 0.5) * math.tau / _DIRECTIONS
-    offsets = np.arange(-reach, reach + _COARSE_MM, _COARSE_MM)
-    votes = _votes(points, angles, offsets, _COARSE_MM, settings)
-    order = np.argsort(-votes, axis=None, kind="stable")[:_STARTS]
+    cell = settings.coarse_mm
+    reach = float(np.abs(points.at_mm).max()) * math.sqrt(2) + cell
+    angles = (np.arange(settings.directions) + 0.5) * math.tau / settings.directions
+    offsets = np.arange(-reach, reach + cell, cell)
+    votes = _votes(points, angles, offsets, cell, settings)
+    order = np.argsort(-votes, axis=None, kind="stable")[: settings.starts]
     found = []
     for row, column in zip(*np.unravel_index(order, votes.shape), strict=True):
         found.append(_refined(points, float(angles[row]), float(offsets[column]), settings))
@@ -91,11 +80,12 @@ def _peaks(points: EdgePoints, settings: HoughSettings) -> list[tuple[float, flo
 def _refined(
     points: EdgePoints, angle: float, offset: float, settings: HoughSettings
 ) -> tuple[float, float]:
-    turn, cell = math.tau / _DIRECTIONS, _COARSE_MM
-    while cell > _FINE_MM:
+    turn, cell = math.tau / settings.directions, settings.coarse_mm
+    around = np.arange(-settings.around, settings.around + 1.0)
+    while cell > settings.fine_mm:
         turn, cell = turn / 2, cell / 2
-        angles = angle + _AROUND * turn
-        offsets = offset + _AROUND * cell
+        angles = angle + around * turn
+        offsets = offset + around * cell
         votes = _votes(points, angles, offsets, max(cell, settings.near_mm), settings)
         row, column = np.unravel_index(int(votes.argmax()), votes.shape)
         angle, offset = float(angles[row]), float(offsets[column])
@@ -128,10 +118,3 @@ def _run(
     runs = np.split(np.arange(len(on)), breaks)
     longest = max(runs, key=lambda run: float(places[run[-1]] - places[run[0]]))
     return np.asarray(on[longest])
-
-
-_DIRECTIONS = 24
-_COARSE_MM = 1.6
-_FINE_MM = 0.1
-_AROUND = np.arange(-2.0, 3.0)  # cells of the refined accumulator
-_STARTS = 4  # cells of the coarse accumulator that are followed

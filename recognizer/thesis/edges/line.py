@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from recognizer.thesis.settings import EDGE_LINE
+
 Array = NDArray[np.float64]
 
 
@@ -125,7 +127,7 @@ def meeting(first: Edge, second: Edge, joint: Array | None = None) -> Corner | N
         (4, 4) covariance of the first one's angle and offset and the second one's; by default
         they are independent.
     """
-    if abs(_cross(first.normal, second.normal)) < _PARALLEL:
+    if abs(_cross(first.normal, second.normal)) < EDGE_LINE.parallel:
         return None
     offsets = np.array([first.offset_mm, second.offset_mm])
     at = np.asarray(np.linalg.solve(np.stack([first.normal, second.normal]), offsets), np.float64)
@@ -169,6 +171,3 @@ def _leads(edge: Edge, at: Array, *, starts: bool = False) -> float:
 
 def _cross(a: Array, b: Array) -> float:
     return float(a[0] * b[1] - a[1] * b[0])
-
-
-_PARALLEL = 0.1  # sine of the angle below which two edges meet nowhere in particular

@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.thesis.filters import sobel
+from recognizer.thesis.settings import EDGE_SEARCH
 from recognizer.touch.tactile_image import TactileImage
 
 Array = NDArray[np.float64]
-
-STEEP = 0.3  #: of the steepest slopes, from which a sample can be an edge point
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +35,7 @@ class EdgePoints:
         return EdgePoints(self.at_mm[mask], self.normals[mask], self.slopes[mask])
 
 
-def edge_points(image: TactileImage, steep: float = STEEP) -> EdgePoints:
+def edge_points(image: TactileImage, steep: float = EDGE_SEARCH.steep) -> EdgePoints:
     """Return the edge points of an image over its bias, in reading order.
 
     Samples with an undefined one beside them have no slope, and those at the rim none across it.

@@ -15,39 +15,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import SensorType
+from recognizer.thesis.settings import EDGE_RESPONSE
 
 Array = NDArray[np.float64]
-
-STEP_MM = 0.05
-REACH_MM = 6.0  #: beyond, responses are 0 or 1
-BLURS_MM = (0.1, 0.4, 0.75)  #: standard deviations that are tabulated
-_BULGE = 0.59  # F(c) / F(1) = c (1 + bulge (1 - c)) of a tip covered by the share c
-_PAD = 0.5  # of its thickness: what a pad smears, standard deviation
 
 
 @lru_cache(maxsize=8)
 def responses(sensor: SensorType) -> Array:
-    """Return responses (blurs, n) at -REACH_MM ... REACH_MM inside, every STEP_MM."""
+    """Return responses (blurs, n) at -reach_mm ... reach_mm inside, every step_mm."""
     from scipy.ndimage import gaussian_filter1d
 
-    steps = round(REACH_MM / STEP_MM)
-    inside = np.arange(-steps, steps + 1) * STEP_MM
+    step = EDGE_RESPONSE.step_mm
+    steps = round(EDGE_RESPONSE.reach_mm / step)
+    inside = np.arange(-steps, steps + 1) * step
     overlay = sensor.overlay
     if overlay.kind == "tab":
         t = np.clip(inside / (overlay.tab_diameter_mm / 2), -1, 1)
         cover = 0.5 + (np.arcsin(t) + t * np.sqrt(1 - t * t)) / np.pi
-        felt = cover * (1 + _BULGE * (1 - cover))
+        felt = cover * (1 + EDGE_RESPONSE.bulge * (1 - cover))
     else:
         share = np.clip(inside / sensor.pitch_mm + 0.5, 0, 1)
-        felt = gaussian_filter1d(share, _PAD * overlay.height_mm / STEP_MM, mode="nearest")
-    table = np.array([gaussian_filter1d(felt, blur / STEP_MM, mode="nearest") for blur in BLURS_MM])
+        felt = gaussian_filter1d(
+            share, EDGE_RESPONSE.pad * overlay.height_mm / step, mode="nearest"
+        )
+    blurs = [blur / step for blur in EDGE_RESPONSE.blurs_mm]
+    table = np.array([gaussian_filter1d(felt, blur, mode="nearest") for blur in blurs])
     table.setflags(write=False)
     return table
 
 
 def felt_at(table: Array, inside_mm: Array) -> Array:
     """Return one row of `responses` at distances of any shape."""
-    place = np.clip((inside_mm + REACH_MM) / STEP_MM, 0, len(table) - 1)
+    place = np.clip((inside_mm + EDGE_RESPONSE.reach_mm) / EDGE_RESPONSE.step_mm, 0, len(table) - 1)
     k = np.minimum(place.astype(np.intp), len(table) - 2)
     share = place - k
     return np.asarray(table[k] * (1 - share) + table[k + 1] * share)

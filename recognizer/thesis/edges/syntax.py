@@ -12,25 +12,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from recognizer.thesis.edges.hough import Segment
 from recognizer.thesis.edges.line import Corner, Edge, meeting, through
 from recognizer.thesis.edges.points import EdgePoints
-
-
-@dataclass(frozen=True, slots=True)
-class SyntaxRules:
-    """When segments run on into each other, and when they turn."""
-
-    straight_rad: float = math.radians(155)  #: angle from which two are one edge
-    break_mm: float = 5.0  #: shorter segments are breaks
-    across_mm: float = 1.0  #: from one's line to the other's ends, for being one edge
-    apart_mm: float = 12.0  #: along the way, between their ends
-    spread_mm: float = 0.2  #: standard deviation of a point across an edge, at least
-    beyond_mm: float = 5.0  #: how far from its edges' seen parts a corner may lie
+from recognizer.thesis.settings import SyntaxRules
 
 
 def fused(segments: list[Segment], rules: SyntaxRules | None = None) -> tuple[Edge, ...]:

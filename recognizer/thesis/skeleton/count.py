@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from encoded_objects.errors import require
 from generator.alphabet import Glyph
+from recognizer.thesis.settings import ROUNDING, Counting
 from recognizer.thesis.skeleton.graph import Path, graph
 
 Array = NDArray[np.float64]
@@ -33,17 +34,6 @@ class Points:
     def counts(self) -> tuple[int, int, int]:
         """End-points, vertices and closed loops."""
         return len(self.ends), len(self.vertices), self.loops
-
-
-@dataclass(frozen=True, slots=True)
-class Counting:
-    """When a bend or a branch counts, in lattice units of the alphabet (reach x pitch)."""
-
-    spur: float = 0.4  #: branches with a free end that are shorter are pruned
-    hook: float = 0.3  #: of a free end, in which thinning may have bent the line
-    bow: float = 0.16  #: how far a line may bow from a straight one
-    turn_rad: float = math.radians(40)  #: from which a bend is a corner
-    near: float = 0.5  #: vertices nearer together are one
 
 
 def points_of_skeleton(skeleton: NDArray[np.bool_], unit: float, counting: Counting) -> Points:
@@ -80,18 +70,15 @@ def points_of_glyph(glyph: Glyph) -> Points:
             for a, b in strokes
             if _on(at, a, b)
             for to in (a, b)
-            if abs(to - at) > _TINY
+            if abs(to - at) > ROUNDING.lattice
         }
         spokes += len(leaving)
-        straight = len(leaving) == 2 and abs(sum(leaving)) < _TINY
+        straight = len(leaving) == 2 and abs(sum(leaving)) < ROUNDING.lattice
         if len(leaving) == 1:
             ends.append((at.real, at.imag))
         elif not straight:
             vertices.append((at.real, at.imag))
     return Points(_stacked(ends), _stacked(vertices), spokes // 2 - len(places) + 1)
-
-
-_TINY = 1e-9
 
 
 def _corners(path: Path, bow: float, turn_rad: float) -> Path:
@@ -132,7 +119,7 @@ def _crossing(one: tuple[complex, complex], other: tuple[complex, complex]) -> s
     (a, b), (c, d) = one, other
     u, v, w = b - a, d - c, c - a
     cross = (u.conjugate() * v).imag
-    if abs(cross) < _TINY:
+    if abs(cross) < ROUNDING.lattice:
         return set()
     at = a + u * (w.conjugate() * v).imag / cross
     inside = _on(at, a, b) and _on(at, c, d)
@@ -140,7 +127,7 @@ def _crossing(one: tuple[complex, complex], other: tuple[complex, complex]) -> s
 
 
 def _on(at: complex, a: complex, b: complex) -> bool:
-    return abs(at - a) + abs(b - at) < abs(b - a) + _TINY
+    return abs(at - a) + abs(b - at) < abs(b - a) + ROUNDING.lattice
 
 
 def _rounded(z: complex) -> complex:

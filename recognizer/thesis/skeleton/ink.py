@@ -9,9 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from recognizer.thesis.settings import INK
 from recognizer.touch.tactile_image import TactileImage
-
-FAINT = 0.15  #: of what the image feels most; below it nothing is pressed
 
 
 def ink(image: TactileImage, reach_mm: float, share: float) -> NDArray[np.bool_]:
@@ -32,5 +31,5 @@ def ink(image: TactileImage, reach_mm: float, share: float) -> NDArray[np.bool_]
         return np.zeros(image.values.shape, np.bool_)
     size = 2 * round(reach_mm / 2 / image.step_mm) + 1
     nearby = uniform_filter(maximum_filter(image.values, size), size, mode="nearest")
-    least = FAINT * np.quantile(image.values[image.defined], 0.99)
+    least = INK.faint * np.quantile(image.values[image.defined], 0.99)
     return np.asarray((image.values > share * nearby) & (nearby > least) & image.defined)

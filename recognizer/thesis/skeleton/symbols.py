@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -21,24 +21,14 @@ from numpy.typing import NDArray
 from encoded_objects.errors import require
 from generator.alphabet import Alphabet, Glyph, SymbolStyle
 from recognizer.thesis.filters import magnified
-from recognizer.thesis.skeleton.count import Counting, Points, points_of_glyph, points_of_skeleton
+from recognizer.thesis.settings import SkeletonSettings
+from recognizer.thesis.skeleton.count import Points, points_of_glyph, points_of_skeleton
 from recognizer.thesis.skeleton.ink import ink
 from recognizer.touch.tactile_image import TactileImage
 
 Array = NDArray[np.float64]
 
 CUT, COUNTS, SHAPE = "cut", "counts", "shape"
-THICK = 6  #: samples that a stroke is magnified to before it is thinned
-
-
-@dataclass(frozen=True, slots=True)
-class SkeletonSettings:
-    """When ink is a symbol."""
-
-    share: float = 0.58  #: of the strongest reading nearby, from which a sample is ink
-    least_area: float = 0.3  #: of a symbol's stroke area; smaller specks are no symbols
-    shape: float = 0.35  #: lattice units, rms, that the points may be off; inf: counts alone
-    counting: Counting = field(default_factory=Counting)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,31 +56,32 @@ def symbols(
     Parameters
     ----------
     image
-        Over its bias; of any resolution, it is magnified until strokes are `THICK` samples wide.
+        Over its bias; of any resolution, it is magnified until strokes are `thick` samples wide.
     """
     require("skimage", extra="thesis", purpose="the thesis's reading")
     from scipy.ndimage import find_objects, label
     from skimage.morphology import skeletonize
 
     chosen = settings or SkeletonSettings()
-    thin = THICK * image.step_mm / style.stroke_mm
+    rim = chosen.rim
+    thin = chosen.thick * image.step_mm / style.stroke_mm
     image = magnified(image, max(0, math.ceil(math.log2(thin))))
     unit_mm = alphabet.reach * style.pitch_mm
     shown = ink(image, style.pitch_mm, chosen.share)
     numbers, _ = label(shown, structure=np.ones((3, 3)))
-    beyond = np.pad(~image.defined, _RIM, constant_values=True)
-    values = np.pad(image.values, _RIM)
+    beyond = np.pad(~image.defined, rim, constant_values=True)
+    values = np.pad(image.values, rim)
     least = chosen.least_area * 2 * unit_mm * style.stroke_mm / image.step_mm**2
     found = []
     for number, (rows, columns) in enumerate(find_objects(numbers), 1):
-        part = np.pad(numbers[rows, columns] == number, _RIM)
+        part = np.pad(numbers[rows, columns] == number, rim)
         if part.sum() < least:
             continue
         box = (
-            slice(rows.start, rows.stop + 2 * _RIM),
-            slice(columns.start, columns.stop + 2 * _RIM),
+            slice(rows.start, rows.stop + 2 * rim),
+            slice(columns.start, columns.stop + 2 * rim),
         )
-        whole = _grown(part, _RIM)
+        whole = _grown(part, rim)
         cut = bool((_grown(part, 1) & beyond[box]).any())
         points = points_of_skeleton(skeletonize(part), unit_mm / image.step_mm, chosen.counting)
         weights = np.where(whole, values[box], 0.0)
@@ -103,15 +94,13 @@ def symbols(
             )
             / weights.sum()
         )
-        corner = (rows.start - _RIM, columns.start - _RIM)
+        corner = (rows.start - rim, columns.start - rim)
         placed = Points(
             image.xy_mm(*(points.ends + corner).T),
             image.xy_mm(*(points.vertices + corner).T),
             points.loops,
         )
-        found.append(
-            _named(placed, image.xy_mm(*(middle + corner)), cut, alphabet, style, chosen.shape)
-        )
+        found.append(_named(placed, image.xy_mm(*(middle + corner)), cut, alphabet, style, chosen))
     return found
 
 
@@ -121,7 +110,7 @@ def _named(
     cut: bool,
     alphabet: Alphabet,
     style: SymbolStyle,
-    shape: float,
+    settings: SkeletonSettings,
 ) -> Symbol:
     unit_mm = alphabet.reach * style.pitch_mm
     x, y = middle.tolist()
@@ -135,9 +124,9 @@ def _named(
     if not fits:
         return Symbol(-1, x, y, math.nan, (x, y), math.nan, points, COUNTS)
     off, theta, label = min(fits)
-    if off > shape * unit_mm:
+    if off > settings.shape * unit_mm:
         return Symbol(-1, x, y, math.nan, (x, y), off, points, SHAPE)
-    own = _middle(alphabet.glyphs[label], unit_mm, style.stroke_mm)
+    own = _middle(alphabet.glyphs[label], unit_mm, style.stroke_mm, settings.fine)
     at = complex(x, y) - own * complex(math.cos(theta), math.sin(theta))
     return Symbol(label, at.real, at.imag, theta, (x, y), off, points, "")
 
@@ -171,10 +160,10 @@ def laid(glyph: Points, found: Points, unit_mm: float) -> tuple[float, float]:
 
 
 @lru_cache(maxsize=256)
-def _middle(glyph: Glyph, unit_mm: float, stroke_mm: float) -> complex:
+def _middle(glyph: Glyph, unit_mm: float, stroke_mm: float, fine: int) -> complex:
     """Return the middle of a glyph's area, mm, in its own axes."""
     half = unit_mm + stroke_mm
-    x, y = np.meshgrid(np.linspace(-half, half, _FINE), np.linspace(-half, half, _FINE))
+    x, y = np.meshgrid(np.linspace(-half, half, fine), np.linspace(-half, half, fine))
     at = x + 1j * y
     covered = np.zeros(at.shape, np.bool_)
     for a, b in glyph.strokes:
@@ -182,10 +171,6 @@ def _middle(glyph: Glyph, unit_mm: float, stroke_mm: float) -> complex:
         share = np.clip(((at - start) * along.conjugate()).real / abs(along) ** 2, 0, 1)
         covered |= abs(at - start - share * along) <= stroke_mm / 2
     return complex(at[covered].mean())
-
-
-_RIM = THICK // 2  # samples around a component that belong to its blur
-_FINE = 101  # points along a symbol's box
 
 
 def _grown(part: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:

@@ -17,9 +17,10 @@ from probe.scan.raster import raster
 from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from recognizer.scan.mosaic.planar import between, moved
-from recognizer.thesis.image import Merging, laid, merged, relative_poses
-from recognizer.thesis.read import ThesisSettings, read_classically
+from recognizer.thesis.image import laid, merged, relative_poses
+from recognizer.thesis.read import read_classically
 from recognizer.thesis.scan import read_scan, read_while_scanning
+from recognizer.thesis.settings import Merging, ThesisSettings
 from recognizer.thesis.skeleton.symbols import symbols
 from recognizer.touch.lab import open_lab
 from recognizer.touch.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, TOO_FEW

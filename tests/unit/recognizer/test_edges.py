@@ -12,12 +12,13 @@ from probe.contact.tips import Tips
 from probe.sensor import Overlay, SensorType
 from probe.surface.face import FaceSurface
 from probe.surface.polygon import polygon
-from recognizer.thesis.edges.find import Finding, classical_edges, face_edges, outline
+from recognizer.thesis.edges.find import classical_edges, face_edges, outline
 from recognizer.thesis.edges.hough import segments
 from recognizer.thesis.edges.line import meeting, through
 from recognizer.thesis.edges.points import EdgePoints, edge_points
-from recognizer.thesis.edges.response import BLURS_MM, REACH_MM, felt_at, responses
+from recognizer.thesis.edges.response import felt_at, responses
 from recognizer.thesis.edges.syntax import fused, vertices
+from recognizer.thesis.settings import EDGE_RESPONSE, EdgeSearchSettings
 from recognizer.touch.tactile_image import tactile_image, touch_image
 
 SENSOR = SensorType()
@@ -135,12 +136,12 @@ def test_edges_that_turn_make_a_vertex_and_parallel_ones_none():
 @pytest.mark.parametrize("kind", ["tab", "pad"])
 def test_response_rises_from_nothing_to_all(kind):
     table = responses(SensorType(overlay=Overlay(kind=kind)))
-    assert len(table) == len(BLURS_MM)
+    assert len(table) == len(EDGE_RESPONSE.blurs_mm)
     assert (np.diff(table, axis=1) > -1e-12).all()
     for row in table:
-        assert felt_at(row, np.array([-REACH_MM - 1, REACH_MM + 1])) == pytest.approx(
-            [0, 1], abs=1e-4
-        )
+        assert felt_at(
+            row, np.array([-EDGE_RESPONSE.reach_mm - 1, EDGE_RESPONSE.reach_mm + 1])
+        ) == pytest.approx([0, 1], abs=1e-4)
     sharp = felt_at(table[0], np.array([-0.5, 0.0, 0.5]))
     assert 0 < sharp[0] < 0.4 < sharp[1] < 0.66 < sharp[2]
 
@@ -248,4 +249,4 @@ def test_dead_tactels_are_left_out():
         values[r, c], trust[r, c] = 0.0, 0.0
     edge = face_edges(touch_image(SENSOR, values, trust), SENSOR)[0]
     assert worst_mm(edge, *truth(touch, (0, 80), (0, 0))) < 0.5
-    assert classical_edges(touch_image(SENSOR, values, trust), Finding(median=False))
+    assert classical_edges(touch_image(SENSOR, values, trust), EdgeSearchSettings(median=False))

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from recognizer.thesis.grid import Acceptance, grid
+from recognizer.thesis.grid import grid
+from recognizer.thesis.settings import Acceptance
 from recognizer.thesis.skeleton.count import Points
 from recognizer.thesis.skeleton.symbols import Symbol
 

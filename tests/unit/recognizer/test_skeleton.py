@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from generator.alphabet import SymbolStyle, alphabet_named
-from recognizer.thesis.skeleton.count import Counting, points_of_glyph, points_of_skeleton
+from recognizer.thesis.settings import Counting, SkeletonSettings
+from recognizer.thesis.skeleton.count import points_of_glyph, points_of_skeleton
 from recognizer.thesis.skeleton.graph import graph, length
-from recognizer.thesis.skeleton.symbols import COUNTS, CUT, SkeletonSettings, symbols
+from recognizer.thesis.skeleton.symbols import COUNTS, CUT, symbols
 from recognizer.touch.tactile_image import tactile_image
 
 STEP = 0.4
