@@ -14,17 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.scan.mosaic.planar import composed, inverse, wrapped
-from recognizer.scan.settings import ScanSettings
+from recognizer.scan.settings import LATTICES, ScanSettings
 from recognizer.scan.views import LatticeViews, Stands
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-ROUNDS = 2  #: of choosing views and moving the lattice
 _NEIGHBOURS = np.array([[i, j] for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j], np.float64)
-_SETTLED = 0.05  # mm, by which a lattice moves at no touch
-_TIE = 1e-6  # of two views that both say nothing for a lattice the likelier one is taken
-_LEAST = 1e-12  # of a variance, mm^2 or rad^2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,11 +61,11 @@ def agreed(
 ) -> Agreement:
     """Return what agrees with a lattice, and the lattice moved to where that wants it."""
     found = _agreed(views, stands, lattice, pitch_mm, limits)
-    for _ in range(ROUNDS):
+    for _ in range(LATTICES.rounds):
         lattice = _moved(views, stands, found, pitch_mm, limits)
         before, found = found, _agreed(views, stands, lattice, pitch_mm, limits)
         away = np.abs(found.expected - before.expected)[:, :2].max()
-        if away < _SETTLED and (found.chosen == before.chosen).all():
+        if away < LATTICES.settled_mm and (found.chosen == before.chosen).all():
             break
     return found
 
@@ -108,7 +104,7 @@ def _agreed(
     likely &= views.losses > -limits.plainly
     score = np.maximum(views.losses, -limits.left_out) - chi2 / 2
     score += np.where(views.led, 0.0, limits.agreement)
-    score += views.losses * _TIE
+    score += views.losses * LATTICES.tie
     chosen, best = np.full(number, -1), np.full(number, -limits.left_out)
     best[np.setdiff1d(np.arange(number), views.touch)] = 0.0  # nothing is felt there
     rising = np.argsort(score, kind="stable")
@@ -169,7 +165,7 @@ def _moved(
     covariance = np.linalg.inv((weighted @ lever).sum(axis=0))
     motion = covariance @ (weighted @ away[chosen][..., None]).sum(axis=0)[:, 0]
     at = composed(motion, found.lattice.T_lattice_plane)
-    return PlaneLattice(at, covariance + _LEAST * np.eye(3))
+    return PlaneLattice(at, covariance + LATTICES.least * np.eye(3))
 
 
 def _lever(poses: Array) -> Array:

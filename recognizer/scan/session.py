@@ -24,8 +24,6 @@ from recognizer.touch.signal import Signal
 
 Array = NDArray[np.float64]
 
-FIRST = (0.01, 0.01, 0.001)  #: mm, rad: of the first touch against itself, where nothing is known
-
 
 class Scan:
     """Several overlapping touches of one face, read as one belief.
@@ -137,7 +135,7 @@ class TouchPlaces:
     def place(self, signal: Signal, pose: SensorPose | ArrayLike | None, seq: int) -> PlacedTouch:
         """Return a touch with what is known of its place."""
         if not self._any:
-            spread = FIRST if pose is None else self._spread(pose, _matrix(pose))
+            spread = self.settings.first if pose is None else self._spread(pose, _matrix(pose))
             return PlacedTouch(signal, believed=placed(np.zeros(3), spread), seq=seq)
         if pose is not None and self._T_first_base is not None:
             return PlacedTouch(signal, believed=self._within(self._T_first_base, pose), seq=seq)

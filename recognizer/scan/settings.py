@@ -35,7 +35,10 @@ class ScanSettings:
     loose_mm: float = 0.6  #: largest standard deviation of a place that is given as an answer
     patience: int = 3  #: touches in a row that may agree with nothing while others are believed
     verify_steps: int = 3  #: of the last touch's pose, with the symbols that the database holds
-    #: standard deviations of x, y (mm) and the turn (rad) of a recorded pose that comes without
+    #: standard deviations of x, y (mm) and the turn (rad) of the first touch against itself,
+    #: where nothing is known
+    first: tuple[float, float, float] = (0.01, 0.01, 0.001)
+    #: of a recorded pose that comes without
     by_arm: tuple[float, float, float] = (0.4, 0.4, 0.004)
     #: of a step from touch to touch that nobody measured. Wide: one of 14 mm must not look less
     #: likely than one of 2 mm, a pitch beside it
@@ -47,3 +50,28 @@ class ScanSettings:
     margin_by_hand: float = 10.0
     shifts_by_hand: int = 3  #: pitches, each way, by which the last touch must lie no better
     surprise_by_hand: float = 8.0
+
+
+@dataclass(frozen=True, slots=True)
+class LatticeAgreementSettings:
+    """How a lattice is moved to where its views want it."""
+
+    rounds: int = 2  #: of choosing views and moving the lattice
+    settled_mm: float = 0.05  #: by which a lattice moves at no touch
+    tie: float = 1e-6
+    """Share of a view's loss that counts: of two views that both say nothing for a lattice the
+    likelier one is taken."""
+    least: float = 1e-12  #: of a variance, mm^2 or rad^2
+
+
+@dataclass(frozen=True, slots=True)
+class LatticeViewSettings:
+    """Which fits of a touch are views, and which of them are one."""
+
+    least_rad: float = 1e-5  #: standard deviation of poses that are believed, at least
+    most_mm: float = 3.0  #: the same, at most
+    same_mm: float = 0.3  #: by which two fits of a touch are one
+    same_rad: float = 0.03  #: the same, of their turns
+
+
+LATTICES, VIEWS = LatticeAgreementSettings(), LatticeViewSettings()

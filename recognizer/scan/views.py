@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from recognizer.scan.mosaic.grow import added
 from recognizer.scan.mosaic.mosaic import Mosaic, MosaicSettings, no_touches
 from recognizer.scan.mosaic.planar import wrapped
-from recognizer.scan.mosaic.search import ImageSearchSettings
+from recognizer.scan.mosaic.settings import ImageSearchSettings
 from recognizer.scan.mosaic.touch import PlacedTouch
-from recognizer.scan.settings import ScanSettings
+from recognizer.scan.settings import VIEWS, ScanSettings
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.reader import Reader
 from recognizer.touch.settings import FitSettings
@@ -31,9 +31,6 @@ from recognizer.touch.symbols.template import ResponseTemplate
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-LEAST_RAD, MOST_MM = 1e-5, 3.0  #: standard deviations of poses that are believed
-SAME_MM, SAME_RAD = 0.3, 0.03  #: by which two fits of a touch are one
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -222,11 +219,13 @@ def tells_place(covariance: Array) -> bool:
     if not np.isfinite(covariance).all():
         return False
     lowest = np.linalg.eigvalsh(covariance)[0]
-    return bool(lowest > LEAST_RAD**2 and max(covariance[0, 0], covariance[1, 1]) < MOST_MM**2)
+    return bool(
+        lowest > VIEWS.least_rad**2 and max(covariance[0, 0], covariance[1, 1]) < VIEWS.most_mm**2
+    )
 
 
 def _same(pose: Array, fit: Fit, pitch_mm: float) -> bool:
     """Whether a lattice is that of a fit, whole pitches apart."""
     away = pose - (fit.x_mm, fit.y_mm, fit.theta_rad)
     at = away[:2] - np.rint(away[:2] / pitch_mm) * pitch_mm
-    return math.hypot(*at) < SAME_MM and abs(float(wrapped(away[2]))) < SAME_RAD
+    return math.hypot(*at) < VIEWS.same_mm and abs(float(wrapped(away[2]))) < VIEWS.same_rad

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from probe.sensor import SensorType
 from recognizer.scan.mosaic.planar import between, composed, inverse, moved, planar_pose
-from recognizer.scan.mosaic.raster import MAGNIFIED
+from recognizer.scan.mosaic.settings import CANVAS
 from recognizer.thesis.filters import magnified
 from recognizer.thesis.product import product_shift
 from recognizer.thesis.settings import ROUNDING, Merging
@@ -115,7 +115,7 @@ def merged(
 
 def laid(sensor: SensorType, images: Sequence[TactileImage], placed: Array) -> TactileImage:
     """Return the mean of images laid at poses (n, 3), sampled four times as finely."""
-    cell = sensor.pitch_mm / MAGNIFIED
+    cell = sensor.pitch_mm / CANVAS.magnified
     half = np.array(sensor.half_mm) - sensor.pitch_mm / 2
     corners = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     ends = np.concatenate([moved(pose, corners) for pose in placed])

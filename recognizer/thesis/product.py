@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.scan.mosaic.raster import MAGNIFIED
+from recognizer.scan.mosaic.settings import CANVAS
 
 Array = NDArray[np.float64]
 
@@ -50,11 +50,11 @@ def product_shift(a: Array, b: Array, believed: tuple[float, float], window: flo
     """
     first, second = magnified(a), magnified(b)
     rows, columns = first.shape
-    right, down = round(believed[0] * MAGNIFIED), -round(believed[1] * MAGNIFIED)
+    right, down = round(believed[0] * CANVAS.magnified), -round(believed[1] * CANVAS.magnified)
     i0, i1 = max(0, down), min(rows, rows + down)
     j0, j1 = max(0, right), min(columns, columns + right)
     zone = first[i0:i1, j0:j1]
-    reach = math.floor(window * MAGNIFIED + 1e-9)
+    reach = math.floor(window * CANVAS.magnified + 1e-9)
     wide = np.pad(second, max(rows, columns) + reach)  # no reading beyond the matrix
     best, shift = -math.inf, (right, down)
     for k in range(-reach, reach + 1):
@@ -65,4 +65,4 @@ def product_shift(a: Array, b: Array, believed: tuple[float, float], window: flo
             total = float((zone * under).sum())
             if total > best:
                 best, shift = total, (right + n, down + k)
-    return np.array([shift[0], -shift[1]]) / MAGNIFIED
+    return np.array([shift[0], -shift[1]]) / CANVAS.magnified

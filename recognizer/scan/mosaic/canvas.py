@@ -19,12 +19,11 @@ from numpy.typing import NDArray
 
 from recognizer.scan.mosaic.patch import TouchPatch, asked, covered, nearest
 from recognizer.scan.mosaic.planar import inverse, moved
-from recognizer.scan.mosaic.raster import MAGNIFIED, KnownRaster
+from recognizer.scan.mosaic.raster import KnownRaster
+from recognizer.scan.mosaic.settings import CANVAS
 
 Array = NDArray[np.float64]
 
-TILE = 64  #: cells, as wide as a touch of 16 tactels
-FLOOR = 0.03  #: least standard deviation of a reading, share of the upper level
 WEIGHT, VALUE, SQUARE, COUNT = range(4)  #: sums of w, w f, w f^2 and 1
 
 
@@ -33,7 +32,7 @@ class Canvas:
     """Sums on tiles."""
 
     cell_mm: float
-    tiles: Mapping[tuple[int, int], Array]  #: tile row and column -> (4, TILE, TILE)
+    tiles: Mapping[tuple[int, int], Array]  #: tile row and column -> (4, tile, tile)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,7 +46,7 @@ class Laid:
 
 def empty_canvas(pitch_mm: float) -> Canvas:
     """Return a canvas on which nothing lies."""
-    return Canvas(pitch_mm / MAGNIFIED, {})
+    return Canvas(pitch_mm / CANVAS.magnified, {})
 
 
 def laid(canvas: Canvas, patch: TouchPatch, how: Laid, sign: int = 1) -> Canvas:
@@ -68,7 +67,8 @@ def laid(canvas: Canvas, patch: TouchPatch, how: Laid, sign: int = 1) -> Canvas:
     away = points[known] - how.pose[:2]
     slopes = np.stack([slope_x, slope_y, slope_y * away[:, 0] - slope_x * away[:, 1]], axis=-1)
     unit = how.gain * patch.scale
-    variance = unit**2 * (FLOOR**2 + np.einsum("ni,ij,nj->n", slopes, how.covariance, slopes))
+    left_open = np.einsum("ni,ij,nj->n", slopes, how.covariance, slopes)
+    variance = unit**2 * (CANVAS.floor**2 + left_open)
     sums = np.zeros((4, points.shape[0]))
     weight = 1 / variance
     sums[WEIGHT, known], sums[COUNT, known] = weight, 1.0
@@ -79,12 +79,12 @@ def laid(canvas: Canvas, patch: TouchPatch, how: Laid, sign: int = 1) -> Canvas:
 
 def cut(canvas: Canvas, i0: int, j0: int, rows: int, columns: int) -> Array:
     """Return the sums (4, rows, columns) of a rectangle of cells."""
-    found = np.zeros((4, rows, columns))
+    found, size = np.zeros((4, rows, columns)), CANVAS.tile
     for (k, m), tile in canvas.tiles.items():
-        top, left = k * TILE - i0, m * TILE - j0
-        if -TILE < top < rows and -TILE < left < columns:
+        top, left = k * size - i0, m * size - j0
+        if -size < top < rows and -size < left < columns:
             a, b = max(top, 0), max(left, 0)
-            c, d = min(top + TILE, rows), min(left + TILE, columns)
+            c, d = min(top + size, rows), min(left + size, columns)
             found[:, a:c, b:d] = tile[:, a - top : c - top, b - left : d - left]
     return found
 
@@ -101,17 +101,17 @@ def reference(canvas: Canvas, x_mm: float, y_mm: float, reach_mm: float) -> Know
 
 
 def _put(canvas: Canvas, sums: Array, i0: int, j0: int) -> Canvas:
-    tiles = dict(canvas.tiles)
+    tiles, size = dict(canvas.tiles), CANVAS.tile
     rows, columns = sums.shape[1:]
-    for k in range(i0 // TILE, (i0 + rows - 1) // TILE + 1):
-        for m in range(j0 // TILE, (j0 + columns - 1) // TILE + 1):
-            top, left = k * TILE - i0, m * TILE - j0
+    for k in range(i0 // size, (i0 + rows - 1) // size + 1):
+        for m in range(j0 // size, (j0 + columns - 1) // size + 1):
+            top, left = k * size - i0, m * size - j0
             a, b = max(top, 0), max(left, 0)
-            c, d = min(top + TILE, rows), min(left + TILE, columns)
+            c, d = min(top + size, rows), min(left + size, columns)
             part = sums[:, a:c, b:d]
             if not part[COUNT].any():
                 continue
-            tile = tiles[k, m].copy() if (k, m) in tiles else np.zeros((4, TILE, TILE))
+            tile = tiles[k, m].copy() if (k, m) in tiles else np.zeros((4, size, size))
             under = tile[:, a - top : c - top, b - left : d - left]
             under += part
             under[:, under[COUNT] < 0.5] = 0.0  # nothing is left there but rounding

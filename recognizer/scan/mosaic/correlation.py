@@ -19,10 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.scan.mosaic.raster import KnownRaster
+from recognizer.scan.mosaic.settings import CORRELATION
 
 Array = NDArray[np.float64]
-
-_FLAT = 1e-10  # of the sum of squares: rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,7 +66,8 @@ def correlated(reference: KnownRaster, image: KnownRaster) -> Correlation:
     overlap = np.rint(count)
     cells = np.maximum(overlap, 1.0)
     a_rest, b_rest = a_squares - a_sum**2 / cells, b_squares - b_sum**2 / cells
-    varies = (a_rest > _FLAT * (a * a).sum()) & (b_rest > _FLAT * (b * b).sum()) & (overlap > 1)
+    flat = CORRELATION.flat
+    varies = (a_rest > flat * (a * a).sum()) & (b_rest > flat * (b * b).sum()) & (overlap > 1)
     scale = np.sqrt(np.where(varies, a_rest * b_rest, 1.0))
     rho = np.clip((product - a_sum * b_sum / cells) / scale, -1.0, 1.0)
     return Correlation(np.where(varies, rho, np.nan), overlap)

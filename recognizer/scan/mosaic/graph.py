@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.scan.mosaic.planar import between, wrapped
+from recognizer.scan.mosaic.settings import GRAPH
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -31,12 +32,6 @@ Ints = NDArray[np.int64]
 PLANE, ARM = -2, -1  #: the mosaic's frame, which stands fast, and the arm's
 
 Kind = Literal["decoded", "believed", "stepped", "pair"]
-
-FREE = 16.0  #: chi^2 of three numbers from which a constraint is doubted
-OUTLIER = 0.5  #: s^2 under which it is reported
-STEPS = 30
-DONE_MM, DONE_RAD = 1e-4, 1e-6
-_LEAST = 1e-4  # s^2 of a constraint that is let go; keeps everything somewhere
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +53,7 @@ class PoseGraphSolution:
     poses: Array  #: (n, 3) T_plane_touch
     arm: Array  #: (3,) T_plane_arm
     chi2: Array  #: (m,) of each constraint
-    weights: Array  #: (m,) 0 ... 1; under `OUTLIER` a constraint is taken as wrong
+    weights: Array  #: (m,) 0 ... 1; under `GRAPH.outlier` a constraint is taken as wrong
     cost: float
     steps: int
     normal: Any  #: sparse matrix (3 n + 3) square, inverse covariance of poses and arm
@@ -85,7 +80,7 @@ def solved(
     at = np.concatenate([poses, arm[None]])
     damping, steps = 1e-6, 0
     now = _linear(graph, at)
-    while steps < STEPS:
+    while steps < GRAPH.steps:
         steps += 1
         diagonal = diags(now.normal.diagonal() * damping)
         step = splu((now.normal + diagonal).tocsc()).solve(now.pull).reshape(-1, 3)
@@ -97,7 +92,7 @@ def solved(
             continue
         damping = max(damping / 10, 1e-9)
         at, now = moved, then
-        if np.abs(step[:, :2]).max() < DONE_MM and np.abs(step[:, 2]).max() < DONE_RAD:
+        if np.abs(step[:, :2]).max() < GRAPH.done_mm and np.abs(step[:, 2]).max() < GRAPH.done_rad:
             break
     return PoseGraphSolution(at[:-1], at[-1], now.chi2, now.weights, now.cost, steps, now.normal)
 
@@ -111,8 +106,8 @@ def covariances(normal: Any, numbers: Sequence[int]) -> Array:
 
     factor, size = splu(normal.tocsc()), normal.shape[0]
     found = np.empty((len(numbers), 3, 3))
-    for first in range(0, len(numbers), _AT_ONCE):
-        some = np.asarray(numbers[first : first + _AT_ONCE])
+    for first in range(0, len(numbers), GRAPH.at_once):
+        some = np.asarray(numbers[first : first + GRAPH.at_once])
         rows = (3 * some[:, None] + np.arange(3)).reshape(-1)
         right = np.zeros((size, len(rows)))
         right[rows, np.arange(len(rows))] = 1.0
@@ -120,9 +115,6 @@ def covariances(normal: Any, numbers: Sequence[int]) -> Array:
         k = np.arange(len(some))
         found[first : first + len(some)] = blocks[k, :, k, :]
     return (found + found.swapaxes(1, 2)) / 2
-
-
-_AT_ONCE = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -171,9 +163,9 @@ def _linear(graph: _Graph, at: Array) -> _Linear:
     residual[:, 2] = wrapped(residual[:, 2])
     pushed = (graph.information @ residual[:, :, None])[:, :, 0]
     chi2 = (residual * pushed).sum(axis=1)
-    scale = np.minimum(1.0, 2 * FREE / (FREE + chi2))
-    weights = np.maximum(scale**2, _LEAST)
-    cost = float((scale**2 * chi2 + FREE * (1 - scale) ** 2).sum())
+    scale = np.minimum(1.0, 2 * GRAPH.free / (GRAPH.free + chi2))
+    weights = np.maximum(scale**2, GRAPH.least)
+    cost = float((scale**2 * chi2 + GRAPH.free * (1 - scale) ** 2).sum())
     by_a, by_b = _slopes(every[graph.a, 2], relative)
     heavy = graph.information * weights[:, None, None]
     rows, columns, blocks = [], [], []

@@ -18,7 +18,6 @@ from recognizer.scan.mosaic.canvas import Canvas, Laid, empty_canvas, laid
 from recognizer.scan.mosaic.errors import MosaicError
 from recognizer.scan.mosaic.graph import (
     ARM,
-    OUTLIER,
     Constraint,
     PoseGraphSolution,
     covariances,
@@ -29,16 +28,13 @@ from recognizer.scan.mosaic.pair import CONSTANT
 from recognizer.scan.mosaic.patch import TouchPatch, patch_of
 from recognizer.scan.mosaic.place import placing
 from recognizer.scan.mosaic.planar import composed, inverse
+from recognizer.scan.mosaic.settings import GRAPH, GROW
 from recognizer.scan.mosaic.texture import far_apart
 from recognizer.scan.mosaic.touch import PlacedTouch
 
 Array = NDArray[np.float64]
 
-RELAID = 0.2  #: tactels, under one cell, by which a touch moves before it is laid anew
-SPREAD_LOG, SURE_LOG = 0.5, 0.05  #: of gains: from touch to touch, and by a pair
-ROUNDS = 3  #: in which touches are tried again
 _SHOWN = ("", ALONE, PARTLY, CONSTANT)  # reasons with which a touch is laid
-_AGREE = 16.0  # chi^2 of two decoded places about the arm
 
 
 def mosaic_of(
@@ -99,14 +95,14 @@ def added(mosaic: Mosaic, touch: PlacedTouch) -> Mosaic:
     fresh = {number, *(constraint.a for constraint in place.constraints if constraint.a >= 0)}
     found = _solved(grown)
     doubted = [k for k, constraint in enumerate(constraints) if constraint.kind == "decoded"]
-    if any(found.weights[k] < OUTLIER for k in doubted):
+    if any(found.weights[k] < GRAPH.outlier for k in doubted):
         found = _revoted(grown, found)
     return _updated(grown, found, fresh)
 
 
 def settled(mosaic: Mosaic) -> Mosaic:
     """Return the mosaic with everything tried again that failed, and exact covariances."""
-    for _ in range(ROUNDS):
+    for _ in range(GROW.rounds):
         open_ = [n for n, reason in enumerate(mosaic.reasons) if reason not in ("", CONSTANT)]
         before = mosaic.reasons
         for number in open_:
@@ -257,7 +253,7 @@ def _relaid(
     pose, gain = found.poses[n], float(mosaic.gains[n])
     shown = mosaic.reasons[n] in _SHOWN and mosaic.patches[n].scale >= 0
     if now is not None:
-        near = far_apart(now.pose, pose, mosaic.sensor) < RELAID
+        near = far_apart(now.pose, pose, mosaic.sensor) < GROW.relaid
         if shown and near and abs(gain / now.gain - 1) < 0.02:
             return canvas, now
         canvas = laid(canvas, mosaic.patches[n], now, -1)
@@ -271,11 +267,12 @@ def _relaid(
 def _gains(mosaic: Mosaic) -> Array:
     """Return gains (n,) that agree with all pairs at once, near 1 where nothing is known."""
     n = len(mosaic)
-    normal, right = np.eye(n) / SPREAD_LOG**2, np.zeros(n)
+    normal, right = np.eye(n) / GROW.spread_log**2, np.zeros(n)
+    variance = GROW.sure_log**2
     for constraint, weight in zip(mosaic.constraints, mosaic.weights, strict=True):
-        if constraint.kind == "pair" and weight > OUTLIER:
-            normal[[constraint.a, constraint.b], [constraint.a, constraint.b]] += 1 / SURE_LOG**2
-            normal[[constraint.a, constraint.b], [constraint.b, constraint.a]] -= 1 / SURE_LOG**2
-            right[constraint.b] += constraint.log_gain / SURE_LOG**2
-            right[constraint.a] -= constraint.log_gain / SURE_LOG**2
+        if constraint.kind == "pair" and weight > GRAPH.outlier:
+            normal[[constraint.a, constraint.b], [constraint.a, constraint.b]] += 1 / variance
+            normal[[constraint.a, constraint.b], [constraint.b, constraint.a]] -= 1 / variance
+            right[constraint.b] += constraint.log_gain / variance
+            right[constraint.a] -= constraint.log_gain / variance
     return np.asarray(np.exp(np.linalg.solve(normal, right)))

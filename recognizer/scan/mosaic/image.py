@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.scan.mosaic.canvas import COUNT, SQUARE, TILE, VALUE, WEIGHT, Canvas, cut
+from recognizer.scan.mosaic.canvas import COUNT, SQUARE, VALUE, WEIGHT, Canvas, cut
+from recognizer.scan.mosaic.settings import CANVAS
 from recognizer.touch.tactile_image import TactileImage, tactile_image
 
 Array = NDArray[np.float64]
@@ -41,7 +42,7 @@ def image_of(canvas: Canvas) -> GlobalImage:
         none = np.zeros((0, 0))
         return GlobalImage(none, none, none, none.astype(np.int64), h, (0.0, 0.0))
     at = np.array(list(canvas.tiles))
-    low, high = at.min(axis=0) * TILE, (at.max(axis=0) + 1) * TILE
+    low, high = at.min(axis=0) * CANVAS.tile, (at.max(axis=0) + 1) * CANVAS.tile
     sums = cut(canvas, low[0], low[1], *(high - low).tolist())
     rows, columns = (np.flatnonzero((sums[COUNT] > 0.5).any(axis=axis)) for axis in (1, 0))
     sums = sums[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]

@@ -24,19 +24,9 @@ from numpy.typing import NDArray
 
 from recognizer.scan.mosaic.patch import TouchPatch, asked, covered
 from recognizer.scan.mosaic.planar import inverse, moved, wrapped
+from recognizer.scan.mosaic.settings import LUCAS_KANADE
 
 Array = NDArray[np.float64]
-
-STEPS = 12
-REACH = 1.0  #: tactels from the start; what is found further away is something else
-LEAST = 40  #: tactels of each image over the other
-FLOOR = 0.02  #: least standard deviation of a reading, share of the upper level
-INFLATION = 2.6  #: of the variance: what aliases is not independent; measured on encoded faces
-_CUT = 6.0  # standard deviations from which a reading counts ever less
-_FARTHEST = 0.4  # tactels in one step
-_WIDEST = 0.1  # rad in one step
-_DONE = 2e-3  # tactels
-_SLOPE = 0.5  # standard deviation of the gain's slope, over the half width
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,13 +84,14 @@ def aligned(
         found = _solved(rows, pose, believed, prior)
         if found is None:
             return None
-        shift = np.clip(found.step[:2], -_FARTHEST * pitch, _FARTHEST * pitch)
-        turn = min(_WIDEST, max(-_WIDEST, float(found.step[2])))
+        farthest, widest = LUCAS_KANADE.farthest * pitch, LUCAS_KANADE.widest_rad
+        shift = np.clip(found.step[:2], -farthest, farthest)
+        turn = min(widest, max(-widest, float(found.step[2])))
         moves = max(np.abs(shift).max(), abs(turn) * a.sensor.reach_mm)
-        if moves < _DONE * pitch or steps == STEPS:
+        if moves < LUCAS_KANADE.done * pitch or steps == LUCAS_KANADE.steps:
             break
         pose = np.append(pose[:2] + shift, wrapped(pose[2] + turn))
-        if math.hypot(*(pose[:2] - start[:2])) > REACH * pitch:
+        if math.hypot(*(pose[:2] - start[:2])) > LUCAS_KANADE.reach * pitch:
             return None
     tactels = len(rows.target) / 2
     return Aligned(pose, found.information, found.gain, found.rho, tactels, steps)
@@ -110,7 +101,7 @@ def _rows(a: TouchPatch, b: TouchPatch, pose: Array) -> _Rows | None:
     there, here = moved(inverse(pose), a.points_mm), moved(pose, b.points_mm)
     over_b = a.good.reshape(-1) & covered(a.sensor, there)
     over_a = b.good.reshape(-1) & covered(b.sensor, here)
-    if min(over_b.sum(), over_a.sum()) < LEAST:
+    if min(over_b.sum(), over_a.sum()) < LUCAS_KANADE.least:
         return None
     v, u = there[over_b], here[over_a]
     of_v, b_x, b_y = asked(b, v)
@@ -131,21 +122,21 @@ def _rows(a: TouchPatch, b: TouchPatch, pose: Array) -> _Rows | None:
 
 def _solved(rows: _Rows, pose: Array, believed: Array, prior: Array) -> _Step | None:
     """Return a step of pose, gain and offset together; None where the images are not alike."""
-    target, n = rows.target, len(rows.slopes_b)
+    target, n, floor = rows.target, len(rows.slopes_b), LUCAS_KANADE.floor
     nuisance = np.concatenate([rows.values[:, None] * rows.plane, rows.plane], axis=1)
-    ridge = np.diag([1e-9, 1.0, 1.0, 1e-9, 1.0, 1.0]) * (FLOOR / _SLOPE) ** 2
+    ridge = np.diag([1e-9, 1.0, 1.0, 1e-9, 1.0, 1.0]) * (floor / LUCAS_KANADE.slope) ** 2
     gain = np.linalg.solve(nuisance.T @ nuisance + ridge, nuisance.T @ target)
     if gain[0] <= 0:
         return None
     residual = target - nuisance @ gain
-    spread = max(FLOOR, 1.4826 * float(np.median(np.abs(residual))))
-    weights = 1.0 / (1.0 + (residual / (_CUT * spread)) ** 2) ** 2
-    variance = max(FLOOR**2, float(weights @ residual**2 / weights.sum()))
+    spread = max(floor, 1.4826 * float(np.median(np.abs(residual))))
+    weights = 1.0 / (1.0 + (residual / (LUCAS_KANADE.cut * spread)) ** 2) ** 2
+    variance = max(floor**2, float(weights @ residual**2 / weights.sum()))
     slopes = np.concatenate(
         [rows.slopes_b * (rows.plane[:n] @ gain[:3])[:, None], -rows.slopes_a], axis=0
     )
     design = np.concatenate([slopes, nuisance], axis=1)
-    scale = 1.0 / (2 * INFLATION * variance)
+    scale = 1.0 / (2 * LUCAS_KANADE.inflation * variance)
     normal = (design * weights[:, None]).T @ design
     normal[3:, 3:] += ridge
     right = design.T @ (weights * residual)

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from probe.sensor import SensorType
 from recognizer.scan.mosaic.canvas import Canvas, Laid, empty_canvas
-from recognizer.scan.mosaic.graph import OUTLIER, Constraint
+from recognizer.scan.mosaic.graph import Constraint
 from recognizer.scan.mosaic.image import GlobalImage, image_of
 from recognizer.scan.mosaic.patch import TouchPatch
-from recognizer.scan.mosaic.search import ImageSearchSettings
+from recognizer.scan.mosaic.settings import GRAPH, ImageSearchSettings
 from recognizer.scan.mosaic.touch import PlacedTouch
 
 Array = NDArray[np.float64]
@@ -108,6 +108,6 @@ def outliers(mosaic: Mosaic) -> list[Outlier]:
         for constraint, weight, chi2 in zip(
             mosaic.constraints, mosaic.weights, mosaic.chi2, strict=True
         )
-        if weight < OUTLIER
+        if weight < GRAPH.outlier
     ]
     return sorted(found, key=lambda outlier: -outlier.chi2)

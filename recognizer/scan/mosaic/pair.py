@@ -21,7 +21,8 @@ from recognizer.scan.mosaic.lucas_kanade import Aligned, aligned
 from recognizer.scan.mosaic.patch import TouchPatch, covered
 from recognizer.scan.mosaic.planar import inverse, moved, wrapped
 from recognizer.scan.mosaic.raster import magnified
-from recognizer.scan.mosaic.search import ImageSearchSettings, nats, searched, window_mm
+from recognizer.scan.mosaic.search import nats, searched, window_mm
+from recognizer.scan.mosaic.settings import ImageSearchSettings
 from recognizer.scan.mosaic.texture import far_apart, held, kept, scales, seen_motions
 
 Array = NDArray[np.float64]

@@ -14,13 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import SensorType
+from recognizer.scan.mosaic.settings import PATCH
 from recognizer.touch.signal import Signal
 
 Array = NDArray[np.float64]
 
-SMOOTHING = 0.4  #: tactels; none to .4 register equally well, .5 and more worse
-TEXTURE = 0.8  #: tactels; smooths over the gaps between tabs (`texture`)
-LEAST_TRUST = 0.5  #: below, a tactel counts as bad
 RIM = 2  #: coefficients beyond the matrix, mirrored
 
 
@@ -54,16 +52,16 @@ def patch_of(sensor: SensorType, signal: Signal) -> TouchPatch:
     """
     from scipy.ndimage import gaussian_filter, spline_filter
 
-    good = signal.trust >= LEAST_TRUST
+    good = signal.trust >= PATCH.least_trust
     filled = _filled(signal.forces, good)
     scale = float(np.quantile(filled, 0.95))
     if scale <= 0:
         scale = float(filled.max())
     raw = filled / scale if scale > 0 else filled
-    values = gaussian_filter(raw, SMOOTHING, mode="nearest")
+    values = gaussian_filter(raw, PATCH.smoothing, mode="nearest")
     coefficients = np.pad(spline_filter(values, 3, mode="mirror"), RIM, mode="reflect")
     points = sensor.centres_mm().reshape(-1, 2)
-    smooth = gaussian_filter(raw, TEXTURE, mode="nearest")
+    smooth = gaussian_filter(raw, PATCH.texture, mode="nearest")
     down, right = np.gradient(smooth)
     slopes = np.stack([right.reshape(-1), -down.reshape(-1)])
     for array in (raw, values, good, coefficients, points, smooth, slopes):

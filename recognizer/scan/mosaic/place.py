@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from recognizer.scan.mosaic.canvas import laid, reference
 from recognizer.scan.mosaic.errors import MosaicError
-from recognizer.scan.mosaic.graph import ARM, FREE, PLANE, Constraint, Kind
+from recognizer.scan.mosaic.graph import ARM, PLANE, Constraint, Kind
 from recognizer.scan.mosaic.mosaic import ALONE, PARTLY, Mosaic
 from recognizer.scan.mosaic.pair import (
     AMBIGUOUS,
@@ -36,6 +36,7 @@ from recognizer.scan.mosaic.planar import (
     wrapped,
 )
 from recognizer.scan.mosaic.search import searched, window_mm
+from recognizer.scan.mosaic.settings import GRAPH
 from recognizer.scan.mosaic.texture import scales, seen_motions
 from recognizer.scan.mosaic.touch import PlacedTouch, PlanarBelief
 
@@ -113,7 +114,7 @@ def _contradicted(mosaic: Mosaic, touch: PlacedTouch, number: int) -> bool:
     away = touch.decoded.pose - expected.pose
     away[2] = wrapped(away[2])
     spread = expected.covariance + touch.decoded.covariance
-    return float(away @ np.linalg.solve(spread, away)) > FREE
+    return float(away @ np.linalg.solve(spread, away)) > GRAPH.free
 
 
 def _pose(mosaic: Mosaic, frame: int) -> Array:
@@ -252,8 +253,8 @@ def _disagreement(mosaic: Mosaic, constraints: Sequence[Constraint], pose: Array
         away = between(_pose(mosaic, constraint.a), pose) - constraint.pose
         away[2] = wrapped(away[2])
         chi2 = float(away @ constraint.information @ away)
-        scale = min(1.0, 2 * FREE / (FREE + chi2))
-        total += scale**2 * chi2 + FREE * (1 - scale) ** 2
+        scale = min(1.0, 2 * GRAPH.free / (GRAPH.free + chi2))
+        total += scale**2 * chi2 + GRAPH.free * (1 - scale) ** 2
     return total
 
 

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from recognizer.scan.mosaic.errors import MosaicError
+from recognizer.scan.mosaic.settings import PLANAR
 
 Array = NDArray[np.float64]
-
-STEEPEST_COS = 0.5  #: a sensor turned further than 60 degrees from the plane does not face it
 
 
 def composed(T_a_b: Array, T_b_c: Array) -> Array:
@@ -83,7 +82,7 @@ def planar_pose(T_plane_sensor: ArrayLike) -> Array:
     T = np.asarray(T_plane_sensor, np.float64)
     if T.shape != (4, 4) or not np.isfinite(T).all():
         raise MosaicError(f"a pose of shape {T.shape}", fix="give T_plane_sensor (4, 4), mm")
-    if T[2, 2] < STEEPEST_COS:
+    if T[2, 2] < PLANAR.steepest_cos:
         angle = math.degrees(math.acos(max(-1.0, min(1.0, float(T[2, 2])))))
         raise MosaicError(
             f"the sensor is tilted by {angle:.0f} degrees, it must face the plane within 60",

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 
 from recognizer.scan.mosaic.patch import RIM, TouchPatch, basis
 from recognizer.scan.mosaic.planar import moved
+from recognizer.scan.mosaic.settings import CANVAS
 
 Array = NDArray[np.float64]
-
-MAGNIFIED = 4  #: cells to a tactel, the thesis's 64 by 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,10 +34,10 @@ class KnownRaster:
 def magnified(patch: TouchPatch) -> KnownRaster:
     """Return a patch at four times its resolution, sensor frame."""
     rows, columns = patch.values.shape
-    h = patch.sensor.pitch_mm / MAGNIFIED
+    h = patch.sensor.pitch_mm / CANVAS.magnified
     values = _between(rows) @ patch.coefficients @ _between(columns).T
-    known = patch.good.repeat(MAGNIFIED, axis=0).repeat(MAGNIFIED, axis=1)
-    width, height = columns * MAGNIFIED, rows * MAGNIFIED
+    known = patch.good.repeat(CANVAS.magnified, axis=0).repeat(CANVAS.magnified, axis=1)
+    width, height = columns * CANVAS.magnified, rows * CANVAS.magnified
     return KnownRaster(
         np.where(known, values, 0.0), known, -(width - 1) / 2 * h, (height - 1) / 2 * h, h
     )
@@ -95,7 +94,7 @@ def laid_under(source: KnownRaster, like: KnownRaster, T_source_like: Array) -> 
 @lru_cache(maxsize=8)
 def _between(tactels: int) -> Array:
     """Return what spline coefficients give at the cells of a row of tactels."""
-    cells = (np.arange(tactels * MAGNIFIED) + 0.5) / MAGNIFIED - 0.5 + RIM
+    cells = (np.arange(tactels * CANVAS.magnified) + 0.5) / CANVAS.magnified - 0.5 + RIM
     first = np.floor(cells).astype(np.intp)
     table = np.zeros((len(cells), tactels + 2 * RIM))
     np.put_along_axis(table, first[:, None] + np.arange(-1, 3), basis(cells - first)[0], axis=1)

@@ -22,27 +22,10 @@ from numpy.typing import NDArray
 from recognizer.scan.mosaic.correlation import correlated, peaks
 from recognizer.scan.mosaic.patch import TouchPatch
 from recognizer.scan.mosaic.planar import composed
-from recognizer.scan.mosaic.raster import MAGNIFIED, KnownRaster, enlarged, laid_under, magnified
+from recognizer.scan.mosaic.raster import KnownRaster, enlarged, laid_under, magnified
+from recognizer.scan.mosaic.settings import CANVAS, ImageSearchSettings
 
 Array = NDArray[np.float64]
-
-BEST = 0.94  #: correlation that true places have; more of it is chance, not evidence
-
-
-@dataclass(frozen=True, slots=True)
-class ImageSearchSettings:
-    """When a place is told from the images."""
-
-    sigmas: float = 3.0  #: half width of the window, standard deviations of the belief
-    contrast: float = 0.15  #: least spread of a patch, planes taken out, in its upper levels
-    overlap: float = 0.2  #: least share of the matrix
-    significance: float = 8.0  #: nats over what the best of as many shifts of noise gives
-    margin: float = 3.0  #: nats over the next place, in a window within half a period
-    margin_beyond: float = 8.0  #: the same in a wider window
-    independent: float = 0.4  #: readings to a tactel: smoothing constraints neighbours together
-    enough: float = 96.0  #: tactels of overlap, beyond which more do not count
-    candidates: int = 6  #: maxima that are looked at
-    near_tactels: float = 0.4  #: windows no wider than this need no search
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +47,7 @@ class Searched:
 
 def nats(rho: Array, tactels: Array, settings: ImageSearchSettings) -> Array:
     """Return how much likelier images are if they show the same, by their correlation."""
-    known = np.clip(np.nan_to_num(rho), 0.0, BEST)
+    known = np.clip(np.nan_to_num(rho), 0.0, settings.best)
     readings = settings.independent * np.minimum(tactels, settings.enough)
     return np.asarray(-readings / 2 * np.log1p(-(known**2)))
 
@@ -109,7 +92,7 @@ def searched(
         # shifts are along the turned axes; for the prior that is the same to second order
         away = np.stack([right * h, -down * h, np.full(right.shape, turn)], axis=-1)
         seen = correlated(laid_under(reference, wide, stands), image)
-        tactels = seen.overlap / MAGNIFIED**2
+        tactels = seen.overlap / CANVAS.magnified**2
         images = nats(seen.rho, tactels, settings)
         score = images - 0.5 * np.einsum("kni,ij,knj->kn", away, prior, away)
         score[~(seen.rho > 0) | (tactels < settings.overlap * patch.good.size)] = -np.inf
@@ -118,7 +101,7 @@ def searched(
             alone = float(images[round(i), round(j)])
             found.append(PlaceCandidate(composed(stands, shift), value, alone))
     found.sort(key=lambda candidate: -candidate.score)
-    tried = down.size * len(turns) / MAGNIFIED**2
+    tried = down.size * len(turns) / CANVAS.magnified**2
     return Searched(tuple(found[: settings.candidates]), tried)
 
 

@@ -19,13 +19,9 @@ from numpy.typing import NDArray
 
 from probe.sensor import SensorType
 from recognizer.scan.mosaic.patch import TouchPatch
+from recognizer.scan.mosaic.settings import TEXTURE
 
 Array = NDArray[np.float64]
-
-LEAST = 0.05  #: of the image's variance, for one tactel; ridges <= .02, symbols >= .12
-ASKEW = 0.1  #: rad, of the motions' directions; measured: .07
-STIFF = 1e6  #: 1/tactel^2
-LEAST_CHANGE = 1e-9  # of a patch's unit
 
 
 def scales(sensor: SensorType) -> Array:
@@ -49,10 +45,10 @@ def seen_motions(a: TouchPatch, over: NDArray[np.bool_], pose: Array) -> Array:
     x, y = ((a.points_mm - pose[:2]) / min(a.sensor.half_mm)).T
     slopes = np.stack([by_x, by_y, by_y * x - by_x * y], axis=-1)[over]
     variance = float(a.smooth[over].var())
-    if variance < LEAST_CHANGE:
+    if variance < TEXTURE.least_change:
         return np.zeros((3, 0))
     values, motions = np.linalg.eigh(slopes.T @ slopes / (len(slopes) * variance))
-    return np.asarray(motions[:, values > LEAST], np.float64)
+    return np.asarray(motions[:, values > TEXTURE.least], np.float64)
 
 
 def kept(information: Array, motions: Array, sensor: SensorType, believed: Array) -> Array:
@@ -76,7 +72,8 @@ def kept(information: Array, motions: Array, sensor: SensorType, believed: Array
     unit = np.outer(scales(sensor), scales(sensor))
     covariance, belief = np.linalg.inv(information * unit), believed / unit
     open_ = float(np.trace(belief) - np.trace(motions.T @ belief @ motions))
-    spread = motions.T @ covariance @ motions + ASKEW**2 * open_ * np.eye(motions.shape[1])
+    askew = TEXTURE.askew_rad**2 * open_ * np.eye(motions.shape[1])
+    spread = motions.T @ covariance @ motions + askew
     found = motions @ np.linalg.inv(spread) @ motions.T / unit
     return np.asarray((found + found.T) / 2)
 
@@ -84,7 +81,7 @@ def kept(information: Array, motions: Array, sensor: SensorType, believed: Array
 def held(motions: Array, sensor: SensorType) -> Array:
     """Return an information (3, 3) that holds a pose in all motions but these."""
     unit = np.outer(scales(sensor), scales(sensor))
-    return np.asarray(STIFF * (np.eye(3) - motions @ motions.T) / unit)
+    return np.asarray(TEXTURE.stiff * (np.eye(3) - motions @ motions.T) / unit)
 
 
 def far_apart(a: Array, b: Array, sensor: SensorType) -> float:

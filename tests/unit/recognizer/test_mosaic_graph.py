@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from recognizer.scan.mosaic.graph import ARM, OUTLIER, PLANE, Constraint, covariances, solved
+from recognizer.scan.mosaic.graph import ARM, PLANE, Constraint, covariances, solved
 from recognizer.scan.mosaic.planar import between, composed, wrapped
+from recognizer.scan.mosaic.settings import GRAPH
 
 BELIEF, PAIR = np.diag([0.4, 0.4, 4e3]), np.diag([90.0, 60.0, 6e4])
 SURE = np.diag([1e3, 1e3, 3e5])
@@ -54,7 +55,7 @@ def test_wrong_pairs_are_let_go_and_named():
     found = solved(
         constraints, np.array([t.pose for t in constraints[:16]]), np.zeros(3), arm_stands=True
     )
-    assert set((np.flatnonzero(found.weights < OUTLIER) - 16).tolist()) == wrong
+    assert set((np.flatnonzero(found.weights < GRAPH.outlier) - 16).tolist()) == wrong
     shape = (found.poses - true)[:, :2]
     assert np.hypot(*(shape - shape.mean(axis=0)).T).max() < 1.0
 
