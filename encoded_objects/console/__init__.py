@@ -71,7 +71,6 @@ def main(
         sys.stdout.flush()
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second one would end us without our code
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second one would end it without a code
         sys.stderr.write(f"\n{name}: interrupted{advice}\n")
         code = INTERRUPTED
     except BrokenPipeError:  # the reader of our output has gone, as in `| head`

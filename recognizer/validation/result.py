@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from encoded_objects.console import DONE, FAILED
+from recognizer.validation.results import HOLDS
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,11 +22,15 @@ class ValidationBound:
     sign: str  #: of what must hold: =, <= or >=
     limit: float  #: a share, or in `unit`
     unit: str  #: empty: shares are bounded
-    holds: bool
     state: str  #: holds, fails, or too few touches to tell
     value: float | None  #: found: the share, or the size in `unit`; None: nothing to judge
     counted: tuple[int, int] | None = None  #: of a share: how many, of how many
     interval: tuple[float, float] | None = None  #: of a share, 95 %
+
+    @property
+    def holds(self) -> bool:
+        """Whether the touches show that it holds."""
+        return self.state == HOLDS
 
     def __str__(self) -> str:
         if self.counted is None or self.interval is None:
@@ -109,7 +114,6 @@ def bound_from(line: dict[str, Any]) -> ValidationBound:
         sign=line["sign"],
         limit=line["bound"],
         unit=line["unit"],
-        holds=line["holds"],
         state=line["state"],
         value=line["share" if of_shares else "value"],
         counted=(line["count"], line["of"]) if of_shares else None,
