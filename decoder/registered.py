@@ -19,7 +19,7 @@ from generator.database.cells import faces_at, occupied_cells
 from generator.database.entries import list_objects
 from generator.database.open import open_database
 from generator.database.read import read_array, read_object
-from generator.database.transaction import reading
+from generator.database.transaction import read_transaction
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ def read_registered(url: str, profile: str = "") -> Registered:
     DecoderError
         It holds no such array, or several and none is named.
     """
-    with reading(open_database(url, writable=False)) as connection:
+    with read_transaction(open_database(url, writable=False)) as connection:
         arrays = {entry.array_id: entry.profile for entry in list_objects(connection)}
         named = [number for number, name in arrays.items() if profile in ("", name)]
         if len(named) != 1:
@@ -88,7 +88,7 @@ def prior(held: Registered, window: Labels) -> NDArray[np.int64]:
 
 def holder(held: Registered, row: int, column: int) -> tuple[str, str] | None:
     """Return the names of object and face that hold a cell; None where nothing is registered."""
-    with reading(open_database(held.url, writable=False)) as connection:
+    with read_transaction(open_database(held.url, writable=False)) as connection:
         objects, faces = faces_at(connection, held.array_id, [row], [column])
         for entry in list_objects(connection):
             if entry.object_id == objects[0]:

@@ -20,7 +20,7 @@ from typing import Any, overload
 
 from generator.cad.read import polyhedron_from
 from generator.database.open import open_if_there
-from generator.database.transaction import reading
+from generator.database.transaction import read_transaction
 from generator.layout.placement import Layout
 from generator.pipeline.choose import choose_array
 from generator.pipeline.encode import encode as encode_specs
@@ -194,7 +194,7 @@ def encode(
     url = url or database_option("lab.db")
     located = spec_of(named, ShapeSpec("solid", {"sha256": _digest(polyhedron)}))
     engine = open_if_there(url)
-    with reading(engine) if engine else nullcontext() as connection:
+    with read_transaction(engine) if engine else nullcontext() as connection:
         choice = choose_array([located], connection, polyhedron)
     plan = plan_object(choice.specs[0], polyhedron)
     plan = dataclasses.replace(plan, notes=(*plan.notes, *choice.notes))

@@ -15,7 +15,7 @@ from generator.database.read import surfaces_of
 from generator.database.url import without_password
 
 if TYPE_CHECKING:
-    from generator.database.carry import Carried
+    from generator.database.carry import CopyReport
     from generator.database.part_state import PartState
     from generator.database.registered import ObjectEntry, RegisteredObject
     from generator.layout.placement import FaceLayout, Placement
@@ -110,7 +110,7 @@ def warning_before(entries: Sequence[ObjectEntry]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def print_export(done: Carried, file: Path, url: str, *, as_json: bool) -> None:
+def print_export(done: CopyReport, file: Path, url: str, *, as_json: bool) -> None:
     """Say what was exported, and what the other lab does with it."""
     if as_json:
         output.write_json(
@@ -123,7 +123,7 @@ def print_export(done: Carried, file: Path, url: str, *, as_json: bool) -> None:
     )
 
 
-def print_import(done: Carried, url: str, *, dry_run: bool, as_json: bool) -> None:
+def print_import(done: CopyReport, url: str, *, dry_run: bool, as_json: bool) -> None:
     """Say what was imported, what was there already, and what was refused."""
     if as_json:
         values = {

@@ -35,11 +35,11 @@ def list_(database: Database = LAB, as_json: Json = False) -> Action:
         from generator.command import object_report
         from generator.database.entries import list_objects
         from generator.database.open import open_database
-        from generator.database.transaction import reading
+        from generator.database.transaction import read_transaction
         from generator.spec.option import database_option
 
         url = database_option(database)
-        with reading(open_database(url, writable=False)) as connection:
+        with read_transaction(open_database(url, writable=False)) as connection:
             entries = list_objects(connection)
         object_report.print_list(entries, url, as_json=as_json)
         return 0
@@ -60,12 +60,12 @@ def show(
         from generator.database.open import open_database
         from generator.database.part_state import part_state
         from generator.database.read import read_object
-        from generator.database.transaction import reading
+        from generator.database.transaction import read_transaction
         from generator.spec.option import database_option
 
         url = database_option(database)
         engine = open_database(url, writable=False)
-        with reading(engine) as connection:
+        with read_transaction(engine) as connection:
             held = read_object(connection, name)
         files = [part_state(engine.url, part) for part in held.parts]
         object_report.print_object(held, files, url, as_json=as_json)
@@ -185,9 +185,9 @@ def _confirm(engine: Engine, names: list[str], *, as_json: bool) -> None:
     """Ask before cells are freed; leave when the answer is no."""
     from generator.command import object_report
     from generator.database.entries import object_entry
-    from generator.database.transaction import reading
+    from generator.database.transaction import read_transaction
 
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         entries = [object_entry(connection, name) for name in dict.fromkeys(names)]
     if as_json or not sys.stdin.isatty():
         raise typer.BadParameter("--free removes objects for good; confirm it with --yes")

@@ -16,7 +16,7 @@ from sqlalchemy import URL, Connection, insert
 from generator.database import tables
 from generator.database.carry_check import (
     ArrayHere,
-    NotCarriedError,
+    CopyRefusedError,
     array_here,
     check_alphabet,
     check_cells,
@@ -42,7 +42,7 @@ class Origin:
 
 
 @dataclass(frozen=True, slots=True)
-class Refused:
+class RefusedCopy:
     """An object that cannot be carried over."""
 
     name: str
@@ -51,15 +51,15 @@ class Refused:
 
 
 @dataclass(frozen=True, slots=True)
-class Carried:
+class CopyReport:
     """What became of the objects; names as they are in the database that receives them."""
 
     copied: tuple[str, ...]
     known: tuple[str, ...]  #: were there already, the same
-    refused: tuple[Refused, ...]
+    refused: tuple[RefusedCopy, ...]
 
 
-def carry(
+def copy_objects(
     source: Connection,
     target: Connection,
     *,
@@ -68,7 +68,7 @@ def carry(
     origin: Origin | None = None,
     skip_refused: bool = False,
     homes: tuple[URL, URL] | None = None,
-) -> Carried:
+) -> CopyReport:
     """Copy objects with their cells, their provenance and the names of their files.
 
     Parameters
@@ -109,11 +109,11 @@ def carry(
                 copied.append(name)
             else:
                 known.append(name)
-        except NotCarriedError as error:
-            refused.append(Refused(name, error.cause, error.fix))
+        except CopyRefusedError as error:
+            refused.append(RefusedCopy(name, error.cause, error.fix))
     if refused and not skip_refused:
         raise _refusal(refused, place_of(homes[1]))
-    return Carried(tuple(copied), tuple(known), tuple(refused))
+    return CopyReport(tuple(copied), tuple(known), tuple(refused))
 
 
 def _copy_object(
@@ -131,7 +131,7 @@ def _copy_object(
         if same_object(source, entry, target, present):
             return False
         fix = f"import it under a name of its own: --rename '{entry.name}=NEW'"
-        raise NotCarriedError("is the name of another object here", fix)
+        raise CopyRefusedError("is the name of another object here", fix)
     if entry.array_id not in arrays:
         arrays[entry.array_id] = array_here(source, target, entry.array_id)
     here = arrays[entry.array_id]
@@ -164,7 +164,7 @@ def _copy_object(
     return True
 
 
-def _refusal(refused: Sequence[Refused], place: str) -> DatabaseError:
+def _refusal(refused: Sequence[RefusedCopy], place: str) -> DatabaseError:
     """Return the error that names every object that is refused."""
     causes = "; ".join(f"'{each.name}' {each.cause}" for each in refused)
     fixes = "; ".join(dict.fromkeys(each.fix for each in refused))

@@ -1,6 +1,6 @@
 """Whether an object of one database may stand in another one: the same, new, or refused.
 
-Object + receiving database -> nothing, or `NotCarriedError` with cause and way out. What the
+Object + receiving database -> nothing, or `CopyRefusedError` with cause and way out. What the
 cells say is checked against the array itself, so that a damaged or hand-made database brings
 nothing in.
 """
@@ -40,7 +40,7 @@ GEOMETRY = (
 _DAMAGED = "export it once more, from the lab that registered it"
 
 
-class NotCarriedError(Exception):
+class CopyRefusedError(Exception):
     """An object may not stand in the receiving database."""
 
     def __init__(self, cause: str, fix: str) -> None:
@@ -65,10 +65,10 @@ def array_here(source: Connection, target: Connection, array_id: int) -> ArrayHe
         array = array_from(read_array(source, array_id).definition)
     except (GeneratorError, ValueError, KeyError, TypeError) as error:
         cause = f"stands on an array that cannot be made: {error}"
-        raise NotCarriedError(cause, _DAMAGED) from error
+        raise CopyRefusedError(cause, _DAMAGED) from error
     said = (stored.definition_sha256, stored.rows, stored.columns, stored.order)
     if (array_key(array), array.rows, array.columns, array.order) != said:
-        raise NotCarriedError("stands on an array whose definition was changed", _DAMAGED)
+        raise CopyRefusedError("stands on an array whose definition was changed", _DAMAGED)
     number = find_array(target, array)
     return ArrayHere(array, number, _keys(array, *occupied_cells(target, number)))
 
@@ -82,7 +82,7 @@ def check_alphabet(source: Connection, alphabet_id: int) -> None:
         )
     ).one()
     if digest(row.definition) != row.definition_sha256:
-        raise NotCarriedError("has an alphabet whose definition was changed", _DAMAGED)
+        raise CopyRefusedError("has an alphabet whose definition was changed", _DAMAGED)
 
 
 def check_cells(target: Connection, name: str, here: ArrayHere, cells: Rows) -> None:
@@ -92,15 +92,15 @@ def check_cells(target: Connection, name: str, here: ArrayHere, cells: Rows) -> 
         for column in ("row", "column", "label")
     )
     if ((r >= here.array.rows) | (c >= here.array.columns)).any():
-        raise NotCarriedError("has cells beyond its array", _DAMAGED)
+        raise CopyRefusedError("has cells beyond its array", _DAMAGED)
     wrong = np.flatnonzero(here.array.symbols(r, c) != labels)
     if len(wrong):
         k = wrong[0]
         cause = f"has symbol {labels[k]} on cell ({r[k]}, {c[k]}), where the array has another"
-        raise NotCarriedError(cause, _DAMAGED)
+        raise CopyRefusedError(cause, _DAMAGED)
     held = np.isin(_keys(here.array, r, c), here.taken)
     if held.any() and here.array_id is not None:
-        raise NotCarriedError(
+        raise CopyRefusedError(
             f"needs {np.count_nonzero(held)} cells that "
             f"{_holders(target, here.array_id, r[held], c[held])} here",
             f"make '{name}' again here from its spec, on cells of its own, and print it again; or "
@@ -128,7 +128,7 @@ def same_object(
         entry.spec_hash == present.spec_hash
         and _definitions(source, entry) == _definitions(target, present)
         and all(
-            _plain(mine) == _plain(theirs)
+            _comparable_rows(mine) == _comparable_rows(theirs)
             for mine, theirs in zip(
                 geometry(source, entry.object_id).values(),
                 geometry(target, present.object_id).values(),
@@ -158,7 +158,7 @@ def _definitions(connection: Connection, entry: ObjectEntry) -> Sequence[Any]:
     ).one()
 
 
-def _plain(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+def _comparable_rows(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return rows without the numbers that differ between databases; -0.0 is not 0.0."""
     return [
         repr([value for name, value in row.items() if name not in ("object_id", "array_id")])

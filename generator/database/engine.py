@@ -29,7 +29,7 @@ _POSTGRESQL = {
 }
 
 
-def connectable(url: URL, writable: bool, wait_s: float) -> Engine:
+def database_engine(url: URL, writable: bool, wait_s: float) -> Engine:
     """Return an engine on a database of either kind.
 
     Raises

@@ -23,18 +23,18 @@ from pathlib import Path
 
 from sqlalchemy import URL, Connection, Engine
 
-from generator.database.carry import Carried, Origin, carry
+from generator.database.carry import CopyReport, Origin, copy_objects
 from generator.database.migrate import snapshot
 from generator.database.open import database_exists, open_database
 from generator.database.race import in_turn
-from generator.database.transaction import place_of, reading, writing
+from generator.database.transaction import place_of, read_transaction, write_transaction
 from generator.database.url import normal_url
 from generator.errors import DatabaseError
 
 
 def export_objects(
     url: str, file: Path, *, names: Sequence[str] = (), force: bool = False
-) -> Carried:
+) -> CopyReport:
     """Write objects of a database into a new database file, whole or not at all.
 
     Parameters
@@ -51,7 +51,7 @@ def export_objects(
     """
     engine = open_database(url, writable=False)
     file = file.absolute()
-    if _same(engine.url, normal_url(str(file))):
+    if _same_database(engine.url, normal_url(str(file))):
         raise DatabaseError(
             "a database cannot be exported into itself",
             fix="name another file, such as for-the-other-lab.db",
@@ -67,8 +67,8 @@ def export_objects(
     try:
         made = open_database(str(beside))
         homes = (engine.url, normal_url(str(file)))
-        with reading(engine) as source, writing(made) as target:
-            carried = carry(source, target, names=names, homes=homes)
+        with read_transaction(engine) as source, write_transaction(made) as target:
+            carried = copy_objects(source, target, names=names, homes=homes)
         if force:
             beside.replace(file)
         else:
@@ -89,7 +89,7 @@ def import_objects(
     renamed: Mapping[str, str] | None = None,
     skip_refused: bool = False,
     dry_run: bool = False,
-) -> Carried:
+) -> CopyReport:
     """Bring the objects of another database into this one.
 
     Parameters
@@ -112,17 +112,17 @@ def import_objects(
     """
     home = normal_url(given)
     engine_home = normal_url(url)
-    if _same(home, engine_home):
+    if _same_database(home, engine_home):
         fix = "name the file that another lab exported"
         cause = "a database cannot be imported into itself"
         raise DatabaseError(cause, fix=fix, place=place_of(home))
     from_file = home.get_backend_name() == "sqlite"
     name = Path(home.database or "").name if from_file else place_of(home)
     origin = Origin(name, datetime.now(UTC).isoformat(timespec="seconds"))
-    with _open_unchanged(home) as source_engine, reading(source_engine) as source:
+    with _open_unchanged(home) as source_engine, read_transaction(source_engine) as source:
 
-        def work(target: Connection) -> Carried:
-            return carry(
+        def work(target: Connection) -> CopyReport:
+            return copy_objects(
                 source,
                 target,
                 names=names,
@@ -144,8 +144,8 @@ class _RehearsedError(Exception):
     """Undoes a transaction whose outcome is known."""
 
 
-def _rehearse(engine: Engine, work: Callable[[Connection], Carried]) -> Carried:
-    outcome: list[Carried] = []
+def _rehearse(engine: Engine, work: Callable[[Connection], CopyReport]) -> CopyReport:
+    outcome: list[CopyReport] = []
 
     def undone(target: Connection) -> None:
         outcome.append(work(target))
@@ -185,7 +185,7 @@ def _open_unchanged(home: URL) -> Iterator[Engine]:
         yield open_database(str(copy), writable=False, keep_older=False)
 
 
-def _same(one: URL, other: URL) -> bool:
+def _same_database(one: URL, other: URL) -> bool:
     """Whether two URLs name one database."""
     if one == other:
         return True

@@ -20,7 +20,7 @@ from urllib.parse import quote
 from sqlalchemy import Connection, Engine, update
 
 from generator.database.tables import SCHEMA_VERSION, meta
-from generator.database.transaction import place_of, writing
+from generator.database.transaction import place_of, write_transaction
 from generator.errors import DatabaseError
 
 _log = logging.getLogger(__name__)  # without settings of its own, warnings go to stderr
@@ -45,7 +45,7 @@ def migrate(engine: Engine, version_of: Callable[[Connection], int | None], *, k
     """
     copy: Path | None = None
     try:
-        with writing(engine) as connection:
+        with write_transaction(engine) as connection:
             version = version_of(connection)
             if version is None or version >= SCHEMA_VERSION:  # another program was first
                 return

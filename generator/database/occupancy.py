@@ -45,7 +45,7 @@ def free_cells(connection: Connection, array_id: int, cells: Cells) -> None:
 
 def _write(connection: Connection, array_id: int, cells: Cells, *, taken: bool) -> None:
     changed = tiles_of(*cells)
-    known = _read(connection, array_id, changed)
+    known = _read_tiles(connection, array_id, changed)
     empty = np.zeros(TILE * TILE // 8, np.uint8)
     rows = []
     for tile, bits in changed.items():
@@ -73,7 +73,7 @@ def _write(connection: Connection, array_id: int, cells: Cells, *, taken: bool) 
     insert_rows(connection, tables.occupancy, new)
 
 
-def _read(connection: Connection, array_id: int, wanted: Iterable[tuple[int, int]]) -> Tiles:
+def _read_tiles(connection: Connection, array_id: int, wanted: Iterable[tuple[int, int]]) -> Tiles:
     """Return the tiles among `wanted` that the database has."""
     occupancy = tables.occupancy.c
     columns_of: dict[int, set[int]] = defaultdict(set)

@@ -10,10 +10,10 @@ from pathlib import Path
 
 from sqlalchemy import URL, Connection, Engine, insert, inspect, select, text
 
-from generator.database.engine import check_place, connectable
+from generator.database.engine import check_place, database_engine
 from generator.database.migrate import migrate
 from generator.database.tables import FORMAT, SCHEMA_VERSION, meta, metadata
-from generator.database.transaction import WAIT_S, place_of, reading, writing
+from generator.database.transaction import WAIT_S, place_of, read_transaction, write_transaction
 from generator.database.url import normal_url
 from generator.errors import DatabaseError
 
@@ -43,14 +43,14 @@ def open_database(
         A place that does not exist or may not be written, a file that is no database
         or another program's, a newer schema, an older one that may not be written.
     """
-    engine = connectable(normal_url(url), writable, wait_s)
+    engine = database_engine(normal_url(url), writable, wait_s)
     if _update_schema(engine, wait_s, keep_older):
         return engine
     if not writable:
         fix = "register an object with encode-object first, or name another database"
         place = place_of(engine.url)
         raise DatabaseError("no objects are registered here", fix=fix, place=place)
-    with writing(engine) as connection:
+    with write_transaction(engine) as connection:
         if _schema_version(connection) is None:  # nobody else made it meanwhile
             _create_schema(connection)
     return engine
@@ -61,7 +61,7 @@ def open_if_there(url: str, *, writable: bool = True) -> Engine | None:
     normal = normal_url(url)
     if not _file_is_there(normal):
         return None
-    engine = connectable(normal, writable, WAIT_S)
+    engine = database_engine(normal, writable, WAIT_S)
     return engine if _update_schema(engine, WAIT_S, keep_older=True) else None
 
 
@@ -81,7 +81,7 @@ def database_exists(url: str) -> bool:
     normal = normal_url(url)
     if not _file_is_there(normal):
         return False
-    with reading(connectable(normal, writable=False, wait_s=WAIT_S)) as connection:
+    with read_transaction(database_engine(normal, writable=False, wait_s=WAIT_S)) as connection:
         return _schema_version(connection) is not None
 
 
@@ -96,7 +96,7 @@ def _file_is_there(url: URL) -> bool:
 
 def _update_schema(engine: Engine, wait_s: float, keep_older: bool) -> bool:
     """Bring a database to this version of the schema; False where there is none yet."""
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         version = _schema_version(connection)
     if version is not None and version < SCHEMA_VERSION:
         older = _for_migration(engine.url, version, wait_s)
@@ -106,7 +106,7 @@ def _update_schema(engine: Engine, wait_s: float, keep_older: bool) -> bool:
 
 def _for_migration(url: URL, version: int, wait_s: float) -> Engine:
     try:
-        return connectable(url, writable=True, wait_s=wait_s)
+        return database_engine(url, writable=True, wait_s=wait_s)
     except DatabaseError as error:
         raise DatabaseError(
             f"the database has schema version {version}, must be brought to {SCHEMA_VERSION}, "

@@ -22,7 +22,7 @@ from typing import TypeVar
 import numpy as np
 from sqlalchemy import Connection, Engine
 
-from generator.database.transaction import LostRaceError, writing
+from generator.database.transaction import LostRaceError, write_transaction
 
 Result = TypeVar("Result")
 
@@ -42,8 +42,8 @@ def in_turn(
     Parameters
     ----------
     work
-        Called with the connection of a `writing` transaction; again after each lost race, so
-        that it must read the database itself and leave nothing behind that is not undone.
+        Called with the connection of a `write_transaction`; again after each lost race, so that
+        it must read the database itself and leave nothing behind that is not undone.
     tries
         How often in all.
     rng
@@ -55,14 +55,14 @@ def in_turn(
     LostRaceError
         The last of `tries` races was lost, too.
     DatabaseError
-        As `writing`.
+        As `write_transaction`.
     """
     chance = np.random.default_rng(os.getpid()) if rng is None else rng
     for number in range(tries - 1):
         try:
-            with writing(engine) as connection:
+            with write_transaction(engine) as connection:
                 return work(connection)
         except LostRaceError:
             time.sleep(FIRST_PAUSE_S * 2**number * chance.uniform(0.5, 1.0))
-    with writing(engine) as connection:
+    with write_transaction(engine) as connection:
         return work(connection)

@@ -103,7 +103,7 @@ def _layout_of(connection: Connection, entry: ObjectEntry) -> Layout:
     ):
         symbols[face].append(tuple(symbol))
     faces, blank = [], []
-    for row in connection.execute(_of(tables.placements, entry, "position")):
+    for row in connection.execute(_rows_of_object(tables.placements, entry, "position")):
         if row.blank:
             blank.append(row.face_id)
         r, c, label, x, y = (
@@ -187,7 +187,7 @@ def read_parts(connection: Connection, object_id: int) -> tuple[RegisteredPart, 
     )
 
 
-def _of(table: Table, entry: ObjectEntry, *order: str) -> Select[Any]:
+def _rows_of_object(table: Table, entry: ObjectEntry, *order: str) -> Select[Any]:
     """Return the query for an object's rows of a table, in a stated order."""
     return (
         select(table)
@@ -199,15 +199,15 @@ def _of(table: Table, entry: ObjectEntry, *order: str) -> Select[Any]:
 def _read_polyhedron(connection: Connection, entry: ObjectEntry) -> Polyhedron:
     points = [
         (row.x_vertex, row.y_vertex, row.z_vertex)
-        for row in connection.execute(_of(tables.vertices, entry, "vertex_id"))
+        for row in connection.execute(_rows_of_object(tables.vertices, entry, "vertex_id"))
     ]
     loops: dict[int, dict[int, list[int]]] = defaultdict(lambda: defaultdict(list))
-    query = _of(tables.faces_to_vertices, entry, "face_id", "loop", "position")
+    query = _rows_of_object(tables.faces_to_vertices, entry, "face_id", "loop", "position")
     for row in connection.execute(query):
         loops[row.face_id][row.loop].append(row.vertex_id)
     faces = tuple(
         Face(row.name, tuple(tuple(loop) for loop in loops[row.face_id].values()))
-        for row in connection.execute(_of(tables.faces, entry, "face_id"))
+        for row in connection.execute(_rows_of_object(tables.faces, entry, "face_id"))
     )
     edges = tuple(
         WingedEdge(
@@ -220,7 +220,7 @@ def _read_polyhedron(connection: Connection, entry: ObjectEntry) -> Polyhedron:
             right_previous=row.right_previous_id,
             right_next=row.right_next_id,
         )
-        for row in connection.execute(_of(tables.edges, entry, "edge_id"))
+        for row in connection.execute(_rows_of_object(tables.edges, entry, "edge_id"))
     )
     return Polyhedron(entry.object_type, _read_only(points, np.float64), faces, edges)
 
@@ -237,7 +237,7 @@ def _read_faces(
     }
     rounds = {one.carrier: round_face(polyhedron, one) for one in surfaces}
     faces = []
-    for row in connection.execute(_of(tables.faces, entry, "face_id")):
+    for row in connection.execute(_rows_of_object(tables.faces, entry, "face_id")):
         faces.append(
             RegisteredFace(
                 face_id=row.face_id,

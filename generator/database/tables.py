@@ -132,7 +132,7 @@ def _of_object() -> Column[int]:
     )
 
 
-def _to(table: str, column: str, *, key: str, **options: Any) -> ForeignKeyConstraint:
+def _foreign_key(table: str, column: str, *, key: str, **options: Any) -> ForeignKeyConstraint:
     """Return a foreign key from (object_id, column) to (object_id, key) of `table`.
 
     It removes nothing: an object goes as a whole, a single vertex or face does not.
@@ -188,11 +188,14 @@ edges = Table(
     Column("right_next_id", Integer, nullable=False),
     Column("edge_length", REAL, nullable=False),  #: mm
     PrimaryKeyConstraint("object_id", "edge_id"),
-    _to("faces", "face_id", key="face_id"),
-    _to("faces", "right_face_id", key="face_id"),
-    _to("vertices", "start_vertex_id", key="vertex_id"),
-    _to("vertices", "end_vertex_id", key="vertex_id"),
-    *(_to("edges", link, key="edge_id", deferrable=True, initially="DEFERRED") for link in _LINKS),
+    _foreign_key("faces", "face_id", key="face_id"),
+    _foreign_key("faces", "right_face_id", key="face_id"),
+    _foreign_key("vertices", "start_vertex_id", key="vertex_id"),
+    _foreign_key("vertices", "end_vertex_id", key="vertex_id"),
+    *(
+        _foreign_key("edges", link, key="edge_id", deferrable=True, initially="DEFERRED")
+        for link in _LINKS
+    ),
     *(Index(f"edges_by_{link}", "object_id", link) for link in _LINKS),
     CheckConstraint("edge_length > 0", name="edge_has_length"),
     CheckConstraint("start_vertex_id <> end_vertex_id", name="edge_has_two_ends"),
@@ -209,8 +212,8 @@ faces_to_vertices = Table(
     Column("position", Integer, nullable=False),
     Column("vertex_id", Integer, nullable=False),
     PrimaryKeyConstraint("object_id", "face_id", "loop", "position"),
-    _to("faces", "face_id", key="face_id"),
-    _to("vertices", "vertex_id", key="vertex_id"),
+    _foreign_key("faces", "face_id", key="face_id"),
+    _foreign_key("vertices", "vertex_id", key="vertex_id"),
     sqlite_with_rowid=False,
 )
 
@@ -222,8 +225,8 @@ edges_to_vertices = Table(
     Column("position", Integer, nullable=False),  #: 0 start, 1 end
     Column("vertex_id", Integer, nullable=False),
     PrimaryKeyConstraint("object_id", "edge_id", "position"),
-    _to("edges", "edge_id", key="edge_id"),
-    _to("vertices", "vertex_id", key="vertex_id"),
+    _foreign_key("edges", "edge_id", key="edge_id"),
+    _foreign_key("vertices", "vertex_id", key="vertex_id"),
     CheckConstraint("position IN (0, 1)", name="edge_end"),
     sqlite_with_rowid=False,
 )
@@ -243,7 +246,7 @@ placements = Table(
     Column("y_mm", REAL, nullable=False),
     Column("places", BigInteger, nullable=False),  #: places of the face that can be identified
     PrimaryKeyConstraint("object_id", "face_id"),
-    _to("faces", "face_id", key="face_id"),
+    _foreign_key("faces", "face_id", key="face_id"),
     Column("blank", Integer, nullable=False),  #: 1 where the face was left blank, else 0
     CheckConstraint('"row" >= 0 AND "column" >= 0', name="anchor_on_array"),
     CheckConstraint("blank IN (0, 1)", name="blank_or_not"),
@@ -267,7 +270,7 @@ cells = Table(
     ForeignKeyConstraint(
         ["object_id", "array_id"], ["objects.object_id", "objects.array_id"], ondelete="CASCADE"
     ),
-    _to("placements", "face_id", key="face_id"),
+    _foreign_key("placements", "face_id", key="face_id"),
     CheckConstraint('"row" >= 0 AND "column" >= 0 AND label >= 0', name="cell_on_array"),
     Index("cells_of_face", "object_id", "face_id", "position", unique=True),
     sqlite_with_rowid=False,

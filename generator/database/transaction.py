@@ -29,7 +29,7 @@ class LostRaceError(DatabaseError):
 
 
 @contextmanager
-def writing(engine: Engine) -> Iterator[Connection]:
+def write_transaction(engine: Engine) -> Iterator[Connection]:
     """Open a transaction that alone may write; commits at the end, undone on any error.
 
     Raises
@@ -49,7 +49,7 @@ def writing(engine: Engine) -> Iterator[Connection]:
 
 
 @contextmanager
-def reading(engine: Engine) -> Iterator[Connection]:
+def read_transaction(engine: Engine) -> Iterator[Connection]:
     """Open a transaction that sees one state of the database, whatever others write."""
     try:
         with engine.connect() as connection:

@@ -19,7 +19,7 @@ from sqlalchemy import Connection, Engine
 
 from generator.database.cells import occupancy
 from generator.database.open import open_database, open_if_there
-from generator.database.transaction import reading
+from generator.database.transaction import read_transaction
 from generator.pipeline.choose import choose_array
 from generator.pipeline.faces import face_reports
 from generator.pipeline.files import parts_of
@@ -82,7 +82,7 @@ def encode(
     url = database or specs[0].spec.database
     plans: list[ObjectPlan] = []
     engine = open_if_there(url, writable=not dry_run)
-    with reading(engine) if engine else nullcontext() as connection:
+    with read_transaction(engine) if engine else nullcontext() as connection:
         choice = choose_array(specs, connection)
     for number, located in enumerate(choice.specs):
         progress(f"planning {located.spec.name}", 0.1 * number / len(specs))
@@ -92,7 +92,7 @@ def encode(
     rest = within(progress, 0.1, 1.0)
     files: tuple[Path, ...] = ()
     if dry_run:
-        with reading(engine) if engine else nullcontext() as connection:
+        with read_transaction(engine) if engine else nullcontext() as connection:
             made, used = _rehearse(connection, plans, replace, rest)
     else:
         engine = engine or new_database(url, plans[0])
@@ -104,7 +104,7 @@ def encode(
             made = [make_under_lock(engine, orders[0], rest).made]
         else:
             made, files = make_set(engine, url, orders, set_folder(orders, folder), jobs, rest)
-        with reading(engine) as connection:
+        with read_transaction(engine) as connection:
             used = occupancy(connection, plans[0].array).used
     array = plans[0].array
     seconds = time.perf_counter() - began

@@ -17,7 +17,7 @@ from sqlalchemy import Connection, Engine
 
 from generator.database.entries import find_object
 from generator.database.register import ObjectRecord, register
-from generator.database.transaction import LostRaceError, writing
+from generator.database.transaction import LostRaceError, write_transaction
 from generator.database.url import part_file
 from generator.export.atomic import Staging
 from generator.pipeline.files import Staged, stage
@@ -50,7 +50,7 @@ def make_under_lock(engine: Engine, order: Order, progress: Progress = no_progre
     """Make one object; nobody else writes to the database meanwhile."""
     name = order.plan.spec.name
     with Staging(order.folder) as staging:
-        with writing(engine) as connection:
+        with write_transaction(engine) as connection:
             progress(f"placing {name}", 0.0)
             place = place_object(connection, order.plan, order.replace)
             files = _stage(order, place, staging, within(progress, 0.1, 0.9))
@@ -66,7 +66,7 @@ def make_at(
     try:
         with Staging(order.folder) as staging:
             files = _stage(order, place, staging, within(progress, 0.0, 0.9))
-            with writing(engine) as connection:
+            with write_transaction(engine) as connection:
                 known = find_object(connection, order.plan.spec.name)
                 if (known is not None) != (place.reused or place.replaces):
                     raise LostRaceError("an object of this name came or went meanwhile")

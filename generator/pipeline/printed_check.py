@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from generator.database.open import open_if_there
-from generator.database.transaction import reading
+from generator.database.transaction import read_transaction
 from generator.pipeline.choose import choose_array
 from generator.pipeline.files import parts_of
 from generator.pipeline.place import occupancy_of, occupancy_with, place_object
@@ -96,7 +96,7 @@ def _build(
     """Return the parts of each object, placed beside the ones before it."""
     engine = open_if_there(url, writable=False)
     built = []
-    with reading(engine) if engine else nullcontext() as connection:
+    with read_transaction(engine) if engine else nullcontext() as connection:
         taken = None
         for number, located in enumerate(choose_array(specs, connection).specs):
             progress(f"building {located.spec.name}", number / len(specs))

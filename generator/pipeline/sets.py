@@ -20,7 +20,7 @@ from generator.database.entries import find_object
 from generator.database.part_state import part_state
 from generator.database.read import read_layout, read_parts
 from generator.database.register import require_in_use
-from generator.database.transaction import reading
+from generator.database.transaction import read_transaction
 from generator.export.overview import can_draw
 from generator.pipeline.made import MadeObject, describe_object
 from generator.pipeline.make import Order, Product, make_at
@@ -63,7 +63,7 @@ def make_set(
     products: list[Product | None] = [None] * len(orders)
     tasks: list[Task[Product]] = []
     numbers: list[int] = []
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         taken = occupancy_of(connection, orders[0].plan)
         for number, order in enumerate(orders):
             name = order.plan.spec.name

@@ -21,7 +21,7 @@ from generator.database.entries import find_object, object_names
 from generator.database.open import open_database
 from generator.database.read import read_object
 from generator.database.registered import RegisteredFace, RegisteredObject
-from generator.database.transaction import reading
+from generator.database.transaction import read_transaction
 from probe.errors import SurfaceError
 from probe.simulate.round import round_scene
 from probe.simulate.scene import Scene
@@ -87,7 +87,7 @@ def registered_object(database: str, name: str) -> RegisteredObject:
     SurfaceError
         As `registered_surface`.
     """
-    with _opened(database) as connection:
+    with _connect(database) as connection:
         if name and find_object(connection, name) is not None:
             return read_object(connection, name)
         known = object_names(connection)
@@ -103,14 +103,14 @@ def registered_object(database: str, name: str) -> RegisteredObject:
 
 def registered_objects(database: str) -> tuple[str, ...]:
     """Return the names of all registered objects, in order."""
-    with _opened(database) as connection:
+    with _connect(database) as connection:
         return object_names(connection)
 
 
 @contextmanager
-def _opened(database: str) -> Iterator[Connection]:
+def _connect(database: str) -> Iterator[Connection]:
     try:
-        with reading(open_database(database, writable=False)) as connection:
+        with read_transaction(open_database(database, writable=False)) as connection:
             yield connection
     except DatabaseError as error:
         place = error.place or database
@@ -152,7 +152,7 @@ def _surface(held: RegisteredObject, face: RegisteredFace) -> FaceSurface:
             place.x_mm,
             place.y_mm,
         )
-    return FaceSurface(lattice, polygon(face.polygon_mm), _around(held, face, symbols))
+    return FaceSurface(lattice, polygon(face.polygon_mm), _surrounding_mesh(held, face, symbols))
 
 
 def _symbols(held: RegisteredObject) -> SymbolReliefs:
@@ -166,7 +166,7 @@ def _symbols(held: RegisteredObject) -> SymbolReliefs:
     return emboss(glyphs, definition["reach"] * style.pitch_mm, relief)
 
 
-def _around(
+def _surrounding_mesh(
     held: RegisteredObject, face: RegisteredFace, symbols: SymbolReliefs
 ) -> MeshSurface | None:
     """Return all other faces that are seen from above, with symbols near this face."""
@@ -181,20 +181,20 @@ def _around(
         if T[2, 2] > _FLAT:
             # Corners come from the object, so that neighbours share them to the last bit.
             loops = held.polyhedron.faces[other.face_id].loops
-            corners = _moved(held.polyhedron.vertices, T_face_object)
+            corners = _transform_points(held.polyhedron.vertices, T_face_object)
             numbers = np.concatenate([np.array(loop) for loop in loops])
             found.append(corners[numbers[triangulate(other.polygon_mm)]])
         if other.placement is None or T[2, 2] < -0.5:
             continue
         cells = held.layout.faces[other.face_id]
-        at = _moved(np.c_[cells.centres_mm, np.zeros(len(cells.labels))], T)
+        at = _transform_points(np.c_[cells.centres_mm, np.zeros(len(cells.labels))], T)
         reach = math.hypot(symbols.foot_half_mm * math.sqrt(2), symbols.relief.height_mm)
         near = (at[:, 2] + reach > -DEEPEST_MM) & (
             (at[:, :2] > low - BESIDE_MM) & (at[:, :2] < high + BESIDE_MM)
         ).all(axis=1)
-        turn = _turn(-other.placement.rotation_rad)
+        turn = _rotation_about_z(-other.placement.rotation_rad)
         for label in np.unique(cells.labels[near]):
-            solid = _moved(symbol_triangles(symbols, int(label)), T[:3, :3] @ turn)
+            solid = _transform_points(symbol_triangles(symbols, int(label)), T[:3, :3] @ turn)
             here = at[near & (cells.labels == label)]
             found.append((here[:, None, None] + solid).reshape(-1, 3, 3))
     if not found:
@@ -207,7 +207,7 @@ def _around(
     return mesh(corners[seen], place=held.entry.name) if seen.any() else None
 
 
-def _moved(points: NDArray[Any], T: NDArray[Any]) -> Array:
+def _transform_points(points: NDArray[Any], T: NDArray[Any]) -> Array:
     """Return points (..., 3) turned by T (3, 3), or moved by T (4, 4); the same bits anywhere."""
     x, y, z = np.moveaxis(points, -1, 0)
     shift = T[:3, 3] if T.shape == (4, 4) else np.zeros(3)
@@ -215,6 +215,6 @@ def _moved(points: NDArray[Any], T: NDArray[Any]) -> Array:
     return np.stack(rows, axis=-1)
 
 
-def _turn(angle_rad: float) -> Array:
+def _rotation_about_z(angle_rad: float) -> Array:
     c, s = math.cos(angle_rad), math.sin(angle_rad)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

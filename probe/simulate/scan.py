@@ -60,7 +60,9 @@ class ScanPath:
         """Return T_base_sensor (4, 4) of a touch that pressed on a scene, as it is."""
         T_base_surface = self.T_base_surface
         if T_base_surface is None:
-            T_base_surface = _known(self.T_base_object) @ _known(scene.T_object_surface)
+            T_base_surface = _require_transform(self.T_base_object) @ _require_transform(
+                scene.T_object_surface
+            )
         return T_base_surface @ pose_of(self.touches[number], contact)
 
     def believed_pose(self, number: int, true: Array) -> Array:
@@ -173,7 +175,7 @@ def _pressed_n(wrist: Wrist, force_n: float, rng: np.random.Generator) -> float:
     return guarded_approach(lambda at: springs_n_mm * max(0.0, at - gap_mm), limits).force_n
 
 
-def _known(transform: Array | None) -> Array:
+def _require_transform(transform: Array | None) -> Array:
     if transform is None:
         raise SurfaceError("the object's frame is not known", fix="touch a registered face")
     return transform

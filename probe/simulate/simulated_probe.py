@@ -65,12 +65,12 @@ class TouchOptions:
         else:
             drawn = next(random_touches(scene.region, rng, Touches()))
         touch = Touch(
-            _or(self.x_mm, drawn.x_mm),
-            _or(self.y_mm, drawn.y_mm),
-            math.radians(_or(self.theta_deg, math.degrees(drawn.theta_rad))),
-            _or(self.force_n, drawn.force_n),
-            math.radians(_or(self.tilt_x_deg, math.degrees(drawn.tilt_x_rad))),
-            math.radians(_or(self.tilt_y_deg, math.degrees(drawn.tilt_y_rad))),
+            _given_or_drawn(self.x_mm, drawn.x_mm),
+            _given_or_drawn(self.y_mm, drawn.y_mm),
+            math.radians(_given_or_drawn(self.theta_deg, math.degrees(drawn.theta_rad))),
+            _given_or_drawn(self.force_n, drawn.force_n),
+            math.radians(_given_or_drawn(self.tilt_x_deg, math.degrees(drawn.tilt_x_rad))),
+            math.radians(_given_or_drawn(self.tilt_y_deg, math.degrees(drawn.tilt_y_rad))),
             drawn.wrist,
         )
         numbers = (touch.x_mm, touch.y_mm, touch.theta_rad, touch.force_n, touch.tilt_x_rad,
@@ -241,10 +241,10 @@ class SimulatedProbe:
                                fix="leave x, y and tilts out, or the scan")  # fmt: skip
         return scan_path(
             self.scene, self.sensor, options.scan, np.random.default_rng([options.seed, _WAY]),
-            most=options.touches, theta_rad=math.radians(_or(options.theta_deg, 0.0)),
-            force_n=_or(options.force_n, FORCE_N),
+            most=options.touches, theta_rad=math.radians(_given_or_drawn(options.theta_deg, 0.0)),
+            force_n=_given_or_drawn(options.force_n, FORCE_N),
         )  # fmt: skip
 
 
-def _or(given: float | None, drawn: float) -> float:
+def _given_or_drawn(given: float | None, drawn: float) -> float:
     return drawn if given is None else given

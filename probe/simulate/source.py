@@ -46,7 +46,7 @@ NAMES = ("x", "y", "theta", *_DEFAULTS, *_CHOICES, "accuracy")
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
+class MotionOptions:
     """How a simulated probe moves and what it is; the table above."""
 
     numbers: dict[str, float]  #: x, y and theta only where given
@@ -76,7 +76,7 @@ def frames_of(target: str, options: Mapping[str, str] | None = None) -> Iterator
     return _frames(surface_of(target), given)
 
 
-def options_of(values: Mapping[str, str], *, place: str = "") -> Options:
+def options_of(values: Mapping[str, str], *, place: str = "") -> MotionOptions:
     """Read options from text.
 
     Raises
@@ -105,7 +105,7 @@ def options_of(values: Mapping[str, str], *, place: str = "") -> Options:
     electronics = Electronics(noise=noise, frame_s=1 / numbers["rate"])
     accuracy = accuracy_of(values.get("accuracy", "auto"))
     level_for(sensor, accuracy)
-    return Options(numbers, sensor, electronics, accuracy)
+    return MotionOptions(numbers, sensor, electronics, accuracy)
 
 
 def _number(name: str, text: str, place: str) -> float:
@@ -120,18 +120,18 @@ def _number(name: str, text: str, place: str) -> float:
     return value
 
 
-def _frames(scene: Scene, options: Options) -> Iterator[Frame]:
+def _frames(scene: Scene, options: MotionOptions) -> Iterator[Frame]:
     numbers = options.numbers
     rng = np.random.default_rng(int(numbers["seed"]))
     fsr, state = fsr_of(options.sensor.rows, options.sensor.columns), None
     beats = max(1, round(numbers["period"] * numbers["rate"]))
     seq = 0
-    for touch in _wandering(scene, options, rng):
+    for touch in _random_walk(scene, options, rng):
         images: dict[float, Image] = {}
         for beat in range(beats):
             share = round(load(beat / beats) * LEVELS) / LEVELS
             if share not in images:
-                images[share] = _pressed(scene, options, touch, share)
+                images[share] = _press_forces(scene, options, touch, share)
             counts, state = read_counts(images[share], options.electronics, fsr, state, rng)
             yield frame_from(counts, t_ns=round(seq * 1e9 / numbers["rate"]), seq=seq)
             seq += 1
@@ -148,13 +148,13 @@ def load(share: float) -> float:
     return 0.0
 
 
-def _pressed(scene: Scene, options: Options, touch: Touch, share: float) -> Image:
+def _press_forces(scene: Scene, options: MotionOptions, touch: Touch, share: float) -> Image:
     pressed = replace(touch, force_n=touch.force_n * share)
     surface = scene.under(touch).surface
     return press(surface, options.sensor, pressed, accuracy=options.accuracy).forces_n
 
 
-def _wandering(scene: Scene, options: Options, rng: np.random.Generator) -> Iterator[Touch]:
+def _random_walk(scene: Scene, options: MotionOptions, rng: np.random.Generator) -> Iterator[Touch]:
     """Yield touches that have an equilibrium: at the place asked for, or step after step."""
     numbers = options.numbers
     fixed = "x" in numbers or "y" in numbers
@@ -173,7 +173,7 @@ def _wandering(scene: Scene, options: Options, rng: np.random.Generator) -> Iter
             tilt_y_rad=tilt * math.sin(towards),
         )
         try:
-            _pressed(scene, options, touch, 1.0)
+            _press_forces(scene, options, touch, 1.0)
         except ContactError:
             refused += 1
             if fixed or refused > _TURNS:
@@ -182,10 +182,10 @@ def _wandering(scene: Scene, options: Options, rng: np.random.Generator) -> Iter
             refused = 0
             yield touch
         if not fixed:
-            at = _stepped(scene, at, numbers["step"], rng)
+            at = _next_place(scene, at, numbers["step"], rng)
 
 
-def _stepped(scene: Scene, at: Image, step_mm: float, rng: np.random.Generator) -> Image:
+def _next_place(scene: Scene, at: Image, step_mm: float, rng: np.random.Generator) -> Image:
     """Return a place one step further inside the region; the middle where there is none."""
     for angle in rng.uniform(-math.pi, math.pi, _TURNS):
         onward = at + step_mm * np.array([math.cos(angle), math.sin(angle)])

@@ -11,7 +11,7 @@ from fastapi.responses import FileResponse
 from generator.database.entries import object_entry
 from generator.database.open import open_database
 from generator.database.read import read_parts
-from generator.database.transaction import reading
+from generator.database.transaction import read_transaction
 from recognizer.bench.errors import UnknownError
 from recognizer.bench.files import part_to_send
 from recognizer.bench.lab_json import arrays_json, map_json, object_json, objects_json
@@ -31,12 +31,12 @@ def lab_routes(session: Session, parts: Path | None) -> APIRouter:
     def objects() -> dict[str, Any]:
         if not session.database:
             return {"objects": []}
-        with reading(engine()) as connection:
+        with read_transaction(engine()) as connection:
             return {"objects": objects_json(connection)}
 
     @routes.get("/objects/{name}")
     def one(name: str) -> dict[str, Any]:
-        with reading(engine()) as connection:
+        with read_transaction(engine()) as connection:
             held = object_json(connection, name)
         if session.simulation is not None:
             session.simulation.prepare(name)
@@ -44,7 +44,7 @@ def lab_routes(session: Session, parts: Path | None) -> APIRouter:
 
     @routes.get("/objects/{name}/parts/{number}")
     def part(name: str, number: int) -> FileResponse:
-        with reading(engine()) as connection:
+        with read_transaction(engine()) as connection:
             known = read_parts(connection, object_entry(connection, name).object_id)
         if not 0 <= number < len(known):
             raise UnknownError(f"{name} has no part {number}", fix=f"it has {len(known)}")
@@ -69,7 +69,7 @@ def lab_routes(session: Session, parts: Path | None) -> APIRouter:
         known = () if reader is None else reader.lab.arrays
         if not 0 <= number < len(known):
             raise UnknownError(f"there is no array {number}", fix=f"there are {len(known)}")
-        with reading(engine()) as connection:
+        with read_transaction(engine()) as connection:
             return map_json(connection, known[number])
 
     return routes

@@ -24,7 +24,7 @@ from generator.database.cells import held_cells
 from generator.database.open import open_database
 from generator.database.read import read_array, read_object, read_styles, read_surfaces
 from generator.database.registered import Developable, RegisteredObject, RegisteredStyle, RoundFace
-from generator.database.transaction import reading
+from generator.database.transaction import read_transaction
 from recognizer.errors import LabError
 from recognizer.touch.settings import DEFAULTS, LabSettings
 from recognizer.touch.windows import Windows, index_windows
@@ -93,7 +93,7 @@ class EmbossedArray:
         if number not in self.known:
             object_id = int(self.faces[number, 0])
             numbers = np.flatnonzero(self.faces[:, 0] == object_id)
-            with reading(self.engine) as connection:
+            with read_transaction(self.engine) as connection:
                 found = read_object(connection, self.names[object_id])
             encoded = dict(_encoded_faces(found))
             for near in numbers.tolist():
@@ -147,7 +147,7 @@ def open_lab(database: str | Path, settings: LabSettings = DEFAULTS.lab) -> Lab:
     """
     url = str(database)
     engine = open_database(url, writable=False)
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         arrays = tuple(_embossed_arrays(connection, engine, settings))
     if not arrays:
         raise LabError(

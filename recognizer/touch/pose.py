@@ -25,8 +25,8 @@ def face_pose(
     array, pitch = embossed.array, embossed.style.pitch_mm
     # any symbol of the face ties the two frames together; the first one does
     row, column = int(face.rows[0]), int(face.columns[0])
-    i = _nearest(column - hypothesis.column, array.columns, fit.x_mm / pitch)
-    j = _nearest(hypothesis.row - row, array.rows, fit.y_mm / pitch)
+    i = _nearest_congruent(column - hypothesis.column, array.columns, fit.x_mm / pitch)
+    j = _nearest_congruent(hypothesis.row - row, array.rows, fit.y_mm / pitch)
     away = np.array([fit.x_mm - (i + 0.5) * pitch, fit.y_mm - (j + 0.5) * pitch])
     c, s = math.cos(face.rotation_rad), math.sin(face.rotation_rad)
     centre = face.centres_mm[0] + np.array([c * away[0] + s * away[1], c * away[1] - s * away[0]])
@@ -68,6 +68,6 @@ def inside_mm(face: EncodedFace, x: float, y: float) -> float:
     return distance if crossings % 2 else -distance
 
 
-def _nearest(difference: int, size: int, near: float) -> int:
+def _nearest_congruent(difference: int, size: int, near: float) -> int:
     """Return the number congruent to `difference` modulo `size` that lies nearest to `near`."""
     return difference + round((near - difference) / size) * size

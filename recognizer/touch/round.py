@@ -112,10 +112,10 @@ def _is_compatible(
 ) -> bool:
     """Whether a place has about the bend under which its symbols were read."""
     bend = bend_at(embossed, hypothesis, fit)
-    return _alike(bend, under, settings.turned_rad, settings.radii)
+    return _same_bend(bend, under, settings.turned_rad, settings.radii)
 
 
-def _alike(a: Bend | None, b: Bend | None, turn_rad: float, factor: float) -> bool:
+def _same_bend(a: Bend | None, b: Bend | None, turn_rad: float, factor: float) -> bool:
     if a is None or b is None:
         return False
     turn = abs(math.remainder(a.towards_rad - b.towards_rad, math.pi))
@@ -168,7 +168,7 @@ def _under_best_fit(one: VerifiedHypothesis, found: list[VerifiedHypothesis]) ->
     for other in found:
         if other.hypothesis.fit != one.hypothesis.fit:
             continue
-        if not _alike(other.bend, one.bend, settings.same_rad, settings.same_radii):
+        if not _same_bend(other.bend, one.bend, settings.same_rad, settings.same_radii):
             continue
         score = log_likelihood(one.embossed, other.fit, one.hypothesis, limits)
         if score > best.score:

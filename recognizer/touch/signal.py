@@ -58,11 +58,11 @@ def signal_of(
     forces = np.maximum(readings - level, 0.0)
     rise = settings.contact_n if newtons else settings.contact_counts
     strongest = np.sort(forces[known > 0])[-settings.strongest :]
-    alive = _alive(forces, known, settings)
+    alive = _live_mask(forces, known, settings)
     return Signal(forces, known * alive, bool(strongest[0] > rise), newtons)
 
 
-def _alive(forces: Array, known: Array, settings: SignalSettings) -> Array:
+def _live_mask(forces: Array, known: Array, settings: SignalSettings) -> Array:
     """Return 0 for whole rows and columns that read nothing between ones that do."""
     alive = np.ones(forces.shape)
     for axis in (0, 1):

@@ -84,7 +84,7 @@ def source_of(
         place=str(path),
         sensor=with_overlay(sensor, overlay or told),
         calibration=known,
-        together=1 if every else _together(origin, path),
+        together=1 if every else _frames_per_touch(origin, path),
         frames=len(recording),
         notice=notice,
     )
@@ -99,7 +99,7 @@ def with_overlay(sensor: SensorType, kind: str) -> SensorType:
     return replace(sensor, overlay=Overlay(kind="pad")) if kind == "pad" else sensor
 
 
-def _together(origin: RecordingOrigin, path: Path) -> int:
+def _frames_per_touch(origin: RecordingOrigin, path: Path) -> int:
     """Return how many frames follow each other at one place; 0 if the recording does not tell."""
     told: Any = origin.more.get("frames_per_touch", 0)
     if not isinstance(told, int) or told < 0:

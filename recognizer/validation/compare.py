@@ -14,7 +14,7 @@ from typing import Any
 
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.files import write_text
-from recognizer.validation.pictures import against
+from recognizer.validation.pictures import accuracy
 from recognizer.validation.pipeline import RESULTS, TIMES_FILE
 from recognizer.validation.report import PAIR, environment
 
@@ -42,10 +42,13 @@ def compare_runs(first: Path, second: Path, output: Path | None) -> dict[str, An
     """
     a, b = _read_json(first, RESULTS), _read_json(second, RESULTS)
     times = _read_json(first, TIMES_FILE), _read_json(second, TIMES_FILE)
-    found = {"lines": _lines(a, b, times), "differ": _differ(a["provenance"], b["provenance"])}
+    found = {
+        "lines": _lines(a, b, times),
+        "differ": _differing_settings(a["provenance"], b["provenance"]),
+    }
     if output is not None:
         page = environment().get_template(PAIR)
-        text = page.render(a=a, b=b, found=found, pictures=(against(a), against(b)))
+        text = page.render(a=a, b=b, found=found, pictures=(accuracy(a), accuracy(b)))
         write_text(output, text)
     return found
 
@@ -113,7 +116,7 @@ def _size(name: str, a: float | None, b: float | None, of: tuple[int, int]) -> d
     return {"name": name, "a": a, "b": b, "word": word}
 
 
-def _differ(a: dict[str, Any], b: dict[str, Any]) -> list[dict[str, str]]:
+def _differing_settings(a: dict[str, Any], b: dict[str, Any]) -> list[dict[str, str]]:
     """Return the settings in which two runs differ."""
     found = []
     for part in ("campaign", "versions"):

@@ -73,12 +73,12 @@ def draw_touch(plan: TouchPlan, number: int, reader: Reader) -> DrawnTouch:
         surface: HeightMap
         if plan.kind in FOREIGN:
             surface = FOREIGN[plan.kind](encoding, rng)
-            touch = _anywhere(rng, ranges)
+            touch = _draw_anywhere(rng, ranges)
         else:
             face = encoding.face(_by_name(encoding)[int(rng.integers(len(encoding.faces)))])
             scene = scene_of(plan.database, face.object, face.face, plan.files)
-            most = _inmost(plan.database, face.object, face.face, plan.files)
-            touch = _on(scene, plan.kind, most, rng, ranges)
+            most = _inradius_mm(plan.database, face.object, face.face, plan.files)
+            touch = _draw_on_face(scene, plan.kind, most, rng, ranges)
             surface = scene.under(touch).surface
             if plan.kind == "worn" and isinstance(surface, FaceSurface):
                 surface = wear_face(surface, plan.worn, rng)
@@ -110,7 +110,9 @@ def scene_of(database: str, object_name: str, face: str, files: bool) -> Scene:
     return registered_surface(database, object_name, face)
 
 
-def _on(scene: Scene, kind: str, most: float, rng: np.random.Generator, ranges: Touches) -> Touch:
+def _draw_on_face(
+    scene: Scene, kind: str, most: float, rng: np.random.Generator, ranges: Touches
+) -> Touch:
     """Draw a touch of a face; where a face is too small for its kind, anywhere on it."""
     inside = DRAWING.inside_mm
     if kind == "corner":
@@ -129,7 +131,7 @@ def _on(scene: Scene, kind: str, most: float, rng: np.random.Generator, ranges: 
 
 
 @lru_cache(maxsize=512)
-def _inmost(database: str, object_name: str, face: str, files: bool) -> float:
+def _inradius_mm(database: str, object_name: str, face: str, files: bool) -> float:
     """Return how far the inmost point of a face lies from its edges, mm, nearly."""
     scene = scene_of(database, object_name, face, files)
     low, high = scene.region.box_mm
@@ -139,7 +141,7 @@ def _inmost(database: str, object_name: str, face: str, files: bool) -> float:
     return float(scene.region.distance_mm(points).max())
 
 
-def _anywhere(rng: np.random.Generator, ranges: Touches) -> Touch:
+def _draw_anywhere(rng: np.random.Generator, ranges: Touches) -> Touch:
     low, high = ranges.force_n
     theta, towards = rng.uniform(-math.pi, math.pi, 2)
     tilt = ranges.tilt_rad * math.sqrt(rng.random())

@@ -18,7 +18,7 @@ from generator.database import DatabaseError
 from generator.database.entries import list_objects
 from generator.database.open import open_database
 from generator.database.read import read_parts
-from generator.database.transaction import reading
+from generator.database.transaction import read_transaction
 from recognizer.validation.errors import SetError
 
 PARTS, LAB = "parts", "lab.db"
@@ -71,7 +71,7 @@ def members_of(database: str) -> tuple[Member, ...]:
         It cannot be read.
     """
     try:
-        with reading(open_database(database, writable=False)) as connection:
+        with read_transaction(open_database(database, writable=False)) as connection:
             entries = list_objects(connection)
     except DatabaseError as error:
         raise SetError(error.cause, fix=error.fix, place=error.place or database) from error
@@ -97,7 +97,7 @@ def set_digest(database: str) -> str:
         The database cannot be read.
     """
     try:
-        with reading(open_database(database, writable=False)) as connection:
+        with read_transaction(open_database(database, writable=False)) as connection:
             held: list[Any] = [
                 [
                     entry.name,

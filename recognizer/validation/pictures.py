@@ -142,7 +142,7 @@ def pose(rows: dict[str, Any]) -> str:
     return picture.svg
 
 
-def against(results: dict[str, Any]) -> str:
+def accuracy(results: dict[str, Any]) -> str:
     """Return answers and pose error against level, force, tilt, edge distance and symbols."""
     picture = SvgPicture()
     names = [name for name in _NAMES if results["against"][name]["bins"]]

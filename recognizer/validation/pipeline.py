@@ -30,7 +30,7 @@ from recognizer.validation.extremes import extremes
 from recognizer.validation.files import write_json, write_text
 from recognizer.validation.precision import contact_study, decoder_study, reader_study
 from recognizer.validation.progress import TouchProgress
-from recognizer.validation.provenance import circumstances, provenance, rule
+from recognizer.validation.provenance import circumstances, judging_limits, provenance
 from recognizer.validation.record import RECORD, RunRecord, read_record
 from recognizer.validation.report import page_of, require_report
 from recognizer.validation.result import ValidationResult, result_from
@@ -220,7 +220,7 @@ def _finish(record: RunRecord, folder: Path) -> dict[str, Any]:
     reader = prepare_reader(work)
     results = results_of(rows)
     times: dict[str, Any] = {name: _cpu_ms(spent[name]) for name in ("drawing", "reading")}
-    results["rule"] = rule()
+    results["rule"] = judging_limits()
     results["study"], results["left_out"] = {}, []
     if campaign.study:
         studies = {

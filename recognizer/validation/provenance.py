@@ -56,7 +56,7 @@ def _contact(campaign: Campaign) -> str:
     return f"{engine}, {points} points a tab"
 
 
-def rule() -> dict[str, float]:
+def judging_limits() -> dict[str, float]:
     """Return the limits by which touches are judged."""
     return {
         "enough": JUDGING.enough,

@@ -139,7 +139,7 @@ def _draw_fit(axis: Axes, found: DrawnTouch, reader: Reader) -> None:
                 continue  # no symbol
             for stroke in alphabet.glyphs[label].strokes:
                 line = (cell + 0.5) * pitch + np.array(stroke) * alphabet.reach * pitch
-                at = _into(line, fit.x_mm, fit.y_mm, fit.theta_rad)
+                at = _to_sensor_frame(line, fit.x_mm, fit.y_mm, fit.theta_rad)
                 axis.plot(*at.T, color="#2f6db3", lw=2.5, alpha=0.8)
     axis.set_title("3  the symbols that the likeliest lattice shows")
     half = reader.sensor.half_mm
@@ -191,7 +191,7 @@ def _outline(reader: Reader, x: float, y: float, theta: float) -> Array:
     return outline
 
 
-def _into(points: Array, x: float, y: float, theta: float) -> Array:
+def _to_sensor_frame(points: Array, x: float, y: float, theta: float) -> Array:
     """Take points of the lattice to the sensor frame."""
     c, s = math.cos(theta), math.sin(theta)
     moved: Array = (points - (x, y)) @ np.array([[c, -s], [s, c]])

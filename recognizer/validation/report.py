@@ -38,7 +38,7 @@ def page_of(results: dict[str, Any], times: dict[str, Any], rows: dict[str, Any]
     drawn = {
         "confusion": pictures.confusion(results["objects"]),
         "pose": pictures.pose(rows),
-        "against": pictures.against(results),
+        "against": pictures.accuracy(results),
         "margins": pictures.margins(rows),
         "work": pictures.work_precision(results["study"], times) if results["study"] else "",
     }

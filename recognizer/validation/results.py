@@ -51,7 +51,7 @@ def results_of(rows: Columns) -> dict[str, Any]:
         Columns of `rows.COLUMNS`, in the order of the numbers.
     """
     verdicts, kinds, levels = rows["verdict"], rows["kind"], rows["level"]
-    whole = _isin(kinds, [kind for kind in ON_FACES if kind != "worn"])
+    whole = _membership_mask(kinds, [kind for kind in ON_FACES if kind != "worn"])
     fair = np.asarray(rows["enough"], bool)
     inside = kinds == "face"
     everything = np.ones(len(kinds), bool)
@@ -64,7 +64,7 @@ def results_of(rows: Columns) -> dict[str, Any]:
             {
                 "kind": kind,
                 "surface": surface,
-                **line_of(rows, (kinds == kind) & _at(rows, surface)),
+                **line_of(rows, (kinds == kind) & _surface_mask(rows, surface)),
             }
             for kind, surface in _kinds(rows)
         ],
@@ -73,7 +73,7 @@ def results_of(rows: Columns) -> dict[str, Any]:
             for level in LEVELS
             if ((levels == level) & fair).any()
         ],
-        "objects": _confusion(rows, _isin(kinds, list(ON_FACES))),
+        "objects": _confusion(rows, _membership_mask(kinds, list(ON_FACES))),
         "reasons": dict(sorted(Counter(rows["reason"][verdicts == REJECTED].tolist()).items())),
         "pose": _pose(rows),
         "against": {
@@ -84,19 +84,19 @@ def results_of(rows: Columns) -> dict[str, Any]:
             for name, (unit, edges) in BINS.items()
         },
         "margins": _margins(rows),
-        "worst": _worst(rows, fair),
+        "worst": _worst_touches(rows, fair),
     }
 
 
 _INSIDE = ("force_n", "tilt_deg")  # shown for touches inside faces; the others for whole faces
 
 
-def _at(rows: Columns, surface: str) -> Mask:
+def _surface_mask(rows: Columns, surface: str) -> Mask:
     found: Mask = np.ones(len(rows["kind"]), bool) if not surface else rows["surface"] == surface
     return found
 
 
-def _isin(values: Any, names: list[str]) -> Mask:
+def _membership_mask(values: Any, names: list[str]) -> Mask:
     return np.array([value in names for value in values], bool)
 
 
@@ -225,7 +225,7 @@ def _pose(rows: Columns) -> dict[str, Any]:
 
 def _worlds(rows: Columns) -> list[dict[str, Any]]:
     """Return what became of the touches of registered faces, by the sensor that felt them."""
-    on_face = _isin(rows["kind"], list(ON_FACES))
+    on_face = _membership_mask(rows["kind"], list(ON_FACES))
     return [
         {
             "level": level,
@@ -263,7 +263,7 @@ def _margins(rows: Columns) -> dict[str, Any]:
     return found
 
 
-def _worst(rows: Columns, fair: Mask) -> list[dict[str, Any]]:
+def _worst_touches(rows: Columns, fair: Mask) -> list[dict[str, Any]]:
     """Return the worst touches: wrong ones; then unanswered and farthest off, one by one."""
     verdict, error = rows["verdict"], np.nan_to_num(rows["error_mm"])
     wrong = np.flatnonzero(verdict == WRONG)
@@ -277,10 +277,10 @@ def _worst(rows: Columns, fair: Mask) -> list[dict[str, Any]]:
     keep = ("number", "kind", "surface", "level", "object", "face", "symbols", "verdict",
             "reason", "answer", "force_n", "tilt_deg", "edge_mm", "error_mm", "error_deg",
             "margin")  # fmt: skip
-    return [{name: _plain(rows[name][i]) for name in keep} for i in chosen[:WORST]]
+    return [{name: _json_value(rows[name][i]) for name in keep} for i in chosen[:WORST]]
 
 
-def _plain(value: Any) -> Any:
+def _json_value(value: Any) -> Any:
     """Return a value as JSON has it: null for what is no number."""
     plain = value.item() if hasattr(value, "item") else value
     if isinstance(plain, float):

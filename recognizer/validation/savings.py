@@ -16,7 +16,7 @@ import numpy as np
 from generator.database.entries import object_names
 from generator.database.open import open_database
 from generator.database.read import read_object
-from generator.database.transaction import reading
+from generator.database.transaction import read_transaction
 from probe.contact.press import LEVELS, level_for, table
 from probe.contact.tips import Tips, tip_points
 from recognizer.touch.reader import Reader
@@ -52,7 +52,7 @@ def find_savings(reader: Reader, plan: TouchPlan, readers: Study) -> Study:
 
 def _objects(study: Study, reader: Reader) -> None:
     """Objects read from the database: that whose cells were met."""
-    with reading(open_database(reader.lab.url, writable=False)) as connection:
+    with read_transaction(open_database(reader.lab.url, writable=False)) as connection:
         names = object_names(connection)
         spent = [
             _cpu_ms(partial(read_object, connection, name), 1) for name in names[: STUDIES.objects]

@@ -63,7 +63,7 @@ class Dots:
         return np.where(inside, self.height_mm, 0.0)
 
 
-def blank(_encoding: EmbossedArray, _rng: np.random.Generator) -> HeightMap:
+def flat_face(_encoding: EmbossedArray, _rng: np.random.Generator) -> HeightMap:
     """Return a flat face."""
     return FlatPlate()
 
@@ -82,14 +82,14 @@ def dots(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
     return Dots(period, period * rng.uniform(0.3, 0.7))
 
 
-def rough(_encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
+def rough_face(_encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
     """Return a random surface."""
     return Rough(int(rng.integers(1 << 31)), rng.uniform(0.1, 0.5), rng.uniform(2.0, 8.0))
 
 
 def random_symbols(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
     """Return symbols of the same alphabet at the same pitch, drawn at random."""
-    return _of(encoding, rng.integers(encoding.array.order, size=(64, 64)))
+    return _embossed_surface(encoding, rng.integers(encoding.array.order, size=(64, 64)))
 
 
 def other_lab(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
@@ -102,7 +102,7 @@ def other_lab(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
         return random_symbols(encoding, rng)
     row, column = (int(rng.integers(size)) for size in (array.rows, array.columns))
     rows, columns = np.indices((64, 64))
-    return _of(
+    return _embossed_surface(
         encoding, array.symbols((rows + row) % array.rows, (columns + column) % array.columns)
     )
 
@@ -126,17 +126,17 @@ def text(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
 
 #: Surfaces of no database.
 FOREIGN: dict[str, Callable[[EmbossedArray, np.random.Generator], HeightMap]] = {
-    "blank": blank,
+    "blank": flat_face,
     "ridges": ridges,
     "dots": dots,
-    "rough": rough,
+    "rough": rough_face,
     "random symbols": random_symbols,
     "other lab": other_lab,
     "text": text,
 }
 
 
-def _of(encoding: EmbossedArray, labels: NDArray[np.int64]) -> HeightMap:
+def _embossed_surface(encoding: EmbossedArray, labels: NDArray[np.int64]) -> HeightMap:
     style, alphabet = encoding.style, encoding.alphabet
     return endless(
         labels,

@@ -65,7 +65,7 @@ def in_processes(processes: int, work: Work, batches: Iterable[Batch]) -> Iterat
 
 def _run_pool(processes: int, work: Work, batches: list[Batch]) -> Iterator[BatchResult]:
     # Begun anew rather than forked: no open database and no thread is taken over.
-    pool = ProcessPoolExecutor(processes, get_context("spawn"), initializer=_begin)
+    pool = ProcessPoolExecutor(processes, get_context("spawn"), initializer=_prepare_worker)
     try:
         waiting = [pool.submit(touch, work, batch) for batch in batches]
         yield from _as_done(waiting)
@@ -86,7 +86,7 @@ def _as_done(waiting: list[Future[BatchResult]]) -> Iterator[BatchResult]:
             yield future.result()
 
 
-def _begin() -> None:
+def _prepare_worker() -> None:
     """Prepare a worker."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)

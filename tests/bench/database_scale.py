@@ -46,7 +46,7 @@ from generator.database.race import in_turn
 from generator.database.read import read_layout
 from generator.database.register import ObjectRecord, register
 from generator.database.retire import remove
-from generator.database.transaction import reading, writing
+from generator.database.transaction import read_transaction, write_transaction
 from generator.errors import LayoutError
 from generator.layout.board import board_size
 from generator.layout.layout import lay_out
@@ -144,7 +144,7 @@ def fill(engines, array, objects, have, want):
         found = [next(objects) for _ in numbers]
         for k, engine in enumerate(engines):
             began = time.perf_counter()
-            with writing(engine) as connection:
+            with write_transaction(engine) as connection:
                 for number, (solid, layout) in zip(numbers, found, strict=True):
                     new = registration(f"object {number}", solid, layout, array)
                     register(connection, new)
@@ -176,10 +176,10 @@ def measured(url, array, objects):
     engine = open_database(url)
     names = [f"next {number}" for number in range(7)]
     placing, cpu = timed(lambda k: place(url, names[k], array), len(names))
-    with writing(engine) as connection:
+    with write_transaction(engine) as connection:
         for name in names:
             remove(connection, name)
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         array_id = find_array(connection, array)
         taken = timed(lambda _: occupancy(connection, array), 3)[0]
         held = occupancy(connection, array)
@@ -196,10 +196,10 @@ def measured(url, array, objects):
         )
 
     def look_opening(k):
-        with reading(open_database(url, writable=False)) as connection:
+        with read_transaction(open_database(url, writable=False)) as connection:
             look(connection, k)
 
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         looking = timed(lambda k: look(connection, k), len(corners))[0]
         for k in range(20):
             assert look(connection, k)[0][0] > 0
@@ -228,7 +228,7 @@ def scaled(urls, array, how, steps):
         for url in urls:
             measured(url, array, want)
     for engine in engines:
-        with reading(engine) as connection:
+        with read_transaction(engine) as connection:
             assert len(read_layout(connection, "object 0").faces) >= 4
 
 

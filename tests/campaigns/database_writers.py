@@ -39,7 +39,7 @@ from generator.database.open import open_database
 from generator.database.race import in_turn
 from generator.database.read import read_layout, read_object
 from generator.database.register import ObjectRecord, register
-from generator.database.transaction import reading
+from generator.database.transaction import read_transaction
 from generator.layout.layout import lay_out
 from generator.polyhedron import shapes
 
@@ -65,7 +65,7 @@ def write(url: str, writer: int, names: list[str], acknowledge: int) -> None:
         solid = SOLIDS[int(name.split("-")[1]) % len(SOLIDS)]
         early = None
         if writer % 2:  # a place chosen before our turn: somebody may take it meanwhile
-            with reading(engine) as connection:
+            with read_transaction(engine) as connection:
                 early = laid_out(solid, occupied_cells(connection, find_array(connection, ARRAY)))
             time.sleep(0.01)
         tries = []
@@ -165,7 +165,7 @@ def wrong(url: str, acknowledged: dict[str, str]) -> list[str]:
     """Return what is not as it must be."""
     found = []
     engine = open_database(url, writable=False)
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         entries = {entry.name: entry for entry in list_objects(connection)}
         found += [f"{name} is lost" for name in acknowledged if name not in entries]
         for name, entry in entries.items():

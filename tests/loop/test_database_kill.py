@@ -16,7 +16,7 @@ from generator.database.cells import held_cells, occupied_cells
 from generator.database.entries import list_objects
 from generator.database.open import open_database
 from generator.database.read import read_layout
-from generator.database.transaction import reading, writing
+from generator.database.transaction import read_transaction, write_transaction
 
 # One process loads everything and forks a writer per line that it reads, so that a kill
 # costs no start-up. A line: the database, the first and the number of objects, symbols a face.
@@ -29,7 +29,7 @@ from generator.array.profiles import PROFILES
 from generator.database.cells import find_array, occupied_cells
 from generator.database.open import open_database
 from generator.database.register import ObjectRecord, register
-from generator.database.transaction import writing
+from generator.database.transaction import write_transaction
 from generator.layout.placement import FaceLayout, Layout, Placement
 from generator.polyhedron.shapes import cube
 
@@ -38,7 +38,7 @@ solid = cube(60.0)
 
 def write(url, name, symbols):
     # The first cells that are free, as a layout would choose them: a race on purpose.
-    with writing(open_database(url)) as connection:
+    with write_transaction(open_database(url)) as connection:
         taken_rows, taken_columns = occupied_cells(connection, find_array(connection, array))
         taken = taken_rows * array.columns + taken_columns
         free = np.setdiff1d(np.arange(array.rows * array.columns), taken)[: 6 * symbols]
@@ -112,9 +112,9 @@ def writers(pair):
 def whole_objects(url):
     """Check that the database is sound and every object complete; return their symbols."""
     engine = open_database(url)
-    with writing(engine):
+    with write_transaction(engine):
         pass  # a server ends the turn of a killed writer once it has noticed
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         entries = list_objects(connection)
         for entry in entries:
             layout = read_layout(connection, entry.name)
@@ -173,6 +173,6 @@ def test_writers_at_once_never_share_a_cell(lab_url, pair):
         writers.start(lab_url, 100 * number, 6, 30)
     assert [writers.status() for writers in pair] == [0, 0]
     assert len(whole_objects(lab_url)) == 12
-    with reading(open_database(lab_url)) as connection:
+    with read_transaction(open_database(lab_url)) as connection:
         cells = held_cells(connection, 1)
     assert len(np.unique(cells[:, :2], axis=0)) == len(cells) == 12 * 6 * 30

@@ -14,7 +14,7 @@ import pytest
 from generator.database.entries import list_objects
 from generator.database.open import open_database
 from generator.database.read import read_object
-from generator.database.transaction import reading
+from generator.database.transaction import read_transaction
 from generator.errors import DatabaseError
 from generator.pipeline import encode
 from generator.spec import read_specs
@@ -33,7 +33,9 @@ def made(folder: Path, text: str, **options: object):
 
 
 def registered(folder: Path, name: str):
-    with reading(open_database(f"sqlite:///{folder / 'lab.db'}", writable=False)) as connection:
+    with read_transaction(
+        open_database(f"sqlite:///{folder / 'lab.db'}", writable=False)
+    ) as connection:
         return read_object(connection, name)
 
 
@@ -186,5 +188,5 @@ def test_every_fixture_can_be_made(path, tmp_path):
     url = f"sqlite:///{tmp_path / 'lab.db'}"
     result = encode(read_specs([path]), folder=tmp_path, database=url, formats=("stl", "glb"))
     assert all(made.symbols and made.places for made in result.objects)
-    with reading(open_database(url, writable=False)) as connection:
+    with read_transaction(open_database(url, writable=False)) as connection:
         assert len(list_objects(connection)) == len(result.objects)

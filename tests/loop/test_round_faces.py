@@ -19,7 +19,7 @@ from generator.alphabet.outline import outlines
 from generator.array import array_from
 from generator.database.open import open_database
 from generator.database.read import read_object
-from generator.database.transaction import reading
+from generator.database.transaction import read_transaction
 from generator.pipeline import encode
 from generator.plane.polygon import points_inside
 from generator.plane.rings import distance
@@ -51,7 +51,7 @@ def made(request, tmp_path_factory):
     url = f"sqlite:///{folder / 'lab.db'}"
     result = encode(read_specs([spec]), folder=folder / "out", database=url,
                     formats=("stl", "3mf", "glb"), verify=True)  # fmt: skip
-    with reading(open_database(url, writable=False)) as connection:
+    with read_transaction(open_database(url, writable=False)) as connection:
         return folder / "out", result.objects[0], read_object(connection, "Round")
 
 

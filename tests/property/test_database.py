@@ -15,7 +15,7 @@ from generator.database.open import open_database
 from generator.database.read import read_object
 from generator.database.register import ObjectRecord, register, remove_object, same_layout
 from generator.database.registered import RegisteredPart
-from generator.database.transaction import reading, writing
+from generator.database.transaction import read_transaction, write_transaction
 from generator.errors import DatabaseError
 from generator.layout.placement import FaceLayout, Layout, Placement
 from generator.polyhedron.shapes import tetrahedron
@@ -87,11 +87,11 @@ def test_everything_comes_back_bit_for_bit_from_a_server(database_on, registrati
 
 
 def comes_back(engine, registration):
-    with writing(engine) as connection:
+    with write_transaction(engine) as connection:
         register(connection, registration)
-    with writing(engine) as connection:  # the same once more changes nothing
+    with write_transaction(engine) as connection:  # the same once more changes nothing
         register(connection, registration)
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         known = read_object(connection, registration.name)
         for face in registration.layout.faces:
             objects, faces = faces_at(connection, 1, face.rows, face.columns)
@@ -155,7 +155,7 @@ def shares_no_cell(engine, steps):
         asked = range(first, first + count)  # equal to any other where it is empty
         others = {c for other, cells in held.items() if other != name for c in cells}
         try:
-            with writing(engine) as connection:
+            with write_transaction(engine) as connection:
                 if step == "remove":
                     entry = find_object(connection, name)
                     if entry is not None:
@@ -173,7 +173,7 @@ def shares_no_cell(engine, steps):
                 spec.pop(name, None)
             else:
                 held[name], spec[name] = asked, (first, count)
-        with reading(engine) as connection:
+        with read_transaction(engine) as connection:
             assert [e.name for e in list_objects(connection)] == sorted(held)
             assert object_names(connection) == tuple(sorted(held))
             rows, columns = occupied_cells(connection, find_array(connection, ARRAY))

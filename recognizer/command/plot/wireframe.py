@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from generator.database.read import read_object
 from generator.database.registered import Polyhedron
-from generator.database.transaction import reading
+from generator.database.transaction import read_transaction
 from probe.plot.touch import MARK
 from probe.sensor import SensorType
 from probe.surface.solids import triangulate
@@ -34,7 +34,7 @@ def draw_object(
 ) -> None:
     """Draw the edges, the numbers of the vertices, the face that is touched, and the probe."""
     axes.computed_zorder = False  # what is drawn later lies above
-    with reading(encoding.engine) as connection:
+    with read_transaction(encoding.engine) as connection:
         held = read_object(connection, name)
     solid = held.polyhedron
     for edge in solid.edges:

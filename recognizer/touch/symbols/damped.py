@@ -70,7 +70,7 @@ def ascend(
         tried = moved(best, damping)
         better = tried.value > best.value
         done = bool((np.abs(tried.value - best.value) < settled).all())
-        best = _either(better, tried, best)
+        best = _select_points(better, tried, best)
         damping = np.where(
             better, damping / settings.easier, np.minimum(damping * settings.harder, MOST)
         )
@@ -86,7 +86,7 @@ def damped_step(at: Point, damping: Array, least: Array | float) -> Array:
     return np.asarray(np.linalg.solve(system, at.right[..., None])[..., 0])
 
 
-def _either(better: NDArray[np.bool_], one: Any, other: Any) -> Any:
+def _select_points(better: NDArray[np.bool_], one: Any, other: Any) -> Any:
     """Return the points of one where they are better, else those of the other."""
     picked = {}
     for item in fields(one):

@@ -77,14 +77,14 @@ def fit_lattices(
     lattices = refine_lattices(image, template, pose, gain, steps=settings.steps)
     if settings.crossed:
         lattices = _cross_gains(image, template, lattices, settings.crossed)
-    best = _distinct(image, template, lattices)[: settings.finalists]
+    best = _distinct_lattices(image, template, lattices)[: settings.finalists]
     pose, gain = lattices.pose[best], lattices.gain[best]
     lattices = refine_lattices(image, template, pose, gain, steps=settings.final_steps)
     found = score_cells(image, template, lattices)
-    return tuple(found[b] for b in _distinct(image, template, lattices))
+    return tuple(found[b] for b in _distinct_lattices(image, template, lattices))
 
 
-def _distinct(image: Image, template: ResponseTemplate, found: Lattices) -> list[int]:
+def _distinct_lattices(image: Image, template: ResponseTemplate, found: Lattices) -> list[int]:
     """Return the numbers of lattices, best first, each once."""
     same, pitch = image.settings.search, template.pitch_mm
     kept: list[int] = []

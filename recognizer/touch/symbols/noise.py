@@ -54,16 +54,16 @@ def log_likelihoods(felt: NormalizedImage, tables: Floats, noise: Array) -> Arra
         (b,) standard deviation of psi on a covered tactel.
     """
     unit = noise[:, None] / np.maximum(felt.press, 1e-3)
-    symbols = _each(felt, tables[..., 0], psi_deviation(tables, felt.settings), unit)
+    symbols = _log_densities(felt, tables[..., 0], psi_deviation(tables, felt.settings), unit)
     floor = psi(felt.bare)
     bare = np.stack([np.zeros_like(floor), floor], axis=-1)  # beyond the edge of the face, or not
-    nothing = _each(felt, bare, np.hypot(felt.settings.quiet, bare), unit).max(
+    nothing = _log_densities(felt, bare, np.hypot(felt.settings.quiet, bare), unit).max(
         axis=-1, keepdims=True
     )
     return np.concatenate([symbols, nothing], axis=-1)
 
 
-def _each(
+def _log_densities(
     felt: NormalizedImage, values: Array | Floats, widths: Array | Floats, unit: Array
 ) -> Array:
     away = (felt.psi[..., None] - values) / (unit[..., None] * widths)

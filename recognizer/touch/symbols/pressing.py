@@ -34,14 +34,14 @@ class Pressing:
         u = np.clip(depth, 0.0, self.deepest)
         if not self.hardens:
             return 3.0 * np.maximum(depth, 0.0)
-        beyond = np.maximum(depth - self.deepest, 0.0) * _steep(self.deepest)
+        beyond = np.maximum(depth - self.deepest, 0.0) * _stiffness(self.deepest)
         return np.asarray((1 - u) ** -2 - (1 - u) + beyond)
 
     def slope(self, depth: Array) -> Array:
         """Return dF/du, 0 without contact."""
         if not self.hardens:
             return np.where(depth > 0, 3.0, 0.0)
-        return np.where(depth > 0, _steep(np.clip(depth, 0.0, self.deepest)), 0.0)
+        return np.where(depth > 0, _stiffness(np.clip(depth, 0.0, self.deepest)), 0.0)
 
     def depth(self, force: Array) -> Array:
         """Return the depths at which F has given values, at most `deepest`."""
@@ -68,5 +68,5 @@ def pressing_of(
     )
 
 
-def _steep(depth: Array | float) -> Array:
+def _stiffness(depth: Array | float) -> Array:
     return np.asarray(2.0 * (1.0 - depth) ** -3 + 1.0)

@@ -75,14 +75,14 @@ def refine_lattices(
         pose[:, 3:] = np.clip(pose[:, 3:], -limits, limits)
         gain[:, 1] = np.clip(gain[:, 1], settings.shallower * at.gain[:, 1], settings.deepest)
         gain = bounded_gain(gain, image.settings.gain.steepest)
-        return _evaluate(image, template, pose, gain, shown)
+        return _evaluate_lattices(image, template, pose, gain, shown)
 
     whole = np.pad(pose, ((0, 0), (0, POSE - pose.shape[1])))
-    start = _evaluate(image, template, whole, gain, shown)
+    start = _evaluate_lattices(image, template, whole, gain, shown)
     return ascend(start, moved, steps, settings, settings.settled)
 
 
-def _evaluate(
+def _evaluate_lattices(
     image: Image, template: ResponseTemplate, pose: Array, gain: Array, shown: Shown | None
 ) -> Lattices:
     """Return how well lattices explain the image, and what a small change would do."""

@@ -123,14 +123,14 @@ def test_nothing_heavy_is_imported():
 def test_database_gives_array_prior_object_and_face(tmp_path, monkeypatch, capsys):
     from generator.database.open import open_database
     from generator.database.read import read_object
-    from generator.database.transaction import reading
+    from generator.database.transaction import read_transaction
     from generator.pipeline import encode
     from generator.spec import read_specs
 
     monkeypatch.chdir(tmp_path)
     Path("c.yaml").write_text("name: Small\nshape: {cube: 40 mm}\n")
     encode(read_specs(["c.yaml"]), formats=(), database="lab.db")
-    with reading(open_database("lab.db", writable=False)) as connection:
+    with read_transaction(open_database("lab.db", writable=False)) as connection:
         small = read_object(connection, "Small")
     face = small.layout.faces[3]
     low, left = face.rows.min(), face.columns.min()

@@ -20,7 +20,7 @@ from generator.database.read import read_object
 from generator.database.register import ObjectRecord, register, same_layout
 from generator.database.registered import RegisteredPart
 from generator.database.retire import remove, restore, retire
-from generator.database.transaction import reading, writing
+from generator.database.transaction import read_transaction, write_transaction
 from generator.errors import DatabaseError
 from generator.layout.layout import lay_out
 from generator.polyhedron.shapes import cube, tetrahedron
@@ -37,7 +37,7 @@ def make(url, name, *, profile="one-touch", solid=None, **spec):
     array, style = ready.array(), SymbolStyle(pitch_mm=ready.pitch_mm)
     clearances = [[np.full(len(loop), 1.0) for loop in face.loops] for face in solid.faces]
     part = RegisteredPart("F1", "stl", "out/F1.stl", "ab" * 32, np.eye(4) / 3)
-    with writing(open_database(url)) as connection:
+    with write_transaction(open_database(url)) as connection:
         taken = occupied_cells(connection, find_array(connection, array))
         layout = lay_out(solid, array, style.pitch_mm, 2.0, clearances, taken, "faces",
                          allow_blank_faces=True)  # fmt: skip
@@ -48,18 +48,18 @@ def make(url, name, *, profile="one-touch", solid=None, **spec):
 
 
 def names(url):
-    with reading(open_database(url, writable=False)) as connection:
+    with read_transaction(open_database(url, writable=False)) as connection:
         return [entry.name for entry in list_objects(connection)]
 
 
 def held(url, name):
-    with reading(open_database(url, writable=False)) as connection:
+    with read_transaction(open_database(url, writable=False)) as connection:
         return read_object(connection, name)
 
 
 def sound(url):
     """Check that the bits of taken cells are those of the cells; return the cells by array."""
-    with reading(open_database(url, writable=False)) as connection:
+    with read_transaction(open_database(url, writable=False)) as connection:
         numbers = {entry.array_id for entry in list_objects(connection)}
         for number in numbers:
             cells = held_cells(connection, number)[:, :2]
@@ -78,7 +78,7 @@ def test_objects_come_over_as_they_are(new_database, file, ours, theirs):
     make(here, "Cube")
     make(here, "Tetra", profile="thesis", solid=tetrahedron(150.0))
     make(there, "Other", solid=cube(60.0), profile="large")
-    with writing(open_database(here)) as connection:
+    with write_transaction(open_database(here)) as connection:
         retire(connection, "Tetra")
     assert export_objects(here, file).copied == ("Cube", "Tetra")
     done = import_objects(there, str(file))
@@ -150,7 +150,7 @@ def test_an_object_on_cells_that_are_held_is_refused_by_name(new_database, lab_u
     assert [refused.name for refused in done.refused] == ["Cube"]
     assert names(lab_url) == ["Other", "Tetra"]
     sound(lab_url)
-    with writing(open_database(lab_url)) as connection:
+    with write_transaction(open_database(lab_url)) as connection:
         remove(connection, "Other")
     assert import_objects(lab_url, str(file), names=["Cube"]).copied == ("Cube",)
     sound(lab_url)
@@ -216,7 +216,7 @@ def test_a_rehearsed_import_changes_nothing(new_database, lab_url, file):
     make(lab_url, "Other", profile="large", solid=cube(60.0))
     assert import_objects(lab_url, str(file), dry_run=True).copied == ("Cube",)
     assert names(lab_url) == ["Other"]
-    with reading(open_database(lab_url)) as connection:
+    with read_transaction(open_database(lab_url)) as connection:
         assert len(occupied_cells(connection, 2)[0]) == 0
 
 
@@ -291,7 +291,7 @@ def test_a_file_of_the_first_version_is_imported_and_not_changed(lab_url, tmp_pa
 def test_retired_objects_keep_their_cells_and_are_not_made_again(lab_url):
     make(lab_url, "Cube")
     engine = open_database(lab_url)
-    with writing(engine) as connection:
+    with write_transaction(engine) as connection:
         entry = retire(connection, "Cube")
         assert retire(connection, "Cube").retired_utc == entry.retired_utc != ""
     with pytest.raises(DatabaseError, match="'Cube' was retired") as caught:
@@ -300,14 +300,17 @@ def test_retired_objects_keep_their_cells_and_are_not_made_again(lab_url):
     before = held(lab_url, "Cube")
     make(lab_url, "Tetra")
     sound(lab_url)
-    with writing(engine) as connection:
+    with write_transaction(engine) as connection:
         assert restore(connection, "Cube").retired_utc == ""
     after = held(lab_url, "Cube")
     assert same_layout(before.layout, after.layout)
     assert json.dumps(before.spec) == json.dumps(after.spec)
-    with writing(engine) as connection:
+    with write_transaction(engine) as connection:
         assert remove(connection, "Cube").symbols == before.entry.symbols
         assert find_object(connection, "Cube") is None
     sound(lab_url)
-    with writing(engine) as connection, pytest.raises(DatabaseError, match="called 'Cube'"):
+    with (
+        write_transaction(engine) as connection,
+        pytest.raises(DatabaseError, match="called 'Cube'"),
+    ):
         retire(connection, "Cube")

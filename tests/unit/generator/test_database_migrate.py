@@ -23,7 +23,7 @@ from generator.database.entries import list_objects
 from generator.database.migrations import v2
 from generator.database.open import database_exists, open_database
 from generator.database.read import read_array, read_layout, read_object
-from generator.database.transaction import reading, writing
+from generator.database.transaction import read_transaction, write_transaction
 from generator.errors import DatabaseError
 
 FIRST = Path(__file__).parents[3] / "fixtures" / "database"
@@ -64,7 +64,7 @@ def everything(path):
 
 def test_objects_of_the_first_version_are_all_there(first_version):
     engine = open_database(first_version)
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         stored = {row.key: row.value for row in connection.execute(select(tables.meta))}
         assert stored["schema_version"] == str(tables.SCHEMA_VERSION)
         assert [entry.name for entry in list_objects(connection)] == NAMES
@@ -85,7 +85,7 @@ def test_objects_of_the_first_version_are_all_there(first_version):
 
 def test_the_migrated_schema_is_the_one_that_new_databases_get(first_version, new_database):
     for url in (first_version, new_database("sqlite")):
-        with reading(open_database(url)) as connection:
+        with read_transaction(open_database(url)) as connection:
             context = MigrationContext.configure(connection, opts={"compare_type": False})
             assert compare_metadata(context, tables.metadata) == []
     if "://" in first_version:
@@ -130,11 +130,11 @@ def test_the_message_goes_to_stderr_and_json_stays_json(first_file):
 
 def test_a_reader_finds_an_older_database_and_migrates_it(first_version):
     assert database_exists(first_version)
-    with reading(open_database(first_version, writable=False)) as connection:
+    with read_transaction(open_database(first_version, writable=False)) as connection:
         assert read_layout(connection, "Cube").kind == "faces"
     with (
         pytest.raises(DatabaseError, match="may not be written"),
-        writing(open_database(first_version, writable=False)) as connection,
+        write_transaction(open_database(first_version, writable=False)) as connection,
     ):
         connection.execute(text("DELETE FROM cells"))
 
@@ -163,7 +163,7 @@ def test_a_migration_that_fails_changes_nothing(first_version, monkeypatch):
         assert Path(first_version).read_bytes() == before
         assert os.listdir(Path(first_version).parent) == ["lab.db"]
     monkeypatch.undo()
-    with reading(open_database(first_version)) as connection:
+    with read_transaction(open_database(first_version)) as connection:
         assert [entry.name for entry in list_objects(connection)] == NAMES
 
 
@@ -203,7 +203,7 @@ def test_a_migration_killed_before_its_commit_leaves_the_old_version(first_versi
         patched.setattr(v2, "upgrade", killing)
         _, status = os.waitpid(forked(lambda: open_database(first_version)), 0)
     assert os.WTERMSIG(status) == signal.SIGKILL
-    with reading(open_database(first_version)) as connection:  # migrates at last
+    with read_transaction(open_database(first_version)) as connection:  # migrates at last
         assert [entry.name for entry in list_objects(connection)] == NAMES
         assert len(occupied_cells(connection, 1)[0]) == 176
 
@@ -247,7 +247,7 @@ def test_an_older_database_that_may_not_be_written_says_what_to_do():
 
 
 def test_a_newer_schema_is_refused_on_either_engine(lab_url):
-    with writing(open_database(lab_url)) as connection:
+    with write_transaction(open_database(lab_url)) as connection:
         connection.execute(text("UPDATE meta SET value = '3' WHERE key = 'schema_version'"))
     for writable in (True, False):
         with pytest.raises(DatabaseError, match="version 3, newer than 2"):

@@ -8,7 +8,7 @@ from generator.database import tables
 from generator.database.cells import occupied_cells
 from generator.database.occupancy import free_cells, take_cells
 from generator.database.open import open_database
-from generator.database.transaction import reading, writing
+from generator.database.transaction import read_transaction, write_transaction
 from generator.layout.occupancy import TILE
 
 PLACES = {
@@ -28,7 +28,7 @@ def engine(lab_url):
          "columns": 2**63 - 1, "window_rows": 3, "window_columns": 2, "order": 4}
         for k in range(2)
     ]  # fmt: skip
-    with writing(engine) as connection:
+    with write_transaction(engine) as connection:
         connection.execute(insert(tables.arrays), arrays)
     return engine
 
@@ -40,9 +40,9 @@ def listed(cells):
 @pytest.mark.parametrize("place", PLACES)
 def test_cells_come_back_sorted(engine, place):
     cells = PLACES[place]
-    with writing(engine) as connection:
+    with write_transaction(engine) as connection:
         take_cells(connection, 1, cells)
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         assert listed(occupied_cells(connection, 1)) == sorted(listed(cells))
         assert listed(occupied_cells(connection, 2)) == []
 
@@ -53,22 +53,22 @@ def test_cells_are_added_and_freed_one_by_one(engine):
     for _ in range(12):
         some = chance.integers(0, 150, (2, 40))
         cells = set(listed(some))
-        with writing(engine) as connection:
+        with write_transaction(engine) as connection:
             if chance.random() < 0.6:
                 take_cells(connection, 1, tuple(some))
                 held |= cells
             else:
                 free_cells(connection, 1, tuple(some))
                 held -= cells
-        with reading(engine) as connection:
+        with read_transaction(engine) as connection:
             assert listed(occupied_cells(connection, 1)) == sorted(held)
 
 
 def test_a_block_of_cells_is_few_rows(engine):
     block = tuple(index.ravel() for index in np.mgrid[10 : 10 + 4 * TILE, 0 : 4 * TILE])
-    with writing(engine) as connection:
+    with write_transaction(engine) as connection:
         take_cells(connection, 1, block)
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         count = connection.execute(select(func.count()).select_from(tables.occupancy)).scalar_one()
         assert count == 20
         assert len(occupied_cells(connection, 1)[0]) == 16 * TILE**2

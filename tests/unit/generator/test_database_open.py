@@ -13,7 +13,7 @@ from sqlalchemy import select, text
 
 from generator.database.open import database_exists, open_database
 from generator.database.tables import SCHEMA_VERSION, meta, metadata
-from generator.database.transaction import reading, writing
+from generator.database.transaction import read_transaction, write_transaction
 from generator.database.url import normal_url
 from generator.errors import DatabaseError
 
@@ -67,14 +67,17 @@ def test_a_new_database_has_all_tables_and_its_version(tmp_path):
     path = tmp_path / "a b?#%41.db"
     engine = open_database(str(path))
     assert path.is_file()
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         stored = [tuple(row) for row in connection.execute(select(meta).order_by(meta.c.key))]
         assert stored == [("format", "encoded-objects"), ("schema_version", str(SCHEMA_VERSION))]
         for table in metadata.sorted_tables:
             connection.execute(select(table)).all()
     assert os.listdir(tmp_path) == [path.name]  # one file, so that it can be copied
     again = open_database(str(path), writable=False)
-    with pytest.raises(DatabaseError, match="may not be written"), writing(again) as connection:
+    with (
+        pytest.raises(DatabaseError, match="may not be written"),
+        write_transaction(again) as connection,
+    ):
         connection.execute(text("DELETE FROM meta"))
 
 
@@ -154,7 +157,7 @@ def test_another_programs_database_is_left_alone(tmp_path):
 def test_a_newer_schema_is_refused(tmp_path, version):
     path = tmp_path / "lab.db"
     engine = open_database(str(path))
-    with writing(engine) as connection:
+    with write_transaction(engine) as connection:
         connection.execute(
             text("UPDATE meta SET value = :v WHERE key = 'schema_version'"), {"v": version}
         )
@@ -167,7 +170,7 @@ def test_a_newer_schema_is_refused(tmp_path, version):
 @pytest.mark.parametrize("value", ["", "one", "0", "-1", "1.5"])
 def test_a_version_that_is_none_is_refused(tmp_path, value):
     path = tmp_path / "lab.db"
-    with writing(open_database(str(path))) as connection:
+    with write_transaction(open_database(str(path))) as connection:
         connection.execute(
             text("UPDATE meta SET value = :v WHERE key = 'schema_version'"), {"v": value}
         )
@@ -202,19 +205,22 @@ def test_a_read_only_place_is_refused_for_writing_alone(unprivileged):
     path.chmod(0o444)
     assert "may not be written" in refused(path)
     folder.chmod(0o555)
-    with reading(open_database(str(path), writable=False)) as connection:
+    with read_transaction(open_database(str(path), writable=False)) as connection:
         assert len(connection.execute(select(meta)).all()) == 2
 
 
 def test_a_writer_waits_for_its_turn_and_no_longer(tmp_path):
     engine = open_database(str(tmp_path / "lab.db"))
     hasty = open_database(str(tmp_path / "lab.db"), wait_s=0.05)
-    with writing(engine):
-        with reading(hasty) as connection:  # readers go on
+    with write_transaction(engine):
+        with read_transaction(hasty) as connection:  # readers go on
             connection.execute(select(meta)).all()
-        with pytest.raises(DatabaseError, match="keep the database locked"), writing(hasty):
+        with (
+            pytest.raises(DatabaseError, match="keep the database locked"),
+            write_transaction(hasty),
+        ):
             pass
-    with writing(hasty):
+    with write_transaction(hasty):
         pass
 
 
@@ -234,7 +240,7 @@ def test_many_may_make_a_database_at_once(tmp_path):
     for maker in makers:
         maker.stdin.close()
         assert maker.wait(timeout=60) == 0
-    with reading(open_database(str(path), writable=False)) as connection:
+    with read_transaction(open_database(str(path), writable=False)) as connection:
         assert len(connection.execute(select(meta)).all()) == 2
 
 

@@ -14,7 +14,7 @@ from generator.database.entries import find_object, list_objects
 from generator.database.open import open_database
 from generator.database.race import in_turn
 from generator.database.register import ObjectRecord, register
-from generator.database.transaction import LostRaceError, reading, writing
+from generator.database.transaction import LostRaceError, read_transaction, write_transaction
 from generator.errors import DatabaseError
 from generator.layout.layout import lay_out
 from generator.polyhedron.shapes import tetrahedron
@@ -47,7 +47,7 @@ def test_the_loser_of_a_race_places_anew(lab_url):
     tries = {"a": 0, "b": 0}
 
     def write(name):
-        with reading(open_database(lab_url)) as connection:
+        with read_transaction(open_database(lab_url)) as connection:
             early = placed(connection)
         both_placed.wait()
 
@@ -64,7 +64,7 @@ def test_the_loser_of_a_race_places_anew(lab_url):
     for writer in writers:
         writer.join(60)
     assert sorted(tries.values()) == [1, 2]
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         entries = list_objects(connection)
         cells = held_cells(connection, 1)
     assert [entry.name for entry in entries] == ["a", "b"]
@@ -73,7 +73,7 @@ def test_the_loser_of_a_race_places_anew(lab_url):
 
 def test_a_lost_race_leaves_nothing_behind(lab_url):
     engine = open_database(lab_url)
-    with writing(engine) as connection:
+    with write_transaction(engine) as connection:
         first = placed(connection)
         register(connection, registration("first", first))
     seen = []
@@ -89,7 +89,7 @@ def test_a_lost_race_leaves_nothing_behind(lab_url):
 
 def test_who_always_loses_gives_up_and_says_why(lab_url):
     engine = open_database(lab_url)
-    with writing(engine) as connection:
+    with write_transaction(engine) as connection:
         first = placed(connection)
         register(connection, registration("first", first))
     tries = []
@@ -118,7 +118,7 @@ def test_errors_that_are_no_race_are_not_tried_again(lab_url):
     with pytest.raises(DatabaseError, match="another spec"):
         in_turn(engine, work)
     assert len(tries) == 1
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         assert list_objects(connection) == ()
 
 
@@ -126,11 +126,11 @@ def test_a_writer_without_turns_on_a_server_is_a_race_too(new_database):
     """A program that does not know of turns takes the cells while we register."""
     url = new_database("postgresql")
     engine, other = open_database(url), open_database(url)
-    with writing(engine) as connection:  # an object to copy the rows of
+    with write_transaction(engine) as connection:  # an object to copy the rows of
         register(connection, registration("known", placed(connection)))
         row, column = held_cells(connection, 1)[0, :2].tolist()
     reached = threading.Event()
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         wanted = placed(connection)
 
     def meddle():
@@ -160,16 +160,19 @@ def test_a_writer_without_turns_on_a_server_is_a_race_too(new_database):
     in_turn(engine, work)
     thread.join(30)
     assert len(tries) == 2
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         assert find_object(connection, "mine") is not None
 
 
 def test_a_writer_waits_no_longer_than_it_is_told(lab_url):
     engine, hasty = open_database(lab_url), open_database(lab_url, wait_s=0.05)
-    with writing(engine):
-        with reading(hasty) as connection:  # readers go on
+    with write_transaction(engine):
+        with read_transaction(hasty) as connection:  # readers go on
             assert list_objects(connection) == ()
-        with pytest.raises(DatabaseError, match="keep the database locked"), writing(hasty):
+        with (
+            pytest.raises(DatabaseError, match="keep the database locked"),
+            write_transaction(hasty),
+        ):
             pass
-    with writing(hasty):
+    with write_transaction(hasty):
         pass

@@ -20,7 +20,7 @@ from generator.database.open import open_database
 from generator.database.read import read_layout, read_object
 from generator.database.register import ObjectRecord, register, remove_object, same_layout
 from generator.database.registered import RegisteredPart
-from generator.database.transaction import reading, writing
+from generator.database.transaction import read_transaction, write_transaction
 from generator.errors import DatabaseError
 from generator.layout.placement import FaceLayout, Layout, Placement
 from generator.polyhedron.shapes import cube, triangular_prism
@@ -68,12 +68,12 @@ def cube_on(first, name="Cube", **changes):
 
 
 def register_one(engine, registration, **options):
-    with writing(engine) as connection:
+    with write_transaction(engine) as connection:
         return register(connection, registration, **options)
 
 
 def held(engine):
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         rows, columns = occupied_cells(connection, find_array(connection, ARRAY))
         return sorted((rows * ARRAY.columns + columns).tolist())
 
@@ -86,7 +86,7 @@ def engine(lab_url):
 def test_an_object_comes_back_exactly(engine):
     given = cube_on(100)
     number = register_one(engine, given)
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         known = read_object(connection, "Cube")
     assert known.entry.object_id == number
     assert known.entry.symbols == 384
@@ -110,7 +110,7 @@ def test_an_object_comes_back_exactly(engine):
 def test_faces_have_frames_that_put_their_outlines_back_on_the_vertices(engine):
     given = cube_on(0)
     register_one(engine, given)
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         known = read_object(connection, "Cube")
     for face, shape, placed in zip(
         known.faces, given.polyhedron.faces, given.layout.faces, strict=True
@@ -136,7 +136,7 @@ def test_a_face_without_symbols_has_no_placement(engine):
     ]
     layout = Layout("net", 7.0, tuple(faces), (2, 3, 4, 5), ("4 faces are blank",))
     register_one(engine, dataclasses.replace(bare, layout=layout))
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         faces = read_object(connection, "Cube").faces
         assert same_layout(read_layout(connection, "Cube"), layout)
     assert [face.placement is not None for face in faces] == [
@@ -161,7 +161,7 @@ def test_an_object_with_holes_and_a_layout_in_its_own_order(engine):
     layout = layout_from(0, faces=10, symbols=8)
     layout = dataclasses.replace(layout, faces=layout.faces[::-1])
     register_one(engine, cube_on(0, "Frame", polyhedron=frame, layout=layout))
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         known = read_object(connection, "Frame")
     assert known.polyhedron.faces == frame.faces
     assert known.polyhedron.genus == 1
@@ -173,7 +173,7 @@ def test_an_object_with_holes_and_a_layout_in_its_own_order(engine):
 
 def test_the_same_spec_again_changes_nothing_but_its_parts(engine):
     first = register_one(engine, cube_on(100))
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         utc = find_object(connection, "Cube").utc
         stored = read_layout(connection, "Cube")
     parts = (
@@ -181,7 +181,7 @@ def test_the_same_spec_again_changes_nothing_but_its_parts(engine):
         RegisteredPart("F1", "step", "elsewhere/F1.step", "ef" * 32, np.eye(4)),
     )
     assert register_one(engine, cube_on(100, layout=stored, parts=parts)) == first
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         known = read_object(connection, "Cube")
     assert known.entry.utc == utc
     assert [(part.format, part.file) for part in known.parts] == [
@@ -197,7 +197,7 @@ def test_a_changed_spec_is_refused_and_replaced_on_request(engine):
         register_one(engine, cube_on(500))
     assert "--replace" in caught.value.fix
     assert held(engine) == [*range(384), *range(1000, 1384)]
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         own = cells_of(connection, number, find_array(connection, ARRAY))
         taken = occupancy(connection, ARRAY)
         assert (taken.used, taken.without_cells(*own).used) == (768, 384)
@@ -216,7 +216,7 @@ def test_a_cell_that_another_object_holds_undoes_the_whole_object(engine):
     with pytest.raises(DatabaseError, match="another object holds"):
         register_one(engine, cube_on(383, "Other"))
     assert held(engine) == list(range(384))
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         assert [entry.name for entry in list_objects(connection)] == ["Cube"]
         for table in tables.metadata.sorted_tables:
             if "object_id" in table.c:
@@ -225,7 +225,7 @@ def test_a_cell_that_another_object_holds_undoes_the_whole_object(engine):
 
 def test_an_error_of_the_caller_undoes_everything(engine):
     def interrupted():
-        with writing(engine) as connection:
+        with write_transaction(engine) as connection:
             register(connection, cube_on(0))
             raise KeyboardInterrupt
 
@@ -236,7 +236,7 @@ def test_an_error_of_the_caller_undoes_everything(engine):
 
 def test_removing_frees_the_cells(engine):
     number = register_one(engine, cube_on(0))
-    with writing(engine) as connection:
+    with write_transaction(engine) as connection:
         remove_object(connection, number)
     assert held(engine) == []
     register_one(engine, cube_on(0, "Other"))
@@ -247,7 +247,7 @@ def test_cells_name_object_and_face(engine):
     register_one(engine, cube_on(0))
     register_one(engine, cube_on(1000, "Other"))
     cells = np.array([0, 63, 64, 383, 384, 999, 1000, 1383, 0])
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         array_id = find_array(connection, ARRAY)
         objects, faces = faces_at(connection, array_id, cells // 65, cells % 65)
         everything = faces_at(
@@ -269,7 +269,7 @@ def test_objects_with_other_windows_stand_on_the_same_cells(engine):
 
 
 def test_an_array_that_nobody_used_has_no_cells_taken(engine):
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         assert find_array(connection, ARRAY) is None
         rows, columns = occupied_cells(connection, None)
     assert len(rows) == len(columns) == 0
@@ -279,7 +279,7 @@ def test_objects_are_listed_by_name(engine):
     register_one(engine, cube_on(400, "b"))
     prism = cube_on(0, "a", polyhedron=triangular_prism(60.0, 60.0), layout=layout_from(0, faces=5))
     register_one(engine, prism)
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         entries = list_objects(connection)
     assert [(e.name, e.object_type, e.number_of_faces, e.symbols) for e in entries] == [
         ("a", "triangular_prism", 5, 320),
@@ -290,7 +290,7 @@ def test_objects_are_listed_by_name(engine):
 def test_an_unknown_object_is_named_beside_the_known_ones(engine):
     register_one(engine, cube_on(0))
     with (
-        reading(engine) as connection,
+        read_transaction(engine) as connection,
         pytest.raises(DatabaseError, match="called 'cub'") as caught,
     ):
         read_object(connection, "cub")

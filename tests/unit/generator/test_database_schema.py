@@ -9,7 +9,7 @@ from sqlalchemy import insert, inspect, select, text
 
 from generator.database import tables
 from generator.database.open import open_database
-from generator.database.transaction import reading, writing
+from generator.database.transaction import read_transaction, write_transaction
 from generator.errors import DatabaseError
 
 THESIS = {  # figure 6.16
@@ -50,7 +50,7 @@ def filled(engine):
                              "rotation_rad": 0, "x_mm": 0, "y_mm": 0, "places": 1, "blank": 0}),
         (tables.cells, cell()),
     ]  # fmt: skip
-    with writing(engine) as connection:
+    with write_transaction(engine) as connection:
         for table, row in rows:
             connection.execute(insert(table), [row])
     return engine
@@ -68,7 +68,10 @@ def test_the_six_tables_of_the_thesis_stand_under_its_names(engine):
 
 
 def test_a_cell_cannot_be_used_twice(filled):
-    with pytest.raises(DatabaseError, match="another object holds"), writing(filled) as connection:
+    with (
+        pytest.raises(DatabaseError, match="another object holds"),
+        write_transaction(filled) as connection,
+    ):
         connection.execute(insert(tables.cells), [cell(position=1)])
 
 
@@ -83,9 +86,9 @@ def test_a_cell_cannot_be_used_twice(filled):
     ],
 )
 def test_a_cell_of_nothing_is_refused(filled, changes):
-    with pytest.raises(DatabaseError, match="refuses"), writing(filled) as connection:
+    with pytest.raises(DatabaseError, match="refuses"), write_transaction(filled) as connection:
         connection.execute(insert(tables.cells), [cell(row=6, position=1) | changes])
-    with reading(filled) as connection:
+    with read_transaction(filled) as connection:
         assert len(connection.execute(select(tables.cells)).all()) == 1
 
 
@@ -93,24 +96,30 @@ def test_links_to_missing_edges_are_refused_at_the_commit(filled):
     edge = {"object_id": 1, "edge_id": 0, "face_id": 0, "right_face_id": 0, "edge_length": 1.0}
     edge |= {"start_vertex_id": 0, "end_vertex_id": 1}
     links = dict.fromkeys(("left_previous_id", "left_next_id", "right_previous_id"), 0)
-    with pytest.raises(DatabaseError, match=r"(?i)foreign key"), writing(filled) as connection:
+    with (
+        pytest.raises(DatabaseError, match=r"(?i)foreign key"),
+        write_transaction(filled) as connection,
+    ):
         connection.execute(insert(tables.edges), [edge | links | {"right_next_id": 1}])
-    with writing(filled) as connection:
+    with write_transaction(filled) as connection:
         connection.execute(insert(tables.edges), [edge | links | {"right_next_id": 0}])
 
 
 def test_an_object_goes_as_a_whole_and_its_parts_do_not_go_alone(filled):
     for table in ("faces", "placements"):
-        with pytest.raises(DatabaseError, match=r"(?i)foreign key"), writing(filled) as connection:
+        with (
+            pytest.raises(DatabaseError, match=r"(?i)foreign key"),
+            write_transaction(filled) as connection,
+        ):
             connection.execute(text(f"DELETE FROM {table}"))
-    with writing(filled) as connection:
+    with write_transaction(filled) as connection:
         connection.execute(text("DELETE FROM objects"))
         for table in (tables.vertices, tables.faces, tables.placements, tables.cells):
             assert connection.execute(select(table)).all() == []
 
 
 def test_numbers_come_back_bit_for_bit(filled):
-    with reading(filled) as connection:
+    with read_transaction(filled) as connection:
         row = connection.execute(select(tables.vertices)).first()
         assert math.copysign(1, row.y_vertex) == -1.0
         assert row.z_vertex == 0.1

@@ -10,7 +10,7 @@ import pytest
 from generator.database import engine
 from generator.database import open as open_module
 from generator.database.open import open_if_there
-from generator.database.transaction import reading
+from generator.database.transaction import read_transaction
 from generator.pipeline import encode
 from generator.pipeline.choose import choose_array
 from generator.pipeline.plan import plan_object
@@ -29,7 +29,7 @@ def choice(folder: Path, text: str):
     file = folder / "spec.yaml"
     file.write_text(text)
     lab = open_if_there(f"sqlite:///{folder / 'lab.db'}")
-    with reading(lab) if lab else nullcontext() as connection:
+    with read_transaction(lab) if lab else nullcontext() as connection:
         return choose_array(read_specs([file]), connection)
 
 
@@ -61,9 +61,9 @@ def test_a_run_opens_the_database_once(tmp_path, monkeypatch, profile, copies):
 
     def connectable(*arguments, **options):
         calls.append(arguments)
-        return engine.connectable(*arguments, **options)
+        return engine.database_engine(*arguments, **options)
 
-    monkeypatch.setattr(open_module, "connectable", connectable)
+    monkeypatch.setattr(open_module, "database_engine", connectable)
     text = f"name: A\nprofile: {profile}\nshape: {{cube: 30 mm}}\ncopies: {copies}\n"
     dry(tmp_path, text)
     assert (calls, [file.name for file in tmp_path.iterdir()]) == ([], ["spec.yaml"])

@@ -15,7 +15,7 @@ from generator.database import cells as cells_module
 from generator.database.occupancy import taken_tiles
 from generator.database.open import open_database
 from generator.database.read import read_layout
-from generator.database.transaction import reading
+from generator.database.transaction import read_transaction
 from generator.errors import DatabaseError
 from generator.layout import occupancy
 from generator.layout.occupancy import tiles_of
@@ -186,14 +186,14 @@ def test_who_loses_his_cells_to_another_writer_places_anew(tmp_path):
     url = f"sqlite:///{tmp_path / 'lab.db'}"
     engine = open_database(url)
     orders = [Order(plan_object(one), tmp_path / one.spec.name, ("stl",)) for one in located[:2]]
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         chosen = [place_object(connection, order.plan, replace=False) for order in orders]
     first = make_at(engine, orders[0], chosen[0])
     second = make_at(engine, orders[1], chosen[1])  # both chose the same corner
     assert first.placed is chosen[0]
     assert second.placed is not chosen[1]
     cells = []
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         for name in "AB":
             for face in read_layout(connection, name).faces:
                 cells += zip(face.rows.tolist(), face.columns.tolist(), strict=True)
@@ -205,7 +205,7 @@ def test_an_object_that_another_writer_made_meanwhile_keeps_its_cells(tmp_path):
     engine = open_database(f"sqlite:///{tmp_path / 'lab.db'}")
     orders = [Order(plan_object(one), tmp_path / one.spec.name, ("stl",)) for one in located[:2]]
     make_under_lock(engine, orders[1])  # moves what is free
-    with reading(engine) as connection:
+    with read_transaction(engine) as connection:
         chosen = place_object(connection, orders[0].plan, replace=False)
     other = make_under_lock(engine, orders[0])
     mine = make_at(engine, orders[0], chosen)
