@@ -11,6 +11,7 @@ takes an explicit encoding; both give a `SymbolArray` (`contract`).
     product                       PRPA, PRMVPA
     window                        minimum distance, unique windows
     touches                       how many of a sensor's touches name a place
+    visible, rivals               cells that a sensor sees whole, places that look like them
     definition, profiles          arrays by plain values and by name
 """
 
