@@ -7,4 +7,5 @@
     scan        places one after the other on a way over a face, as a robot goes it
     simulation  target + options -> touches with their frames and their truth
     source      what stands behind `sim:` ports: a probe that keeps touching
+    world       how sensors, prints and surfaces are off: levels, wear, surfaces of nobody
 """

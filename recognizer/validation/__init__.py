@@ -3,7 +3,7 @@
 ::
 
     campaign  how many touches, of which kinds and levels;  encoded_set  what is touched
-    draw      number -> touch and counts (surfaces, wear, written, levels)
+    draw      number -> touch and counts (surfaces, written)
     trial     touch -> answer -> verdict;  rows  a touch as a row
     run       who does which touches (work, workers, cluster), and where they go (shards)
     results   rows -> shares and errors (statistics, precision, extremes, savings)

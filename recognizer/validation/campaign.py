@@ -14,11 +14,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from probe.simulate.world.levels import LEVELS
 from recognizer.touch.reader import Reader
 from recognizer.touch.settings import DEFAULTS
 from recognizer.validation.draw import TouchPlan
 from recognizer.validation.errors import ValidationError
-from recognizer.validation.levels import LEVELS
 from recognizer.validation.settings import SHARING
 from recognizer.validation.surfaces import FOREIGN
 

@@ -19,14 +19,14 @@ from probe.sensor import Overlay, SensorType
 from probe.simulate.registered import registered_surface
 from probe.simulate.scene import Scene
 from probe.simulate.touch import Touches, random_touches
+from probe.simulate.world.levels import LEVELS, read_sensor
+from probe.simulate.world.worn import wear_face, wear_part
 from probe.surface.contract import HeightMap
 from probe.surface.face import FaceSurface
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.reader import Reader
-from recognizer.validation.levels import LEVELS, read_sensor
 from recognizer.validation.settings import DRAWING
 from recognizer.validation.surfaces import FOREIGN
-from recognizer.validation.wear import wear_face, wear_part
 from recognizer.validation.written import written_surface
 
 Array = NDArray[np.float64]
@@ -84,7 +84,8 @@ def draw_touch(plan: TouchPlan, number: int, reader: Reader) -> DrawnTouch:
                 surface = wear_face(surface, plan.worn, rng)
             elif plan.kind == "worn":
                 pitch = encoding.style.pitch_mm
-                surface = wear_part(surface, face, pitch, plan.worn, rng)
+                at, turn = face.centres_mm, face.rotation_rad
+                surface = wear_part(surface, at, turn, pitch, plan.worn, rng)
         try:
             counts, _ = read_sensor(surface, reader.sensor, touch, level, rng, plan.engine)
         except ContactError:

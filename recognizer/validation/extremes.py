@@ -1,119 +1,40 @@
-"""Stiff and extreme scenes: each gives a finite answer in balance, or is refused by name.
+"""Stiff and extreme scenes and images: a finite answer in balance, or a refusal by name.
 
-Scenes for the contact models of both overlays, and images for the reader. An answer of a
-contact model passes if every force is finite and not negative and their sum is the load to
-within `BALANCE`; an image passes if the reader answers nothing, and raises nothing.
+The scenes for the contact models are `probe.simulate.world.extremes`; an image passes if the
+reader answers nothing, and raises nothing.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.contact.contract import Touch, WristStiffness
-from probe.contact.press import press
-from probe.errors import ProbeError
-from probe.sensor import Overlay, SensorType
-from probe.surface.contract import HeightMap
-from probe.surface.indenters import Cross, FlatPlate, RaisedStrip, Rough, TiltedPlane
+from probe.simulate.world.extremes import FINITE, SCENES, press_scene
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.signal import signal_of
 from recognizer.validation.statistics import round_digits
 
-BALANCE = 1e-6  #: of the load
-FINITE, REFUSED, NO_ANSWER = "finite", "refused", "no answer"
-EITHER = "finite or refused"
-
-_HERE = Touch(x_mm=0.0, y_mm=0.0, theta_rad=0.3, force_n=80.0)
-_FREE = WristStiffness(0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class ExtremeScene:
-    """What is pressed, and what must come of it."""
-
-    name: str
-    surface: HeightMap
-    touch: Touch = _HERE
-    expected: str = FINITE
-    overlay: Mapping[str, Any] = field(default_factory=dict)  #: what of it is changed
-
-
-class _NoNumber:
-    top_mm = 0.0
-
-    def heights_mm(self, points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return no number anywhere."""
-        return np.full(len(points_mm), math.nan)
-
-
-_CROSS = Cross(floor_mm=-1.0)
-SCENES: tuple[ExtremeScene, ...] = (
-    ExtremeScene("no force: an image of zeros", _CROSS, replace(_HERE, force_n=0.0)),
-    ExtremeScene("force 1e-9 N", _CROSS, replace(_HERE, force_n=1e-9)),
-    ExtremeScene("force 10,000 N", _CROSS, replace(_HERE, force_n=1e4), EITHER),
-    ExtremeScene("incompressible, nu = 0.5", _CROSS, overlay={"poisson": 0.5}),
-    ExtremeScene("nu = 0.3", _CROSS, overlay={"poisson": 0.3}),
-    ExtremeScene("soft, E = 0.001 MPa", _CROSS, replace(_HERE, force_n=0.05),
-                 overlay={"young_mpa": 1e-3}),
-    ExtremeScene("hard, E = 10,000 MPa", _CROSS, overlay={"young_mpa": 1e4}),
-    ExtremeScene("overlay 0.2 mm thin", _CROSS, overlay={"height_mm": 0.2}),
-    ExtremeScene("overlay 20 mm thick", _CROSS, overlay={"height_mm": 20.0}),
-    ExtremeScene("wrist free to turn", _CROSS, replace(_HERE, wrist=_FREE)),
-    ExtremeScene("wrist 1e9 N mm/rad", _CROSS, replace(_HERE, wrist=WristStiffness(1e9, 1e9))),
-    ExtremeScene("tilt 20 degrees on a plate", FlatPlate(),
-                 replace(_HERE, tilt_x_rad=math.radians(20))),
-    ExtremeScene("plane that rises 1 mm a mm", TiltedPlane(1.0, 0.0), expected=EITHER),
-    ExtremeScene("stroke of 0.02 mm", RaisedStrip(0.02), replace(_HERE, force_n=1.0)),
-    ExtremeScene("cliff through the centre", RaisedStrip(200.0), replace(_HERE, x_mm=100.0)),
-    ExtremeScene("rough, 0.5 mm", Rough(1, 0.5, 4.0)),
-    ExtremeScene("1,000 km away", FlatPlate(), replace(_HERE, x_mm=1e9)),
-    ExtremeScene("tips: centre beyond the edge, wrist free", RaisedStrip(200.0),
-          replace(_HERE, x_mm=110.0, wrist=_FREE), REFUSED),
-    ExtremeScene("nothing under the sensor", RaisedStrip(2.0), replace(_HERE, x_mm=100.0), REFUSED),
-    ExtremeScene("heights that are no numbers", _NoNumber(), expected=REFUSED),
-    ExtremeScene("force that is no number", _CROSS, replace(_HERE, force_n=math.nan), REFUSED),
-    ExtremeScene("negative force", _CROSS, replace(_HERE, force_n=-1.0), REFUSED),
-    ExtremeScene("place that is no number", _CROSS, replace(_HERE, x_mm=math.inf), REFUSED),
-)  # fmt: skip
+NO_ANSWER = "no answer"
 
 
 def press_scenes() -> Iterator[dict[str, Any]]:
     """Press every scene with both overlays; yield what came of it, and whether it passes."""
     for kind in ("tab", "pad"):
-        plain = Overlay(kind="pad" if kind == "pad" else "tab")
         for scene in SCENES:
-            sensor = SensorType(overlay=replace(plain, **dict(scene.overlay)))
-            outcome, told, balance = _press(scene, sensor)
-            close = balance is None or balance <= BALANCE
+            found = press_scene(scene, kind)
             yield {
                 "part": f"contact, {kind}",
                 "case": scene.name,
                 "expected": scene.expected,
-                "outcome": outcome,
-                "told": told,
-                "out_of_balance": None if close else round_digits(balance or 0.0, 2),
-                "passes": outcome in scene.expected and close,
+                "outcome": found.outcome,
+                "told": found.told,
+                "out_of_balance": None if found.balanced else round_digits(found.balance or 0.0, 2),
+                "passes": found.outcome in scene.expected and found.balanced,
             }
-
-
-def _press(scene: ExtremeScene, sensor: SensorType) -> tuple[str, str, float | None]:
-    """Return what came of a scene, in words, and how far the forces are out of balance."""
-    try:
-        contact = press(scene.surface, sensor, scene.touch)
-    except ProbeError as error:
-        return REFUSED, error.cause, None
-    forces, load = contact.forces_n, scene.touch.force_n
-    if not np.isfinite(forces).all() or forces.min() < -BALANCE * load:
-        return "no finite answer", "", None
-    off = abs(float(forces.sum()) - load) / max(load, 1e-30)
-    return FINITE, contact.level, off
 
 
 def _images(shape: tuple[int, int]) -> Iterator[tuple[str, NDArray[np.float64]]]:

@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from probe.contact.engines import engine_named
+from probe.simulate.world.levels import LEVELS
 from recognizer.validation.campaign import KINDS, LEVEL_SHARES, Campaign, Shares
 from recognizer.validation.draw import TouchPlan
 from recognizer.validation.encoded_set import members_of
-from recognizer.validation.levels import LEVELS
 from recognizer.validation.record import RunRecord
 from recognizer.validation.settings import DRAWING, JUDGING
 

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from probe.simulate.world.levels import LEVELS
 from recognizer.validation.campaign import ON_FACES, STRANGE
-from recognizer.validation.levels import LEVELS
 from recognizer.validation.settings import LIMITS
 from recognizer.validation.statistics import (
     calibration,

@@ -1,7 +1,7 @@
 """Numbers that decide what is drawn, how it is judged, and what a campaign must reach.
 
 One frozen value a stage. What a person may change stands in `campaign.Campaign`; what is
-wrong with simulated sensors, in `levels.LEVELS`.
+wrong with simulated sensors, in `probe.simulate.world.levels`.
 """
 
 from __future__ import annotations

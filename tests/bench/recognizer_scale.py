@@ -27,6 +27,7 @@ from generator.alphabet import SymbolStyle, alphabet_named  # noqa: E402
 from generator.array import next_larger, profile  # noqa: E402
 from probe.contact.contract import Touch  # noqa: E402
 from probe.sensor import SensorType  # noqa: E402
+from probe.simulate.world.levels import TYPICAL, read_sensor  # noqa: E402
 from probe.surface.face import FaceSurface  # noqa: E402
 from probe.surface.lattice import LatticeSurface, list_lookup  # noqa: E402
 from probe.surface.polygon import polygon  # noqa: E402
@@ -36,7 +37,6 @@ from recognizer.touch.lab import EmbossedArray, EncodedFace, Lab, cell_keys  # n
 from recognizer.touch.reader import Reader  # noqa: E402
 from recognizer.touch.recognise import recognise  # noqa: E402
 from recognizer.touch.signal import signal_of  # noqa: E402
-from recognizer.validation.levels import TYPICAL, read_sensor  # noqa: E402
 
 SIDE = 8  # symbols along an edge
 STYLE = SymbolStyle()

@@ -36,6 +36,8 @@ from probe.scan.places import surface_to_sensor
 from probe.scan.raster import raster
 from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
+from probe.simulate.world.levels import LEVELS, READOUT, read_sensor
+from probe.simulate.world.worn import wear_face
 from recognizer.scan.grow import begin_scan, extend_scan
 from recognizer.scan.mosaic.planar import inverse, moved, planar_covariance, planar_pose
 from recognizer.scan.mosaic.touch import PlacedTouch, placed
@@ -45,9 +47,7 @@ from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.signal import signal_of
-from recognizer.validation.levels import LEVELS, READOUT, read_sensor
 from recognizer.validation.surfaces import FOREIGN
-from recognizer.validation.wear import wear_face
 
 SPECS = Path(__file__).parents[2] / "fixtures" / "specs"
 SHAPES = {"thesis": ("cube", "prism", "tetrahedron", "box"), "product": ("cube",),

@@ -46,6 +46,7 @@ from probe.sensor import SensorType  # noqa: E402
 from probe.simulate.registered import registered_object  # noqa: E402
 from probe.simulate.round import RoundPart, round_part  # noqa: E402
 from probe.simulate.touch import Touches, random_touches  # noqa: E402
+from probe.simulate.world.levels import LEVELS, read_sensor  # noqa: E402
 from recognizer.scan.grow import begin_scan, extend_scan  # noqa: E402
 from recognizer.scan.mosaic.touch import PlacedTouch, placed  # noqa: E402
 from recognizer.touch.lab import open_lab  # noqa: E402
@@ -53,7 +54,6 @@ from recognizer.touch.reader import Reader  # noqa: E402
 from recognizer.touch.recognise import recognise  # noqa: E402
 from recognizer.touch.recognition import Recognition  # noqa: E402
 from recognizer.touch.signal import signal_of  # noqa: E402
-from recognizer.validation.levels import LEVELS, read_sensor  # noqa: E402
 from recognizer.validation.settings import DRAWING, JUDGING  # noqa: E402
 
 SHAPES = {

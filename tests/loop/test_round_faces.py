@@ -30,11 +30,11 @@ from probe.sensor import SensorType
 from probe.simulate.registered import registered_object
 from probe.simulate.round import round_part
 from probe.simulate.touch import Touches, random_touches
+from probe.simulate.world.levels import LEVELS, read_sensor
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.signal import signal_of
-from recognizer.validation.levels import LEVELS, read_sensor
 
 SHAPES = {
     "cylinder": "{cylinder: {diameter: 36 mm, height: 30 mm}}",

@@ -15,6 +15,7 @@ from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
+from probe.simulate.world.levels import LEVELS
 from recognizer.touch.belief import Support, symbols_to_name, weigh_cells
 from recognizer.touch.lab import open_lab
 from recognizer.touch.locate import (
@@ -34,7 +35,6 @@ from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.template import psi, template_of
 from recognizer.touch.verify import verify_hypotheses
 from recognizer.validation.draw import TouchPlan, draw_touch, sensor_of
-from recognizer.validation.levels import LEVELS
 from recognizer.validation.settings import DRAWING
 from recognizer.validation.surfaces import FOREIGN
 from recognizer.validation.trial import trial

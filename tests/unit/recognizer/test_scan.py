@@ -12,6 +12,7 @@ from probe.contact.contract import Touch
 from probe.scan.places import surface_to_sensor
 from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
+from probe.simulate.world.levels import MISMATCH, TYPICAL, read_sensor
 from recognizer.scan.grow import begin_scan, extend_scan, read_scan
 from recognizer.scan.mosaic.errors import MosaicError
 from recognizer.scan.mosaic.touch import PlacedTouch, placed
@@ -21,7 +22,6 @@ from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import NO_CONTACT, TOO_FEW
 from recognizer.touch.signal import signal_of
-from recognizer.validation.levels import MISMATCH, TYPICAL, read_sensor
 from recognizer.validation.surfaces import FOREIGN
 
 SENSOR = SensorType()

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from probe.surface.body import body_of, indexed_triangles, manifold_of
 from probe.surface.contract import HeightMap
 from probe.surface.face import FaceSurface
-from recognizer.touch.lab import EncodedFace
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -78,7 +77,8 @@ class WornAway:
 
 def wear_part(
     surface: HeightMap,
-    face: EncodedFace,
+    centres_mm: Array,
+    rotation_rad: float,
     pitch_mm: float,
     share: float,
     rng: np.random.Generator,
@@ -89,12 +89,12 @@ def wear_part(
     ----------
     surface
         Of the face, face frame.
-    face, pitch_mm
-        Where its symbols are.
+    centres_mm, rotation_rad, pitch_mm
+        Where its symbols are: (n, 2) in the face frame, the turn of face x into array x.
     share
         Probability that a symbol is gone.
     rng
         Draws them.
     """
-    gone = rng.random(len(face.centres_mm)) < share
-    return WornAway(surface, face.centres_mm[gone], face.rotation_rad, pitch_mm)
+    gone = rng.random(len(centres_mm)) < share
+    return WornAway(surface, centres_mm[gone], rotation_rad, pitch_mm)

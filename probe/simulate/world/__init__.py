@@ -1,0 +1,11 @@
+"""Worlds that a reader must hold in: sensors, prints and surfaces as they are, not as drawn.
+
+::
+
+    levels     how bad a sensor and a print are, and what such a sensor reads
+    distorted  a print that is off in scale and stroke;  worn  one whose symbols are gone
+    foreign    surfaces that no database knows
+    extremes   stiff and extreme scenes for the contact models
+
+Nothing here knows a reader: counts go out, and the truth stays with who asked.
+"""
