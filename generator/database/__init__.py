@@ -4,7 +4,7 @@
 
     open.py         file or URL -> Engine, with the schema made, checked, or brought up to date
     engine.py       how SQLite and PostgreSQL are connected to
-    tables.py       the schema, with its version history
+    tables/         the schema, with its version history
     migrate.py      an older schema -> this one, whole or not at all (migrations/vN.py)
     transaction.py  writers one after another, readers on one state; what failures mean
     unreached.py    why a server was not reached
@@ -17,6 +17,7 @@
     occupancy.py    taken cells as bits, in tiles, for the placing of the next object
     carry.py        objects of one database -> another one (carry_check.py: whether they may)
     exchange.py     export to a file, import from one
+    as_built.py     how prints came out, as touches found it
     part_state.py   whether registered files are there and unchanged
     round_face.py   where a plane stands that touches a registered round face
 

@@ -69,7 +69,7 @@ def copy_objects(
     skip_refused: bool = False,
     homes: tuple[URL, URL] | None = None,
 ) -> CopyReport:
-    """Copy objects with their cells, their provenance and the names of their files.
+    """Copy objects with cells, provenance, names of files, and how their prints came out.
 
     Parameters
     ----------
@@ -159,6 +159,10 @@ def _copy_object(
         part["file"] = part_file(homes[1], str(part_path(homes[0], part["file"])))
     insert_rows(target, tables.parts, [part | new for part in parts])
     came = {} if origin is None else {"imported_from": origin.name, "imported_utc": origin.utc}
+    prints = rows_of(source, tables.as_built, entry.object_id)
+    for print_ in prints:
+        del print_["as_built_id"]
+    insert_rows(target, tables.as_built, [print_ | new for print_ in prints])
     provenance = rows_of(source, tables.provenance, entry.object_id)
     insert_rows(target, tables.provenance, [row | new | came for row in provenance])
     return True

@@ -8,7 +8,7 @@
         register(connection, ObjectRecord(...))
                                                         # committed here, undone on any error
 
-Polyhedron + Layout + array + alphabet -> rows of every table of `tables.py`. The primary
+Polyhedron + Layout + array + alphabet -> rows of every table of `tables`. The primary
 key of `cells` is the last defence of the promise that no cell is used twice.
 """
 

@@ -1,4 +1,4 @@
-"""Databases of the first schema version, as they were written then, become today's."""
+"""Databases of earlier schema versions, as they were written then, become today's."""
 
 import logging
 import os
@@ -8,6 +8,7 @@ import sqlite3
 import subprocess
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +19,10 @@ from sqlalchemy import select, text
 
 from generator.array.definition import array_from
 from generator.database import migrate, tables
+from generator.database.as_built import AsBuilt, read_as_built, write_as_built
 from generator.database.cells import held_cells, occupied_cells
 from generator.database.entries import list_objects
-from generator.database.migrations import v2
+from generator.database.migrations import v3
 from generator.database.open import database_exists, open_database
 from generator.database.read import read_array, read_layout, read_object
 from generator.database.transaction import read_transaction, write_transaction
@@ -28,19 +30,35 @@ from generator.errors import DatabaseError
 
 FIRST = Path(__file__).parents[3] / "fixtures" / "database"
 NAMES = ["Cube", "Prism", "Small box-1", "Small box-2"]
+NAMES_OF = {1: NAMES, 2: ["Brick", "Cube", "Prism", "Pyramid", "Small box-1", "Small box-2"]}
+TAKEN_OF = {1: [96 + 40 + 40, 90], 2: [96 + 40 + 40, 90, 76, 88]}  # cells, by array
 
 
-@pytest.fixture
-def first_version(lab_url):
-    """A database of version 1: the committed file, or the committed dump on a server."""
+def of_version(number, lab_url):
+    """Put a database of an earlier version: the committed file, or the committed dump."""
     if "://" not in lab_url:
-        shutil.copy(FIRST / "v1.db", lab_url)
+        shutil.copy(FIRST / f"v{number}.db", lab_url)
         return lab_url
     import psycopg
 
     with psycopg.connect(lab_url, autocommit=True) as connection:
-        connection.execute((FIRST / "v1.sql").read_bytes())
+        connection.execute((FIRST / f"v{number}.sql").read_bytes())
     return lab_url
+
+
+@pytest.fixture
+def first_version(lab_url):
+    return of_version(1, lab_url)
+
+
+@pytest.fixture(params=sorted(NAMES_OF))
+def version(request):
+    return request.param
+
+
+@pytest.fixture
+def earlier(version, lab_url):
+    return of_version(version, lab_url)
 
 
 @pytest.fixture
@@ -62,60 +80,81 @@ def everything(path):
     return found
 
 
-def test_objects_of_the_first_version_are_all_there(first_version):
-    engine = open_database(first_version)
+def test_objects_of_earlier_versions_are_all_there(version, earlier):
+    engine = open_database(earlier)
     with read_transaction(engine) as connection:
         stored = {row.key: row.value for row in connection.execute(select(tables.meta))}
-        assert stored["schema_version"] == str(tables.SCHEMA_VERSION)
-        assert [entry.name for entry in list_objects(connection)] == NAMES
+        assert stored == {"format": "encoded-objects", "schema_version": "3"}  # no lab key
+        assert [entry.name for entry in list_objects(connection)] == NAMES_OF[version]
         for entry in list_objects(connection):
-            assert (entry.retired_utc, entry.imported_from, entry.imported_utc) == ("", "", "")
+            imported = version == 2 and entry.name == "Pyramid"
+            assert bool(entry.retired_utc) == (version == 2 and entry.name == "Small box-2")
+            assert entry.imported_from == ("other.db" if imported else "")
             held = read_object(connection, entry.name)
             array = array_from(held.array.definition)
+            assert array.definition() == held.array.definition
             assert len(held.faces) == entry.number_of_faces == len(held.layout.faces)
             assert sum(len(face.rows) for face in held.layout.faces) == entry.symbols > 0
             for face in held.layout.faces:
                 np.testing.assert_array_equal(array.symbols(face.rows, face.columns), face.labels)
-        for array_id in (1, 2):
+        for array_id, number in enumerate(TAKEN_OF[version], 1):
             taken = np.stack(occupied_cells(connection, array_id), axis=1)
             np.testing.assert_array_equal(taken, held_cells(connection, array_id)[:, :2])
-        assert len(occupied_cells(connection, 1)[0]) == 96 + 40 + 40
+            assert len(taken) == number
         assert read_array(connection, 2).profile == "thesis"
+        assert connection.execute(select(tables.arrays.c.lab_key)).scalars().all() == [None] * len(
+            TAKEN_OF[version]
+        )
 
 
-def test_the_migrated_schema_is_the_one_that_new_databases_get(first_version, new_database):
-    for url in (first_version, new_database("sqlite")):
+def test_a_migrated_database_keeps_how_prints_came_out(earlier):
+    measured = AsBuilt(1, None, "mk4", "PLA", 0.997, 0.998, -0.0, 1.43, np.eye(4), 25)
+    with write_transaction(open_database(earlier)) as connection:
+        write_as_built(connection, measured)
+        write_as_built(connection, replace(measured, printer="x1"))
+        found = read_as_built(connection, 1)
+    assert [one.printer for one in found] == ["mk4", "x1"]
+    assert repr(found[0].skew_rad) == "-0.0"
+
+
+def test_the_migrated_schema_is_the_one_that_new_databases_get(earlier, new_database):
+    for url in (earlier, new_database("sqlite")):
         with read_transaction(open_database(url)) as connection:
             context = MigrationContext.configure(connection, opts={"compare_type": False})
             assert compare_metadata(context, tables.metadata) == []
-    if "://" in first_version:
+    if "://" in earlier:
         return
-    with sqlite3.connect(first_version) as old, sqlite3.connect(url) as new:
+    with sqlite3.connect(earlier) as old, sqlite3.connect(url) as new:
         for table in tables.metadata.tables:
             listed = f'PRAGMA table_info("{table}")'
             columns = [sorted(row[1:] for row in c.execute(listed)) for c in (old, new)]
             assert columns[0] == columns[1]
 
 
-def test_every_row_stays_as_it_was_and_the_old_file_beside_it(first_file, caplog):
+def test_every_row_stays_as_it_was_and_the_old_file_beside_it(version, tmp_path, caplog):
+    first_file = tmp_path / "lab.db"
+    shutil.copy(FIRST / f"v{version}.db", first_file)
     before = everything(first_file)
     open_database(str(first_file))
     after = everything(first_file)
-    added = {"retired_utc", "imported_from", "imported_utc"}
+    added = {"lab_key"}
+    if version == 1:
+        added |= {"retired_utc", "imported_from", "imported_utc"}
     for table, rows in before.items():
         if table != "meta":
             kept = [[(k, v) for k, v in row if k not in added] for row in after[table]]
             assert kept == rows
-    copy = first_file.with_name("lab.v1.db")
+    copy = first_file.with_name(f"lab.v{version}.db")
     assert everything(copy) == before
-    assert sorted(os.listdir(first_file.parent)) == ["lab.db", "lab.v1.db"]
+    assert sorted(os.listdir(first_file.parent)) == ["lab.db", copy.name]
     (record,) = caplog.records
     assert record.levelno == logging.WARNING
-    assert f"{first_file}: brought from schema version 1 to 2; as it was: {copy}" in caplog.text
+    said = f"{first_file}: brought from schema version {version} to 3; as it was: {copy}"
+    assert said in caplog.text
     caplog.clear()
     open_database(str(first_file))  # once is enough
     assert caplog.records == []
-    assert sorted(os.listdir(first_file.parent)) == ["lab.db", "lab.v1.db"]
+    assert sorted(os.listdir(first_file.parent)) == ["lab.db", copy.name]
 
 
 def test_the_message_goes_to_stderr_and_json_stays_json(first_file):
@@ -125,7 +164,7 @@ def test_the_message_goes_to_stderr_and_json_stays_json(first_file):
     )
     assert done.returncode == 0
     assert done.stdout.startswith("{")
-    assert "brought from schema version 1 to 2" in done.stderr
+    assert "brought from schema version 1 to 3" in done.stderr
 
 
 def test_a_reader_finds_an_older_database_and_migrates_it(first_version):
@@ -154,8 +193,8 @@ def test_a_migration_that_fails_changes_nothing(first_version, monkeypatch):
         done(connection)
         raise NoMemoryError
 
-    done = v2.upgrade
-    monkeypatch.setattr(v2, "upgrade", failing)
+    done = v3.upgrade
+    monkeypatch.setattr(v3, "upgrade", failing)
     before = None if "://" in first_version else Path(first_version).read_bytes()
     with pytest.raises(NoMemoryError):
         open_database(first_version)
@@ -193,14 +232,14 @@ def forked(action):
 
 
 def test_a_migration_killed_before_its_commit_leaves_the_old_version(first_version, monkeypatch):
-    done = v2.upgrade
+    done = v3.upgrade
 
     def killing(connection):
         done(connection)
         os.kill(os.getpid(), signal.SIGKILL)
 
     with monkeypatch.context() as patched:
-        patched.setattr(v2, "upgrade", killing)
+        patched.setattr(v3, "upgrade", killing)
         _, status = os.waitpid(forked(lambda: open_database(first_version)), 0)
     assert os.WTERMSIG(status) == signal.SIGKILL
     with read_transaction(open_database(first_version)) as connection:  # migrates at last
@@ -209,14 +248,14 @@ def test_a_migration_killed_before_its_commit_leaves_the_old_version(first_versi
 
 
 def test_many_may_open_an_older_database_at_once(first_version, monkeypatch):
-    done = v2.upgrade
+    done = v3.upgrade
     upgraded, note = os.pipe()
 
     def noting(connection):
         done(connection)
         os.write(note, b"1")
 
-    monkeypatch.setattr(v2, "upgrade", noting)
+    monkeypatch.setattr(v3, "upgrade", noting)
     several = [forked(lambda: open_database(first_version)) for _ in range(3)]
     assert [os.waitpid(child, 0)[1] for child in several] == [0, 0, 0]
     os.close(note)
@@ -236,7 +275,7 @@ def test_an_older_database_that_may_not_be_written_says_what_to_do():
         if root:  # root may write anywhere
             os.seteuid(65534)
         try:
-            with pytest.raises(DatabaseError, match="schema version 1, must be brought to 2") as e:
+            with pytest.raises(DatabaseError, match="schema version 1, must be brought to 3") as e:
                 open_database(str(folder / "lab.db"), writable=False)
         finally:
             if root:
@@ -248,7 +287,7 @@ def test_an_older_database_that_may_not_be_written_says_what_to_do():
 
 def test_a_newer_schema_is_refused_on_either_engine(lab_url):
     with write_transaction(open_database(lab_url)) as connection:
-        connection.execute(text("UPDATE meta SET value = '3' WHERE key = 'schema_version'"))
+        connection.execute(text("UPDATE meta SET value = '4' WHERE key = 'schema_version'"))
     for writable in (True, False):
-        with pytest.raises(DatabaseError, match="version 3, newer than 2"):
+        with pytest.raises(DatabaseError, match="version 4, newer than 3"):
             open_database(lab_url, writable=writable)

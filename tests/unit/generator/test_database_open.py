@@ -153,7 +153,7 @@ def test_another_programs_database_is_left_alone(tmp_path):
         assert path.read_bytes() == before
 
 
-@pytest.mark.parametrize("version", ["3", "77"])
+@pytest.mark.parametrize("version", ["4", "77"])
 def test_a_newer_schema_is_refused(tmp_path, version):
     path = tmp_path / "lab.db"
     engine = open_database(str(path))

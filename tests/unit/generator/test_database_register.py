@@ -219,7 +219,7 @@ def test_a_cell_that_another_object_holds_undoes_the_whole_object(engine):
     with read_transaction(engine) as connection:
         assert [entry.name for entry in list_objects(connection)] == ["Cube"]
         for table in tables.metadata.sorted_tables:
-            if "object_id" in table.c:
+            if "object_id" in table.c and table is not tables.as_built:
                 assert set(connection.execute(select(table.c.object_id)).scalars()) == {1}
 
 

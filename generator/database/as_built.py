@@ -1,0 +1,91 @@
+"""How prints came out, as touches found it: kept with the object, or with printer and material.
+
+A part of an object, an object, or all that a printer makes of a material -> scale, skew and
+stroke with their covariance. What is kept of an object goes when the object is replaced or
+removed.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import Connection, delete, insert, select
+
+from generator.database.tables import as_built
+
+PARAMETERS = ("scale_x", "scale_y", "skew_rad", "stroke_mm")  #: order in the covariance
+
+
+@dataclass(frozen=True, slots=True)
+class AsBuilt:
+    """How a print differs from what was drawn."""
+
+    object_id: int | None  #: None: of whatever `printer` makes of `material`
+    part: str | None  #: one part of the object; None: all of it
+    printer: str
+    material: str
+    scale_x: float  #: felt length / drawn length
+    scale_y: float
+    skew_rad: float  #: by which x and y are felt off a right angle
+    stroke_mm: float  #: width of the strokes of symbols
+    covariance: NDArray[np.float64]  #: (4, 4) of (scale_x, scale_y, skew_rad, stroke_mm)
+    touches: int  #: on which it rests
+
+
+def write_as_built(connection: Connection, measured: AsBuilt) -> None:
+    """Keep a measurement; an earlier one of the same object, part, printer, material goes.
+
+    Parameters
+    ----------
+    connection
+        Of a `write_transaction`.
+
+    Raises
+    ------
+    ValueError
+        The covariance is not a finite 4x4 matrix.
+    DatabaseError
+        There is no such object, or a scale, the stroke or `touches` is not positive.
+    """
+    covariance = np.asarray(measured.covariance, np.float64)
+    if covariance.shape != (4, 4) or not np.isfinite(covariance).all():
+        raise ValueError("the covariance of an as-built print is a finite 4x4 matrix")
+    named = ("object_id", "part", "printer", "material")
+    row = {name: getattr(measured, name) for name in (*named, *PARAMETERS, "touches")}
+    same = [as_built.c[name].is_not_distinct_from(row[name]) for name in named]
+    connection.execute(delete(as_built).where(*same))
+    row["covariance"] = json.dumps(covariance.tolist())
+    connection.execute(insert(as_built).values(row))
+
+
+def read_as_built(connection: Connection, object_id: int | None = None) -> tuple[AsBuilt, ...]:
+    """Return what is kept of an object, or, with None, of printers and materials.
+
+    In the order of part, printer and material, an object as a whole before its parts.
+    """
+    of_object = as_built.c.object_id.is_not_distinct_from(object_id)
+    found = [
+        AsBuilt(
+            object_id=row.object_id,
+            part=row.part,
+            printer=row.printer,
+            material=row.material,
+            scale_x=row.scale_x,
+            scale_y=row.scale_y,
+            skew_rad=row.skew_rad,
+            stroke_mm=row.stroke_mm,
+            covariance=_read_only(row.covariance),
+            touches=row.touches,
+        )
+        for row in connection.execute(select(as_built).where(of_object))
+    ]
+    return tuple(sorted(found, key=lambda one: (one.part or "", one.printer, one.material)))
+
+
+def _read_only(text: str) -> NDArray[np.float64]:
+    matrix = np.array(json.loads(text), np.float64)
+    matrix.setflags(write=False)
+    return matrix
