@@ -2,7 +2,7 @@
 
 S(i, j) = sum over cells (a, b) of L_ab(law(SR[i + a], SC[j + b])): summed over a for every i
 first, then over b for every j. Where all pairs are too many, rows are taken in falling order
-of an upper bound of their best pair, until no other row can matter: still exact.
+of an upper bound of their best pair, until no other row can be listed or weigh: still exact.
 """
 
 from __future__ import annotations
@@ -63,10 +63,10 @@ class Joint:
         best: Ranked | None = None
         for start in range(0, len(order), block):
             rows = order[start : start + block]
-            if best is not None and bounds[rows[0]] < max(
-                best.values[0, -1], best.values[0, 0] - LIKELIHOOD.negligible
-            ):
-                break
+            if best is not None and best.values.shape[1] >= number:
+                negligible = best.values[0, 0] - LIKELIHOOD.negligible
+                if bounds[rows[0]] < min(best.values[0, -1], negligible):
+                    break
             values = (by_row[rows] @ self._in_columns).reshape(1, -1)
             places, chosen, rest = best_of(values, number)
             places = rows[places // self._columns] * self._columns + places % self._columns

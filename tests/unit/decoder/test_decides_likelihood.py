@@ -22,6 +22,8 @@ BINARY = array_from({"family": "prba", "order": 2, "degree": 8})  # 15 x 17
 QUATERNARY = array_from({"family": "prmva", "order": 4, "degree": 4})  # 15 x 17
 PRODUCT = array_from({"family": "prpa", "factors": {
     "rows": {"order": 2, "degree": 3}, "columns": {"order": 2, "degree": 4}}})  # fmt: skip
+MIXED = array_from({"family": "prmvpa", "factors": {
+    "rows": {"order": 2, "degree": 3}, "columns": {"order": 4, "degree": 2}}})  # fmt: skip
 ARRAYS = {"binary": BINARY, "quaternary": QUATERNARY, "product": PRODUCT}
 ALL_TURNS = (0, 1, 2, 3)
 
@@ -400,26 +402,29 @@ def test_the_best_places_are_where_they_are_said_to_be(places, number):
     )
 
 
-def test_a_window_of_a_product_array_is_searched_as_it_is_weighed(monkeypatch):
+@pytest.mark.parametrize("number", [2, 5, 20])
+@pytest.mark.parametrize("pairs", [15, 40, 60])  # one, two and four rows at a time
+@pytest.mark.parametrize(("array", "shape"), [(PRODUCT, (4, 5)), (MIXED, (6, 2))])
+def test_a_window_of_a_product_array_is_searched_as_it_is_weighed(
+    monkeypatch, array, shape, pairs, number
+):
     rng = np.random.default_rng(10)
-    scores = rng.normal(size=(6, 4, 5, PRODUCT.order)) * np.arange(1, 7)[:, None, None, None]
-    flat = (scores - scores.max(axis=-1, keepdims=True)).reshape(6, 20, -1).astype(np.float32)
-    exact = ranking_of(PRODUCT, (4, 5)).rank(flat, 5)
-    for pairs in (15, 40, 60):  # one, two and four rows at a time; there are 105 places
-        monkeypatch.setattr(decoder.joint, "_PAIRS", pairs)
-        found = ranking_of(PRODUCT, (4, 5)).rank(flat, 5)
-        np.testing.assert_array_equal(found.rows, exact.rows)
-        np.testing.assert_array_equal(found.columns, exact.columns)
-        np.testing.assert_allclose(found.values, exact.values, atol=1e-5)
-        # rows that cannot hold one of the best are not weighed
-        listed = np.exp(found.values[:, 1:] - found.values[:, :1]).sum(axis=1)
-        assert (found.rest >= listed * (1 - 1e-4)).all()
-        assert (found.rest <= exact.rest * (1 + 1e-4)).all()
-    for i in range(6):
-        ranked, _, _ = bayes(PRODUCT, scores[i])
-        assert [(r, c) for r, c, _, _ in ranked[:2]] == list(
-            zip(exact.rows[i, :2].tolist(), exact.columns[i, :2].tolist(), strict=True)
-        )
+    scores = rng.normal(size=(8, *shape, array.order))
+    scores *= np.arange(1, 9)[:, None, None, None]  # from faint to sharp
+    scores -= scores.max(axis=-1, keepdims=True)
+    flat = scores.reshape(8, shape[0] * shape[1], -1).astype(np.float32)
+    monkeypatch.setattr(decoder.joint, "_PAIRS", pairs)
+    found = ranking_of(array, shape).rank(flat, number)
+    _, shown = hypotheses(array, shape)  # 7 x 15
+    for i in range(8):
+        each = shown @ flat[i].ravel().astype(float)
+        best = np.sort(each)[::-1]
+        np.testing.assert_allclose(found.values[i], best[:number], rtol=1e-5, atol=1e-5)
+        listed = found.rows[i] * array.columns + found.columns[i]
+        assert len(set(listed.tolist())) == number
+        np.testing.assert_allclose(each[listed.astype(int)], found.values[i], rtol=1e-5, atol=1e-5)
+        # every row that weighs is weighed, listed or not
+        assert found.rest[i] == pytest.approx(np.exp(best[1:] - best[0]).sum(), rel=1e-4)
 
 
 def test_places_that_are_too_many_to_be_tried_weigh_as_many_on_the_average():
