@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from generator.alphabet.known import Alphabet
 from generator.alphabet.nib import Lines, nib_outline, offset_ring
+from generator.alphabet.settings import OUTLINE
 from generator.alphabet.strokes import Glyph
 from generator.errors import AlphabetError
 from generator.plane.polygon import signed_area
@@ -26,13 +27,6 @@ from generator.plane.rings import edges_cross, keeps_edges
 Ring = NDArray[
     np.float64
 ]  #: (k, 2) mm in the symbol's axes, outer counter-clockwise, holes clockwise
-
-#: An edge shorter than this share of the stroke is refused as collapsed.
-SHORTEST_EDGE = 0.01
-#: A smaller chamfer cannot be seen, and its sides would be slivers.
-LEAST_CHAMFER_MM = 0.01
-#: Free margin around the footprint, as a share of the pitch, for triangulation.
-FOOT_MARGIN = 0.005
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,11 +153,11 @@ def footprint_half_mm(alphabet: Alphabet, style: SymbolStyle) -> float:
         If neighbouring symbols would touch, or see `outline`.
     """
     half = max(foot_half_mm(tiers) for tiers in outlines(alphabet, style))
-    half += FOOT_MARGIN * style.pitch_mm
+    half += OUTLINE.foot_margin * style.pitch_mm
     if half < style.pitch_mm / 2:
         return half
     solid = style.stroke_mm / 2 + style.draft_mm
-    free = 0.5 - alphabet.reach - FOOT_MARGIN
+    free = 0.5 - alphabet.reach - OUTLINE.foot_margin
     fix = f"set pitch to {math.ceil(solid / free * 100) / 100 + 0.01:g} mm or more"
     if free * style.pitch_mm > style.draft_mm:
         widest = 2 * (free * style.pitch_mm - style.draft_mm)
@@ -202,10 +196,10 @@ def _check_numbers(style: SymbolStyle, place: str) -> None:
             place=place,
         )
     most = 0.9 * style.height_mm
-    if style.chamfer_mm and not LEAST_CHAMFER_MM <= style.chamfer_mm <= most:
+    if style.chamfer_mm and not OUTLINE.least_chamfer_mm <= style.chamfer_mm <= most:
         raise AlphabetError(
             f"chamfer {style.chamfer_mm:g} mm on symbols {style.height_mm:g} mm high",
-            fix=f"set chamfer to 0, or between {LEAST_CHAMFER_MM:g} and {most:.2g} mm",
+            fix=f"set chamfer to 0, or between {OUTLINE.least_chamfer_mm:g} and {most:.2g} mm",
             place=place,
         )
 
@@ -234,7 +228,7 @@ def _regular(lines: list[Lines], distances: list[float], stroke_mm: float) -> bo
     normal = [offset_ring(ring, 0.0) for ring in lines]
     for distance in distances:
         rings = [offset_ring(ring, distance) for ring in lines]
-        short = SHORTEST_EDGE * stroke_mm
+        short = OUTLINE.shortest_edge * stroke_mm
         if not all(keeps_edges(a, b, short) for a, b in zip(normal, rings, strict=True)):
             return False
         if edges_cross(rings):

@@ -16,11 +16,9 @@ import numpy as np
 
 from generator.alphabet.known import Alphabet
 from generator.alphabet.outline import SymbolStyle, Tiers, footprint_half_mm, outlines
+from generator.alphabet.settings import OUTLINE
 from generator.errors import AlphabetError
 from generator.printers import Printer
-
-#: Share of the printer's least gap that strokes of one symbol keep at their tops.
-INSIDE_SHARE = 0.5
 
 
 def gap_inside_mm(tiers: Tiers) -> float:
@@ -94,7 +92,7 @@ def check_printable(alphabet: Alphabet, style: SymbolStyle, printer: Printer) ->
             fix=_ways_out(alphabet, style, printer),
             place=place,
         )
-    least = INSIDE_SHARE * printer.gap_min_mm
+    least = OUTLINE.inside_share * printer.gap_min_mm
     for glyph, tiers in zip(alphabet.glyphs, outlines(alphabet, style), strict=True):
         inside = gap_inside_mm(tiers)
         if inside < least * (1 - 1e-9):
@@ -117,7 +115,7 @@ def _ways_out(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> str:
         except AlphabetError:
             return False
         return gap_between_mm(alphabet, trial) >= printer.gap_min_mm and all(
-            gap_inside_mm(tiers) >= INSIDE_SHARE * printer.gap_min_mm * (1 - 1e-9)
+            gap_inside_mm(tiers) >= OUTLINE.inside_share * printer.gap_min_mm * (1 - 1e-9)
             for tiers in outlines(alphabet, trial)
         )
 

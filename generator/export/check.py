@@ -19,11 +19,8 @@ import numpy as np
 from encoded_objects.errors import require
 from generator.errors import GeneratorError, SolidError
 from generator.export.exact_crossing import cut_triangles, perhaps_folded
+from generator.export.settings import READ_BACK
 
-#: Greatest relative error of a volume that is read back from STEP.
-STEP_VOLUME = 1e-9
-#: Greatest relative error of a volume that is read back from STL: 32-bit coordinates.
-STL_VOLUME = 1e-5
 _EXTRAS = "cad,mesh"
 
 
@@ -171,12 +168,12 @@ def _verified_step(part: str, volume_mm3: float, path: Path) -> StepReport:
         raise _failure(part, path, f"holds {report.solids} solids where one is allowed")
     if not report.valid:
         raise _failure(part, path, "holds a solid that the CAD kernel finds invalid")
-    if not abs(report.volume_error) <= STEP_VOLUME:
+    if not abs(report.volume_error) <= READ_BACK.step_volume:
         raise _failure(
             part,
             path,
             f"has a volume of {read.volume_mm3:.6f} mm3 where {volume_mm3:.6f} mm3 was meant "
-            f"(relative error {report.volume_error:.1e}, allowed {STEP_VOLUME:.0e})",
+            f"(relative error {report.volume_error:.1e}, allowed {READ_BACK.step_volume:.0e})",
         )
     return report
 
@@ -195,7 +192,7 @@ def _verified_stl(part: str, volume_mm3: float, path: Path) -> MeshReport:
         found = ["no triangles that can be read"]
     if found:
         raise _failure(part, path, "has " + ", ".join(found))
-    if not abs(report.volume_error) <= STL_VOLUME:
+    if not abs(report.volume_error) <= READ_BACK.stl_volume:
         raise _failure(
             part,
             path,

@@ -22,14 +22,14 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from generator.export.settings import READ_BACK
+
 Vector = tuple[int, int, int]
 #: x, y, z and the common denominator, which is positive.
 Point = tuple[int, int, int, int]
 #: a, b, c, d of a x + b y + c z + d >= 0.
 HalfSpace = tuple[int, int, int, int]
 Triangle = tuple[Vector, Vector, Vector]
-
-_FOLDED = -0.999  # cosine between neighbours from which the exact test looks at them
 
 
 def cut_triangles(corners: NDArray[np.float64], suspects: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -76,7 +76,7 @@ def perhaps_folded(points: NDArray[np.float64], triangles: NDArray[np.int64]) ->
     same = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
     one, other = owner[order][same], owner[order][same + 1]
     cosine = (normals[one] * normals[other]).sum(axis=1)
-    back = cosine <= _FOLDED * lengths[one] * lengths[other]
+    back = cosine <= READ_BACK.folded_cos * lengths[one] * lengths[other]
     return np.unique(np.concatenate([one[back], other[back], np.flatnonzero(lengths == 0)]))
 
 

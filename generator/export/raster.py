@@ -17,15 +17,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from generator.export.settings import RASTER
+
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _DEPTH_STEPS = float(1 << 28)
 _NUMBER_BITS = 26  # up to 67 million triangles
 # Fresh memory is what costs most, so pixels are treated in blocks that stay in the cache.
-_BLOCK = 4096  # spans
-_ROWS = 32  # of the picture
-_TRIANGLES = 131_072  # drawn at once: bounds the memory
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,10 +37,10 @@ class Visible:
 
     def paint(self, picture: NDArray[np.uint32], colours: NDArray[np.uint32]) -> None:
         """Write the colour of the triangle seen into each pixel of `picture`, (height, width)."""
-        for row in range(0, len(picture), _ROWS):
-            keys = self.keys[row : row + _ROWS]
+        for row in range(0, len(picture), RASTER.rows):
+            keys = self.keys[row : row + RASTER.rows]
             chosen = colours[keys & ((1 << _NUMBER_BITS) - 1) & -(keys >= 0).astype(np.int64)]
-            np.copyto(picture[row : row + _ROWS], chosen, where=keys >= 0)
+            np.copyto(picture[row : row + RASTER.rows], chosen, where=keys >= 0)
 
     def coarse(self, values: Index, step: int) -> Index:
         """Return the value of the triangle seen in the middle of each `step` by `step` pixels.
@@ -76,9 +75,16 @@ def visible(points: Floats, triangles: Index, screen: Index) -> Visible:
     columns = points.T.copy()
     low = float(columns[2].min(initial=0.0))
     step = max(float(columns[2].max(initial=0.0)) - low, 1e-300) / _DEPTH_STEPS
-    for start in range(0, len(triangles), _TRIANGLES):
+    for start in range(0, len(triangles), RASTER.triangles):
         _draw(
-            buffer, height, width, columns, triangles[start : start + _TRIANGLES], start, low, step
+            buffer,
+            height,
+            width,
+            columns,
+            triangles[start : start + RASTER.triangles],
+            start,
+            low,
+            step,
         )
     return Visible(screen, low, step)
 
@@ -149,8 +155,8 @@ def _spans(x: Floats, y: Floats, rows: Index, owner: Index, width: int) -> tuple
 
 def _fill(buffer: Index, start: Index, length: Index, first: Index, step: Index) -> None:
     """Raise `buffer` along each span to first, first + step, first + 2 step, ..."""
-    for block in range(0, len(start), _BLOCK):
-        some = slice(block, block + _BLOCK)
+    for block in range(0, len(start), RASTER.spans):
+        some = slice(block, block + RASTER.spans)
         count = length[some]
         before = np.cumsum(count) - count
         span = np.repeat(np.arange(len(count)), count)

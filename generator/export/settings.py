@@ -53,3 +53,37 @@ class PreviewSettings:
 
 
 PREVIEW = PreviewSettings()
+
+
+@dataclass(frozen=True, slots=True)
+class ArraySvgSettings:
+    """The picture of the array with the faces laid on it."""
+
+    full: int = 300  #: cells a side up to which the whole array is drawn
+    margin: int = 3  #: cells around the faces in a cropped picture
+    named: float = 1.5  #: cells: a narrower strip of a face bears no name
+    cell: int = 14  #: px
+    wide: int = 1600  #: px; a wider picture gets smaller cells
+
+
+@dataclass(frozen=True, slots=True)
+class RasterSettings:
+    """Blocks in which triangles become pixels: memory and time, no pixel."""
+
+    spans: int = 4096  #: at a time, so that they stay in the cache
+    rows: int = 32  #: of the picture at a time
+    triangles: int = 131_072  #: drawn at once: bounds the memory
+
+
+@dataclass(frozen=True, slots=True)
+class ReadBackSettings:
+    """How near to exact what was written must be when it is read back."""
+
+    step_volume: float = 1e-9  #: greatest relative error of a volume in STEP
+    stl_volume: float = 1e-5  #: the same in STL: 32-bit coordinates
+    folded_cos: float = -0.999  #: between neighbours, from which the exact test looks at them
+
+
+ARRAY_SVG = ArraySvgSettings()
+RASTER = RasterSettings()
+READ_BACK = ReadBackSettings()

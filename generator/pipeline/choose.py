@@ -22,13 +22,11 @@ from generator.errors import ArrayError, GeneratorError, LayoutError
 from generator.layout.placement import Layout
 from generator.pipeline.place import NO_CELLS, lay_out_object
 from generator.pipeline.plan import ObjectPlan, plan_object
+from generator.pipeline.settings import CHOICE
 from generator.polyhedron import Polyhedron
 from generator.spec import LocatedSpec, error_at
 from generator.spec.profile import AUTO
 from generator.spec.script import with_profile
-
-FULL = 0.8  #: share of an array that faces of all shapes fill without a search
-LARGER = 4  #: sizes tried beyond `large`
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +124,7 @@ def _candidates() -> Iterator[Profile]:
     yield PROFILES["one-touch"]
     larger = PROFILES["large"]
     yield larger
-    for _ in range(LARGER):
+    for _ in range(CHOICE.larger):
         try:
             larger = next_larger(larger)
         except ArrayError:
@@ -176,7 +174,7 @@ def _counts(plan: ObjectPlan, layout: Layout) -> tuple[int, int]:
 def _room(array: SymbolArray, connection: Connection | None) -> int:
     """Return how many more cells of an array faces of all shapes can have."""
     taken = 0 if connection is None else occupancy(connection, array).used
-    return max(0, int(FULL * array.rows * array.columns) - taken)
+    return max(0, int(CHOICE.full * array.rows * array.columns) - taken)
 
 
 def _names_printer(located: LocatedSpec) -> bool:

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from probe.arm.links import Arm
+from probe.arm.settings import ARM_MOTION
 from probe.errors import PoseError
 
 _TWISTS: Final = (-math.pi / 2, 0.0, 0.0, -math.pi / 2, 0.0)
-_ROUNDING: Final = 1e-9  #: of the arm's length: what a pose may be off by rounding
 
 
 def inverse(arm: Arm, pose: ArrayLike) -> list[NDArray[np.float64]]:
@@ -75,13 +75,13 @@ def _plane_angle(pose: NDArray[np.float64], length: float) -> float:
     """
     parts = np.array([pose[:2, 3] / length, pose[:2, 2]])
     xx, yy, xy = parts[:, 0] @ parts[:, 0], parts[:, 1] @ parts[:, 1], parts[:, 0] @ parts[:, 1]
-    if xx + yy < _ROUNDING**2:
+    if xx + yy < ARM_MOTION.rounding**2:
         return 0.0
     angle = math.atan2(2 * xy, xx - yy) / 2
     if parts[np.argmax(np.hypot(*parts.T))] @ (math.cos(angle), math.sin(angle)) < 0:
         angle += math.pi
     off = float(np.abs(parts @ (-math.sin(angle), math.cos(angle))).max())
-    if off > _ROUNDING:
+    if off > ARM_MOTION.rounding:
         raise PoseError(
             f"the approach direction is {math.degrees(math.asin(min(1.0, off))):.3g} degrees off "
             "the vertical plane through the arm; five axes cannot reach that",
@@ -103,7 +103,7 @@ def _elbow_branches(
     down = d1 - a4 * s234 - d5 * c234 - pose[2, 3]
     reach = math.hypot(out, down)
     lack = max(reach - (a2 + a3), abs(a2 - a3) - reach)
-    if lack > _ROUNDING * length:
+    if lack > ARM_MOTION.rounding * length:
         return lack, []
     stretch = math.sqrt(max(0.0, (a2 + a3 - reach) * (a2 + a3 + reach)))
     fold = math.sqrt(max(0.0, (reach - abs(a2 - a3)) * (reach + abs(a2 - a3))))

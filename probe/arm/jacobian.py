@@ -19,11 +19,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from probe.arm.links import AXES, Arm, joint_frames
+from probe.arm.settings import ARM_MOTION
 from probe.errors import PoseError
 
-LENGTH_MM: Final = 228.6  #: at which a mm/s of the point counts as much as rad/s of turning
-LEAST: Final = 0.02  #: singular value, of the Jacobian in links and radians, that is damped below
-GAIN: Final = 2 / 3**0.5  #: bound of the joint speed by damping is GAIN / LEAST per unit of speed
+GAIN: Final = 2 / 3**0.5  #: joint speed by damping, at most, times the least singular value
 
 
 def jacobian(arm: Arm, q: ArrayLike, point_mm: ArrayLike | None = None) -> NDArray[np.float64]:
@@ -58,10 +57,10 @@ def condition(arm: Arm, q: ArrayLike) -> float:
 def joint_speeds(arm: Arm, q: ArrayLike, twist: ArrayLike) -> NDArray[np.float64]:
     """Return joint speeds (5,), rad/s, that follow a twist as well as bounded speeds can.
 
-    Least squares by singular directions. One that is weaker than `LEAST` is damped, the more
-    the weaker it is, so that nothing jumps on the way into a singularity, the other directions
-    are followed exactly, and no unit of speed (a link's length per second) asks for more than
-    GAIN / LEAST = 58 rad/s.
+    Least squares by singular directions. One that is weaker than `ARM_MOTION.least_singular` is
+    damped, the more the weaker it is, so that nothing jumps on the way into a singularity, the
+    other directions are followed exactly, and no unit of speed (a link's length per second) asks
+    for more than GAIN over that value, 58 rad/s.
 
     Parameters
     ----------
@@ -80,10 +79,10 @@ def joint_speeds(arm: Arm, q: ArrayLike, twist: ArrayLike) -> NDArray[np.float64
     wanted = np.asarray(twist, np.float64)
     if wanted.shape != (6,) or not np.isfinite(wanted).all():
         raise PoseError(f"a twist {wanted.tolist()}", fix="give 3 speeds in mm/s and 3 in rad/s")
-    wanted = wanted / np.repeat([LENGTH_MM, 1.0], 3)
+    wanted = wanted / np.repeat([ARM_MOTION.length_mm, 1.0], 3)
     u, values, v = np.linalg.svd(_scaled(arm, q), full_matrices=False)
-    weak = np.clip(values / LEAST, 0.0, 1.0)
-    damping = (1 - weak**2) * (LEAST / 2) ** 2
+    weak = np.clip(values / ARM_MOTION.least_singular, 0.0, 1.0)
+    damping = (1 - weak**2) * (ARM_MOTION.least_singular / 2) ** 2
     safe = np.where(values > 0, values, 1.0)
     gains = np.where(values > 0, values / (safe**2 + damping), 0.0)
     speeds: NDArray[np.float64] = v.T @ (gains * (u.T @ wanted))
@@ -91,5 +90,7 @@ def joint_speeds(arm: Arm, q: ArrayLike, twist: ArrayLike) -> NDArray[np.float64
 
 
 def _scaled(arm: Arm, q: ArrayLike) -> NDArray[np.float64]:
-    scaled: NDArray[np.float64] = jacobian(arm, q) / np.repeat([LENGTH_MM, 1.0], 3)[:, None]
+    scaled: NDArray[np.float64] = (
+        jacobian(arm, q) / np.repeat([ARM_MOTION.length_mm, 1.0], 3)[:, None]
+    )
     return scaled

@@ -13,14 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from probe.calibration.law import law_s
+from probe.calibration.settings import FELT
 from probe.calibration.value import Calibration, Condition, Image
 from probe.circuit import Inverted, invert_readings
 from probe.circuit.readout import scan_shares, shares
 from probe.errors import CalibrationError
 from probe.frame import Frame
-
-_FELT = 3.0  # sigmas of a conductance from which it is a force
-_LEAK_S = 1e-9  # joins the network of a board with floating rows
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,14 +73,16 @@ def calibrate_image(image: Frame | ArrayLike, calibration: Calibration | None = 
     found = _conductances(counts, c)
     g, noise = found.conductance_s, found.sigma_s
     bad = c.bad | np.isnan(g) | (counts >= c.full)
-    felt = ~bad & (g > _FELT * noise)
-    safe = np.where(felt, g, np.where(c.bad, 1.0, np.maximum(_FELT * noise, np.nan_to_num(g))))
+    felt = ~bad & (g > FELT.sigmas * noise)
+    safe = np.where(
+        felt, g, np.where(c.bad, 1.0, np.maximum(FELT.sigmas * noise, np.nan_to_num(g)))
+    )
     with np.errstate(invalid="ignore", over="ignore"):
         over = (safe / c.gain_s) ** (1.0 / c.exponent)
         variance = (over * noise / (c.exponent * safe)) ** 2
         variance += _of_the_law(over, c) + (c.repeat * over) ** 2
         force = np.where(felt, np.maximum(c.break_n + over, 0.0), 0.0)
-        silent = np.maximum(c.break_n, 0.0) + over / _FELT
+        silent = np.maximum(c.break_n, 0.0) + over / FELT.sigmas
         sigma = np.where(bad, np.inf, np.where(felt, np.sqrt(variance), silent))
     return Calibrated(force, sigma, bad, "N")
 
@@ -113,7 +113,7 @@ def expected_counts(forces_n: ArrayLike, calibration: Calibration) -> Image:
         read = g + c.bias_counts
     else:
         if c.board.readout == "floating":
-            g = g + _LEAK_S
+            g = g + FELT.leak_s
         read = scan_shares(shares(g, c.board), c.board) * c.full + c.bias_counts
     return np.clip(read, 0.0, float(c.full))
 

@@ -16,12 +16,9 @@ from probe.calibration.apply import calibrate_image
 from probe.calibration.average import average_frames
 from probe.calibration.condition import tactel_words
 from probe.calibration.load import CalibrationLoad
+from probe.calibration.settings import DRIFT
 from probe.calibration.value import Calibration, Image
 from probe.errors import CalibrationError
-
-BIAS_COUNTS = 2.0  #: shift of the bias that warns, counts
-GAIN = 0.10  #: change of the gain that warns, share of 1
-_SIGMAS = 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +56,9 @@ def drift_of(
             fix="use the calibration of the sensor that read them",
         )
     shift = rest.mean - calibration.rest_counts
-    moved = ~calibration.bad & (np.abs(shift) > np.maximum(BIAS_COUNTS, _SIGMAS * rest.sigma))
+    moved = ~calibration.bad & (
+        np.abs(shift) > np.maximum(DRIFT.bias_counts, DRIFT.sigmas * rest.sigma)
+    )
     said = []
     if moved.any():
         worst = float(np.abs(shift[moved]).max())
@@ -67,7 +66,7 @@ def drift_of(
     ratios = [_ratios(calibration, load) for load in loads]
     felt = np.concatenate(ratios) if ratios else np.zeros(0)
     gain = float(np.median(felt)) - 1.0 if felt.size else float("nan")
-    if felt.size and abs(gain) > GAIN:
+    if felt.size and abs(gain) > DRIFT.gain:
         said.append(f"the gain changed by {100 * gain:+.0f} %")
     return Drift(shift, gain, "; ".join([*said, "calibrate again"]) if said else "")
 

@@ -14,13 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from probe.calibration.settings import LAW_FIT
 
-EXPONENTS = (0.3, 3.0)  #: least and largest that is believed
-_STEPS = 40
-_LADDER = 24  # break forces that are tried
-_FIRM = 3.0  # sigmas from which a reading takes part in the start
-_TINY_N = 1e-9
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,12 +51,12 @@ def fit_laws(force_n: Array, read_s: Array, error_s: Array, used: NDArray[np.boo
         (T,) tactels whose break force may be negative.
     """
     weight = np.where(used, 1.0 / error_s, 0.0)
-    firm = used & (read_s > _FIRM * error_s) & (force_n > 0)
+    firm = used & (read_s > LAW_FIT.firm * error_s) & (force_n > 0)
     least = np.where(firm, force_n, np.inf).min(axis=0)  # smallest force that is clearly felt
-    least = np.where(np.isfinite(least), np.maximum(least, _TINY_N), 1.0)
+    least = np.where(np.isfinite(least), np.maximum(least, LAW_FIT.tiny_n), 1.0)
     theta = _started(force_n, read_s, weight, firm, least, preloaded)
     damping, cost = np.full(least.size, 1e-3), _cost(theta, force_n, read_s, weight, least)
-    for _ in range(_STEPS):
+    for _ in range(LAW_FIT.steps):
         slopes, residual = _linearised(theta, force_n, read_s, weight, least)
         normal = np.einsum("lti,ltj->tij", slopes, slopes)
         descent = np.einsum("lti,lt->ti", slopes, residual)
@@ -86,20 +82,20 @@ def fit_laws(force_n: Array, read_s: Array, error_s: Array, used: NDArray[np.boo
 def _started(force: Array, read: Array, weight: Array, firm: NDArray[np.bool_], least: Array,
              preloaded: NDArray[np.bool_]) -> Array:  # fmt: skip
     """Return the best of a ladder of break forces, (T, 3) ln gain, exponent, break force."""
-    up = np.linspace(0.0, 0.98, _LADDER)
-    down = -np.geomspace(1e-3, 10.0, _LADDER)
+    up = np.linspace(0.0, 0.98, LAW_FIT.break_forces)
+    down = -np.geomspace(1e-3, 10.0, LAW_FIT.break_forces)
     best, lowest = np.zeros((least.size, 3)), np.full(least.size, np.inf)
     share = np.where(firm, (read * weight) ** 2, 0.0)
     height = np.log(np.where(firm, read, 1.0))
     for step in np.concatenate([down, up]):
         broken = step * least if step >= 0 else np.full(least.size, step)
-        over = np.log(np.maximum(force - broken, _TINY_N))
+        over = np.log(np.maximum(force - broken, LAW_FIT.tiny_n))
         total = np.maximum(share.sum(axis=0), 1e-300)
         x, z = (share * over).sum(axis=0) / total, (share * height).sum(axis=0) / total
         width = (share * (over - x) ** 2).sum(axis=0) / total
         slope = (share * (over - x) * (height - z)).sum(axis=0) / total
         exponent = np.clip(np.where(width > 1e-12, slope / np.maximum(width, 1e-12), 1.0),
-                           *EXPONENTS)  # fmt: skip
+                           *LAW_FIT.exponents)  # fmt: skip
         theta = np.stack([z - exponent * x, exponent, broken], axis=1)
         cost = _cost(theta, force, read, weight, least)
         take = (cost < lowest) & (preloaded | (step >= 0))
@@ -115,7 +111,7 @@ def _linearised(theta: Array, force: Array, read: Array, weight: Array, least: A
     is felt, which counts as an even prior.
     """
     gain, exponent, broken = np.exp(theta[:, 0]), theta[:, 1], theta[:, 2]
-    over = np.maximum(force - broken, _TINY_N)
+    over = np.maximum(force - broken, LAW_FIT.tiny_n)
     model = np.where(force > broken, gain * over**exponent, 0.0)
     slopes = np.zeros((len(force) + 1, theta.shape[0], 3))
     slopes[:-1, :, 0] = weight * model
@@ -135,7 +131,7 @@ def _cost(theta: Array, force: Array, read: Array, weight: Array, least: Array) 
 def _bounded(theta: Array, least: Array, preloaded: NDArray[np.bool_]) -> Array:
     bounded = theta.copy()
     bounded[:, 0] = np.clip(theta[:, 0], -700.0, 700.0)
-    bounded[:, 1] = np.clip(theta[:, 1], *EXPONENTS)
+    bounded[:, 1] = np.clip(theta[:, 1], *LAW_FIT.exponents)
     lowest = np.where(preloaded, -np.inf, 0.0)
     bounded[:, 2] = np.clip(theta[:, 2], lowest, 0.99 * least)
     return bounded

@@ -13,11 +13,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.calibration.law import EXPONENTS, FittedLaw
-
-TACTELS = 24  #: least number that tells a spread
-_FLOOR = np.array([0.02, 0.005, 0.001])  # ln gain, exponent, N: no sensor is more even
-_OUTLYING = 4.0  # robust deviations; what lies farther out is not pooled
+from probe.calibration.law import FittedLaw
+from probe.calibration.settings import LAW_FIT, POOL
 
 
 def shrink_laws(law: FittedLaw, alike: NDArray[np.bool_]) -> FittedLaw:
@@ -32,18 +29,20 @@ def shrink_laws(law: FittedLaw, alike: NDArray[np.bool_]) -> FittedLaw:
     """
     theta = np.stack([np.log(law.gain_s), law.exponent, law.break_n], axis=1)
     middle = np.median(theta[alike], axis=0) if alike.any() else np.zeros(3)
-    width = 1.4826 * np.median(np.abs(theta[alike] - middle), axis=0) if alike.any() else _FLOOR
-    usual = alike & (np.abs(theta - middle) <= _OUTLYING * np.maximum(width, _FLOOR)).all(axis=1)
-    if usual.sum() < TACTELS:
+    width = 1.4826 * np.median(np.abs(theta[alike] - middle), axis=0) if alike.any() else POOL.floor
+    usual = alike & (np.abs(theta - middle) <= POOL.outlying * np.maximum(width, POOL.floor)).all(
+        axis=1
+    )
+    if usual.sum() < POOL.tactels:
         return law
     mean = theta[usual].mean(axis=0)
     excess = np.cov(theta[usual].T) - np.median(law.covariance[usual], axis=0)
-    values, axes = np.linalg.eigh(excess / np.outer(_FLOOR, _FLOOR))
-    spread = (axes * np.maximum(values, 1.0)) @ axes.T * np.outer(_FLOOR, _FLOOR)
+    values, axes = np.linalg.eigh(excess / np.outer(POOL.floor, POOL.floor))
+    spread = (axes * np.maximum(values, 1.0)) @ axes.T * np.outer(POOL.floor, POOL.floor)
     gain = law.covariance @ np.linalg.inv(law.covariance + spread)
     drawn = theta + np.einsum("tij,tj->ti", gain, mean - theta)
     narrowed = law.covariance - gain @ law.covariance
-    drawn[:, 1] = np.clip(drawn[:, 1], *EXPONENTS)
+    drawn[:, 1] = np.clip(drawn[:, 1], *LAW_FIT.exponents)
     drawn[:, 2] = np.maximum(drawn[:, 2], 0.0)
     kept = np.where(usual[:, None], drawn, theta)
     symmetric = (narrowed + np.swapaxes(narrowed, 1, 2)) / 2

@@ -26,17 +26,12 @@ from numpy.typing import NDArray
 
 from probe.circuit.fsr import Image
 from probe.circuit.network import Network, eliminate
+from probe.circuit.settings import FLOATING
 from probe.errors import CircuitError
 
 Vector = NDArray[np.float64]
 
-STEPS = 60  #: most steps
 EPSILON = float(np.finfo(float).eps)
-_PIVOTS = 200  # of one step
-_PATIENCE = 6  # block pivots without progress before single ones
-_NEAR = 1e-3  # squared Newton decrement; -logdet is self-concordant: full steps converge
-_DECREASE = 1e-4  # share of the promised decrease that a step must keep
-_HALVINGS = 40
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,7 +70,7 @@ def solve_floating(resistance_ohm: Image, tolerance: float = 1e-9) -> FloatingSo
     y = np.full(measured.size, (sum(shape) - 1) / measured.size)
     network = eliminate(y.reshape(shape) / measured)
     free = np.ones(y.size, dtype=np.bool_)
-    for steps in range(1, STEPS + 1):
+    for steps in range(1, FLOATING.steps + 1):
         gradient = 1.0 - (network.resistances_ohm / measured).ravel()
         hessian = _hessian(network, measured)
         wanted, free = _bounded(hessian, gradient - hessian @ y, free)
@@ -86,7 +81,7 @@ def solve_floating(resistance_ohm: Image, tolerance: float = 1e-9) -> FloatingSo
             return FloatingSolution(conductance, y.reshape(shape), hessian, steps)
         y, network = _searched(y, move, gradient, network, measured)
     raise CircuitError(
-        f"the network did not settle in {STEPS} steps; misfit {misfit:.1e}",
+        f"the network did not settle in {FLOATING.steps} steps; misfit {misfit:.1e}",
         fix="the readings contradict each other: average more frames",
     )
 
@@ -103,8 +98,8 @@ def _bounded(
     hessian: NDArray[np.float64], linear: Vector, free: NDArray[np.bool_]
 ) -> tuple[Vector, NDArray[np.bool_]]:
     """Minimise z' hessian z / 2 + linear' z over z >= 0; start from a guess of what is free."""
-    patience, fewest = _PATIENCE, linear.size + 1
-    for _ in range(_PIVOTS):
+    patience, fewest = FLOATING.patience, linear.size + 1
+    for _ in range(FLOATING.pivots):
         z = _unbounded(hessian, linear, free)
         slope = hessian @ z + linear
         wrong = (free & (z < 0)) | (~free & (slope < -64 * EPSILON))
@@ -112,7 +107,7 @@ def _bounded(
         if number == 0:
             return z, free
         if number < fewest:
-            patience, fewest = _PATIENCE, number
+            patience, fewest = FLOATING.patience, number
         elif patience > 0:
             patience -= 1
         else:
@@ -146,15 +141,15 @@ def _searched(
     value = float(y.sum() - network.logdet)
     slope = float(gradient @ move)
     length = 1.0
-    for _ in range(_HALVINGS):
+    for _ in range(FLOATING.halvings):
         there = np.maximum(y + length * move, 0.0)
         try:
             ahead = eliminate(there.reshape(measured.shape) / measured)
         except CircuitError:
             length /= 2
             continue
-        allowed = value + _DECREASE * length * slope
-        if -slope < _NEAR or there.sum() - ahead.logdet <= allowed:
+        allowed = value + FLOATING.decrease * length * slope
+        if -slope < FLOATING.near or there.sum() - ahead.logdet <= allowed:
             return there, ahead
         length /= 2
     return y, network

@@ -21,14 +21,10 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from probe.circuit.settings import FILM
 from probe.errors import CircuitError
 
 Image = NDArray[np.float64]  #: (..., rows, columns)
-
-GAIN_S = 1e-4  #: at 1 N above the break force: 10 kOhm
-BREAK_N = 0.01  #: 0.4 N/cm^2
-SERIES_OHM = 500.0
-LEAK_S = 5e-8  #: 20 MOhm unloaded
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,7 +38,7 @@ class Fsr:
     series_ohm: Image  #: (rows, columns) least resistance
     stuck_s: Image  #: (rows, columns) S, held whatever the force; 0 where the tactel moves
     dead: NDArray[np.bool_]  #: (rows, columns) open: leaks, feels nothing
-    leak_s: float = LEAK_S  #: S, unloaded
+    leak_s: float = FILM.leak_s  #: S, unloaded
     hysteresis: float = 0.10  #: reading on the way back over the way up, less 1
     drift: float = 0.05  #: rise of the conductance per decade of time under load
 
@@ -87,7 +83,9 @@ class FilmState:
 def fsr_of(rows: int = 16, columns: int = 16) -> Fsr:
     """Return a matrix of equal, sound tactels."""
     one, none = np.ones((rows, columns)), np.zeros((rows, columns))
-    return Fsr(GAIN_S * one, one, BREAK_N * one, none, SERIES_OHM * one, none, none > 0)
+    return Fsr(
+        FILM.gain_s * one, one, FILM.break_n * one, none, FILM.series_ohm * one, none, none > 0
+    )
 
 
 def conductances(
@@ -137,7 +135,7 @@ def conductances(
 
 def film_conductances(fsr: Fsr, effective_n: Image) -> Image:
     """Return the conductance (S) of the film alone, without leak, series and creep."""
-    over = np.minimum(np.maximum(effective_n - fsr.break_n, 0.0), _MOST_N)
+    over = np.minimum(np.maximum(effective_n - fsr.break_n, 0.0), FILM.most_n)
     film: Image = fsr.gain_s * over**fsr.exponent
     return film
 
@@ -157,6 +155,3 @@ def checked_forces(fsr: Fsr, forces_n: ArrayLike) -> Image:
             fix="give the forces of a contact",
         )
     return force
-
-
-_MOST_N = 1e12  # beyond it nothing changes: the series resistance holds

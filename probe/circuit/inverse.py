@@ -21,12 +21,8 @@ from probe.circuit.floating import FloatingSolution, solve_floating
 from probe.circuit.fsr import Image
 from probe.circuit.network import transconductances, transfers
 from probe.circuit.readout import unscan_shares
+from probe.circuit.settings import INVERSE
 from probe.errors import CircuitError
-
-STEPS = 30  #: most Newton steps with a row resistance
-_TOLERANCE = 1e-12
-_FINEST = 1e-6  # relative error of a resistance that is never undercut
-_EDGE = 1e-9  # of 1: a column whose currents add up to all that the supply can give
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,8 +112,8 @@ def _driven(share: Image, spread: Image, e: Electronics) -> Inverted:
     column = e.load_ohm if e.readout == "grounded" else e.column_ohm
     current, noise = share / scale, spread / scale
     room = 1.0 - column * current.sum(axis=-2, keepdims=True)
-    possible = np.broadcast_to(room > _EDGE, current.shape)
-    room = np.where(room > _EDGE, room, np.nan)
+    possible = np.broadcast_to(room > INVERSE.edge, current.shape)
+    room = np.where(room > INVERSE.edge, room, np.nan)
     g = current / room
     variance = (noise / room) ** 2 * np.maximum(1.0 + 2.0 * column * g, 1.0) + (
         column * np.maximum(g, 0.0) / room
@@ -153,9 +149,9 @@ def _newton(
     start: Image, current: Image, noise: Image, row: float, column: float
 ) -> tuple[Image, Image]:
     g = np.maximum(start, 0.0)
-    floor = _TOLERANCE * float(np.abs(current).max()) + np.finfo(float).tiny
+    floor = INVERSE.tolerance * float(np.abs(current).max()) + np.finfo(float).tiny
     error = current - transconductances(g, row, column)
-    for _ in range(STEPS):
+    for _ in range(INVERSE.steps):
         slopes = transfers(g, row, column)
         if np.abs(error).max() <= floor:
             break
@@ -205,7 +201,7 @@ def _determined(
     whose variance is 1/12) together; the bounds keep a tactel that its neighbours hide from
     blurring those that are seen.
     """
-    weighted = found.hessian / np.maximum(relative, _FINEST)[:, None]
+    weighted = found.hessian / np.maximum(relative, INVERSE.finest)[:, None]
     information = weighted.T @ weighted
     own = found.own.ravel()
     seen = np.linalg.eigvalsh(information * np.outer(own, own)) >= 1.0

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from probe.circuit.fsr import BREAK_N, GAIN_S, LEAK_S, SERIES_OHM, Fsr
+from probe.circuit.fsr import Fsr
+from probe.circuit.settings import FILM
 from probe.errors import CircuitError
 
 
@@ -20,19 +21,19 @@ from probe.errors import CircuitError
 class Spread:
     """Medians and spreads of the law, and how many tactels are unsound (shares of 1)."""
 
-    gain_s: float = GAIN_S  #: S, median
+    gain_s: float = FILM.gain_s  #: S, median
     gain_spread: float = 0.30  #: standard deviation of its logarithm
     exponent: float = 1.0  #: mean
     exponent_spread: float = 0.08  #: standard deviation
-    break_n: float = BREAK_N  #: N, median
+    break_n: float = FILM.break_n  #: N, median
     break_spread: float = 0.5  #: standard deviation of its logarithm
-    series_ohm: float = SERIES_OHM  #: median
+    series_ohm: float = FILM.series_ohm  #: median
     series_spread: float = 0.3  #: standard deviation of its logarithm
     dead: float = 147 / 256  #: share that never responds
     stuck: float = 1 / 256  #: share that shows one conductance whatever the force
     preloaded: float = 5 / 256  #: share that is pressed by the assembly
     preload_n: float = 0.3  #: N, mean force on those (exponential)
-    leak_s: float = LEAK_S  #: S
+    leak_s: float = FILM.leak_s  #: S
     hysteresis: float = 0.10  #: reading on the way back over the way up, less 1
     drift: float = 0.05  #: per decade of time
 

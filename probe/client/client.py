@@ -19,6 +19,7 @@ from typing import Self
 
 from probe.client.diagnosis import no_probe
 from probe.client.receiver import Receiver
+from probe.client.settings import CLIENT
 from probe.client.statistics import ClientStatistics
 from probe.errors import PortError, ProbeError
 from probe.frame import Frame
@@ -31,14 +32,6 @@ from probe.protocol import (
     bits_command,
     sensor_command,
 )
-
-BUFFER = 2048  #: frames, about 2 MB and 20 s
-SILENCE_S = 0.5  #: after so long without a packet the stream is started again
-ANSWER_S = 5.0  #: a probe that has a boot loader answers within that
-_SLICE_S = 0.05  #: longest wait for bytes; a frame without successor is held so long
-_GATHER_S = 0.006  #: pause after few bytes, so that each byte does not wake the thread
-_FEW = 4096
-_NOTICES = 256
 
 
 class Client:
@@ -70,9 +63,9 @@ class Client:
         *,
         sensor: int | None = None,
         bits: int | None = None,
-        buffer: int = BUFFER,
+        buffer: int = CLIENT.buffer,
         reopen_s: float = 30.0,
-        answer_s: float = ANSWER_S,
+        answer_s: float = CLIENT.answer_s,
     ) -> None:
         if buffer < 1:
             raise PortError(f"a buffer of {buffer} frames, it holds at least 1", fix="take 1")
@@ -82,7 +75,7 @@ class Client:
         self._waits = url.startswith("file:")
         self._ready = threading.Condition()
         self._frames: deque[Frame] = deque()
-        self._notices: deque[str] = deque(maxlen=_NOTICES)
+        self._notices: deque[str] = deque(maxlen=CLIENT.notices)
         self._receiver = Receiver()
         self._reopenings = self._overruns = 0
         self._outbox = b""
@@ -209,15 +202,19 @@ class Client:
                 heard_s = now_s
             # After a torn packet: a reset, whose ident was joined to what was being sent.
             anew, torn = heard_s > asked_s, self._receiver.torn
-            if now_s - max(heard_s, asked_s) > (_SLICE_S if anew and torn else SILENCE_S):
+            if now_s - max(heard_s, asked_s) > (
+                CLIENT.slice_s if anew and torn else CLIENT.silence_s
+            ):
                 if anew and not torn:
-                    self._tell(f"nothing came for {SILENCE_S:g} s; the stream is started again")
+                    self._tell(
+                        f"nothing came for {CLIENT.silence_s:g} s; the stream is started again"
+                    )
                 self._send(self._greeting())
                 asked_s = now_s
             if not self._receiver.packets and now_s - began_s > self._answer_s:
                 raise no_probe(self._receiver.damages, self._answer_s, self._port.url)
-            if 0 < len(data) < _FEW:
-                time.sleep(_GATHER_S)
+            if 0 < len(data) < CLIENT.few:
+                time.sleep(CLIENT.gather_s)
 
     def _exchange(self) -> bytes:
         """Send what waits to be sent; return what came."""
@@ -225,7 +222,7 @@ class Client:
             with self._ready:
                 outbox, self._outbox = self._outbox, b""
             self._port.write(outbox)
-        return self._port.read(_SLICE_S)
+        return self._port.read(CLIENT.slice_s)
 
     def _take(self, data: bytes, now_ns: int) -> bool:
         """Take bytes; tell whether a packet was among them."""

@@ -5,7 +5,7 @@ corruptions, so a frame is held back until what follows agrees with it:
 
 - the next packet continues its number, or what failed in between accounts for the numbers
   that are missing, by its blocks or by its bytes (a lost delimiter joins two packets);
-- the next packet's time is later, by at most `LONGEST_STEP_US` a frame.
+- the next packet's time is later, by at most `CLIENT.longest_step_us` a frame.
 
 Bytes that get lost between the head of one frame and the tail of another leave a gap that
 nothing accounts for; a damaged number or time disagrees with the next. After `probe.client` heard
@@ -23,12 +23,11 @@ starts anew, its number starts anew too, and the time goes on rising by the host
 
 from __future__ import annotations
 
+from probe.client.settings import CLIENT
 from probe.frame import Frame
 from probe.protocol import BYTE_FRAME_BYTES, FRAME_BYTES, FramePacket, IdentPacket, Packet
 
-LONGEST_STEP_US = 1_000_000  #: longest time from frame to frame that is confirmed at once
 _NUMBERS, _TIMES = 1 << 16, 1 << 32
-_SLACK = 64  #: frames by which number and time may disagree
 
 
 class FrameOrder:
@@ -126,7 +125,7 @@ class FrameOrder:
 def _agree(held: FramePacket, packet: Packet, failed: int) -> bool:
     steps = (packet.seq - held.seq) % _NUMBERS
     later_us = (packet.t_us - held.t_us) % _TIMES
-    return 1 <= steps <= 1 + failed and later_us <= steps * LONGEST_STEP_US
+    return 1 <= steps <= 1 + failed and later_us <= steps * CLIENT.longest_step_us
 
 
 def _advance(last: FramePacket, packet: FramePacket, step_us: float) -> tuple[int, int]:
@@ -142,4 +141,4 @@ def _advance(last: FramePacket, packet: FramePacket, step_us: float) -> tuple[in
     expected = later_us / step_us if step_us else 0.0
     if expected > _NUMBERS / 2:
         steps += _NUMBERS * max(round((expected - steps) / _NUMBERS), 0)
-    return (steps if steps <= 2 * expected + _SLACK else 0), later_us
+    return (steps if steps <= 2 * expected + CLIENT.slack else 0), later_us

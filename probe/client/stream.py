@@ -13,13 +13,11 @@ from types import TracebackType
 from typing import Self
 
 from probe.client.client import Client
+from probe.client.settings import CLIENT
 from probe.errors import ProbeError
 from probe.frame import Frame
 from probe.port.url import address_of
 from probe.protocol import IdentPacket
-
-WAITING = 2048  #: frames between the threads; beyond, the client counts overruns
-_IDENT_S = 2.0
 
 
 class Stream:
@@ -42,7 +40,7 @@ class Stream:
         if sensor is not None:
             self.client.select_sensor(sensor)  # so that the ident tells of the sensor selected
         self.ended = False  #: whether there will be no more frames
-        self._queue: queue.Queue[Frame | None] = queue.Queue(WAITING)
+        self._queue: queue.Queue[Frame | None] = queue.Queue(CLIENT.waiting)
         self._failure: ProbeError | None = None
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._feed, name="frames", daemon=True)
@@ -88,7 +86,7 @@ class Stream:
 
     def ident(self) -> IdentPacket | None:
         """Return what the device is, after a short wait for its answer."""
-        until_s = time.monotonic() + _IDENT_S
+        until_s = time.monotonic() + CLIENT.ident_s
         while time.monotonic() < until_s:
             ident = self.client.ident
             if ident is not None and self._asked in (None, ident.sensor):

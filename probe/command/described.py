@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from encoded_objects.console.output import number
 from probe.client.stream import Stream, name_of
+from probe.command.settings import COMMAND
 
 Described = tuple[dict[str, Any], dict[str, str]]
 """What `--json` prints, and what people read."""
-
-_ANSWER_S = 0.5  # a probe that was asked for its statistics answers within that
 
 
 def probe(url: str, sensor: int | None, seconds: float) -> Described:
@@ -37,8 +36,8 @@ def probe(url: str, sensor: int | None, seconds: float) -> Described:
                 saturated += int((frame.counts >= full).sum())
             if heard and time.monotonic() > until_s:
                 stream.client.ask_device()
-                stream.take(_ANSWER_S)
-                until_s = time.monotonic() + _ANSWER_S
+                stream.take(COMMAND.answer_s)
+                until_s = time.monotonic() + COMMAND.answer_s
                 while stream.client.device is None and time.monotonic() < until_s:
                     time.sleep(0.02)
                 break

@@ -22,13 +22,12 @@ from probe.client.stream import Stream, name_of
 from probe.command.calibrated import calibrate_loads
 from probe.command.listen import Counts
 from probe.command.loads import Given, write_list
+from probe.command.settings import COMMAND
 from probe.errors import CalibrationError, PortError
 from probe.frame import Frame
 from probe.recording.record import Recorder
 
 LIST = "loads.csv"
-_FELT_COUNTS = 5.0  # above rest
-_STEADY = 0.05  # share by which a load may change while it is read
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,11 +129,12 @@ def _felt(counts: Counts, rest: Counts | None) -> str:
     rise = mean - rest.mean(axis=0)
     half = len(counts) // 2
     change = float(np.median(counts[half:].mean(axis=0) - counts[:half].mean(axis=0)))
+    felt = int((rise > COMMAND.felt_counts).sum())
     words = (
-        f"{len(counts)} frames, felt by {int((rise > _FELT_COUNTS).sum())} of {rise.size} tactels, "
+        f"{len(counts)} frames, felt by {felt} of {rise.size} tactels, "
         f"median {np.median(rise):.1f} counts above rest"
     )
-    if abs(change) > max(1.0, _STEADY * float(np.median(rise))):
+    if abs(change) > max(1.0, COMMAND.steady * float(np.median(rise))):
         words += f"; not steady, it changed by {change:+.1f} counts"
     return words
 

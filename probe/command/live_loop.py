@@ -20,8 +20,7 @@ from probe.client.stream import Stream, name_of
 from probe.command.keys import Pressed, keys
 from probe.command.live_state import LiveState
 from probe.command.live_view import line_of, render_frame
-
-PER_SECOND = 15  #: pictures
+from probe.command.settings import COMMAND
 
 
 def watch(
@@ -83,7 +82,7 @@ def _obey(state: LiveState, stream: Stream, pressed: Pressed) -> bool:
         "s": state.save,
         "r": lambda: state.toggle_recording(name_of(stream.client.ident, state.url)),
     }
-    for key in pressed(1 / PER_SECOND):
+    for key in pressed(1 / COMMAND.pictures_hz):
         if key == "q":
             return False
         if key == " ":

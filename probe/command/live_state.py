@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 from encoded_objects.console.files import staged
 from encoded_objects.errors import MissingExtraError, require
 from probe.calibration import Calibration, calibrate_image, calibration_hash, drift_of
-from probe.calibration.average import BIAS_FRAMES
+from probe.calibration.settings import AVERAGE
+from probe.command.settings import COMMAND
 from probe.frame import Frame, median_filter
 from probe.recording.names import next_free
 from probe.recording.record import Recorder
 
 Image = NDArray[np.float64]
 
-_HOLD = 0.98  # of the scale is left after each frame shown
 _LEAST = {"counts": 32.0, "N": 0.2}  # scale of a sensor at rest
 
 
@@ -66,7 +66,7 @@ class LiveState:
                 self.recorder.append(frame)
             if self._resting is not None:
                 self._resting.append(frame.counts)
-                if len(self._resting) == BIAS_FRAMES:
+                if len(self._resting) == AVERAGE.bias_frames:
                     self._settle_bias()
         if frames and not self.paused:
             self.frame = frames[-1]
@@ -84,7 +84,7 @@ class LiveState:
         if self.median:
             image = median_filter(image)
         if not self.paused:
-            self.scale = max(float(image.max()), self.scale * _HOLD, _LEAST[self.unit])
+            self.scale = max(float(image.max()), self.scale * COMMAND.hold, _LEAST[self.unit])
         return image
 
     def toggle_bias(self) -> None:
@@ -159,7 +159,7 @@ class LiveState:
     def _settle_bias(self) -> None:
         frames, self._resting = np.stack(self._resting or []), None
         self.bias = frames.mean(axis=0)
-        self.notice = f"bias of {BIAS_FRAMES} frames is off the image"
+        self.notice = f"bias of {AVERAGE.bias_frames} frames is off the image"
         if self.calibration is not None:
             self.bias = None  # a calibration has its own
             drift = drift_of(self.calibration, frames)

@@ -14,13 +14,11 @@ from encoded_objects.console.output import message, number, write, write_json
 from encoded_objects.console.progress import ProgressBar, progress_bar
 from probe.calibration import Calibration, calibration_hash, read_calibration
 from probe.client.stream import Stream, name_of
+from probe.command.settings import COMMAND
 from probe.errors import PortError, ProbeError, RecordingError
 from probe.frame import Frame
 from probe.recording.names import check_name
 from probe.recording.record import Recorder
-
-_SLICE_S = 0.1
-_SILENT_S = 5.0  # without a frame for so long, the host's clock ends a recording too
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +109,7 @@ def check_output(output: Path, *, replace: bool) -> None:
 def _first(stream: Stream, interrupted: Event) -> list[Frame]:
     frames: list[Frame] = []
     while not frames and not stream.ended and not interrupted.is_set():
-        frames = stream.take(_SLICE_S)
+        frames = stream.take(COMMAND.slice_s)
     return frames
 
 
@@ -146,7 +144,7 @@ def _run(
         _tell(stream, told, recorder.frames, seconds if limits.frames is None else None)
         now_s = time.monotonic()
         heard_s = now_s if frames else heard_s
-        silent = limits.seconds is not None and now_s - heard_s > _SILENT_S
+        silent = limits.seconds is not None and now_s - heard_s > COMMAND.silent_s
         if limits.left(recorder.frames) == 0:
             ended = "frames"
         elif interrupted.is_set():
@@ -158,7 +156,7 @@ def _run(
         elif not ended:
             if not frames:
                 recorder.flush()
-            frames = stream.take(_SLICE_S)
+            frames = stream.take(COMMAND.slice_s)
     return ended, seconds
 
 

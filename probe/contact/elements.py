@@ -23,18 +23,10 @@ from probe.contact.elements_line import Array
 from probe.contact.elements_pad import CondensedPad, PadLines, condense
 from probe.contact.elements_seen import heights_at, refuse_unseen
 from probe.contact.elements_unilateral import rest, tips
+from probe.contact.settings import CONTACT, ELEMENTS
 from probe.errors import ContactError
 from probe.sensor import SensorType
 from probe.surface.contract import HeightMap
-
-STEEPEST_RAD = 0.35  #: tilts beyond are not small
-KEPT = 2  #: condensed pads
-ROUGH = 0.25  #: of the deepest point: strokes between the nodes that rise less are let pass
-GROWTH = 1.5  #: from element to element of the margin
-BESIDE = 0.15  #: of an element: from a wall to the lines next to it
-NEAR = 0.1  #: of an element: no two lines as near as that, but walls and tactels
-TINY = 1e-6  #: of an element: the same place
-FINER = 1.6  #: elements get thinner towards the top, by this power
 
 
 def elements(
@@ -93,14 +85,20 @@ def elements(
         refuse_unseen(surface, touch, lines, low, low, np.zeros(grid, dtype=bool), 0.0)
     found = rest(nodes, heights, pad.between, pad.displaced, touch, height / 50)
     z, tilt_x, tilt_y = (float(v) for v in found.plate)
-    if max(abs(tilt_x), abs(tilt_y)) > STEEPEST_RAD:
+    if max(abs(tilt_x), abs(tilt_y)) > CONTACT.steepest_rad:
         raise tips()
     sunk = pad.displaced(found.forces)
     deepest = float(sunk.max())
     top = sunk + z + tilt_x * nodes[:, 1] - tilt_y * nodes[:, 0]
     bears = found.forces.reshape(grid) > 0
     refuse_unseen(
-        surface, touch, lines, heights.reshape(grid), top.reshape(grid), bears, ROUGH * deepest
+        surface,
+        touch,
+        lines,
+        heights.reshape(grid),
+        top.reshape(grid),
+        bears,
+        ELEMENTS.rough * deepest,
     )
     if deepest >= height:
         raise ContactError(
@@ -126,7 +124,7 @@ def condensed_pad(
     return _condensed(sensor, per_tactel, layers, float(margin_mm), walls[0], walls[1], memory_gb)
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=ELEMENTS.kept)
 def _condensed(
     sensor: SensorType,
     per_tactel: int,
@@ -146,7 +144,7 @@ def _condensed(
     lines = PadLines(
         _along(sensor.columns, pitch, per_tactel, margin_mm, walls_x),
         _along(sensor.rows, pitch, per_tactel, margin_mm, walls_y),
-        overlay.height_mm * (1 - (1 - np.linspace(0, 1, layers + 1)) ** FINER),
+        overlay.height_mm * (1 - (1 - np.linspace(0, 1, layers + 1)) ** ELEMENTS.finer),
     )
     tactels = ((sensor.rows + 1) // 2) * ((sensor.columns + 1) // 2)
     needed = lines.bytes_needed(tactels) / 1e9
@@ -176,20 +174,25 @@ def _along(
     )
     size = pitch / per_tactel
     if margin > 0:
-        count = max(1, math.ceil(math.log1p(margin / size * (GROWTH - 1)) / math.log(GROWTH)))
-        steps = np.cumsum(GROWTH ** np.arange(count))
+        count = max(
+            1,
+            math.ceil(
+                math.log1p(margin / size * (ELEMENTS.growth - 1)) / math.log(ELEMENTS.growth)
+            ),
+        )
+        steps = np.cumsum(ELEMENTS.growth ** np.arange(count))
         lines = np.concatenate([lines, lines[-1] + margin * steps / steps[-1]])
     walls = tuple(w for w in walls if 0 < w < lines[-1])
     firm = np.concatenate([firm, walls, lines[-1:]])
     for wall in walls:  # a line there, in place of one too near, and one close by on each side
-        apart = np.abs(lines - wall) > NEAR * size
-        held = (np.abs(lines[:, None] - firm) <= TINY * size).any(axis=1)
+        apart = np.abs(lines - wall) > ELEMENTS.near * size
+        held = (np.abs(lines[:, None] - firm) <= ELEMENTS.tiny * size).any(axis=1)
         lines = np.append(lines[apart | held], wall)
-        for beside in (wall - BESIDE * size, wall + BESIDE * size):
-            if 0 < beside < lines.max() and np.abs(lines - beside).min() > NEAR * size:
+        for beside in (wall - ELEMENTS.beside * size, wall + ELEMENTS.beside * size):
+            if 0 < beside < lines.max() and np.abs(lines - beside).min() > ELEMENTS.near * size:
                 lines = np.append(lines, beside)
     lines = np.sort(lines)
-    return np.asarray(lines[np.append(True, np.diff(lines) > TINY * size)])
+    return np.asarray(lines[np.append(True, np.diff(lines) > ELEMENTS.tiny * size)])
 
 
 def _checked(sensor: SensorType, touch: Touch) -> None:

@@ -22,9 +22,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from probe.contact.elements_line import Array, Quadratic, mirror, per_tactel, quadratic
+from probe.contact.settings import ELEMENTS
 
 PARITIES = ((1, 1), (1, -1), (-1, 1), (-1, -1))  #: of w under x -> -x, and under y -> -y
-COMPRESSIBLE = 1e-7  #: 1 - 2 nu counts as at least this; bulk over shear modulus 1e7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,7 +155,7 @@ def condense(
 def _stiffness(along: list[Quadratic], young: float, poisson: float) -> sp.csr_matrix:
     """Return the stiffness of all displacements (component, x, y, z), pressures eliminated."""
     shear = young / (2 * (1 + poisson))
-    lame = 2 * shear * poisson / max(1 - 2 * poisson, COMPRESSIBLE)
+    lame = 2 * shear * poisson / max(1 - 2 * poisson, ELEMENTS.compressible)
 
     def product(factors: list[sp.csr_matrix]) -> sp.csr_matrix:
         return sp.kron(sp.kron(factors[0], factors[1]), factors[2], format="csr")

@@ -14,15 +14,11 @@ from numpy.typing import NDArray
 
 from probe.contact.contract import Touch
 from probe.contact.elements_line import Array
+from probe.contact.settings import ELEMENT_SIGHT
 from probe.errors import ContactError
 from probe.surface.contract import HeightMap
 
 Value = TypeVar("Value", np.float64, np.bool_)
-
-STEP_MM = 0.01  #: between the points of a line, the thinnest stroke that a face can carry
-POINTS = 4000  #: of a line, at most
-LINES = 70  #: each way, at most
-COVERED = 0.25  #: of the place of a node that bears alone: less is not the node's to bear
 
 
 def heights_at(surface: HeightMap, touch: Touch, points: Array) -> Array:
@@ -73,7 +69,7 @@ def refuse_unseen(
     """
     x, y = lines
     for along, across, swapped in ((x, y, False), (y, x, True)):
-        rows = np.arange(across.size)[:: -(-across.size // LINES)]
+        rows = np.arange(across.size)[:: -(-across.size // ELEMENT_SIGHT.lines)]
         seen, top = ((grid if swapped else grid.T)[rows] for grid in (heights_mm, top_mm))
         bearing = (bears if swapped else bears.T)[rows]
         fine = _places(along)
@@ -92,7 +88,7 @@ def refuse_unseen(
         starts = np.searchsorted(nearest, np.arange(along.size))
         half = np.where(np.isfinite(lower), (lower + seen) / 2, lower)
         there = np.add.reduceat(found > half[:, nearest], starts, axis=1)
-        full = there >= COVERED * np.diff(np.append(starts, fine.size))
+        full = there >= ELEMENT_SIGHT.covered * np.diff(np.append(starts, fine.size))
         thin = ridge & ~full & ~_highest(bearing & full)
         if hidden.any() or thin.any():
             height = found[hidden].max() if hidden.any() else seen[thin].max()
@@ -105,7 +101,9 @@ def refuse_unseen(
 
 def _places(along: Array) -> Array:
     """Return points along a line of nodes, several around each, ascending, ends left out."""
-    parts = np.clip(np.ceil(np.diff(along) / STEP_MM), 4, POINTS // along.size).astype(int)
+    parts = np.clip(
+        np.ceil(np.diff(along) / ELEMENT_SIGHT.step_mm), 4, ELEMENT_SIGHT.points // along.size
+    ).astype(int)
     return np.concatenate(
         [
             a + (b - a) * (np.arange(n) + 0.5) / n

@@ -13,13 +13,12 @@ import numpy as np
 
 from probe.contact.contract import Contact, Touch
 from probe.contact.plate import PlatePose, checked_load, load_of
+from probe.contact.settings import FOOTPRINT
 from probe.contact.tabs import heights_under
 from probe.contact.tips import Tips, tip_points
 from probe.errors import ContactError
 from probe.sensor import SensorType
 from probe.surface.contract import HeightMap
-
-DEPTH = 0.25  #: of the overlay's height, down to which the surface counts as touched
 
 
 def footprint(
@@ -63,7 +62,7 @@ def footprint(
         return Contact(
             np.zeros(shape), math.inf, touch.tilt_x_rad, touch.tilt_y_rad, "footprint", iterations=0
         )
-    depth = DEPTH * sensor.overlay.height_mm if depth_mm is None else depth_mm
+    depth = FOOTPRINT.depth * sensor.overlay.height_mm if depth_mm is None else depth_mm
     if not 0 <= depth < math.inf:
         raise ContactError(f"a depth of {depth:g} mm", fix="give a finite depth >= 0")
     points, drop = tip_points(sensor, tips or _PLAIN)

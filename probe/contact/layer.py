@@ -26,21 +26,12 @@ from probe.contact.layer_patch import LayerPatch, centres_mm, patch_under
 from probe.contact.layer_solve import plate_of
 from probe.contact.neo_hooke import Linear
 from probe.contact.plate import PlatePose, load_of, rest
+from probe.contact.settings import CONTACT, LAYER
 from probe.errors import ContactError
 from probe.sensor import SensorType
 from probe.surface.contract import HeightMap
 
 Array = NDArray[np.float64]
-
-STEEPEST_RAD = 0.35  #: tilts beyond are not small
-DEEPEST = 0.5  #: mean indentation, of the pad's height, beyond which strains are not small
-THINNEST = 1.5  #: points of a cell that meet a stroke, on the mean, below which that is chance
-_FEW = 2  # cells on a step, from which on THINNEST is asked; one may be a sharp corner
-_TURNED = 0.05  # of the indentation: what a turn may change across a cell
-_LEAST = 2e-3  # of a cell: indentations below are not resolved
-_PASSES = 25
-FARTHEST_RAD = 0.05  #: turn of the plate between two looks at the surface
-_HELD_RAD = 1e-4  # the same for the last, where the plate was held
 
 
 def layer(
@@ -122,7 +113,7 @@ def _settled(patch: LayerPatch, grid: Influence, touch: Touch) -> tuple[Pressed,
     pose, depth = _foreseen(patch, touch)
     looks: list[Look] = []
     floor = -depth
-    for _ in range(_PASSES):
+    for _ in range(LAYER.passes):
         above = patch.highest_mm - pose.heights_mm(patch.centres_mm)
         some = above >= min(floor, float(above.max()))
         patch = patch.with_cells(np.flatnonzero(patch.neighbours(some)))
@@ -130,7 +121,7 @@ def _settled(patch: LayerPatch, grid: Influence, touch: Touch) -> tuple[Pressed,
         levels = levels_of(patch, grid, looks[-1], looks[:-1])
         pressed, held = _pressed(levels, touch)
         turn = float(np.abs(pressed.plate[1:]).max()) / levels.reach_mm
-        b = min(1.0, FARTHEST_RAD / max(turn, 1e-300)) * pressed.plate
+        b = min(1.0, LAYER.farthest_rad / max(turn, 1e-300)) * pressed.plate
         moved = PlatePose(float(b[0]), float(b[1]) / levels.reach_mm, float(b[2]) / levels.reach_mm)
         pose = PlatePose(
             pose.z_mm + moved.z_mm,
@@ -141,8 +132,8 @@ def _settled(patch: LayerPatch, grid: Influence, touch: Touch) -> tuple[Pressed,
         sunk = grid.sunk_mm(levels.image(pressed.pressures)).ravel()
         missed = levels.left_out_mm > moved_mm + sunk
         depth = float(deep_mm(levels, b).max())
-        enough = _TURNED * max(depth / grid.dx_mm, _LEAST)
-        enough = min(enough, _HELD_RAD) if held else min(enough, FARTHEST_RAD)
+        enough = LAYER.turned * max(depth / grid.dx_mm, LAYER.least)
+        enough = min(enough, LAYER.held_rad) if held else min(enough, LAYER.farthest_rad)
         if turn <= enough and not missed.any():
             _refuse_steep(pose)
             _refuse_thin(patch, pose, sunk.reshape(grid.rows, -1)[1:-1, 1:-1])
@@ -152,7 +143,7 @@ def _settled(patch: LayerPatch, grid: Influence, touch: Touch) -> tuple[Pressed,
     _refuse_steep(pose)
     _refuse_deep(pressed, sunk, depth, touch)
     raise ContactError(
-        f"the plate does not settle within {_PASSES} passes over the surface",
+        f"the plate does not settle within {LAYER.passes} passes over the surface",
         fix="report the scene; a stiffer wrist helps",
     )
 
@@ -192,10 +183,10 @@ def _turn(pose: PlatePose) -> float:
 
 def _refuse_steep(pose: PlatePose) -> None:
     turn = _turn(pose)
-    if turn > STEEPEST_RAD:
+    if turn > CONTACT.steepest_rad:
         raise ContactError(
             f"the plate tips: it comes to rest at a tilt of {math.degrees(turn):.3g} degrees, "
-            f"beyond {math.degrees(STEEPEST_RAD):.3g}",
+            f"beyond {math.degrees(CONTACT.steepest_rad):.3g}",
             fix="move the sensor, press with less force, or take a stiffer wrist",
         )
 
@@ -205,10 +196,10 @@ def _refuse_deep(pressed: Pressed, sunk_mm: Array, deepest_mm: float, touch: Tou
     height = pressed.levels.grid.sensor.overlay.height_mm
     p = pressed.pressures
     mean = float(sunk_mm[pressed.levels.cells] @ p / p.sum())
-    if mean > DEEPEST * height:
+    if mean > LAYER.deepest * height:
         raise ContactError(
             f"{touch.force_n:g} N press the pad of {height:g} mm in by {mean:.3g} mm on the "
-            f"mean, beyond {DEEPEST * height:g} mm strains are not small",
+            f"mean, beyond {LAYER.deepest * height:g} mm strains are not small",
             fix="press with less force, on more of the surface, or take tabs",
         )
     if deepest_mm > height:
@@ -231,7 +222,7 @@ def _refuse_thin(patch: LayerPatch, pose: PlatePose, sunk_mm: Array) -> None:
     apart = patch.dx_mm / math.sqrt(samples)
     many = np.count_nonzero(heights > heights.max(axis=0) - apart, axis=0)
     many = many[many < samples]
-    if len(many) >= _FEW and many.sum() < THINNEST * len(many):
+    if len(many) >= LAYER.few and many.sum() < LAYER.thinnest * len(many):
         raise ContactError(
             f"of {samples} points in a cell of {patch.dx_mm:.3g} mm only {many.mean():.2g} meet "
             "the strokes, on the mean: they are too thin to be felt by their true width",

@@ -33,14 +33,9 @@ from numpy.typing import NDArray
 
 from probe.contact.layer_levels import Levels
 from probe.contact.layer_solve import RigidPlate, glued_system, solve_glued
+from probe.contact.settings import ACTIVE_SET
 
 Array = NDArray[np.float64]
-
-MOST_STEPS = 40
-TOLERANCE = 1e-5  #: share of the force that may stand on the wrong side of q >= 0
-FINE = 1e-5  #: residual of the last steps, of the indentation
-_ROUGH = 1e-3  # of the first
-_FORCING = 0.01  # residual of a step, of the share that was wrong before it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,27 +69,31 @@ def equilibrium(levels: Levels, plate: RigidPlate) -> Pressed:
     pressures = np.zeros(len(levels.cells))
     touching = deep_mm(levels, b) > 0
     seen: set[bytes] = set()
-    loosest = tolerance = _ROUGH
-    for iteration in range(1, MOST_STEPS + 1):
+    loosest = tolerance = ACTIVE_SET.rough
+    for iteration in range(1, ACTIVE_SET.most_steps + 1):
         if not touching.any():
             touching = _deepest(levels, b)
         key = np.packbits(touching).tobytes()
         if key in seen:
-            if tolerance <= FINE:
+            if tolerance <= ACTIVE_SET.fine:
                 break
-            loosest = tolerance = FINE
+            loosest = tolerance = ACTIVE_SET.fine
             seen.clear()
         seen.add(key)
         pressures, b = solve_glued(glued_system(levels, touching), plate, pressures, b, tolerance)
         springs = springs_mm(levels, pressures, b)
         total, wrong = _judged(levels, springs, touching)
-        if wrong > TOLERANCE * total:
+        if wrong > ACTIVE_SET.tolerance * total:
             touching = springs > 0
-        elif tolerance <= FINE:
+        elif tolerance <= ACTIVE_SET.fine:
             return Pressed(levels, touching, pressures, b, iteration, converged=True)
         else:
             seen.clear()  # the same set once more, finer
-        tolerance = min(max(_FORCING * wrong / total, FINE), loosest) if total > 0 else loosest
+        tolerance = (
+            min(max(ACTIVE_SET.forcing * wrong / total, ACTIVE_SET.fine), loosest)
+            if total > 0
+            else loosest
+        )
     return Pressed(levels, touching, pressures, b, iteration, converged=False)
 
 

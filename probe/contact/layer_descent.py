@@ -28,17 +28,10 @@ from numpy.typing import NDArray
 from probe.contact.layer_active_set import Pressed, deep_mm
 from probe.contact.layer_levels import Levels
 from probe.contact.layer_solve import RigidPlate, answers, glued_system, pseudo_inverse
+from probe.contact.settings import DESCENT
 from probe.errors import ContactError
 
 Array = NDArray[np.float64]
-
-MOST_POSES = 50
-MOST_GRADIENTS = 5000
-HALVINGS = 20
-TOLERANCE = 1e-8  #: of the force, for the plate; of the depth, for the levels
-_HESSIAN = 1e-4  # residual of the columns of the plate's matrix
-_PROPORTION = 1.0  # of chopped to free gradient; 1 is the usual choice
-_STEP = 1.9  # over the largest eigenvalue; below 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,16 +54,16 @@ class _Springs:
 
     def least(self, e: Array, f: Array, tolerance: float) -> Array:
         """Return the minimum over f >= 0 from a first guess."""
-        step, nothing = _STEP / self.largest, self.levels.shares <= 0
+        step, nothing = DESCENT.step / self.largest, self.levels.shares <= 0
         g = self.applied(f) - e
         free = np.where(f > 0, g, 0.0)
         p = free
-        for _ in range(MOST_GRADIENTS):
+        for _ in range(DESCENT.most_gradients):
             chopped = np.where((f > 0) | nothing, 0.0, np.minimum(g, 0.0))
             if max(np.abs(free).max(), np.abs(chopped).max()) <= tolerance:
                 return f
             reduced = self.dot(np.minimum(f / step, free), free)
-            if self.dot(chopped, chopped) > _PROPORTION**2 * reduced:
+            if self.dot(chopped, chopped) > DESCENT.proportion**2 * reduced:
                 Ap = self.applied(chopped)
                 along = self.dot(g, chopped) / self.dot(chopped, Ap)
                 f, g = f - along * chopped, g - along * Ap
@@ -112,7 +105,7 @@ def descend(begun: Pressed, plate: RigidPlate) -> Pressed:
         """Return the gradient of the plate's energy, and the levels at their minimum."""
         e = np.where(matter, deep_mm(levels, b), 0.0)
         scale = float(e.max())
-        f = springs.least(e, f, TOLERANCE * scale) if scale > 0 else np.zeros_like(f)
+        f = springs.least(e, f, DESCENT.tolerance * scale) if scale > 0 else np.zeros_like(f)
         gradient = K * (b - plate.start)
         gradient -= area / edge * (levels.levers @ (levels.shares * f).sum(axis=0))
         gradient[0] += plate.force_n
@@ -120,21 +113,21 @@ def descend(begun: Pressed, plate: RigidPlate) -> Pressed:
 
     b = np.where(free, 0.0, plate.start)
     gradient, f = left(b, np.zeros(levels.shares.shape))
-    for iteration in range(begun.iterations + 1, begun.iterations + MOST_POSES):
+    for iteration in range(begun.iterations + 1, begun.iterations + DESCENT.most_poses):
         size = plate.force_n + float((K * np.abs(b - plate.start)).max())
-        if np.abs(gradient).max() <= 10 * TOLERANCE * size:
+        if np.abs(gradient).max() <= 10 * DESCENT.tolerance * size:
             pressures = (levels.shares * f).sum(axis=0) / edge
             return Pressed(levels, f > 0, pressures, b, iteration, converged=True)
         if (f > 0).any():
             system = glued_system(levels, f > 0)
             R = system.levers[free]
-            stiff = area * (R @ answers(system, R.T, _HESSIAN)) + np.diag(K[free])
+            stiff = area * (R @ answers(system, R.T, DESCENT.hessian)) + np.diag(K[free])
             step = -pseudo_inverse((stiff + stiff.T) / 2) @ gradient
         else:  # nothing is touched: go down to the highest level and a little deeper
             step = np.zeros(int(free.sum()))
             step[0] = 1.001 * float(deep_mm(levels, b).max()) - grid.dx_mm
         slope = float(gradient @ step)
-        for halving in range(HALVINGS):
+        for halving in range(DESCENT.halvings):
             there = b.copy()
             there[free] += 0.5**halving * step
             found, f_there = left(there, f)

@@ -5,13 +5,14 @@ square cells of side dx; pressure is band-limited on them, and the surface sinks
 convolution, two Fourier transforms: the compliance between cells is never a matrix.
 
 The layer has no edges in wave numbers, so the domain is the matrix and a free rim about it,
-`RIM` pad heights in total both ways: what a cell feels of the images of the others has then
-fallen to about 1e-5 of its own compliance. On the way to the base the bells by which cells meet the
-surface (`layer_levels`) are taken off, and the stress is integrated over each cell: a factor
-1/sinc^3 and a factor sinc along either axis. Beyond its edge the real pad ends. There this model
-is an endless layer: against elements with a free edge (nu = .4999) a ring 2.6 h from the edge
-is 2 % too stiff, at 0.9 h 17 %. What the endless layer would carry beyond the matrix is given to
-the outermost tactels, where a free edge carries it; so the sum of all tactels is the force.
+`LAYER_INFLUENCE.rim` pad heights in total both ways: what a cell feels of the images of the
+others has then fallen to about 1e-5 of its own compliance. On the way to the base the bells by
+which cells meet the surface (`layer_levels`) are taken off, and the stress is integrated over each
+cell: a factor 1/sinc^3 and a factor sinc along either axis. Beyond its edge the real pad ends.
+There this model is an endless layer: against elements with a free edge (nu = .4999) a ring 2.6 h
+from the edge is 2 % too stiff, at 0.9 h 17 %. What the endless layer would carry beyond the matrix
+is given to the outermost tactels, where a free edge carries it; so the sum of all tactels is the
+force.
 Thesis 4.2.
 """
 
@@ -26,13 +27,11 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from probe.contact.layer_kernel import base_ratio, edge_compliance, layer_compliance
+from probe.contact.settings import LAYER_INFLUENCE
 from probe.errors import ContactError
 from probe.sensor import SensorType
 
 Array = NDArray[np.float64]
-
-RIM = 12.0  #: free rim of the periodic domain, both sides together, pad heights
-LARGEST_DOMAIN = 4096  #: cells along one side
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,10 +102,10 @@ def influence(sensor: SensorType, cells_per_tactel: int) -> Influence:
     rows, columns = sensor.rows * cells_per_tactel + 2, sensor.columns * cells_per_tactel + 2
     dx = sensor.pitch_mm / cells_per_tactel
     domain = _domain(rows, pad.height_mm / dx), _domain(columns, pad.height_mm / dx)
-    if max(domain) > LARGEST_DOMAIN:
+    if max(domain) > LAYER_INFLUENCE.largest_domain:
         raise ContactError(
             f"a pad {pad.height_mm:g} mm high on cells of {dx:g} mm needs a grid of "
-            f"{domain[0]} x {domain[1]}, allowed are {LARGEST_DOMAIN} a side",
+            f"{domain[0]} x {domain[1]}, allowed are {LAYER_INFLUENCE.largest_domain} a side",
             fix="take fewer cells per tactel, or a lower pad",
         )
     q = 2 * math.pi / dx * np.hypot(
@@ -128,7 +127,7 @@ def influence(sensor: SensorType, cells_per_tactel: int) -> Influence:
 
 def _domain(cells: int, heights: float) -> int:
     """Return the cells of the domain along one side; an even number that the FFT likes."""
-    least = cells + math.ceil(RIM * heights)
+    least = cells + math.ceil(LAYER_INFLUENCE.rim * heights)
     return 2 * int(scipy.fft.next_fast_len((least + 1) // 2, real=True))
 
 

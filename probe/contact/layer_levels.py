@@ -1,10 +1,10 @@
 """What each cell of the pad meets: a few levels of matter, each with its share of the cell.
 
 Patch + a plane near the plate -> Levels. The points of a patch are sorted by their depth below
-the surface, seen from the plane, into at most `COUNT` bins. A cell of the pad takes the points
-under a bell about its centre (the quadratic spline, three cells wide): every level has a share
-and a mean depth there. Bells of neighbours overlap and add to 1, so how strokes lie to the grid
-hardly matters: the stiffness of a strip 3.5 cells wide varies by 0.04 %, by 2.3 % where each
+the surface, seen from the plane, into at most `LAYER_LEVELS.count` bins. A cell of the pad takes
+the points under a bell about its centre (the quadratic spline, three cells wide): every level has
+a share and a mean depth there. Bells of neighbours overlap and add to 1, so how strokes lie to the
+grid hardly matters: the stiffness of a strip 3.5 cells wide varies by 0.04 %, by 2.3 % where each
 cell looks at itself alone.
 
 The bell widens an edge by its variance, dx^2/4; `layer_influence` takes that off again on the
@@ -23,12 +23,9 @@ from numpy.typing import NDArray
 from probe.contact.layer_influence import Influence
 from probe.contact.layer_patch import Cells, LayerPatch, centres_mm, lattice
 from probe.contact.plate import PlatePose
+from probe.contact.settings import LAYER_LEVELS
 
 Array = NDArray[np.float64]
-
-COUNT = 8  #: levels at most; one where all that counts is flat
-_LEVEL = 1e-12  # mm, or of the greatest depth; depths that differ less are one
-_LEAST = 1e-3  # share of a bell below which a cell meets nothing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,14 +86,18 @@ def levels_of(
     depth = look.depths_mm(patch)
     top = float(depth.max())
     floor_mm = min(look.floor_mm, top)
-    step = max(top - floor_mm, _LEVEL * max(1.0, abs(top))) / COUNT
+    step = max(top - floor_mm, LAYER_LEVELS.level * max(1.0, abs(top))) / LAYER_LEVELS.count
     near = depth >= floor_mm
-    number = np.where(near, np.clip((depth - floor_mm) / step, 0, COUNT - 1), COUNT + 1)
+    number = np.where(
+        near, np.clip((depth - floor_mm) / step, 0, LAYER_LEVELS.count - 1), LAYER_LEVELS.count + 1
+    )
     number = number.astype(np.int8)
     for other in earlier:
-        number[(other.depths_mm(patch) >= other.floor_mm) & ~near] = COUNT
-    inside = number <= COUNT
-    used = np.flatnonzero(np.bincount(number.ravel(), minlength=COUNT + 2)[: COUNT + 1])
+        number[(other.depths_mm(patch) >= other.floor_mm) & ~near] = LAYER_LEVELS.count
+    inside = number <= LAYER_LEVELS.count
+    used = np.flatnonzero(
+        np.bincount(number.ravel(), minlength=LAYER_LEVELS.count + 2)[: LAYER_LEVELS.count + 1]
+    )
 
     samples, n = depth.shape
     sorted_points = np.empty((samples, 2, len(used), n))
@@ -112,7 +113,7 @@ def levels_of(
     for k, part in enumerate(spread.reshape(9, 2 * len(used), n)):
         sums[:, first + (k // 3) * grid.columns + k % 3] += part
     shares, moments = sums.reshape(2, len(used), -1)
-    cells = np.flatnonzero(shares.sum(axis=0) > _LEAST)
+    cells = np.flatnonzero(shares.sum(axis=0) > LAYER_LEVELS.least)
     shares, moments = shares[:, cells], moments[:, cells]
     none = np.full_like(shares, -np.inf)
     depths = np.divide(moments, shares, out=none, where=shares > 0)

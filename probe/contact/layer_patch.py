@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.contact.contract import Touch
+from probe.contact.settings import LAYER_PATCH
 from probe.errors import ContactError
 from probe.sensor import SensorType
 from probe.surface.contract import HeightMap
@@ -24,12 +25,6 @@ from probe.surface.contract import HeightMap
 Array = NDArray[np.float64]
 Cells = NDArray[np.intp]
 Number = TypeVar("Number", np.float64, np.bool_)
-
-COARSE = 4  #: points per cell of the first look
-SAMPLES = (16, 64, 256)  #: points per cell of the second, to choose from
-_LEVEL = 1e-9  # mm; heights that differ less are level
-_SEARCH_STEP = 0.01  # mm; along the lines that look for what the first look missed
-_SEARCH_LINES = 16  # across the matrix, each way
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,9 +106,9 @@ def patch_under(
         When the number of samples is another, the surface gives a height that is no number, or
         carries strokes too thin to be seen.
     """
-    if samples not in SAMPLES:
+    if samples not in LAYER_PATCH.samples:
         raise ContactError(
-            f"{samples} samples per cell, allowed are {', '.join(map(str, SAMPLES))}",
+            f"{samples} samples per cell, allowed are {', '.join(map(str, LAYER_PATCH.samples))}",
             fix="take 16 for a touch, 64 for a reference",
         )
     shape = sensor.rows * cells_per_tactel, sensor.columns * cells_per_tactel
@@ -131,7 +126,7 @@ def patch_under(
         offsets_mm=lattice(samples) * dx,
         coarse_mm=coarse[0],
         highest_mm=highest,
-        level=(high <= low + _LEVEL).ravel(),
+        level=(high <= low + LAYER_PATCH.level_mm).ravel(),
         cells=np.zeros(0, dtype=np.intp),
         heights_mm=np.zeros((samples, 0)),
     )
@@ -183,7 +178,7 @@ def _refuse_hidden(
     highest point seen about it by less than what was seen there differs.
     """
     seen, top = float(high.max()), surface.top_mm
-    if top <= seen + _LEVEL:
+    if top <= seen + LAYER_PATCH.level_mm:
         return
     points = _search_lines(*sensor.half_mm)
     heights = _heights(surface, touch, points)
@@ -207,9 +202,11 @@ def _search_lines(half_width: float, half_height: float) -> Array:
     """Return points (n, 2) along lines across the matrix, both ways."""
     both = []
     for along, across in ((half_width, half_height), (half_height, half_width)):
-        n = int(np.ceil(2 * along / _SEARCH_STEP))
+        n = int(np.ceil(2 * along / LAYER_PATCH.search_step_mm))
         a = ((np.arange(n) + 0.5) / n * 2 - 1) * along
-        b = ((np.arange(_SEARCH_LINES) + 0.5) / _SEARCH_LINES * 2 - 1) * across
+        b = (
+            (np.arange(LAYER_PATCH.search_lines) + 0.5) / LAYER_PATCH.search_lines * 2 - 1
+        ) * across
         both.append(np.stack(np.meshgrid(a, b), axis=-1).reshape(-1, 2))
     both[1] = both[1][:, ::-1]
     return np.concatenate(both)
@@ -217,11 +214,11 @@ def _search_lines(half_width: float, half_height: float) -> Array:
 
 @lru_cache(maxsize=8)
 def _coarse_points(rows: int, columns: int, dx: float, samples: int) -> Array:
-    """Return (COARSE, all cells, 2): of every cell another quarter of its lattice."""
-    quarters = samples // COARSE
+    """Return (LAYER_PATCH.coarse, all cells, 2): of every cell another quarter of its lattice."""
+    quarters = samples // LAYER_PATCH.coarse
     row, column = np.divmod(np.arange(rows * columns), columns)
     which = (row * 3 + column * 5 + row // quarters + column // quarters) % quarters
-    offsets = lattice(samples).reshape(COARSE, quarters, 2) * dx
+    offsets = lattice(samples).reshape(LAYER_PATCH.coarse, quarters, 2) * dx
     return centres_mm(rows, columns, dx) + offsets[:, which]
 
 

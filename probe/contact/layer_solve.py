@@ -26,11 +26,9 @@ from numpy.typing import NDArray
 
 from probe.contact.contract import Touch
 from probe.contact.layer_levels import Levels
+from probe.contact.settings import LAYER_SYSTEM
 
 Array = NDArray[np.float64]
-
-MOST_PRODUCTS = 2000
-_SINGULAR = 1e-13  # eigenvalue of the plate's scaled system, of the largest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,7 +140,7 @@ def solve_glued(
     enough = tolerance**2 * float(deep @ deep)
 
     d, e, before = np.zeros_like(p), np.zeros_like(db), 1.0
-    for _ in range(MOST_PRODUCTS):
+    for _ in range(LAYER_SYSTEM.most_products):
         if float(r @ r) <= enough:
             break
         w = G @ (Y @ r)
@@ -182,7 +180,7 @@ def answers(system: Glued, rhs: Array, tolerance: float) -> Array:
         r = rhs[:, column].copy()
         x, d, before = np.zeros(len(r)), np.zeros(len(r)), 1.0
         enough = tolerance**2 * float(r @ r)
-        for _ in range(MOST_PRODUCTS):
+        for _ in range(LAYER_SYSTEM.most_products):
             if float(r @ r) <= enough:
                 break
             z = r / diagonal
@@ -201,6 +199,6 @@ def pseudo_inverse(system: Array) -> Array:
     """Return the inverse of a small symmetric system that may be singular."""
     scale = 1 / np.sqrt(np.maximum(system.diagonal(), 1e-300))
     values, vectors = np.linalg.eigh(system * scale * scale[:, None])
-    keep = values > _SINGULAR * values[-1]
+    keep = values > LAYER_SYSTEM.singular * values[-1]
     half = vectors[:, keep] * scale[:, None]
     return np.asarray((half / values[keep]) @ half.T)

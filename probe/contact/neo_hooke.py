@@ -24,9 +24,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from probe.contact.settings import NEO_HOOKE
 
-_LEAST = 1e-9  # stretch, below which only rounding goes
+Array = NDArray[np.float64]
 
 
 class Law(Protocol):
@@ -77,7 +77,7 @@ class NeoHooke:
         third = self.stiffness / 3.0
         inverse = compression_mm * (-1.0 / self.length_mm)
         inverse += 1.0
-        inverse = 1.0 / np.maximum(inverse, _LEAST)
+        inverse = 1.0 / np.maximum(inverse, NEO_HOOKE.least_stretch)
         square = inverse * inverse
         # lambda^-2 - lambda = (1 - lambda) (lambda^-2 + lambda^-1 + 1): nothing cancels.
         force = square + inverse

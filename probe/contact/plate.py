@@ -30,13 +30,11 @@ from numpy.typing import NDArray
 
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.neo_hooke import Law
-from probe.contact.plate_newton import MOST_STEPS, Columns, PlateProblem, newton
+from probe.contact.plate_newton import Columns, PlateProblem, newton
+from probe.contact.settings import PLATE, PLATE_NEWTON
 from probe.errors import ContactError
 
 Array = NDArray[np.float64]
-
-_FAR_TURNED_RAD = 0.2
-_SLACK = 1e-12  # of the half width, by which a centre of pressure may miss the hull
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,13 +141,13 @@ def rest(
 
 def _restless(pose: PlatePose, load: PlateLoad) -> ContactError:
     turned = math.hypot(pose.tilt_x_rad - load.tilt_x_rad, pose.tilt_y_rad - load.tilt_y_rad)
-    if turned > _FAR_TURNED_RAD:
+    if turned > PLATE.far_turned_rad:
         return ContactError(
             f"the plate tips: turned by {math.degrees(turned):.3g} degrees it still finds no rest",
             fix="move the sensor, press with less force, or take a stiffer wrist",
         )
     return ContactError(
-        f"no equilibrium within {MOST_STEPS} steps",
+        f"no equilibrium within {PLATE_NEWTON.most_steps} steps",
         fix="report the scene; a wrist with some stiffness helps",
     )
 
@@ -211,11 +209,11 @@ def _standing(points: Array, stiffness: Array, f: Array, half: float) -> None:
     at = np.array([-f[2], f[1]]) / f[0]  # x and y, of the half width
     free_x, free_y = stiffness[2] == 0, stiffness[1] == 0  # a turn about y moves it along x
     if free_x and free_y:
-        stands = _within_hull(points, at, _SLACK)
+        stands = _within_hull(points, at, PLATE.slack)
     else:
         along = 0 if free_x else 1
         low, high = points[:, along].min(), points[:, along].max()
-        stands = bool(low - _SLACK <= at[along] <= high + _SLACK)
+        stands = bool(low - PLATE.slack <= at[along] <= high + PLATE.slack)
     if not stands:
         low, high = points.min(axis=0) * half, points.max(axis=0) * half
         raise ContactError(

@@ -17,17 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.contact.neo_hooke import Law
+from probe.contact.settings import PLATE_NEWTON
 
 Array = NDArray[np.float64]
 
 EPS = float(np.finfo(np.float64).eps)
-MOST_STEPS = 100
-_SINGULAR = 1e-14  # eigenvalue of the scaled system, of the largest
-_PIVOT = 1e-6  # of the scaled system, below which its eigenvalues are asked
-_NEAR_LIMIT = 0.95  # share of the way to a law's limit that one step may go
-_WHOLE = 0.5  # of the first slope that a whole step may leave
-_SLOPE = 0.1  # the same of a step that had to be searched
-_SEARCHES = 200
 _NONE = np.zeros(0)
 
 
@@ -73,7 +67,7 @@ class NewtonState:
 def newton(problem: PlateProblem, a: Array, tolerance: float) -> tuple[NewtonState, int | None]:
     """Return the state at rest, begun at unknowns `a`, and the steps taken; None: no rest."""
     state = _begun(problem, a)
-    for iteration in range(MOST_STEPS + 1):
+    for iteration in range(PLATE_NEWTON.most_steps + 1):
         if _resting(problem, state, tolerance):
             return state, iteration
         state = _searched(problem, state, *_step(problem, state))
@@ -88,13 +82,13 @@ def _begun(problem: PlateProblem, a: Array) -> NewtonState:
     deepest = float(pressed.max())
     # At least a trace of contact, at most nearly the limit.
     least = 1e-9 * (1.0 if math.isinf(whole) else whole)
-    back = min(max(least - deepest, 0.0), _NEAR_LIMIT * whole - deepest)
+    back = min(max(least - deepest, 0.0), PLATE_NEWTON.near_limit * whole - deepest)
     a[0] += back
     if columns is None:
         return _at(problem, a, _NONE)
-    v = np.maximum.reduceat(pressed, columns.starts) + (back - _NEAR_LIMIT * limit)
+    v = np.maximum.reduceat(pressed, columns.starts) + (back - PLATE_NEWTON.near_limit * limit)
     v = np.maximum(columns.foreseen_mm, v)
-    return _at(problem, a, np.minimum(v, _NEAR_LIMIT * columns.law.limit_mm))
+    return _at(problem, a, np.minimum(v, PLATE_NEWTON.near_limit * columns.law.limit_mm))
 
 
 def _at(problem: PlateProblem, a: Array, v: Array) -> NewtonState:
@@ -159,7 +153,7 @@ def _solved(system: Array, wanted: Array) -> Array:
     if quick is not None:
         return np.array([v * a for v, a in zip(quick, scale, strict=True)])
     values, vectors = np.linalg.eigh(scaled)
-    regular = values > _SINGULAR * max(float(values[-1]), 1e-300)
+    regular = values > PLATE_NEWTON.singular * max(float(values[-1]), 1e-300)
     along = np.array(right) @ vectors
     if not regular.all() and np.abs(along[~regular]).max() > 1e-9 * np.abs(along).max():
         return np.asarray(scale * (vectors[:, ~regular] @ along[~regular]))
@@ -171,7 +165,7 @@ def _eliminated(system: list[list[float]], right: list[float]) -> list[float] | 
     m = len(right)
     for i in range(m):
         pivot = system[i][i]
-        if not pivot > _PIVOT:
+        if not pivot > PLATE_NEWTON.pivot:
             return None
         for k in range(i + 1, m):
             factor = system[k][i] / pivot
@@ -192,12 +186,16 @@ def _searched(problem: PlateProblem, state: NewtonState, da: Array, dv: Array) -
         rate -= dv[problem.columns.of_point]
     first = float(state.gradient @ da + state.unbalance @ dv)
     low, high = 0.0, _end(problem, state, rate, dv)
-    t = min(1.0, _NEAR_LIMIT * high)
+    t = min(1.0, PLATE_NEWTON.near_limit * high)
     found = state
-    for _ in range(_SEARCHES):
+    for _ in range(PLATE_NEWTON.searches):
         found = _at(problem, state.a + t * da, state.v + t * dv)
         slope = float(found.gradient @ da + found.unbalance @ dv)
-        if abs(slope) <= (_WHOLE if t == 1 else _SLOPE) * abs(first) or not low < t < high:
+        if (
+            abs(slope)
+            <= (PLATE_NEWTON.whole_slope if t == 1 else PLATE_NEWTON.searched_slope) * abs(first)
+            or not low < t < high
+        ):
             return found
         if slope < 0:
             low = t

@@ -22,6 +22,7 @@ from functools import lru_cache, partial
 from importlib import resources
 
 from probe.contact.contract import Contact, Touch
+from probe.contact.settings import CONTACT
 from probe.errors import ContactError
 from probe.sensor import SensorType
 from probe.surface.contract import HeightMap
@@ -29,7 +30,6 @@ from probe.surface.contract import HeightMap
 #: "auto", the name of a level, or the largest error of an image.
 Accuracy = str | float
 
-AUTO = 0.06  #: the error that "auto" holds: below what the models leave out, 0.08 ... 0.14
 LEVELS: dict[str, tuple[str, ...]] = {
     "tab": ("footprint", "tabs-7", "tabs-19", "tabs-61"),
     "pad": ("footprint", "layer-2", "layer-4", "layer-8", "layer-16", "elements"),
@@ -56,8 +56,9 @@ def press(
     surface, sensor, touch
         What is touched, with what, where and how.
     accuracy
-        "auto" holds `AUTO`; a number is the error to hold (0.003: 0.3 %); a name takes that
-        level: footprint, tabs, tabs-7, tabs-19, tabs-61, layer, layer-2 ... layer-16, elements.
+        "auto" holds `CONTACT.auto_error`; a number is the error to hold (0.003: 0.3 %); a name
+        takes that level: footprint, tabs, tabs-7, tabs-19, tabs-61, layer, layer-2 ... layer-16,
+        elements.
 
     Returns
     -------
@@ -98,7 +99,7 @@ def level_for(sensor: SensorType, accuracy: Accuracy = "auto") -> str:
                 fix=f"take auto, an error such as 0.01, or {', '.join(LEVELS[kind])}",
             )
         return level
-    error = AUTO if accuracy == "auto" else float(accuracy)
+    error = CONTACT.auto_error if accuracy == "auto" else float(accuracy)
     known = [line for line in table()[kind] if line.error <= error]
     if not known:
         best = min(table()[kind], key=lambda line: line.error)

@@ -21,17 +21,16 @@ import math
 from functools import lru_cache
 
 from probe.contact.neo_hooke import NeoHooke
+from probe.contact.settings import TABS
 from probe.errors import ContactError
 from probe.sensor import Overlay
-
-BETA = 0.75  #: stiffness of the column behind the skin: the skin's over the column's
 
 
 @lru_cache(maxsize=16)
 def tip_laws(overlay: Overlay, points: int) -> tuple[NeoHooke, NeoHooke]:
     """Return the laws of one point of the skin and of the column behind it."""
     area = math.pi * overlay.tab_diameter_mm**2 / 4
-    skin_mm = overlay.height_mm / (1 + BETA)
+    skin_mm = overlay.height_mm / (1 + TABS.skin)
     column_mm = overlay.height_mm - skin_mm
     return (
         NeoHooke(overlay.young_mpa * area / points / skin_mm, skin_mm),

@@ -23,6 +23,7 @@ from probe.contact.contract import Contact, Touch
 from probe.contact.neo_hooke import Linear
 from probe.contact.plate import PlateLoad, PlatePose, PlateRest, checked_load, load_of, rest
 from probe.contact.plate_newton import Columns
+from probe.contact.settings import CONTACT, TABS
 from probe.contact.tab_law import checked_tabs, tip_laws
 from probe.contact.tabs_foreseen import columns_foreseen, foreseen_pose
 from probe.contact.tips import Tips, tip_points
@@ -31,9 +32,6 @@ from probe.sensor import Overlay, SensorType
 from probe.surface.contract import HeightMap
 
 Array = NDArray[np.float64]
-
-TOLERANCE = 1e-6  #: of the force
-STEEPEST_RAD = 0.35  #: tilts beyond are not small
 
 
 def tabs(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips | None = None) -> Contact:
@@ -75,20 +73,20 @@ def tabs(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips | None
     points, drop = tip_points(sensor, tips)
     heights = heights_under(surface, touch, points) - drop
     stiffness = min(touch.wrist.tilt_x_nmm_rad, touch.wrist.tilt_y_nmm_rad)
-    if touch.force_n * sensor.reach_mm > _HOPELESS_RAD * stiffness > 0:
+    if touch.force_n * sensor.reach_mm > TABS.hopeless_rad * stiffness > 0:
         # Springs tell for any force whether it would turn the plate over.
         law = Linear(overlay.young_mpa * sensor.pitch_mm**2 / overlay.height_mm)
-        _standing(rest(points.reshape(-1, 2), heights.ravel(), law, load).pose, _HOPELESS_RAD)
+        _standing(rest(points.reshape(-1, 2), heights.ravel(), law, load).pose, TABS.hopeless_rad)
     found, forces = tabs_at_rest(points, heights, overlay, load)
-    _standing(found.pose, STEEPEST_RAD)
+    _standing(found.pose, CONTACT.steepest_rad)
     if by_chance := _met_by_chance(heights, forces, overlay):
-        finer = next((q for q in _FINER if q > tips.points), None)
+        finer = next((q for q in TABS.finer if q > tips.points), None)
         if finer:
             return tabs(surface, sensor, touch, replace(tips, points=finer))
-        if by_chance >= _MANY:
+        if by_chance >= TABS.corner_tabs:
             raise ContactError(
                 f"strokes too thin for {tips.points} points on each tip: {by_chance} tabs met "
-                f"them with {_CHANCE} at most",
+                f"them with {TABS.by_chance} at most",
                 fix="give wider strokes; printed ones have 0.1 mm or more",
             )
     return Contact(
@@ -106,7 +104,7 @@ def _standing(pose: PlatePose, steepest_rad: float) -> None:
     if tilt > steepest_rad:
         raise ContactError(
             f"the plate tips: it comes to rest at a tilt of {math.degrees(tilt):.3g} degrees, "
-            f"beyond {math.degrees(STEEPEST_RAD):.3g}",
+            f"beyond {math.degrees(CONTACT.steepest_rad):.3g}",
             fix="move the sensor, press with less force, or take a stiffer wrist",
         )
 
@@ -122,8 +120,8 @@ def _met_by_chance(heights_mm: Array, forces_n: Array, overlay: Overlay) -> int:
     apart = overlay.tab_diameter_mm / 2 * math.sqrt(math.pi / q)
     tips = heights_mm.take(np.flatnonzero(forces_n), axis=0)
     near = np.count_nonzero(tips > tips.max(axis=1, keepdims=True) - apart, axis=1)
-    few = int(np.count_nonzero(near <= min(_CHANCE, q // 7)))
-    return few if few > max(1, _MOST * np.count_nonzero(near < q)) else 0
+    few = int(np.count_nonzero(near <= min(TABS.by_chance, q // 7)))
+    return few if few > max(1, TABS.on_step * np.count_nonzero(near < q)) else 0
 
 
 def heights_under(surface: HeightMap, touch: Touch, points_mm: Array) -> Array:
@@ -160,7 +158,7 @@ def tabs_at_rest(
     foreseen, depth = foreseen_pose(points_mm, heights_mm, overlay, load)
     points, heights = points_mm.reshape(-1, 2), heights_mm.ravel()
     pressed = heights - foreseen.heights_mm(points)
-    kept = pressed >= min(-_MARGIN * depth, float(pressed.max()))
+    kept = pressed >= min(-TABS.margin * depth, float(pressed.max()))
     if min(load.wrist.tilt_x_nmm_rad, load.wrist.tilt_y_nmm_rad) == 0:
         kept = heights > -math.inf  # whether a free plate stands is for all of them to tell
     while True:
@@ -174,7 +172,7 @@ def tabs_at_rest(
         columns = Columns(column, starts, np.cumsum(first) - 1, compressed)
         found = rest(
             points.take(some, axis=0), heights[some], skin, load,
-            columns=columns, foreseen=foreseen, tolerance=TOLERANCE,
+            columns=columns, foreseen=foreseen, tolerance=TABS.tolerance,
         )  # fmt: skip
         missed = (heights > found.pose.heights_mm(points)) & ~kept
         if not missed.any():
@@ -185,9 +183,3 @@ def tabs_at_rest(
 
 
 _PLAIN = Tips()
-_FINER = (61, 217, 817)  # points on a tip, for thin strokes
-_CHANCE = 2  # points of a tip that may meet a stroke by chance
-_MOST = 0.5  # of the tabs on a step
-_MANY = 4  # tabs; fewer are on a corner, which is sharp for any pattern
-_HOPELESS_RAD = 10.0
-_MARGIN = 0.1  # of the foreseen depth, further down which points are still computed

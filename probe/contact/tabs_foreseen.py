@@ -14,13 +14,10 @@ from numpy.typing import NDArray
 
 from probe.contact.neo_hooke import NeoHooke
 from probe.contact.plate import PlateLoad, PlatePose, rest
-from probe.contact.tab_law import BETA
+from probe.contact.settings import TABS
 from probe.sensor import Overlay
 
 Array = NDArray[np.float64]
-
-_CRUSHED = 1.4  # power by which partial cover stiffens more at the usual strains
-_SAMPLED = 8  # every eighth point of a tip foresees the pose
 
 
 def foreseen_pose(
@@ -38,10 +35,12 @@ def foreseen_pose(
         level = heights_mm - unloaded.heights_mm(points_mm)
     high = level > level.max() - overlay.height_mm / 4
     share = high.astype(np.float64) @ np.full(q, 1 / q)
-    stiffer = float(share @ ((1 + BETA) / (1 + BETA * share))) / max(float(share.sum()), 1 / q)
-    area = math.pi * overlay.tab_diameter_mm**2 / 4 * stiffer**_CRUSHED
+    stiffer = float(share @ ((1 + TABS.skin) / (1 + TABS.skin * share))) / max(
+        float(share.sum()), 1 / q
+    )
+    area = math.pi * overlay.tab_diameter_mm**2 / 4 * stiffer**TABS.crushed
     free = min(load.wrist.tilt_x_nmm_rad, load.wrist.tilt_y_nmm_rad) == 0
-    some = slice(None, None, _SAMPLED)
+    some = slice(None, None, TABS.sampled)
     if free or not heights_mm[:, some].max() > -math.inf:
         some = slice(None)  # a needle, or a hull that matters
     points = points_mm[:, some].reshape(-1, 2)
@@ -87,7 +86,7 @@ def columns_foreseen(
 
     Exact for tips covered at one height in the limits of small and of large strain.
     """
-    skin, column = 1 / (1 + BETA), BETA / (1 + BETA)
+    skin, column = 1 / (1 + TABS.skin), TABS.skin / (1 + TABS.skin)
     share = np.add.reduceat((pressed > 0).astype(np.float64), starts) / points
     mean = np.add.reduceat(np.maximum(pressed, 0.0), starts) / points
     small = column * mean / (skin + column * share)

@@ -15,9 +15,8 @@ from pathlib import Path
 
 from probe.errors import PortError
 from probe.firmware.build import cache_folder
+from probe.firmware.settings import EMULATOR
 
-_ANSWER_S = 20.0  # a busy machine may take its time
-_END_S = 5.0
 _SHOWN = 500  # characters of its log
 
 
@@ -75,7 +74,7 @@ class Host:
         with suppress(OSError):
             self._process.stdin.close()
         try:
-            self._process.wait(_END_S)
+            self._process.wait(EMULATOR.end_s)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
@@ -84,7 +83,7 @@ class Host:
     def _answer(self) -> str:
         assert self._process.stdout is not None
         descriptor = self._process.stdout.fileno()
-        until = time.monotonic() + _ANSWER_S
+        until = time.monotonic() + EMULATOR.answer_s
         while b"\n" not in self._heard:
             ready, _, _ = select.select([descriptor], [], [], max(until - time.monotonic(), 0))
             data = os.read(descriptor, 4096) if ready else b""

@@ -14,11 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.frame import COLUMNS, ROWS, WRIST, Frame
+from probe.port.settings import PORT
 
-PERIOD_S = 4.0  #: one round
 FULL = 1023
-STEPS = 400  #: images of one round
-FINGER = 1.6  #: radius of a finger, tactels
 
 
 def moving_pattern(rate: float) -> Iterator[Frame]:
@@ -29,9 +27,9 @@ def moving_pattern(rate: float) -> Iterator[Frame]:
     rate
         Frames a second.
     """
-    images = [_image(2 * math.pi * i / STEPS) for i in range(STEPS)]
+    images = [_image(2 * math.pi * i / PORT.pattern_steps) for i in range(PORT.pattern_steps)]
     for seq in count():
-        image = images[int(seq / rate / PERIOD_S * STEPS) % STEPS]
+        image = images[int(seq / rate / PORT.pattern_s * PORT.pattern_steps) % PORT.pattern_steps]
         yield Frame(image, round(seq * 1e9 / rate), seq, _wrist(image))
 
 
@@ -41,7 +39,7 @@ def _image(phase: float) -> NDArray[np.uint16]:
     for turn, press in ((phase, 0.9), (-phase + math.pi / 3, 0.5)):
         centre = 6.5 + 4 * math.sin(turn), 7.5 + 5 * math.cos(turn)
         away = (y - centre[0]) ** 2 + (x - centre[1]) ** 2
-        force += press * (0.6 + 0.4 * math.sin(2 * turn)) * np.exp(-away / (2 * FINGER**2))
+        force += press * (0.6 + 0.4 * math.sin(2 * turn)) * np.exp(-away / (2 * PORT.finger**2))
     force[-1] = 0
     image = np.round(FULL * np.minimum(force, 1)).astype(np.uint16)
     image.setflags(write=False)

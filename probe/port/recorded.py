@@ -12,10 +12,9 @@ from dataclasses import replace
 from probe.frame import Frame
 from probe.port.address import Address, number, refuse_unknown
 from probe.port.contract import Port
+from probe.port.settings import PORT
 from probe.port.software import SoftwareProbe
 from probe.protocol import IdentPacket
-
-PAUSE_NS = 10_000_000  #: between the end of a recording and its repetition
 
 
 def open_recording(address: Address) -> Port:
@@ -58,4 +57,4 @@ def endless_frames(opened: Callable[[], Iterator[Frame]]) -> Iterator[Frame]:
             yield last
         if first is None or last is None:
             return
-        seq, t_ns = last.seq + 1, last.t_ns + PAUSE_NS
+        seq, t_ns = last.seq + 1, last.t_ns + PORT.pause_ns

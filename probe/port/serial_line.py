@@ -20,9 +20,8 @@ from probe.errors import PortError
 from probe.port.address import Address, number, refuse_unknown
 from probe.port.contract import Port
 from probe.port.listing import list_ports
+from probe.port.settings import PORT
 
-BAUD = 1_000_000
-WRITE_TIMEOUT_S = 1.0
 _CHUNK = 65536
 
 
@@ -35,13 +34,13 @@ def open_serial(address: Address) -> Port:
         When it is not there, busy, forbidden, or cannot run at this baud rate.
     """
     refuse_unknown(address, ("baud",))
-    baud = number(address, "baud", BAUD, least=1)
+    baud = number(address, "baud", PORT.baud, least=1)
     try:
         line = serial.Serial(
             address.target,
             int(baud),
             timeout=0,
-            write_timeout=WRITE_TIMEOUT_S,
+            write_timeout=PORT.write_timeout_s,
             exclusive=True,
         )
         line.reset_input_buffer()
@@ -107,7 +106,7 @@ def _refused(address: Address, failed: Exception) -> PortError:
         cause = f"{device} is in use by another programme"
         fix = f"close it; fuser {device} names it"
     elif isinstance(failed, ValueError):
-        cause = f"{device} cannot run at {address.options.get('baud', BAUD)} baud"
+        cause = f"{device} cannot run at {address.options.get('baud', PORT.baud)} baud"
         fix = "take 500000, 1000000 or 2000000, as the firmware was built"
     else:
         cause, fix = f"{device} cannot be opened: {failed}", "give the device of a serial line"

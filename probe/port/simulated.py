@@ -16,13 +16,13 @@ from probe.frame import Frame
 from probe.port.address import Address, number, refuse_unknown, split_url
 from probe.port.contract import Port
 from probe.port.pattern import moving_pattern
+from probe.port.settings import PORT
 from probe.port.software import SoftwareProbe
 from probe.protocol import IdentPacket
 
 if TYPE_CHECKING:
     from probe.port.emulated import EmulatedProbe
 
-RATE = 100.0
 FULL_MV, FULL_COUNTS = 5000.0, 1023
 
 
@@ -34,7 +34,7 @@ def open_simulation(address: Address) -> Port:
     PortError
         When an option is unknown, or the emulator is not there.
     """
-    rate = number(address, "rate", RATE, least=0.1)
+    rate = number(address, "rate", PORT.rate_hz, least=0.1)
     firmware = address.options.get("firmware", "")
     if firmware not in ("", "avr"):
         raise PortError(

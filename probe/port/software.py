@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from probe.frame import Frame
+from probe.port.settings import PORT
 from probe.protocol import (
     Command,
     FramePacket,
@@ -23,10 +24,6 @@ from probe.protocol import (
     StatisticsPacket,
     encode,
 )
-
-BATCH = 64  #: packets of one read at most
-LATE_S = 0.5  #: a reader later than that makes the device wait
-STEP_NS = 500_000_000  #: longest time between frames that needs no announcement
 
 
 class SoftwareProbe:
@@ -122,13 +119,13 @@ class SoftwareProbe:
         late_s = now_s - (self._origin_s + shown_s)
         if not self._origin_s:
             self._origin_s = now_s - shown_s
-        elif late_s > LATE_S:
+        elif late_s > PORT.late_s:
             self._origin_s += late_s
             self._waits += 1
         return self._origin_s + shown_s
 
     def _ready(self, now_s: float) -> Iterator[bytes]:
-        for _ in range(BATCH):
+        for _ in range(PORT.batch):
             if not (self._streaming or self._wanted):
                 return
             try:
@@ -155,7 +152,7 @@ class SoftwareProbe:
         if self._last is None:
             return False
         steps, step_ns = frame.seq - self._last.seq, frame.t_ns - self._last.t_ns
-        return steps != 1 or not 0 <= step_ns <= STEP_NS
+        return steps != 1 or not 0 <= step_ns <= PORT.step_ns
 
     def _now(self) -> tuple[int, int]:
         """Return number and time for a packet that is no frame."""

@@ -29,13 +29,12 @@ from probe.recording.layout import (
 )
 from probe.recording.lock import is_locked, take_lock
 from probe.recording.opened import explain_errors
+from probe.recording.settings import RECORDING
 from probe.recording.superblock import superblock_of
 
 if TYPE_CHECKING:
     import h5py
 
-_SPARE: Final = 512 * 1024  #: bytes for the next small block, HDF5's own tables, and closing
-_STEP: Final = 1024 * 1024  #: bytes that are reserved at a time
 _FILE_FORMAT: Final = ("v110", "v110")
 
 
@@ -69,7 +68,9 @@ class FileWriter:
         try:
             with explain_errors(path, "write"):
                 self._reserve(0)
-                self._file = h5py.File(path, "w", libver=_FILE_FORMAT, rdcc_nbytes=4 * _STEP)
+                self._file = h5py.File(
+                    path, "w", libver=_FILE_FORMAT, rdcc_nbytes=4 * RECORDING.step
+                )
                 self._reserved = 0  # the library emptied the file
                 self._reserve(0)
             self._file.attrs.update(_attributes(origin, piece))
@@ -147,8 +148,8 @@ class FileWriter:
     def _reserve(self, needed: int) -> None:
         """Make sure of space for `needed` bytes of data, and to close afterwards."""
         end = self._file.id.get_filesize() if self._sets else 0
-        if end + needed + _SPARE > self._reserved:
-            self._reserved = end + needed + _SPARE + _STEP
+        if end + needed + RECORDING.spare > self._reserved:
+            self._reserved = end + needed + RECORDING.spare + RECORDING.step
             os.posix_fallocate(self._descriptor, 0, self._reserved)
 
 

@@ -11,11 +11,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Literal
 
 from probe.errors import ContactError
-
-_SHORT: Final = 0.7  #: share of the step that the stiffness so far would ask for
+from probe.scan.settings import TOUCH_PATH
 
 Reason = Literal["contact", "no contact", "force limit", "travel limit", "too stiff"]
 
@@ -110,7 +109,7 @@ def _further(
     step = limits.step_mm
     if low[1] >= limits.felt_n:
         stiffness = (low[1] - before[1]) / max(low[0] - before[0], limits.finest_mm)
-        wanted = _SHORT * (limits.force_n - low[1])
+        wanted = TOUCH_PATH.short * (limits.force_n - low[1])
         step = min(step, wanted / stiffness) if stiffness > 0 else step / 4
     return min(low[0] + max(step, limits.finest_mm), limits.travel_mm)
 

@@ -11,16 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from probe.contact.contract import Touch, WristStiffness
 from probe.errors import SurfaceError
+from probe.scan.settings import TOUCH_PATH
 from probe.sensor import SensorType
-
-STEP_TACTELS: Final = 4.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +52,7 @@ def raster(
     loops: Sequence[ArrayLike],
     sensor: SensorType | None = None,
     *,
-    step_tactels: float = STEP_TACTELS,
+    step_tactels: float = TOUCH_PATH.step_tactels,
     theta_rad: float = 0.0,
     least_cover: float = 0.1,
 ) -> RasterPlan:

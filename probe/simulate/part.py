@@ -15,9 +15,10 @@ import numpy as np
 from generator.database.registered import RegisteredFace, RegisteredObject, RegisteredPart
 from generator.database.url import normal_url, part_file
 from probe.errors import SurfaceError
-from probe.simulate.registered import UP, face_of, registered_object, registered_objects
+from probe.simulate.registered import face_of, registered_object, registered_objects
 from probe.simulate.round import round_part
 from probe.simulate.scene import Scene
+from probe.simulate.settings import FACE_AROUND
 from probe.simulate.written import part_mesh
 from probe.surface.polygon import polygon
 
@@ -103,6 +104,6 @@ def _face_up(held: RegisteredObject, part: RegisteredPart, name: str) -> Registe
     panels = sum(other.format == part.format for other in held.parts) == len(held.faces)
     for face in held.faces:
         T = np.linalg.inv(part.T_object_part) @ face.T_object_face
-        if panels and part.name.endswith(f"-{face.name}") and T[2, 2] > UP:
+        if panels and part.name.endswith(f"-{face.name}") and T[2, 2] > FACE_AROUND.up:
             return face
     return face_of(held)

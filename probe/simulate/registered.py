@@ -25,6 +25,7 @@ from generator.database.transaction import read_transaction
 from probe.errors import SurfaceError
 from probe.simulate.round import round_scene
 from probe.simulate.scene import Scene
+from probe.simulate.settings import FACE_AROUND
 from probe.surface.face import FaceSurface
 from probe.surface.lattice import LatticeSurface, list_lookup
 from probe.surface.mesh import MeshSurface, mesh
@@ -34,11 +35,6 @@ from probe.surface.symbols import Relief, SymbolReliefs, emboss
 from probe.surface.template import template
 
 Array = NDArray[np.float64]
-
-DEEPEST_MM = 8.0  #: symbols of other faces that stay farther below are left out
-BESIDE_MM = 40.0  #: and those farther beside the face's box
-UP = 0.999  #: cosine from which a face lies up
-_FLAT = 1e-9  # share of the size that is rounding
 
 
 class DatabaseUnreadableError(SurfaceError):
@@ -171,14 +167,14 @@ def _surrounding_mesh(
 ) -> MeshSurface | None:
     """Return all other faces that are seen from above, with symbols near this face."""
     T_face_object = np.linalg.inv(face.T_object_face)
-    eps = _FLAT * float(np.ptp(held.polyhedron.vertices, axis=0).max())
+    eps = FACE_AROUND.flat * float(np.ptp(held.polyhedron.vertices, axis=0).max())
     low, high = polygon(face.polygon_mm).box_mm
     found: list[Array] = []
     for other in held.faces:
         if other.face_id == face.face_id:
             continue
         T = T_face_object @ other.T_object_face
-        if T[2, 2] > _FLAT:
+        if T[2, 2] > FACE_AROUND.flat:
             # Corners come from the object, so that neighbours share them to the last bit.
             loops = held.polyhedron.faces[other.face_id].loops
             corners = _transform_points(held.polyhedron.vertices, T_face_object)
@@ -189,8 +185,8 @@ def _surrounding_mesh(
         cells = held.layout.faces[other.face_id]
         at = _transform_points(np.c_[cells.centres_mm, np.zeros(len(cells.labels))], T)
         reach = math.hypot(symbols.foot_half_mm * math.sqrt(2), symbols.relief.height_mm)
-        near = (at[:, 2] + reach > -DEEPEST_MM) & (
-            (at[:, :2] > low - BESIDE_MM) & (at[:, :2] < high + BESIDE_MM)
+        near = (at[:, 2] + reach > -FACE_AROUND.deepest_mm) & (
+            (at[:, :2] > low - FACE_AROUND.beside_mm) & (at[:, :2] < high + FACE_AROUND.beside_mm)
         ).all(axis=1)
         turn = _rotation_about_z(-other.placement.rotation_rad)
         for label in np.unique(cells.labels[near]):

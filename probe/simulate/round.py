@@ -19,14 +19,13 @@ from generator.database.url import normal_url, part_path
 from probe.contact.contract import Touch
 from probe.errors import SurfaceError
 from probe.simulate.scene import Scene
+from probe.simulate.settings import FACE_AROUND
 from probe.simulate.written import written_triangles
 from probe.surface.indenters import FlatPlate
 from probe.surface.mesh import mesh
 from probe.surface.polygon import FaceRegion, polygon
 
 Array = NDArray[np.float64]
-
-AROUND_MM = 24.0  #: of a touch: what lies farther is not under the sensor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +51,9 @@ class RoundPart:
         x, y = touch.x_mm, touch.y_mm
         T_object_plane = self.tangent(x, y)
         middle = (T_object_plane @ (x, y, 0.0, 1.0))[:3]
-        near = (self.low_mm < middle + AROUND_MM) & (self.high_mm > middle - AROUND_MM)
+        near = (self.low_mm < middle + FACE_AROUND.around_mm) & (
+            self.high_mm > middle - FACE_AROUND.around_mm
+        )
         corners = self.corners_mm[near.all(axis=1)]
         a, b, c = corners.transpose(1, 0, 2)
         seen = np.cross(b - a, c - a) @ T_object_plane[:3, 2] > 0

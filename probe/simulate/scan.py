@@ -24,6 +24,7 @@ from probe.scan.places import surface_to_sensor, touch_at
 from probe.scan.raster import raster
 from probe.sensor import SensorType
 from probe.simulate.scene import Scene
+from probe.simulate.settings import SIMULATED_SCAN
 from probe.simulate.touch import pose_of
 from probe.wrist.distances import counts_of, distances_at
 from probe.wrist.geometry import Wrist
@@ -33,11 +34,6 @@ Array = NDArray[np.float64]
 ScanKind = Literal["raster", "kinesthetic"]
 
 KINDS: Final = ("raster", "kinesthetic")
-FACE_AT: Final = (300.0, 0.0, 100.0)  #: mm, robot's base: the middle of the region, within reach
-FACE_TURN_RAD: Final = 0.2  #: of the face about the base's z, so that no axes agree by chance
-LEAST_COVER: Final = 0.5  #: over the face, of the best place's: with less the sensor slips off
-LIFT_MM: Final = 10.0  #: between two touches; the way decides on which side of its play a joint is
-GAP_MM: Final = 3.0  #: from where an approach begins to the surface
 _PLANAR: Final = (0, 1, 5)  # x, y and the turn about z among a pose's six freedoms
 
 
@@ -123,11 +119,15 @@ def scan_path(
     ContactError
         When the force cannot be felt.
     """
-    way = raster(scene.region.loops(), sensor, theta_rad=theta_rad).there_and_back(LEAST_COVER)
+    way = raster(scene.region.loops(), sensor, theta_rad=theta_rad).there_and_back(
+        SIMULATED_SCAN.least_cover
+    )
     if most is not None and most < len(way):
         begin = int(rng.integers(len(way) - most + 1))
         way = way[begin : begin + most]
-    T_base_middle = surface_to_sensor(*FACE_AT[:2], FACE_TURN_RAD, FACE_AT[2])
+    T_base_middle = surface_to_sensor(
+        *SIMULATED_SCAN.face_at_mm[:2], SIMULATED_SCAN.face_turn_rad, SIMULATED_SCAN.face_at_mm[2]
+    )
     if scene.rolled is not None:
         if kind == "kinesthetic":
             raise SurfaceError("an arm of five axes cannot go round a round face",
@@ -147,7 +147,7 @@ def scan_path(
         touches = tuple(Touch(x, y, theta_rad, force_n) for x, y in way.tolist())
         return ScanPath(touches, T_base_surface, T_base_object, stands, stands, (0.0, 0.0), None)
     wrist = Wrist()
-    lift = surface_to_sensor(0.0, 0.0, 0.0, LIFT_MM)
+    lift = surface_to_sensor(0.0, 0.0, 0.0, SIMULATED_SCAN.lift_mm)
     went = follow_poses(
         Arm(), [pose for stand in stands for pose in (lift @ stand, stand)], JointErrors(), rng
     )
@@ -164,13 +164,13 @@ def scan_path(
 def _pressed_n(wrist: Wrist, force_n: float, rng: np.random.Generator) -> float:
     """Return the force at which an approach ends; the wrist's springs give way, not the overlay."""
     springs_n_mm = 4 * wrist.spring_n_mm + wrist.axial_n_mm
-    gap_mm = GAP_MM + rng.uniform(-1.0, 1.0)
+    gap_mm = SIMULATED_SCAN.gap_mm + rng.uniform(-1.0, 1.0)
     limits = ApproachLimits(
         force_n=force_n,
         tolerance_n=min(1.0, force_n / 20),
         felt_n=min(0.5, force_n / 4),
         most_n=1.5 * force_n,
-        travel_mm=2 * GAP_MM + 1.5 * force_n / springs_n_mm,
+        travel_mm=2 * SIMULATED_SCAN.gap_mm + 1.5 * force_n / springs_n_mm,
     )
     return guarded_approach(lambda at: springs_n_mm * max(0.0, at - gap_mm), limits).force_n
 

@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.contact.contract import Touch
+from probe.simulate.settings import TOUCH_DRAW
 from probe.surface.contract import HeightMap
 from probe.surface.polygon import FaceRegion
-
-_GRID = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +47,7 @@ class Scene:
         if self.region.contains((at + mean)[None])[0]:
             middle: NDArray[np.float64] = at + mean
             return middle
-        x, y = (low + (high - low) * np.linspace(0, 1, _GRID)[:, None]).T
+        x, y = (low + (high - low) * np.linspace(0, 1, TOUCH_DRAW.grid)[:, None]).T
         points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
         points = points[self.region.contains(points)]
         inmost: NDArray[np.float64] = points[np.argmax(self.region.distance_mm(points))]

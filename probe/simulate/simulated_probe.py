@@ -29,10 +29,10 @@ from probe.recording.record import Recorder
 from probe.sensor import Overlay, SensorType
 from probe.simulate.scan import ScanKind, ScanPath, scan_path
 from probe.simulate.scene import Scene
+from probe.simulate.settings import SIMULATED_SCAN
 from probe.simulate.target import surface_of
 from probe.simulate.touch import Touches, pose_of, random_touches
 
-FORCE_N = 80.0  #: as the thesis pressed its washer
 _WAY = 1 << 32  # of the generator that draws a scan's way: no touch has that number
 
 
@@ -61,7 +61,7 @@ class TouchOptions:
         """
         if self.touches is None:
             x, y = scene.centre_mm()
-            drawn = Touch(float(x), float(y), 0.0, FORCE_N)
+            drawn = Touch(float(x), float(y), 0.0, SIMULATED_SCAN.force_n)
         else:
             drawn = next(random_touches(scene.region, rng, Touches()))
         touch = Touch(
@@ -242,7 +242,7 @@ class SimulatedProbe:
         return scan_path(
             self.scene, self.sensor, options.scan, np.random.default_rng([options.seed, _WAY]),
             most=options.touches, theta_rad=math.radians(_given_or_drawn(options.theta_deg, 0.0)),
-            force_n=_given_or_drawn(options.force_n, FORCE_N),
+            force_n=_given_or_drawn(options.force_n, SIMULATED_SCAN.force_n),
         )  # fmt: skip
 
 

@@ -33,13 +33,12 @@ from probe.errors import ContactError, SurfaceError
 from probe.frame import Frame, frame_from
 from probe.sensor import Overlay, SensorType
 from probe.simulate.scene import Scene
+from probe.simulate.settings import SIMULATED_PORT
 from probe.simulate.target import surface_of
 
 Image = NDArray[np.float64]
 
 DOWN, HELD, UP = 0.15, 0.65, 0.80  #: shares of a period: full force, begin to lift, off
-LEVELS = 16  #: of the force while it rises and falls: each is one contact
-_TURNS = 64  # directions tried for the next step, places tried that hold no sensor
 _DEFAULTS = {"force": 80.0, "tilt": 0.0, "step": 5.0, "period": 2.0, "rate": 100.0, "seed": 0.0}
 _CHOICES = {"overlay": ("tab", "pad"), "noise": ("typical", "quiet")}
 NAMES = ("x", "y", "theta", *_DEFAULTS, *_CHOICES, "accuracy")
@@ -129,7 +128,7 @@ def _frames(scene: Scene, options: MotionOptions) -> Iterator[Frame]:
     for touch in _random_walk(scene, options, rng):
         images: dict[float, Image] = {}
         for beat in range(beats):
-            share = round(load(beat / beats) * LEVELS) / LEVELS
+            share = round(load(beat / beats) * SIMULATED_PORT.levels) / SIMULATED_PORT.levels
             if share not in images:
                 images[share] = _press_forces(scene, options, touch, share)
             counts, state = read_counts(images[share], options.electronics, fsr, state, rng)
@@ -176,7 +175,7 @@ def _random_walk(scene: Scene, options: MotionOptions, rng: np.random.Generator)
             _press_forces(scene, options, touch, 1.0)
         except ContactError:
             refused += 1
-            if fixed or refused > _TURNS:
+            if fixed or refused > SIMULATED_PORT.tries:
                 raise
         else:
             refused = 0
@@ -187,7 +186,7 @@ def _random_walk(scene: Scene, options: MotionOptions, rng: np.random.Generator)
 
 def _next_place(scene: Scene, at: Image, step_mm: float, rng: np.random.Generator) -> Image:
     """Return a place one step further inside the region; the middle where there is none."""
-    for angle in rng.uniform(-math.pi, math.pi, _TURNS):
+    for angle in rng.uniform(-math.pi, math.pi, SIMULATED_PORT.tries):
         onward = at + step_mm * np.array([math.cos(angle), math.sin(angle)])
         if scene.region.contains(onward[None])[0]:
             return onward

@@ -19,11 +19,9 @@ from probe.contact.press import Accuracy, press
 from probe.errors import SurfaceError
 from probe.frame import Frame, frame_from
 from probe.sensor import SensorType
+from probe.simulate.settings import TOUCH_DRAW
 from probe.surface.contract import HeightMap
 from probe.surface.polygon import FaceRegion
-
-_TRIES = 16_000  # draws for one touch: a region that fills 0.1 % of its box is still found
-_DRAWN = 16  # at once
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,8 +127,8 @@ def pose_of(touch: Touch, contact: Contact) -> NDArray[np.float64]:
 def _place(region: FaceRegion, rng: np.random.Generator, margin_mm: float) -> tuple[float, float]:
     """Draw a point of a region, uniform in what lies a margin inside its edges."""
     low, high = region.box_mm
-    for _ in range(_TRIES // _DRAWN):
-        points = low + (high - low) * rng.random((_DRAWN, 2))
+    for _ in range(TOUCH_DRAW.tries // TOUCH_DRAW.at_once):
+        points = low + (high - low) * rng.random((TOUCH_DRAW.at_once, 2))
         points = points[region.contains(points)]
         if margin_mm > 0:
             points = points[region.distance_mm(points) >= margin_mm]

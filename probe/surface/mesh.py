@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from probe.errors import SurfaceError
+from probe.surface.settings import SURFACE
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _BLOCK = 1 << 20  # pairs of points and triangles looked at together
-_PAIRS = 1 << 25  # of bins and triangles at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +195,7 @@ def _binned(corners: Array) -> _Bins:
         last = ((high - start) / side).astype(np.int64)
         wide = last - first + 1
         count = wide.prod(axis=1)
-        if count.sum() <= _PAIRS:
+        if count.sum() <= SURFACE.pairs:
             break
         side *= 1.5
     shape = last.max(axis=0) + 1

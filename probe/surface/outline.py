@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from probe.errors import SurfaceError
+from probe.surface.settings import SURFACE
 
 Array = NDArray[np.float64]
 
-_EPS = 1e-9  # share of the size below which points are one and edges are none
 _TURNS = np.arange(8) * (math.pi / 4)
 _FLATS = np.round(np.stack([np.cos(_TURNS), np.sin(_TURNS)], axis=1), 17)
 
@@ -77,7 +77,7 @@ def outline(strokes_mm: ArrayLike, stroke_mm: float) -> tuple[Ring, ...]:
             f"strokes from {lengths.min():g} mm long, {stroke_mm:g} mm wide",
             fix="give strokes with a length, and a width above 0 mm",
         )
-    eps = _EPS * (float(np.abs(strokes).max()) + stroke_mm)
+    eps = SURFACE.same_point * (float(np.abs(strokes).max()) + stroke_mm)
     hulls = [_hull(a, b, stroke_mm / 2) for a, b in strokes]
     return tuple(_rings(_free_edges(hulls, eps), eps))
 
@@ -90,7 +90,7 @@ def _hull(a: Array, b: Array, radius: float) -> _Hull:
     corners = nib * np.stack([np.cos(half), np.sin(half)], axis=1)
     normals, supports = [*_FLATS], [max(n @ a, n @ b) + radius for n in _FLATS]
     for side in (np.array([along[1], -along[0]]), np.array([-along[1], along[0]])):
-        if np.abs(_FLATS - side).max(axis=1).min() > _EPS:
+        if np.abs(_FLATS - side).max(axis=1).min() > SURFACE.same_point:
             normals.append(side)
             supports.append(side @ a + (corners @ side).max())
     order = np.argsort([math.atan2(n[1], n[0]) for n in normals])
@@ -186,6 +186,6 @@ def _merged(chain: list[tuple[Array, Array, Array, float]]) -> Ring:
             [(n, c) for _, _, n, c in chain[-1:] + chain[:-1]],
             strict=True,
         )
-        if abs(_turn(m, n)) > _EPS
+        if abs(_turn(m, n)) > SURFACE.same_point
     ]
     return Ring(np.array([n for n, _ in kept]), np.array([c for _, c in kept]))

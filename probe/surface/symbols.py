@@ -20,14 +20,12 @@ from numpy.typing import NDArray
 
 from probe.errors import SurfaceError
 from probe.surface.outline import Ring, outline
+from probe.surface.settings import SURFACE
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Node = tuple[float, float]
 Strokes = tuple[tuple[Node, Node], ...]  #: of one symbol: pairs of nodes, in lattice units
-
-_EPS = 1e-12  # share of the size by which sides overlap, so that rounding leaves no gap
-_FAR = 1e9  # mm: support of an edge that is not there
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +79,7 @@ class SymbolReliefs:
         on the side of edge k.
         """
         away, heights = self.relief.profile()
-        eps = _EPS * (float(np.abs(self.tops).max()) + self.relief.stroke_mm)
+        eps = SURFACE.overlap * (float(np.abs(self.tops).max()) + self.relief.stroke_mm)
         piece, z = np.zeros(len(x), dtype=np.int64), np.zeros(len(x))
         if len(away) > 1:
             nx, ny = self.normals[:, labels]
@@ -148,7 +146,7 @@ def emboss(glyphs: tuple[Strokes, ...], unit_mm: float, relief: Relief) -> Symbo
     edges = [_edges(label, relief) for label in rings]
     most = max(len(columns[0]) for columns in edges)
     packed = np.zeros((11, len(glyphs), most))
-    packed[2] = _FAR
+    packed[2] = SURFACE.far_mm
     for label, columns in enumerate(edges):
         packed[:, label, : len(columns[0])] = columns
     return SymbolReliefs(relief, rings, packed[:2], packed[2], packed[3:7], packed[7:])

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.errors import SurfaceError
+from probe.surface.settings import SURFACE
 from probe.surface.symbols import SymbolReliefs
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-BINS = 192  #: along a side of a cell
 _CROSSED = -1
 
 
@@ -42,10 +42,10 @@ class HeightTemplate:
         right, down
             (n,) place in the cell from its upper left corner, shares of the pitch in [0, 1).
         """
-        cell = (down * BINS).astype(np.int64)
-        cell += labels * BINS
-        cell *= BINS
-        cell += (right * BINS).astype(np.int64)
+        cell = (down * SURFACE.bins).astype(np.int64)
+        cell += labels * SURFACE.bins
+        cell *= SURFACE.bins
+        cell += (right * SURFACE.bins).astype(np.int64)
         piece = self.table.ravel().take(cell, mode="wrap")
         z: Array = self.planes[:, 0].take(piece, mode="clip")
         sloped = np.flatnonzero(piece > 1)
@@ -79,15 +79,17 @@ def template(symbols: SymbolReliefs, pitch_mm: float) -> HeightTemplate:
             fix="take a larger pitch, or thinner strokes",
         )
     count = len(symbols.rings)
-    table = np.zeros((count + 1, BINS, BINS), dtype=np.int16)  # the last one is label -1
+    table = np.zeros(
+        (count + 1, SURFACE.bins, SURFACE.bins), dtype=np.int16
+    )  # the last one is label -1
     planes = [symbols.planes(0)[:2]]
-    middle = (np.arange(BINS) + 0.5) / BINS - 0.5
+    middle = (np.arange(SURFACE.bins) + 0.5) / SURFACE.bins - 0.5
     x, y = (pitch_mm * grid.ravel() for grid in np.meshgrid(middle, -middle))
     for label in range(count):
         crossed = _crossed(symbols, label, pitch_mm)
         first = sum(map(len, planes)) - 2
         planes.append(symbols.planes(label)[2:])
-        near = np.maximum(np.abs(x), np.abs(y)) <= symbols.foot_half_mm + pitch_mm / BINS
+        near = np.maximum(np.abs(x), np.abs(y)) <= symbols.foot_half_mm + pitch_mm / SURFACE.bins
         ask = np.flatnonzero(near & ~crossed.ravel())
         piece, _ = symbols.pieces(np.full(len(ask), label), x[ask], y[ask])
         table[label].ravel()[ask] = np.where(piece > 1, piece + first, piece)
@@ -99,9 +101,9 @@ def template(symbols: SymbolReliefs, pitch_mm: float) -> HeightTemplate:
 def _crossed(symbols: SymbolReliefs, label: int, pitch_mm: float) -> NDArray[np.bool_]:
     """Return which bins of a cell an edge between two pieces may cross."""
     away = symbols.relief.profile()[0]
-    found = np.zeros((BINS, BINS), dtype=bool)
-    half = pitch_mm / BINS / 2
-    middle = (np.arange(BINS) + 0.5) / BINS - 0.5
+    found = np.zeros((SURFACE.bins, SURFACE.bins), dtype=bool)
+    half = pitch_mm / SURFACE.bins / 2
+    middle = (np.arange(SURFACE.bins) + 0.5) / SURFACE.bins - 0.5
     for ring in symbols.rings[label]:
         levels = [ring.moved(float(d)) for d in away]
         lines = [(a, b) for tier in levels for a, b in zip(tier, np.roll(tier, -1, 0), strict=True)]
@@ -110,8 +112,8 @@ def _crossed(symbols: SymbolReliefs, label: int, pitch_mm: float) -> NDArray[np.
             low, high = np.minimum(a, b), np.maximum(a, b)
             columns, rows = (
                 slice(
-                    max(0, int((p / pitch_mm + 0.5) * BINS) - 1),
-                    int((q / pitch_mm + 0.5) * BINS) + 2,
+                    max(0, int((p / pitch_mm + 0.5) * SURFACE.bins) - 1),
+                    int((q / pitch_mm + 0.5) * SURFACE.bins) + 2,
                 )
                 for p, q in ((low[0], high[0]), (-high[1], -low[1]))
             )

@@ -23,8 +23,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from probe.errors import PoseError
 from probe.wrist.geometry import FREEDOMS, Wrist, WristPose
+from probe.wrist.settings import WRIST_READING
 
-_MANY: Final = 6.0  #: standard deviations that do not happen
 #: mean, half the mean slopes along AD and BA times their lengths, and twist, of A, B, C, D
 _CONTRASTS: Final = np.array([[1, 1, 1, 1], [-1, -1, 1, 1], [1, -1, -1, 1], [1, -1, 1, -1]]) / 4
 
@@ -67,7 +67,7 @@ def wrist_pose(wrist: Wrist, distances: ArrayLike) -> WristPose:
     theta_x = math.atan(g_y * math.cos(theta_y))
     covariance = _covariance(wrist, theta_x, theta_y)
     sd = np.sqrt(covariance.diagonal())
-    if abs(twist) > _MANY * wrist.reading_mm / 2:
+    if abs(twist) > WRIST_READING.many * wrist.reading_mm / 2:
         raise PoseError(
             f"the four distances {np.round(d, 3).tolist()} mm lie {abs(twist):.3g} mm off a plane",
             fix="check the transducers: two opposite ones must have the sum of the other two",
@@ -76,7 +76,7 @@ def wrist_pose(wrist: Wrist, distances: ArrayLike) -> WristPose:
     for name, value, (low, high), error in zip(
         FREEDOMS, (z, theta_x, theta_y), wrist.ranges(), sd, strict=True
     ):
-        if not low - _MANY * error <= value <= high + _MANY * error:
+        if not low - WRIST_READING.many * error <= value <= high + WRIST_READING.many * error:
             raise PoseError(
                 f"{name} is {value:.4g}, the end stops are at {low:.4g} and {high:.4g}",
                 fix="check the transducers and their zero",

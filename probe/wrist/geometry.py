@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.errors import PoseError
+from probe.wrist.settings import WRIST_READING
 
-LEAST_SIN_GAMMA: Final = 0.02  #: below, 0.01 mm of error is more than half a degree
 FREEDOMS: Final = ("z", "theta_x", "theta_y")
 
 
@@ -47,7 +47,7 @@ class Wrist:
                 f"the transducers stand {self.ab_mm:g} and {self.ad_mm:g} mm apart",
                 fix="give distances above 0 mm",
             )
-        if not abs(math.sin(self.gamma_rad)) >= LEAST_SIN_GAMMA:
+        if not abs(math.sin(self.gamma_rad)) >= WRIST_READING.least_sin_gamma:
             error = math.degrees(tilt_error_rad(0.01, self.ab_mm, self.gamma_rad))
             raise PoseError(
                 f"gamma is {math.degrees(self.gamma_rad):g} degrees: the transducers stand almost "

@@ -23,8 +23,9 @@ import numpy as np
 from probe.contact.contract import Touch
 from probe.contact.plate import load_of, rest
 from probe.contact.plate_newton import Columns
+from probe.contact.settings import TABS
 from probe.contact.tab_law import tip_laws
-from probe.contact.tabs import TOLERANCE, heights_under, tabs, tabs_at_rest
+from probe.contact.tabs import heights_under, tabs, tabs_at_rest
 from probe.contact.tips import Tips, tip_points
 from probe.sensor import SensorType
 from probe.surface.face import endless
@@ -110,7 +111,12 @@ def unculled(points, heights, load):
     skin, column = tip_laws(SENSOR.overlay, q)
     columns = Columns(column, np.arange(n) * q, np.arange(n * q) // q, np.zeros(n))
     return rest(
-        points.reshape(-1, 2), heights.ravel(), skin, load, columns=columns, tolerance=TOLERANCE
+        points.reshape(-1, 2),
+        heights.ravel(),
+        skin,
+        load,
+        columns=columns,
+        tolerance=TABS.tolerance,
     )
 
 

@@ -17,9 +17,10 @@ from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
 from generator.array.profiles import profile
 from generator.errors import SolidError
-from generator.export.check import STEP_VOLUME, verify
+from generator.export.check import verify
 from generator.export.colours import SYMBOL_RGB
 from generator.export.glb import glb_bytes
+from generator.export.settings import READ_BACK
 from generator.export.step import step_chunks
 from generator.export.stl import stl_chunks
 from generator.export.threemf import print_files
@@ -100,7 +101,7 @@ def test_step_and_stl_are_one_valid_closed_solid(part: Part, tmp_path: Path) -> 
     assert report.stl is not None
     assert report.step.solids == 1
     assert report.step.valid
-    assert abs(report.step.volume_error) <= STEP_VOLUME
+    assert abs(report.step.volume_error) <= READ_BACK.step_volume
     assert report.stl.boundary_edges == report.stl.non_manifold_edges == 0
     assert report.stl.self_intersections == 0
     assert abs(report.stl.volume_error) <= 1e-6

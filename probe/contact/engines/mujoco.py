@@ -36,8 +36,6 @@ require("mujoco", extra="engines", purpose="engine mujoco")
 
 Array = NDArray[np.float64]
 
-_LEAST = 1e-9  # of the stiffness, against a singular system where one row of points bears all
-
 
 @dataclass(frozen=True, slots=True)
 class MujocoSettings:
@@ -52,6 +50,7 @@ class MujocoSettings:
     halvings: int = 8  #: of a step that does not help
     steps: int = 60  #: of Newton's method; 5-12 are usual
     steepest_rad: float = 0.35  #: tilts beyond are not small
+    damped: float = 1e-9  #: of the stiffness: one row of points that bears all is not singular
 
 
 def press(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips) -> Contact:
@@ -146,8 +145,8 @@ def _rest(
             )  # fmt: skip
         stiff = ((rows * now.slopes) @ rows.T + np.diag([0.0, *stiffness]))[np.ix_(free, free)]
         move = np.zeros(3)
-        move[free] = np.linalg.solve(stiff + _LEAST * np.trace(stiff) * np.eye(len(stiff)),
-                                     now.wrong_n)  # fmt: skip
+        damped = stiff + settings.damped * np.trace(stiff) * np.eye(len(stiff))
+        move[free] = np.linalg.solve(damped, now.wrong_n)
         move *= min(1.0, settings.step_mm / max(float(np.abs(move).max()), settings.step_mm))
         for _ in range(settings.halvings):
             then = balance(plate + move)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from probe.contact.contract import Touch, WristStiffness
-from probe.contact.deblur import LEAST, arriving, blur_of, deblur, thickest_mm
+from probe.contact.deblur import arriving, blur_of, deblur, thickest_mm
 from probe.contact.layer import layer
 from probe.contact.layer_influence import influence
+from probe.contact.settings import DEBLUR
 from probe.errors import ContactError
 from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import Washer
@@ -53,9 +54,9 @@ def test_pads_of_4_mm_and_more_are_refused(height):
 @pytest.mark.parametrize("poisson", [0.0, 0.3, 0.4999, 0.5])
 def test_the_thickest_pad_is_where_the_refusal_begins(poisson):
     most = thickest_mm(pad(2.0, poisson=poisson))
-    assert arriving(pad(most, poisson=poisson)) == pytest.approx(LEAST, rel=1e-6)
+    assert arriving(pad(most, poisson=poisson)) == pytest.approx(DEBLUR.least, rel=1e-6)
     read = np.ones((16, 16))
-    assert deblur(read, pad(0.99 * most, poisson=poisson), noise_n=0.1).arrives > LEAST
+    assert deblur(read, pad(0.99 * most, poisson=poisson), noise_n=0.1).arrives > DEBLUR.least
     with pytest.raises(ContactError, match="at most"):
         deblur(read, pad(1.01 * most, poisson=poisson), noise_n=0.1)
 

@@ -1,0 +1,17 @@
+"""Numbers that decide which array `auto` takes, and when work is shared out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class ChoiceSettings:
+    """Which array and how many processes."""
+
+    full: float = 0.8  #: share of an array that faces of all shapes fill without a search
+    larger: int = 4  #: sizes tried beyond `large`
+    few: int = 16  #: fewer tasks are done in this process, where nobody asked for others
+
+
+CHOICE = ChoiceSettings()
