@@ -68,15 +68,37 @@ def rival_shares(array: FoldedArray, sets: Sequence[VisibleSet]) -> RivalShares:
     >>> round(rival_shares(profile("one-touch").array(), sets).poses[0], 2)
     0.1
     """
+    extent = 1 + np.max([one.cells.max(axis=0, initial=0) for one in sets], axis=0)
+    cells = array.coefficients(np.arange(extent[0])[:, None], np.arange(extent[1]))
+    return code_shares(array.sequence.field, cells.reshape(*extent, -1), sets)
+
+
+def code_shares(gf: Field, cells: Labels, sets: Sequence[VisibleSet]) -> RivalShares:
+    """Return the shares for cells given by what they show.
+
+    Parameters
+    ----------
+    gf
+        GF(q).
+    cells
+        (rows, columns, n) labels: what cell (r, c) shows of a state, on a grid that holds
+        every set.
+    sets
+        Of `visible_sets`.
+    """
+    degree = cells.shape[2]
     share = np.array([one.share for one in sets])
     number = np.array([len(one.cells) for one in sets])
-    rank, words = light_words(array.sequence.field, generators(array, sets))
-    unseen = float(array.order) ** (array.full_rank - rank)  # states that show nothing
+    matrices = np.zeros((len(sets), degree, max(1, *number)), dtype=np.int64)
+    for matrix, one in zip(matrices, sets, strict=True):
+        matrix[:, : len(one.cells)] = cells[one.cells[:, 0], one.cells[:, 1]].T
+    rank, words = light_words(gf, matrices)
+    unseen = float(gf.order) ** (degree - rank)  # states that show nothing
     rivals = np.cumsum(words, axis=1) * unseen[:, None] - 1
     poses, mean = share @ (rivals > 0), share @ rivals
     return RivalShares(
         float(share @ number),
-        float(share @ (rank < np.minimum(number, array.full_rank))),
+        float(share @ (rank < np.minimum(number, degree))),
         (float(poses[0]), float(poses[1]), float(poses[2])),
         (float(mean[0]), float(mean[1]), float(mean[2])),
     )
@@ -105,18 +127,6 @@ def serves(
     """
     sets = visible_sets(pitch_mm, sensor_half_mm, symbol_half_mm, test.poses)
     return rival_shares(array, sets).short <= test.most_short
-
-
-def generators(array: FoldedArray, sets: Sequence[VisibleSet]) -> Labels:
-    """Return (sets, n, k) labels: column c shows cell c of a set; columns beyond it are 0."""
-    most = max(1, *(len(one.cells) for one in sets))
-    extent = 1 + np.max([one.cells.max(axis=0, initial=0) for one in sets], axis=0)
-    every = array.coefficients(np.arange(extent[0])[:, None], np.arange(extent[1]))
-    every = every.reshape(extent[0], extent[1], -1)
-    found = np.zeros((len(sets), array.full_rank, most), dtype=np.int64)
-    for matrix, one in zip(found, sets, strict=True):
-        matrix[:, : len(one.cells)] = every[one.cells[:, 0], one.cells[:, 1]].T
-    return found
 
 
 def reduced_rows(gf: Field, matrices: Labels) -> tuple[Labels, NDArray[np.bool_]]:

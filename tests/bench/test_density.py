@@ -57,7 +57,8 @@ def loaded(rows, columns, turns, seed=5):
 
 @pytest.mark.parametrize("turns", [(0,), (0, 1, 2, 3)], ids=["no-turns", "turns"])
 @pytest.mark.parametrize(
-    ("rows", "columns", "least"), [(63, 65, 0.88), (127, 129, 0.90), (255, 257, 0.90)]
+    ("rows", "columns", "least"),
+    [(63, 65, 0.88), (127, 129, 0.90), (255, 257, 0.90), (51, 1285, 0.90)],
 )
 def test_density(benchmark, rows, columns, least, turns):
     density = benchmark.pedantic(loaded, (rows, columns, turns), rounds=1)

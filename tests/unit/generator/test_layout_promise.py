@@ -1,0 +1,138 @@
+"""What a face promises, against geometry done one pose and one edge at a time."""
+
+import numpy as np
+import pytest
+
+from generator.array import profile
+from generator.layout.layout import lay_out
+from generator.layout.placement import FaceLayout, Placement
+from generator.layout.places import rank_test
+from generator.layout.promise import (
+    AnswerTable,
+    PromiseSettings,
+    SensorView,
+    face_views,
+    promised_share,
+)
+from generator.polyhedron import face_polygon, shapes
+
+NONE = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
+VIEW = SensorView((12.7, 9.0), 2.52)
+SQUARE = np.array([[0, 0], [40, 0], [40, 40], [0, 40]], dtype=float)
+HOLE = np.array([[12, 12], [12, 25], [30, 25], [30, 12]], dtype=float)  # clockwise
+ELL = np.array([[0, 0], [50, 0], [50, 12], [14, 12], [14, 60], [0, 60]], dtype=float)
+TRIANGLE = np.array([[-3, 5], [60, -8], [25, 44]], dtype=float)
+
+
+def lattice(loop, pitch=7.0, rotation=0.3, anchor=(60, 61)):
+    """Symbols on a turned lattice over the box of a loop, placed across the array's seam."""
+    low, size = loop.min(axis=0), np.ptp(loop, axis=0)
+    j, i = (g.ravel() for g in np.meshgrid(range(6), range(6)))
+    c, s = np.cos(rotation), np.sin(rotation)
+    u, v = (j + 0.5) * pitch, -(i + 0.5) * pitch
+    shift = np.array([5.0, -30.0])
+    u_, v_ = u - shift[0], v - shift[1]
+    centres = np.stack([c * u_ + s * v_, -s * u_ + c * v_], axis=1)
+    inside = ((centres >= low) & (centres <= low + size)).all(axis=1)
+    rows, columns = (anchor[0] + i) % 63, (anchor[1] + j) % 65
+    return FaceLayout(
+        0, Placement(*anchor, rotation, *shift), rows[inside], columns[inside],
+        np.zeros(inside.sum(), dtype=np.int64), centres[inside], 1,
+    )  # fmt: skip
+
+
+def cut(polygon, normal, limit):
+    """The part of a polygon at normal . x <= limit (Sutherland and Hodgman)."""
+    kept = []
+    for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+        at, bt = normal @ a - limit, normal @ b - limit
+        if at <= 0:
+            kept.append(a)
+        if at * bt < 0:
+            kept.append(a + (b - a) * at / (at - bt))
+    return np.array(kept).reshape(-1, 2)
+
+
+def area(polygon):
+    x, y = polygon.T
+    return (x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2
+
+
+@pytest.mark.parametrize("loops", [(SQUARE,), (SQUARE, HOLE), (ELL,), (TRIANGLE,)])
+def test_views_are_those_of_each_pose_by_itself(loops):
+    array = profile().array()
+    face = lattice(loops[0])
+    views = face_views(loops, face, 7.0, VIEW, array.window, rank_test(array), PromiseSettings(150))
+    assert len(views.seen) == 150
+    for k in range(150):
+        c, s = np.cos(views.turn_rad[k]), np.sin(views.turn_rad[k])
+        axes = np.array([[c, s], [-s, c]])  # sensor x and y in the face frame
+        there = (face.centres_mm - views.centre_mm[k]) @ axes.T
+        whole = (abs(there[:, 0]) <= 12.7 - 2.52) & (abs(there[:, 1]) <= 9.0 - 2.52)
+        assert views.seen[k] == whole.sum()
+        rows, columns = face.rows[whole], face.columns[whole]
+        assert views.named[k] == (bool(whole.any()) and array.identifies(rows, columns))
+        on_face = 0.0
+        for loop in loops:
+            part = loop - views.centre_mm[k]
+            for normal, limit in ((axes[0], 12.7), (-axes[0], 12.7), (axes[1], 9), (-axes[1], 9)):
+                part = cut(part, normal, limit)
+            on_face += area(part) if len(part) else 0.0
+        assert views.loaded[k] == pytest.approx(on_face / (4 * 12.7 * 9.0), abs=1e-9)
+
+
+def test_centres_lie_on_the_face_evenly():
+    array = profile().array()
+    face = lattice(ELL)
+    poses = PromiseSettings(2000)
+    views = face_views((ELL,), face, 7.0, VIEW, array.window, rank_test(array), poses)
+    x, y = views.centre_mm.T
+    assert (((y < 12) & (x < 50)) | ((x < 14) & (y < 60))).all()
+    assert (x.min(), y.min()) >= (0, 0)
+    assert (x > 14).mean() == pytest.approx(36 * 12 / area(ELL), abs=0.01)
+    assert (y > 36).mean() == pytest.approx(24 * 14 / area(ELL), abs=0.01)
+    for quarter in range(4):
+        share = (views.turn_rad // (np.pi / 2) == quarter).mean()
+        assert share == pytest.approx(0.25, abs=0.01)
+    again = face_views((ELL,), face, 7.0, VIEW, array.window, rank_test(array), poses)
+    assert np.array_equal(views.centre_mm, again.centre_mm)
+
+
+@pytest.mark.parametrize(
+    ("pitch_mm", "half_mm", "mean"), [(7.0, 2.73, (8.4, 5.4, 3.4)), (4.0, 1.6, (30.7, 19.3, 12.1))]
+)
+def test_a_60_mm_face_shows_what_was_measured(pitch_mm, half_mm, mean):
+    """Mid-face, edge (the centre within 9 mm of one) and corner, counted by another program."""
+    array, solid = profile().array(), shapes.cube(60.0)
+    clearances = [[np.full(len(loop), 1.0) for loop in face.loops] for face in solid.faces]
+    (face, *_) = lay_out(solid, array, pitch_mm, half_mm, clearances, NONE).faces
+    views = face_views(
+        face_polygon(solid, 0), face, pitch_mm, SensorView((12.7, 12.7), 0.36 * pitch_mm),
+        array.window, rank_test(array), PromiseSettings(4000),
+    )  # fmt: skip
+    near = (np.minimum(views.centre_mm, 60 - views.centre_mm) < 9).sum(axis=1)
+    for sides, symbols in enumerate(mean):
+        assert views.seen[near == sides].mean() == pytest.approx(symbols, abs=0.35)
+
+
+def test_a_blank_face_shows_nothing():
+    array = profile().array()
+    blank = FaceLayout(0, Placement(0, 0, 0.0, 0.0, 0.0), *NONE, NONE[0], np.empty((0, 2)), 0)
+    views = face_views((SQUARE,), blank, 7.0, VIEW, array.window, rank_test(array))
+    assert not views.seen.any()
+    assert not views.named.any()
+    assert (views.loaded > 0.2).all()
+
+
+def test_a_promise_weighs_measured_answers():
+    table = AnswerTable((4, 8, 12), (0.5, 1.0), np.array([[0.0, 0.2], [0.4, 0.8], [0.8, 1.0]]))
+    seen = np.array([0, 4, 6, 8, 10, 20, 6])
+    loaded = np.array([1.0, 0.75, 1.0, 0.5, 0.2, 2.0, 0.75])
+    assert table.at(seen, loaded) == pytest.approx([0.2, 0.1, 0.5, 0.4, 0.6, 1.0, 0.35])
+    flat = AnswerTable((1,), (1.0,), np.array([[0.7]]))
+    assert flat.at(seen, loaded) == pytest.approx(0.7)
+    array = profile().array()
+    views = face_views((SQUARE,), lattice(SQUARE), 7.0, VIEW, array.window, rank_test(array))
+    assert promised_share(views, flat) == pytest.approx(0.7 * views.named.mean())
+    answered = table.at(views.seen, views.loaded)[views.named].sum() / 1000
+    assert promised_share(views, table) == pytest.approx(answered)
