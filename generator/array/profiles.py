@@ -1,8 +1,9 @@
 """Ready choices of array, window, alphabet and pitch, by name.
 
 `one-touch` is the default: its 3x2 window lies under one 25 mm touch. Windows are rows x
-columns. Where the measured figures come from: design, and the thesis's experiments (6.17 to
-6.19 for `thesis`, figure 5.11 for `product`).
+columns. `thesis` and `product` are the thesis's experiments (6.17 to 6.19, figure 5.11). Folds and
+polynomials of `large`, `fine` and the sizes above them leave a touch the fewest rivals, as
+`tests/bench/fold_search.py` found them (docs/folds.md).
 """
 
 from __future__ import annotations
@@ -54,6 +55,16 @@ def _gf4(degree: int, polynomial: str, rows: int, columns: int) -> dict[str, Any
     return {"family": "prmva", "order": 4, "degree": degree, "polynomial": polynomial} | size
 
 
+_LARGE = _gf4(8, "x^8+x^7+A^2x^4+A^2x^3+x^2+A^2", 51, 1285)
+
+#: Above `large`, by degree; beyond them the most square folds (`generator.array.size`).
+_LARGER = {
+    9: _gf4(9, "x^9+A^2x^6+x^2+A", 511, 513),
+    10: _gf4(10, "x^10+Ax^9+Ax^8+Ax^7+x^6+A^2x^5+A^2x^4+Ax^3+A^2x^2+Ax+A", 825, 1271),
+    11: _gf4(11, "x^11+A^2x^9+Ax^8+x^7+A^2x^6+Ax^5+Ax^4+x^3+A^2x^2+Ax+A^2", 2047, 2049),
+    12: _gf4(12, "x^12+A^2x^11+A^2x^10+x^9+Ax^7+x^6+x^5+A^2x^4+Ax^3+A^2x^2+A", 3133, 5355),
+}
+
 PROFILES: Mapping[str, Profile] = MappingProxyType(
     {
         profile.name: profile
@@ -90,7 +101,7 @@ PROFILES: Mapping[str, Profile] = MappingProxyType(
             ),
             _profile(
                 "large",
-                _gf4(8, "x^8+x^3+x+A", 255, 257),
+                _LARGE,
                 (4, 2),
                 "dense-4",
                 7.0,
@@ -98,7 +109,7 @@ PROFILES: Mapping[str, Profile] = MappingProxyType(
             ),
             _profile(
                 "fine",
-                _gf4(8, "x^8+x^3+x+A", 255, 257),
+                _LARGE,
                 (4, 2),
                 "dense-4",
                 4.5,
@@ -120,9 +131,10 @@ def profile(name: str = DEFAULT_PROFILE) -> Profile:
 
 
 def next_larger(smaller: Profile) -> Profile:
-    """Return the profile on the next larger fold of the same field: `large` "and up".
+    """Return the profile on the next larger array of the same field: `large` "and up".
 
-    255x257, 511x513, 1023x1025, 4095x4097, ... over GF(4); the window is the smallest one.
+    Over GF(4) 511x513, 825x1271, 2047x2049 and 3133x5355, then the most square folds; the
+    window is the smallest one.
 
     Raises `ArrayError` for a product array, or if no larger one decodes.
     """
@@ -132,30 +144,22 @@ def next_larger(smaller: Profile) -> Profile:
             f"profile '{smaller.name}' is not a folded array, so it has no next size",
             fix="take profile large",
         )
-    size = _next_size(array.order, array.full_rank)
-    if size is None:
+    encoding = _next_encoding(array.order, array.full_rank)
+    if encoding is None:
         raise ArrayError(
             f"no array over GF({array.order}) is larger than {array.rows}x{array.columns}",
             fix="start another database",
         )
-    degree, (rows, columns) = size
-    larger = array_from(
-        {
-            "family": array.family,
-            "order": array.order,
-            "degree": degree,
-            "rows": rows,
-            "columns": columns,
-        }
-    )
-    encoding = MappingProxyType(larger.definition())
-    return replace(smaller, encoding=encoding, window=larger.window)
+    larger = array_from({"family": array.family} | encoding)
+    return replace(smaller, encoding=MappingProxyType(larger.definition()), window=larger.window)
 
 
-def _next_size(order: int, degree: int) -> tuple[int, tuple[int, int]] | None:
-    """Return the next degree and fold that is no long strip."""
+def _next_encoding(order: int, degree: int) -> dict[str, Any] | None:
+    """Return the array of the next degree that decodes on a fold that is no long strip."""
     while above := [size for size in nearest_sizes(order, degree) if size[0] > degree]:
         degree, (rows, columns) = above[0]
+        if order == 4 and degree in _LARGER:
+            return _LARGER[degree]
         if columns <= 2 * rows:
-            return degree, (rows, columns)
+            return {"order": order, "degree": degree, "rows": rows, "columns": columns}
     return None

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
 from itertools import chain
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,6 +36,22 @@ def find_array(connection: Connection, array: SymbolArray) -> int | None:
     return connection.execute(
         select(arrays.array_id).where(arrays.definition_sha256 == array_key(array))
     ).scalar_one_or_none()
+
+
+def array_of_profile(connection: Connection, profiles: Sequence[str]) -> dict[str, Any] | None:
+    """Return the definition of the first array that was asked for by one of these names.
+
+    A profile may change from one version to the next; the objects of a database stay on one
+    array, so that their room and their rivals are counted together.
+    """
+    arrays = tables.arrays.c
+    text = connection.execute(
+        select(arrays.definition)
+        .where(arrays.profile.in_(profiles))
+        .order_by(arrays.array_id)
+        .limit(1)
+    ).scalar_one_or_none()
+    return None if text is None else json.loads(text)
 
 
 def occupancy(connection: Connection, array: SymbolArray) -> Occupancy:

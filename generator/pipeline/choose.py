@@ -2,8 +2,10 @@
 
 Of arrays with the same symbols the smallest is taken in which the objects fit beside what the
 database holds: `one-touch`, `large`, and its next sizes. Objects that are registered keep the array
-they are on. Faces that stay blank and would show a place with the finer symbols of `fine` make it
-the choice where the spec names a printer for them, and a note where it does not.
+they are on, and a database goes on with the arrays that it has: where another one was registered
+under a profile's name, that profile means that one. Faces that stay blank and would show a place
+with the finer symbols of `fine` make it the choice where the spec names a printer for them, and a
+note where it does not.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from sqlalchemy import Connection
 
 from generator.array.contract import SymbolArray
 from generator.array.profiles import DEFAULT_PROFILE, PROFILES, Profile, next_larger
-from generator.database.cells import occupancy
+from generator.database.cells import array_of_profile, occupancy
 from generator.database.entries import find_object
 from generator.errors import ArrayError, GeneratorError, LayoutError
 from generator.layout.placement import Layout
@@ -40,12 +42,12 @@ class Choice:
 def choose_array(
     specs: Sequence[LocatedSpec], connection: Connection | None, solid: Polyhedron | None = None
 ) -> Choice:
-    """Return the specs with a profile in place of `auto`.
+    """Return the specs on the database's arrays, with a profile in place of `auto`.
 
     Parameters
     ----------
     specs
-        Of one run; where one of them names its profile, all others follow it.
+        Of one run; where one of them names its profile, those of `auto` follow it.
     connection
         Of a `reading` transaction; None where there is no database yet.
     solid
@@ -56,8 +58,9 @@ def choose_array(
     GeneratorError
         No array is large enough, or an object cannot be made at all.
     """
+    specs = tuple(_keep(one, connection) for one in specs)
     if not any(one.spec.profile == AUTO for one in specs):
-        return Choice(tuple(specs))
+        return Choice(specs)
     named = [one.spec for one in specs if one.spec.profile != AUTO]
     if named:  # on the same array, or the specs would have been refused
         profile, encoding = named[0].profile, named[0].encoding
@@ -66,12 +69,12 @@ def choose_array(
     if connection is not None:
         for one in specs:
             known = find_object(connection, one.spec.name)
-            for candidate in _candidates() if known else ():
-                if known and known.profile == candidate.name:
-                    array = candidate.array()
-                    return Choice(tuple(_with(each, candidate, array) for each in specs))
+            kept = None if known is None else _registered(known.profile, connection)
+            if kept is not None:
+                array = kept.array()
+                return Choice(tuple(_with(each, kept, array) for each in specs))
     short: list[str] = []  # why each smaller array does not do
-    for candidate in _candidates():
+    for candidate in _candidates(connection):
         array = candidate.array()
         tried = tuple(_with(one, candidate, array) for one in specs)
         needed, blank = _needs(tried, solid)
@@ -103,7 +106,7 @@ def _finer(
     coarse: Choice, blank: int, connection: Connection | None, solid: Polyhedron | None
 ) -> Choice:
     """Take the finer symbols where they show faces that stay blank otherwise."""
-    fine = PROFILES["fine"]
+    fine = _kept(PROFILES["fine"], connection)
     array = fine.array()
     try:
         finer = tuple(_with(one, fine, array) for one in coarse.specs)
@@ -119,10 +122,10 @@ def _finer(
     return Choice(coarse.specs, (*coarse.notes, note))
 
 
-def _candidates() -> Iterator[Profile]:
+def _candidates(connection: Connection | None) -> Iterator[Profile]:
     """Yield the arrays from the smallest on."""
-    yield PROFILES["one-touch"]
-    larger = PROFILES["large"]
+    yield _kept(PROFILES["one-touch"], connection)
+    larger = _kept(PROFILES["large"], connection)
     yield larger
     for _ in range(CHOICE.larger):
         try:
@@ -131,6 +134,37 @@ def _candidates() -> Iterator[Profile]:
             return
         rows, columns = larger.encoding["rows"], larger.encoding["columns"]
         yield replace(larger, name=f"large-{rows}x{columns}")
+
+
+def _kept(profile: Profile, connection: Connection | None) -> Profile:
+    """Return a profile on the array that the database has under its name, if it has one."""
+    if connection is None:
+        return profile
+    alike = [name for name, one in PROFILES.items() if one.encoding == profile.encoding]
+    kept = array_of_profile(connection, alike or [profile.name])
+    if kept is None:
+        return profile
+    return replace(profile, encoding=kept, window=tuple(kept["window"]))
+
+
+def _registered(name: str, connection: Connection) -> Profile | None:
+    """Return the profile of an object that got its array by `auto`, None for another one."""
+    base = "large" if name.startswith("large-") else name
+    kept = array_of_profile(connection, [name])
+    if kept is None or base not in ("one-touch", "large"):
+        return None
+    return replace(PROFILES[base], name=name, encoding=kept, window=tuple(kept["window"]))
+
+
+def _keep(located: LocatedSpec, connection: Connection | None) -> LocatedSpec:
+    """Return a spec that names its profile, on the array of `_kept`."""
+    name = located.spec.profile
+    if name not in PROFILES:
+        return located
+    kept = _kept(PROFILES[name], connection)
+    if kept is PROFILES[name]:
+        return located
+    return _with(located, kept, kept.array())
 
 
 def _with(located: LocatedSpec, profile: Profile, array: SymbolArray) -> LocatedSpec:

@@ -285,8 +285,8 @@ def test_general_folds_have_tight_windows(q, n, rows, columns, windows):
         ("thesis", (63, 65, 2), (6, 2), "thesis-2", 12.0, 1),
         ("product", (15, 15, 8), (4, 2), "dense-8", 12.0, 2),
         ("one-touch", (63, 65, 4), (3, 2), "dense-4", 7.0, 1),
-        ("large", (255, 257, 4), (4, 2), "dense-4", 7.0, 1),
-        ("fine", (255, 257, 4), (4, 2), "dense-4", 4.5, 1),
+        ("large", (51, 1285, 4), (4, 2), "dense-4", 7.0, 1),
+        ("fine", (51, 1285, 4), (4, 2), "dense-4", 4.5, 1),
     ],
 )
 def test_profiles(name, size, window, alphabet, pitch_mm, distance_of_window):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -15,6 +16,8 @@ from generator.pipeline import encode
 from generator.pipeline.choose import choose_array
 from generator.pipeline.plan import plan_object
 from generator.spec import SpecError, read_specs
+
+DATABASES = Path(__file__).parents[3] / "fixtures" / "database"
 
 
 def dry(folder: Path, text: str, **options):
@@ -50,7 +53,7 @@ def test_auto_takes_the_smallest_array_that_holds_the_objects(tmp_path):
     assert profiles(larger) == {"large-511x513"}
     assert plan_object(larger.specs[0]).array.rows == 511
     (note,) = larger.notes
-    assert "76800 cells are needed, and large 255x257 has room for 52428" in note
+    assert "76800 cells are needed, and large 51x1285 has room for 52428" in note
     assert larger.specs[199].spec.name == "A-200"
 
 
@@ -83,6 +86,25 @@ def test_auto_goes_on_where_the_database_is_full(tmp_path):
     again = dry(tmp_path, text.format("A"))
     assert again.objects[0].reused
     assert (again.rows, again.columns) == (63, 65)
+
+
+def test_a_database_goes_on_with_the_arrays_that_it_has(tmp_path):
+    """Profile large was 255x257 when this one was made."""
+    new = "name: {}\nprofile: {}\nshape: {{cube: 30 mm}}\n"
+    assert dry(tmp_path, new.format("New", "large")).rows == 51
+    shutil.copy(DATABASES / "v2.db", tmp_path / "lab.db")
+    for profile in ("large", "fine"):
+        result = dry(tmp_path, new.format(f"New {profile}", profile), dry_run=False, formats=())
+        assert (result.rows, result.columns) == (255, 257)
+        assert result.used_cells > result.objects[0].symbols  # beside the brick
+    brick = "name: Brick\nprofile: {}\nshape: {{box: [40, 30, 20]}}\n"
+    for profile in ("large", "auto"):
+        (same,) = dry(tmp_path, brick.format(profile)).objects
+        assert same.reused
+    many = choice(tmp_path, new.format("Many", "auto") + "copies: 120\n")
+    assert profiles(many) == {"large"}
+    assert many.specs[0].spec.encoding["rows"] == 255
+    assert dry(tmp_path, new.format("Other", "one-touch")).rows == 63
 
 
 def test_auto_takes_finer_symbols_for_a_printer_that_makes_them(tmp_path):
@@ -138,7 +160,7 @@ def test_panels_of_a_round_object_are_refused_where_they_are_asked_for(tmp_path)
 def test_what_is_made_with_a_larger_array_is_told(tmp_path):
     text = "name: A\nprofile: auto\nshape: {cube: 30 mm}\ncopies: 60\n"
     result = dry(tmp_path, text)
-    assert (result.rows, result.columns) == (255, 257)
+    assert (result.rows, result.columns) == (51, 1285)
     assert "profile large is taken" in result.objects[0].warnings[0]
     assert not any("is taken" in w for made in result.objects[1:] for w in made.warnings)
 
