@@ -14,13 +14,12 @@ import time
 from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
-from types import TracebackType
-from typing import Self
 
 from probe.client.diagnosis import no_probe
 from probe.client.receiver import Receiver
 from probe.client.settings import CLIENT
 from probe.client.statistics import ClientStatistics
+from probe.closing import Closing
 from probe.errors import PortError, ProbeError
 from probe.frame import Frame
 from probe.port.contract import Port
@@ -34,7 +33,7 @@ from probe.protocol import (
 )
 
 
-class Client:
+class Client(Closing):
     """A conversation with a probe. Use it with `with`, and iterate over `frames()`.
 
     Parameters
@@ -85,17 +84,6 @@ class Client:
         self._port: Port = open_port(url)
         self._thread = threading.Thread(target=self._run, name=f"client of {url}", daemon=True)
         self._thread.start()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def frames(self, timeout_s: float | None = None) -> Iterator[Frame]:
         """Yield trusted frames until the client is closed, or a recording ends.

@@ -9,18 +9,17 @@ from __future__ import annotations
 import queue
 import threading
 import time
-from types import TracebackType
-from typing import Self
 
 from probe.client.client import Client
 from probe.client.settings import CLIENT
+from probe.closing import Closing
 from probe.errors import ProbeError
 from probe.frame import Frame
 from probe.port.url import address_of
 from probe.protocol import IdentPacket
 
 
-class Stream:
+class Stream(Closing):
     """The frames of a probe; a context manager that lets go of the port too.
 
     Parameters
@@ -46,15 +45,8 @@ class Stream:
         self._thread = threading.Thread(target=self._feed, name="frames", daemon=True)
         self._thread.start()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Stop, and close the client."""
         self._closed.set()
         self.client.close()
         self._thread.join()

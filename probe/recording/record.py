@@ -10,11 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType, TracebackType
-from typing import Any, Final, NoReturn, Self
+from types import MappingProxyType
+from typing import Any, Final, NoReturn
 
 import numpy as np
 
+from probe.closing import Closing
 from probe.errors import RecordingError
 from probe.frame import Frame
 from probe.recording.layout import CHUNK, FrameBlock, RecordingOrigin
@@ -24,7 +25,7 @@ from probe.recording.write import FileWriter
 _NO_POSE: Final = np.full((4, 4), np.nan)
 
 
-class Recorder:
+class Recorder(Closing):
     """A recording that is being written; a context manager. Not for several threads.
 
     Parameters
@@ -133,17 +134,6 @@ class Recorder:
             return
         self.flush()
         self._finish(last=True)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _open_writer(self) -> FileWriter:
         if self._writer is None:

@@ -12,11 +12,11 @@ from __future__ import annotations
 import os
 from importlib.metadata import version
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from probe.closing import Closing
 from probe.errors import RecordingError
 from probe.recording.layout import (
     CHUNK,
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 _FILE_FORMAT: Final = ("v110", "v110")
 
 
-class FileWriter:
+class FileWriter(Closing):
     """A recording file that is being written.
 
     Parameters
@@ -116,17 +116,6 @@ class FileWriter:
             os.fsync(self._descriptor)
         os.close(self._descriptor)
         self._descriptor = -1
-
-    def __enter__(self) -> FileWriter:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _start(self, poses: bool) -> None:
         """Make the datasets, and the file readable from now on."""
