@@ -13,7 +13,11 @@ from dataclasses import dataclass
 class LayoutSettings:
     """Limits of the search: larger ones look at more and take longer."""
 
-    # lattice.py: shift and rotation of one face's lattice
+    # lattice_search.py: shift and rotation of one face's lattice
+    same_rad: float = 1e-9
+    """Rotations nearer than this are the same."""
+    centres: int = 1 << 17
+    """Candidate centres looked at for one rotation."""
     search_rotations: int = 12
     """Rotations tried over a quarter turn beside the edges' directions: every 7.5 degrees."""
     edge_rotations: int = 12

@@ -4,18 +4,15 @@ import numpy as np
 import pytest
 import shapely
 
-from generator.layout import lattice as lattices
+from generator.layout import lattice_search
 from generator.layout.footprint import move_region, region_of
-from generator.layout.lattice import (
-    Lattice,
-    _Candidate,
-    _candidates,
-    _centre,
-    _Set,
+from generator.layout.lattice import Lattice, _centre, _with_places, choose_lattice
+from generator.layout.lattice_search import (
+    CellSet,
+    LatticeCandidate,
     _unique_sets,
-    _with_places,
-    choose_lattice,
     edge_rotations,
+    lattice_candidates,
 )
 
 HALF, PITCH = 2.7, 7.0
@@ -393,10 +390,10 @@ def looks(monkeypatch, regions, answers=()):
     def look(regions, half, pitch, window, rotation, steps, best):
         calls.append((rotation, steps, best))
         score = left.pop(0) if left else None
-        return [_Candidate(*score, rotation, ())] if score else []
+        return [LatticeCandidate(*score, rotation, ())] if score else []
 
-    monkeypatch.setattr(lattices, "_best_shifts", look)
-    found = _candidates(regions, HALF, PITCH, WINDOW, search=True)
+    monkeypatch.setattr(lattice_search, "_best_shifts", look)
+    found = lattice_candidates(regions, HALF, PITCH, WINDOW, search=True)
     return calls, [(one.worth, one.cells) for one in found]
 
 
@@ -462,7 +459,7 @@ def test_a_lattice_is_centred_in_three_passes():
     # legs along the axes: the centre may be anywhere with x, y >= 2 and x + y <= 16
     loop = [(0, 0), (20, 0), (0, 20)]
     face = region_of([np.array(loop, float)], [np.array([1.0, 2**0.5, 1.0])])
-    found = _centre([face], 1.0, PITCH, 0.0, _Set(2.5, 3.0, (np.array([[0, 0]]),)))
+    found = _centre([face], 1.0, PITCH, 0.0, CellSet(2.5, 3.0, (np.array([[0, 0]]),)))
     x, y, margin = 3.0, 2.5, 0.0
     for _ in range(3):
         x, across = (2 + 16 - y) / 2, 16 - y - 2
@@ -478,7 +475,7 @@ def test_faces_that_share_a_lattice_bound_its_play_together():
     cells = (np.array([[0, 0]]), np.array([[0, 3]]))
     regions = [region(loop) for loop in loops]
     for order in (slice(None), slice(None, None, -1)):
-        found = _centre(regions[order], 1.0, PITCH, 0.0, _Set(2.5, 3.0, cells[order]))
+        found = _centre(regions[order], 1.0, PITCH, 0.0, CellSet(2.5, 3.0, cells[order]))
         # x from 2.3 to 8, y from 2.4 to 4
         assert (found.x_mm, found.y_mm) == pytest.approx((5.15, 3.2))
         assert found.margin_mm == pytest.approx(0.8, abs=1e-5)
