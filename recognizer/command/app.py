@@ -124,7 +124,8 @@ def recognize(
         raise typer.BadParameter("--joints of a scan: give a file with a line for each touch")
 
     def action() -> int:
-        from recognizer.command.answers import RecognizeOptions, recognize_touches
+        from recognizer.command.answers import RecognizeOptions
+        from recognizer.command.recognize import recognize_touches
 
         return recognize_touches(
             RecognizeOptions(

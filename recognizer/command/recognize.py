@@ -1,0 +1,142 @@
+"""`recognize-object`: answers printed as they come; the pictures of a recording at its end."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack
+from threading import Event
+from typing import Any
+
+from encoded_objects.console import FAILED, INTERRUPTED
+from encoded_objects.console.interruption import interruption
+from encoded_objects.console.output import message, warning, write_json
+from encoded_objects.console.progress import ProgressBar, progress_bar
+from probe.frame import Frame
+from probe.recording.read import Recording
+from probe.sensor import SensorType
+from recognizer.command import report
+from recognizer.command.answer_pictures import draw_answer, draw_answers, refuse_pictures
+from recognizer.command.answers import Answer, RecognizeOptions, answers_of
+from recognizer.command.port import listen, source_at
+from recognizer.command.scanning import touches_for
+from recognizer.touch.lab import Lab, open_lab
+from recognizer.touch.reader import Reader
+from recognizer.touch.recognition import NO_CONTACT
+from recognizer.touch.source import TouchSource, source_of
+
+
+def recognize_touches(options: RecognizeOptions) -> int:
+    """Read touches and print answers; returns the exit code.
+
+    Raises
+    ------
+    RecordingError, PortError, CalibrationError
+        What is read cannot be read.
+    DatabaseError, LabError
+        The database cannot be read, or holds no encoded object.
+    """
+    if options.plot is not None:
+        refuse_pictures(options.plot, replace=options.replace)
+    with interruption() as interrupted:
+        lab = open_lab(options.database)
+        if options.recording is not None:
+            recording = Recording(options.recording, live=options.live)
+            source = source_of(
+                recording, SensorType(), overlay=options.overlay,
+                calibration=options.calibration, every=options.every,
+            )  # fmt: skip
+            reader = _reader(lab, source)
+            return _print_answers(options, reader, source, recording.frames(), interrupted)
+        source = source_at(
+            options.port, overlay=options.overlay, calibration=options.calibration,
+            every=options.every,
+        )  # fmt: skip
+        reader = _reader(lab, source)  # before frames come
+        with listen(source, interrupted, options.sensor, options.calibration) as frames:
+            return _print_answers(options, reader, source, frames, interrupted)
+
+
+def _reader(lab: Lab, source: TouchSource) -> Reader:
+    if source.notice:
+        warning(source.notice)
+    return Reader(lab, source.sensor)
+
+
+def _print_answers(
+    options: RecognizeOptions,
+    reader: Reader,
+    source: TouchSource,
+    frames: Iterator[Frame],
+    interrupted: Event,
+) -> int:
+    """Answer and print all touches; returns the exit code."""
+    out = sys.stdout  # a bar would take it for its terminal
+    values: list[dict[str, Any]] = []
+    kept: list[Answer] = []
+    read = answered = 0
+    lines = options.as_json and options.follow
+    needed = touches_for(reader)
+    if options.scan and needed == 1:
+        message("one touch is enough for these symbols; a scan helps where parts are worn or cut")
+    with ExitStack() as stack:
+        bar = None
+        if options.as_json or not out.isatty():  # otherwise the answers show how far it is
+            bar = stack.enter_context(progress_bar("reading", source.frames))
+            frames = _show_count(frames, bar)
+        for answer in answers_of(options, reader, source, frames, interrupted):
+            read += 1
+            answered = bool(answer.found) + (0 if options.scan else answered)
+            if options.plot is not None:
+                if options.follow:
+                    draw_answer(reader, source, answer, options.plot)
+                else:
+                    kept.append(answer)
+            if not options.as_json:
+                out.write(_sentence(answer, needed) + "\n")
+                out.flush()
+                continue
+            entry = report.entry(answer.touch, answer.found, answer.in_base)
+            if answer.touches is not None:
+                entry["touches"] = answer.touches
+            if answer.edges is not None:
+                entry["edges"] = [report.edge_entry(edge, answer.found) for edge in answer.edges]
+            if lines:
+                write_json(entry, line=True)
+                out.flush()
+            else:
+                values.append(entry)
+    if options.plot is not None and kept:
+        draw_answers(reader, source, kept, options.plot, interrupted)
+    if options.as_json and not lines:
+        write_json(values)
+    elif options.scan and read:
+        what = f"{answer.found.object}/{answer.found.face}" if answered else "not recognised"
+        message(f"a scan of {answer.touches} touches: {what}")
+    elif read != 1:
+        message(report.summary(read, answered, source.frames))
+    if not answered and read and not options.scan and needed > 1:
+        message(f"symbols of this lab are read by a scan of about {needed} overlapping touches: "
+                "recognize-object --scan")  # fmt: skip
+    if interrupted.is_set():
+        message("recognize-object: interrupted")
+        return INTERRUPTED
+    return 0 if answered else FAILED
+
+
+def _sentence(answer: Answer, needed: int) -> str:
+    """Return an answer in a line; of a scan with the number of its touches."""
+    said = report.sentence(answer.touch, answer.found, answer.in_base)
+    if answer.touches is None:
+        return said
+    if not answer.found and answer.found.reason != NO_CONTACT:
+        more = f"; go on: about {needed} touches" if answer.touches < needed else ""
+        said = f"{answer.touch.seq}: not yet: {answer.found.reason}{more}"
+    said = f"{said} ({answer.touches} {'touch' if answer.touches == 1 else 'touches'})"
+    return "; ".join((said, *map(report.edge_words, answer.edges or ())))
+
+
+def _show_count(frames: Iterator[Frame], bar: ProgressBar) -> Iterator[Frame]:
+    for number, frame in enumerate(frames, start=1):
+        bar.show(number, f"{number:,} frames")
+        yield frame
