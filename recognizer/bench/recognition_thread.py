@@ -25,7 +25,7 @@ from recognizer.bench.broker import Broker
 from recognizer.bench.message import MosaicMessage, mosaic_message
 from recognizer.bench.read_trigger import ReadTrigger
 from recognizer.bench.settings import RECOGNITION
-from recognizer.scan.mosaic.grow import added
+from recognizer.scan.mosaic.grow import add_touch
 from recognizer.scan.mosaic.mosaic import Mosaic, no_touches
 from recognizer.scan.mosaic.touch import PlacedTouch, decoded_place
 from recognizer.touch.lab import open_lab
@@ -155,7 +155,7 @@ class RecognitionThread:
         with self._news:
             mosaic = self._mosaics.get(key) or no_touches(self.sensor)
         if len(mosaic) < RECOGNITION.touches:
-            mosaic = added(mosaic, PlacedTouch(signal, decoded=place, seq=answer.seq))
+            mosaic = add_touch(mosaic, PlacedTouch(signal, decoded=place, seq=answer.seq))
         with self._news:
             self._mosaics[key] = mosaic
             self._mosaics.move_to_end(key)

@@ -79,7 +79,7 @@ class LocatedComposite:
         )
 
 
-def located(
+def locate_composites(
     encoding: EmbossedArray,
     composites: Sequence[Composite],
     limits: ScanSettings,
@@ -114,7 +114,7 @@ def distinct_places(found: Sequence[LocatedComposite]) -> list[LocatedComposite]
     return [item for n, item in enumerate(ranked) if n == 0 or not ranked[0].same(item)]
 
 
-def posed(
+def refine_last_pose(
     reader: Reader,
     image: Image,
     template: ResponseTemplate,
@@ -152,7 +152,7 @@ def posed(
     return replace(found, fit=finer, explained=share)
 
 
-def answered(
+def answer_scan(
     reader: Reader,
     found: Sequence[LocatedComposite],
     limits: ScanSettings,

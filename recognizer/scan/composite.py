@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from recognizer.scan.lattice import Agreement, expected_at
 from recognizer.scan.settings import ScanSettings
-from recognizer.scan.views import LatticeViews, Stands
+from recognizer.scan.views import LatticeViews, TouchPoses
 from recognizer.touch.symbols.fit import Fit
 
 Array = NDArray[np.float64]
@@ -32,14 +32,18 @@ class Composite:
 
 
 def composite(
-    views: LatticeViews, stands: Stands, agreement: Agreement, pitch_mm: float, limits: ScanSettings
+    views: LatticeViews,
+    touch_poses: TouchPoses,
+    agreement: Agreement,
+    pitch_mm: float,
+    limits: ScanSettings,
 ) -> Composite | None:
     """Return the sum of what agrees; None where nothing does."""
     contradicting = True
     while contradicting:
         if not (agreement.chosen >= 0).any():
             return None
-        cells, scores, seen, looks, against = _summed(views, agreement, limits)
+        cells, scores, seen, looks, against = _sum_evidence(views, agreement, limits)
         worst = int(np.argmin(against))
         contradicting = against[worst] < -limits.contradicts and (agreement.chosen >= 0).sum() > 2
         if contradicting:
@@ -53,7 +57,9 @@ def composite(
     most = scores.max(axis=1)
     last = len(agreement.chosen) - 1
     view = int(agreement.chosen[last])
-    pose, covariance = expected_at(agreement.lattice, stands.poses[last], stands.covariances[last])
+    pose, covariance = expected_at(
+        agreement.lattice, touch_poses.poses[last], touch_poses.covariances[last]
+    )
     shown = views.fits[view if view >= 0 else int(agreement.chosen.max())]
     if view >= 0:
         pose = views.poses[view] - np.append(agreement.shifts[last] * pitch_mm, 0.0)
@@ -76,16 +82,16 @@ def composite(
     return Composite(agreement, fit, looks, own)
 
 
-def expected_fit(found: Composite, stands: Stands) -> Fit:
+def expected_fit(found: Composite, touch_poses: TouchPoses) -> Fit:
     """Return a composite's fit with the last touch where the others lead to expect it."""
     pose, covariance = expected_at(
-        found.agreement.lattice, stands.poses[-1], stands.covariances[-1]
+        found.agreement.lattice, touch_poses.poses[-1], touch_poses.covariances[-1]
     )
     x, y, theta = pose.tolist()
     return replace(found.fit, x_mm=x, y_mm=y, theta_rad=theta, covariance=covariance)
 
 
-def _summed(
+def _sum_evidence(
     views: LatticeViews, agreement: Agreement, limits: ScanSettings
 ) -> tuple[Ints, Array, Array, Array, Array]:
     """Return cells, scores, how much is seen, looks, and (n,) what each touch is contradicted."""

@@ -9,15 +9,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.scan.answer import LocatedComposite, answered, distinct_places, located, posed
+from recognizer.scan.answer import (
+    LocatedComposite,
+    answer_scan,
+    distinct_places,
+    locate_composites,
+    refine_last_pose,
+)
 from recognizer.scan.composite import Composite, composite, expected_fit
-from recognizer.scan.lattice import PlaneLattice, agreed, alike, expected_at, seeded
+from recognizer.scan.lattice import (
+    PlaneLattice,
+    expected_at,
+    refine_agreement,
+    same_lattice,
+    seed_lattice,
+)
 from recognizer.scan.mosaic.touch import PlacedTouch
 from recognizer.scan.settings import ScanSettings
 from recognizer.scan.views import (
     LatticeView,
     LatticeViews,
-    Stands,
+    TouchPoses,
     fits_of,
     is_unmeasured,
     round_views,
@@ -48,7 +60,7 @@ class ScanBelief:
     reader: Reader
     settings: ScanSettings
     touches: tuple[PlacedTouch, ...]  #: those with contact
-    stands: Stands | None
+    touch_poses: TouchPoses | None
     views: tuple[tuple[tuple[LatticeView, ...], ...], ...]  #: of each encoding, of each touch
     lattices: tuple[tuple[PlaneLattice, ...], ...]  #: of each encoding, best first
     astray: int  #: touches in a row that agree with nothing that the others say
@@ -104,11 +116,11 @@ def extend_scan(scan: ScanBelief, touch: PlacedTouch) -> ScanBelief:
     touches = (*scan.touches, replace(touch, decoded=None))
     finest = min(encoding.style.pitch_mm for encoding in reader.lab.arrays)
     by_hand = any(is_unmeasured(each, limits.loose * finest) for each in touches)
-    stands = stands_of(reader, touches, scan.stands, limits)
+    touch_poses = stands_of(reader, touches, scan.touch_poses, limits)
     shown, lattices, found, images = [], [], [], []
     for k, (encoding, template, bank) in enumerate(reader.prepared):
         image = _image(reader, touch, encoding.style.height_mm)
-        near = _near(scan.lattices[k][: limits.guided], stands)
+        near = _expected_poses(scan.lattices[k][: limits.guided], touch_poses)
         known = bool(scan.recognition) and scan.astray == 0
         new = fits_of(
             image, template, bank, reader, near, limits.clean, known=known, hard=scan.told is None
@@ -117,29 +129,29 @@ def extend_scan(scan: ScanBelief, touch: PlacedTouch) -> ScanBelief:
             new = (*new, *round_views(image, template, bank, reader, encoding, near))
         each = (*scan.views[k], tuple(v for v in new if v.fit.noise <= limits.noise))
         sums = _composites(
-            views_of(each), stands, scan.lattices[k], encoding.style.pitch_mm, limits
+            views_of(each), touch_poses, scan.lattices[k], encoding.style.pitch_mm, limits
         )
         shown.append(each)
         lattices.append(tuple(item.agreement.lattice for item in sums))
-        found += located(encoding, sums, limits, reader.settings.hypotheses)
+        found += locate_composites(encoding, sums, limits, reader.settings.hypotheses)
         images.append(image)
     found = distinct_places(found)
-    answer = answered(reader, found, limits, touch.seq, by_hand=by_hand)
+    answer = answer_scan(reader, found, limits, touch.seq, by_hand=by_hand)
     agrees = bool(found) and bool(found[0].composite.agreement.chosen[-1] >= 0)
     if answer:
-        found[0], agrees = _posed(reader, images, found[0], stands, limits)
-        answer = answered(reader, found, limits, touch.seq, by_hand=by_hand)
+        found[0], agrees = _pose_last_touch(reader, images, found[0], touch_poses, limits)
+        answer = answer_scan(reader, found, limits, touch.seq, by_hand=by_hand)
     elif scan.told is None and _tells_alone(reader, shown):
         alone = recognise(reader, touch.signal, touch.seq)
         if alone and found and found[0].face == (alone.object, alone.face):
             answer, agrees = alone, True
     astray = 0 if agrees else scan.astray + 1
-    answer, told = _believed(scan, answer, astray, 0 if by_hand else limits.patience)
+    answer, told = _believable_answer(scan, answer, astray, 0 if by_hand else limits.patience)
     return ScanBelief(
         reader=reader,
         settings=limits,
         touches=touches,
-        stands=stands,
+        touch_poses=touch_poses,
         views=tuple(shown),
         lattices=tuple(lattices),
         astray=astray,
@@ -149,27 +161,27 @@ def extend_scan(scan: ScanBelief, touch: PlacedTouch) -> ScanBelief:
     )
 
 
-def _posed(
+def _pose_last_touch(
     reader: Reader,
     images: list[Image],
     best: LocatedComposite,
-    stands: Stands,
+    touch_poses: TouchPoses,
     limits: ScanSettings,
 ) -> tuple[LocatedComposite, bool]:
     """Return a place with the pose of the last touch, and whether that touch agrees with it."""
     if best.composite.agreement.chosen[-1] >= 0:
         k = next(n for n, each in enumerate(reader.prepared) if each[0] is best.encoding)
-        finer = posed(reader, images[k], reader.prepared[k][1], best, limits)
+        finer = refine_last_pose(reader, images[k], reader.prepared[k][1], best, limits)
         many = len(best.fit.cells) >= reader.settings.belief.many_inliers
         least = (
             reader.settings.belief.explained_by_many if many else reader.settings.belief.explained
         )
         if finer.explained >= least and tells_place(finer.fit.covariance):
             return finer, True
-    return replace(best, fit=expected_fit(best.composite, stands)), False
+    return replace(best, fit=expected_fit(best.composite, touch_poses)), False
 
 
-def _believed(
+def _believable_answer(
     scan: ScanBelief, answer: Recognition, astray: int, patience: int
 ) -> tuple[Recognition, tuple[str | None, str | None] | None]:
     """Return an answer as far as it may be believed, and what the scan has told by now.
@@ -209,34 +221,44 @@ def _image(reader: Reader, touch: PlacedTouch, height_mm: float) -> Image:
     return image_of_signal(reader.sensor, signal, height_mm, reader.settings)
 
 
-def _near(lattices: tuple[PlaneLattice, ...], stands: Stands) -> Array:
+def _expected_poses(lattices: tuple[PlaneLattice, ...], touch_poses: TouchPoses) -> Array:
     """Return where (k, 3) lattices lead to expect the last touch."""
-    at = [expected_at(each, stands.poses[-1], stands.covariances[-1])[0] for each in lattices]
+    at = [
+        expected_at(each, touch_poses.poses[-1], touch_poses.covariances[-1])[0]
+        for each in lattices
+    ]
     return np.array(at).reshape(-1, 3)
 
 
 def _composites(
     views: LatticeViews,
-    stands: Stands,
+    touch_poses: TouchPoses,
     before: tuple[PlaneLattice, ...],
     pitch_mm: float,
     limits: ScanSettings,
 ) -> list[Composite]:
     """Return the sums of the lattices that were followed and of those of the last touch."""
-    last = len(stands.poses) - 1
-    every = [agreed(views, stands, each, pitch_mm, limits) for each in before]
+    last = len(touch_poses.poses) - 1
+    every = [refine_agreement(views, touch_poses, each, pitch_mm, limits) for each in before]
     known = {int(agreement.chosen[last]) for agreement in every[:1]}
     for view in np.flatnonzero(views.touch == last).tolist():
         if view not in known:
-            every.append(agreed(views, stands, seeded(views, stands, view), pitch_mm, limits))
+            every.append(
+                refine_agreement(
+                    views, touch_poses, seed_lattice(views, touch_poses, view), pitch_mm, limits
+                )
+            )
     every.sort(key=lambda agreement: -agreement.score)
     distinct: list[PlaneLattice] = []
     sums: list[Composite] = []
     for agreement in every:
-        if any(alike(agreement.lattice, other, stands.poses[last], pitch_mm) for other in distinct):
+        if any(
+            same_lattice(agreement.lattice, other, touch_poses.poses[last], pitch_mm)
+            for other in distinct
+        ):
             continue
         distinct.append(agreement.lattice)
-        summed = composite(views, stands, agreement, pitch_mm, limits)
+        summed = composite(views, touch_poses, agreement, pitch_mm, limits)
         if summed is not None:
             sums.append(summed)
         if len(distinct) == limits.lattices:

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.scan.mosaic.planar import composed, inverse, wrapped
+from recognizer.scan.mosaic.planar import compose_poses, inverse, wrap_angle
 from recognizer.scan.settings import LATTICES, ScanSettings
-from recognizer.scan.views import LatticeViews, Stands
+from recognizer.scan.views import LatticeViews, TouchPoses
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -43,64 +43,66 @@ class Agreement:
     score: float  #: their sum
 
 
-def seeded(views: LatticeViews, stands: Stands, view: int) -> PlaneLattice:
+def seed_lattice(views: LatticeViews, touch_poses: TouchPoses, view: int) -> PlaneLattice:
     """Return the lattice that one view shows."""
     touch, pose = int(views.touch[view]), views.poses[view]
-    T_lattice_plane = composed(pose, inverse(stands.poses[touch]))
-    turned = _turned(stands.covariances[touch], float(T_lattice_plane[2]))
+    T_lattice_plane = compose_poses(pose, inverse(touch_poses.poses[touch]))
+    turned = _rotate_covariances(touch_poses.covariances[touch], float(T_lattice_plane[2]))
     back = np.linalg.inv(_lever(pose[None])[0])
     return PlaneLattice(T_lattice_plane, back @ (views.covariances[view] + turned) @ back.T)
 
 
-def agreed(
+def refine_agreement(
     views: LatticeViews,
-    stands: Stands,
+    touch_poses: TouchPoses,
     lattice: PlaneLattice,
     pitch_mm: float,
     limits: ScanSettings,
 ) -> Agreement:
     """Return what agrees with a lattice, and the lattice moved to where that wants it."""
-    found = _agreed(views, stands, lattice, pitch_mm, limits)
+    found = _agreement_with(views, touch_poses, lattice, pitch_mm, limits)
     for _ in range(LATTICES.rounds):
-        lattice = _moved(views, stands, found, pitch_mm, limits)
-        before, found = found, _agreed(views, stands, lattice, pitch_mm, limits)
+        lattice = _refit_lattice(views, touch_poses, found, pitch_mm, limits)
+        before, found = found, _agreement_with(views, touch_poses, lattice, pitch_mm, limits)
         away = np.abs(found.expected - before.expected)[:, :2].max()
         if away < LATTICES.settled_mm and (found.chosen == before.chosen).all():
             break
     return found
 
 
-def alike(a: PlaneLattice, b: PlaneLattice, at: Array, pitch_mm: float) -> bool:
+def same_lattice(a: PlaneLattice, b: PlaneLattice, at: Array, pitch_mm: float) -> bool:
     """Whether two lattices are one, as seen from a touch (3,) of the plane."""
-    away = composed(a.T_lattice_plane, at) - composed(b.T_lattice_plane, at)
+    away = compose_poses(a.T_lattice_plane, at) - compose_poses(b.T_lattice_plane, at)
     off = away[:2] - np.rint(away[:2] / pitch_mm) * pitch_mm
-    return bool(np.hypot(*off) < 0.2 * pitch_mm and abs(wrapped(away[2])) < 0.2)
+    return bool(np.hypot(*off) < 0.2 * pitch_mm and abs(wrap_angle(away[2])) < 0.2)
 
 
 def expected_at(lattice: PlaneLattice, pose: Array, covariance: Array) -> tuple[Array, Array]:
     """Return T_lattice_touch (3,) and its covariance for a touch that stands in the plane."""
-    at = composed(lattice.T_lattice_plane, pose)
+    at = compose_poses(lattice.T_lattice_plane, pose)
     lever = _lever(at[None])[0]
-    turned = _turned(covariance, float(lattice.T_lattice_plane[2]))
+    turned = _rotate_covariances(covariance, float(lattice.T_lattice_plane[2]))
     return at, lever @ lattice.covariance @ lever.T + turned
 
 
-def _agreed(
+def _agreement_with(
     views: LatticeViews,
-    stands: Stands,
+    touch_poses: TouchPoses,
     lattice: PlaneLattice,
     pitch_mm: float,
     limits: ScanSettings,
 ) -> Agreement:
-    number = len(stands.poses)
-    expected = composed(lattice.T_lattice_plane, stands.poses)
-    away, shifts = _away(views, expected, pitch_mm)
-    own = _own(views, stands, lattice, expected, limits)
+    number = len(touch_poses.poses)
+    expected = compose_poses(lattice.T_lattice_plane, touch_poses.poses)
+    away, shifts = _residuals(views, expected, pitch_mm)
+    own = _view_covariances(views, touch_poses, lattice, expected, limits)
     lever = _lever(expected)[views.touch]
     spread = own + lever @ lattice.covariance @ lever.swapaxes(1, 2)
     precision: Array = np.asarray(np.linalg.inv(spread), np.float64)
     chi2 = np.einsum("mi,mij,mj->m", away, precision, away)
-    likely = (chi2 < 2 * limits.left_out) & _sure(away, precision, pitch_mm, limits.shift_margin)
+    likely = (chi2 < 2 * limits.left_out) & _unambiguous_shifts(
+        away, precision, pitch_mm, limits.shift_margin
+    )
     likely &= views.losses > -limits.plainly
     score = np.maximum(views.losses, -limits.left_out) - chi2 / 2
     score += np.where(views.led, 0.0, limits.agreement)
@@ -116,24 +118,26 @@ def _agreed(
     return Agreement(lattice, chosen, taken, expected, best, float(best.sum()))
 
 
-def _away(views: LatticeViews, expected: Array, pitch_mm: float) -> tuple[Array, Ints]:
+def _residuals(views: LatticeViews, expected: Array, pitch_mm: float) -> tuple[Array, Ints]:
     """Return how far (m, 3) views lie from what is expected, and whole pitches (m, 2) beyond."""
     away = views.poses - expected[views.touch]
     shifts = np.rint(away[:, :2] / pitch_mm)
     away[:, :2] -= shifts * pitch_mm
-    away[:, 2] = wrapped(away[:, 2])
+    away[:, 2] = wrap_angle(away[:, 2])
     return away, shifts.astype(np.int64)
 
 
-def _own(
+def _view_covariances(
     views: LatticeViews,
-    stands: Stands,
+    touch_poses: TouchPoses,
     lattice: PlaneLattice,
     expected: Array,
     limits: ScanSettings,
 ) -> Array:
     """Return covariances (m, 3, 3) of views against a lattice that is known exactly."""
-    turned = _turned(stands.covariances, float(lattice.T_lattice_plane[2]))[views.touch]
+    turned = _rotate_covariances(touch_poses.covariances, float(lattice.T_lattice_plane[2]))[
+        views.touch
+    ]
     middle = expected[:, :2].mean(axis=0)
     drift = (limits.scale * (expected[:, :2] - middle)[views.touch]) ** 2
     floor = np.array([limits.floor_mm, limits.floor_mm, limits.floor_rad]) ** 2
@@ -143,7 +147,9 @@ def _own(
     return np.asarray(own)
 
 
-def _sure(away: Array, precision: Array, pitch_mm: float, margin: float) -> NDArray[np.bool_]:
+def _unambiguous_shifts(
+    away: Array, precision: Array, pitch_mm: float, margin: float
+) -> NDArray[np.bool_]:
     """Whether no other whole pitch fits views (m,) nearly as well."""
     # (away + s)' P (away + s) - away' P away for the eight neighbours s
     by_shift = _NEIGHBOURS @ (precision[:, :2] @ away[..., None])[:, :, 0].T * pitch_mm
@@ -151,20 +157,24 @@ def _sure(away: Array, precision: Array, pitch_mm: float, margin: float) -> NDAr
     return np.asarray((2 * by_shift + square * pitch_mm**2).min(axis=0) > 2 * margin)
 
 
-def _moved(
-    views: LatticeViews, stands: Stands, found: Agreement, pitch_mm: float, limits: ScanSettings
+def _refit_lattice(
+    views: LatticeViews,
+    touch_poses: TouchPoses,
+    found: Agreement,
+    pitch_mm: float,
+    limits: ScanSettings,
 ) -> PlaneLattice:
     """Return the lattice where the chosen views want it."""
     chosen = found.chosen[found.chosen >= 0]
     if not len(chosen):
         return found.lattice
-    away, _ = _away(views, found.expected, pitch_mm)
-    own = _own(views, stands, found.lattice, found.expected, limits)[chosen]
+    away, _ = _residuals(views, found.expected, pitch_mm)
+    own = _view_covariances(views, touch_poses, found.lattice, found.expected, limits)[chosen]
     lever = _lever(found.expected)[views.touch[chosen]]
     weighted = lever.swapaxes(1, 2) @ np.linalg.inv(own)
     covariance = np.linalg.inv((weighted @ lever).sum(axis=0))
     motion = covariance @ (weighted @ away[chosen][..., None]).sum(axis=0)[:, 0]
-    at = composed(motion, found.lattice.T_lattice_plane)
+    at = compose_poses(motion, found.lattice.T_lattice_plane)
     return PlaneLattice(at, covariance + LATTICES.least * np.eye(3))
 
 
@@ -175,7 +185,7 @@ def _lever(poses: Array) -> Array:
     return lever
 
 
-def _turned(covariance: Array, angle: float) -> Array:
+def _rotate_covariances(covariance: Array, angle: float) -> Array:
     """Return covariances (..., 3, 3) of x, y, theta in axes turned back by an angle."""
     c, s = np.cos(angle), np.sin(angle)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

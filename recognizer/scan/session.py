@@ -14,7 +14,7 @@ from probe.arm.carried import SensorPose
 from probe.sensor import SensorType
 from recognizer.scan.grow import begin_scan, extend_scan
 from recognizer.scan.mosaic.planar import planar_covariance, planar_pose
-from recognizer.scan.mosaic.touch import PlacedTouch, PlanarBelief, placed
+from recognizer.scan.mosaic.touch import PlacedTouch, PlanarBelief, planar_belief
 from recognizer.scan.settings import ScanSettings
 from recognizer.touch.contacts import TouchImage
 from recognizer.touch.lab import Lab
@@ -136,18 +136,18 @@ class TouchPlaces:
         """Return a touch with what is known of its place."""
         if not self._any:
             spread = self.settings.first if pose is None else self._spread(pose, _matrix(pose))
-            return PlacedTouch(signal, believed=placed(np.zeros(3), spread), seq=seq)
+            return PlacedTouch(signal, believed=planar_belief(np.zeros(3), spread), seq=seq)
         if pose is not None and self._T_first_base is not None:
             return PlacedTouch(signal, believed=self._within(self._T_first_base, pose), seq=seq)
         if pose is None or self._before is None:
-            step = placed(np.zeros(3), self.settings.by_hand)
+            step = planar_belief(np.zeros(3), self.settings.by_hand)
         else:
             step = self._within(_inverse(_matrix(self._before)), pose)
         return PlacedTouch(signal, stepped=step, seq=seq)
 
     def _within(self, T_plane_base: Array, pose: SensorPose | ArrayLike) -> PlanarBelief:
         at = planar_pose(T_plane_base @ _matrix(pose))
-        return placed(at, self._spread(pose, _inverse(T_plane_base)))
+        return planar_belief(at, self._spread(pose, _inverse(T_plane_base)))
 
     def _spread(self, pose: SensorPose | ArrayLike, T_base_plane: Array) -> ArrayLike:
         """Return covariance (3, 3) or standard deviations (3,) of a pose in a plane."""

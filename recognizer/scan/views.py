@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.scan.mosaic.grow import added
+from recognizer.scan.mosaic.grow import add_touch
 from recognizer.scan.mosaic.mosaic import Mosaic, MosaicSettings, no_touches
-from recognizer.scan.mosaic.planar import wrapped
+from recognizer.scan.mosaic.planar import wrap_angle
 from recognizer.scan.mosaic.settings import ImageSearchSettings
 from recognizer.scan.mosaic.touch import PlacedTouch
 from recognizer.scan.settings import VIEWS, ScanSettings
@@ -34,7 +34,7 @@ Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stands:
+class TouchPoses:
     """Where touches stand in the plane."""
 
     poses: Array  #: (n, 3) T_plane_touch
@@ -64,8 +64,8 @@ class LatticeViews:
 
 
 def stands_of(
-    reader: Reader, touches: Sequence[PlacedTouch], before: Stands | None, limits: ScanSettings
-) -> Stands:
+    reader: Reader, touches: Sequence[PlacedTouch], before: TouchPoses | None, limits: ScanSettings
+) -> TouchPoses:
     """Return where touches stand, the last one being new.
 
     The mosaic is asked from the first touch on whose place is uncertain by more
@@ -79,18 +79,18 @@ def stands_of(
     if mosaic is None and sure and last.believed is not None:
         pose, covariance = last.believed.pose[None], last.believed.covariance[None]
         if before is None:
-            return Stands(pose, covariance, None)
+            return TouchPoses(pose, covariance, None)
         poses = np.concatenate([before.poses, pose])
-        return Stands(poses, np.concatenate([before.covariances, covariance]), None)
+        return TouchPoses(poses, np.concatenate([before.covariances, covariance]), None)
     if mosaic is None:
         search = ImageSearchSettings()
         if any(is_unmeasured(touch, loose_mm) for touch in touches):
             search = replace(search, margin_beyond=limits.margin_by_hand)
         mosaic = no_touches(reader.sensor, MosaicSettings(search=search, period_mm=pitch))
         for touch in touches[:-1]:
-            mosaic = added(mosaic, touch)
-    mosaic = added(mosaic, last)
-    return Stands(mosaic.poses, mosaic.covariances, mosaic)
+            mosaic = add_touch(mosaic, touch)
+    mosaic = add_touch(mosaic, last)
+    return TouchPoses(mosaic.poses, mosaic.covariances, mosaic)
 
 
 def is_unmeasured(touch: PlacedTouch, loose_mm: float) -> bool:
@@ -133,17 +133,19 @@ def fits_of(
     """
     settings = reader.settings.first
     if known and len(near):
-        expected = _near(image, template, settings, near[:1], None)
+        expected = _refine_near(image, template, settings, near[:1], None)
         if expected and expected[0].noise <= clean:
             return (LatticeView(expected[0], led=True),)
     found = fit_lattices(image, template, bank, settings)
     if hard and found and found[0].noise > clean:
         found = fit_lattices(image, template, bank, reader.settings.thorough)
     views = tuple(LatticeView(fit, led=False) for fit in found)
-    rest = [pose for pose in near if not any(_same(pose, f, template.pitch_mm) for f in found)]
-    for fit in _near(image, template, settings, np.array(rest).reshape(-1, 3), found):
+    rest = [
+        pose for pose in near if not any(_same_as_fit(pose, f, template.pitch_mm) for f in found)
+    ]
+    for fit in _refine_near(image, template, settings, np.array(rest).reshape(-1, 3), found):
         pose = np.array([fit.x_mm, fit.y_mm, fit.theta_rad])
-        if not any(_same(pose, view.fit, template.pitch_mm) for view in views):
+        if not any(_same_as_fit(pose, view.fit, template.pitch_mm) for view in views):
             views = (*views, LatticeView(fit, led=True))
     return views
 
@@ -173,13 +175,17 @@ def round_views(
         under = bend_image(image, reader.sensor, guess.bend)
         found = fit_lattices(under, template, bank, settings.first, [guess.gain])
         views += [LatticeView(fit, led=False) for fit in found]
-        rest = [pose for pose in near if not any(_same(pose, f, template.pitch_mm) for f in found)]
-        led = _near(under, template, settings.first, np.array(rest).reshape(-1, 3), found)
+        rest = [
+            pose
+            for pose in near
+            if not any(_same_as_fit(pose, f, template.pitch_mm) for f in found)
+        ]
+        led = _refine_near(under, template, settings.first, np.array(rest).reshape(-1, 3), found)
         views += [LatticeView(fit, led=True) for fit in led]
     return tuple(views)
 
 
-def _near(
+def _refine_near(
     image: Image,
     template: ResponseTemplate,
     settings: FitSettings,
@@ -224,8 +230,8 @@ def tells_place(covariance: Array) -> bool:
     )
 
 
-def _same(pose: Array, fit: Fit, pitch_mm: float) -> bool:
+def _same_as_fit(pose: Array, fit: Fit, pitch_mm: float) -> bool:
     """Whether a lattice is that of a fit, whole pitches apart."""
     away = pose - (fit.x_mm, fit.y_mm, fit.theta_rad)
     at = away[:2] - np.rint(away[:2] / pitch_mm) * pitch_mm
-    return math.hypot(*at) < VIEWS.same_mm and abs(float(wrapped(away[2]))) < VIEWS.same_rad
+    return math.hypot(*at) < VIEWS.same_mm and abs(float(wrap_angle(away[2]))) < VIEWS.same_rad

@@ -21,7 +21,7 @@ Mask = NDArray[np.bool_]
 WIDEST_ERASED = 1  #: samples; lines no wider are erased by a 3 x 3 median, two wide survive
 
 
-def unbiased(image: TactileImage, bias: ArrayLike | None = None) -> TactileImage:
+def subtract_bias(image: TactileImage, bias: ArrayLike | None = None) -> TactileImage:
     """Return readings over their bias, 0 or more.
 
     Parameters
@@ -34,7 +34,7 @@ def unbiased(image: TactileImage, bias: ArrayLike | None = None) -> TactileImage
         return image
     level = np.quantile(image.values[image.defined], 0.05) if bias is None else np.asarray(bias)
     values = np.where(image.defined, np.maximum(image.values - level, 0.0), 0.0)
-    return _with(image, values)
+    return _replace_values(image, values)
 
 
 def median(image: TactileImage, thinnest_mm: float | None = None) -> TactileImage:
@@ -71,10 +71,10 @@ def median(image: TactileImage, thinnest_mm: float | None = None) -> TactileImag
         high = np.take_along_axis(ranked, (np.minimum(count, 8) // 2)[..., None], axis=-1)
         middle = np.where(count % 2 == 1, low[..., 0], (low + high)[..., 0] / 2)
         values = np.where(image.defined, middle, 0.0)
-    return _with(image, values)
+    return _replace_values(image, values)
 
 
-def magnified(image: TactileImage, doublings: int = 2) -> TactileImage:
+def magnify_image(image: TactileImage, doublings: int = 2) -> TactileImage:
     """Return an image sampled twice as finely for every doubling: 16 x 16 becomes 61 x 61.
 
     Zeros go between the samples, and the image is convolved with
@@ -90,7 +90,7 @@ def magnified(image: TactileImage, doublings: int = 2) -> TactileImage:
     values, weights = image.values, image.defined.astype(np.float64)
     values = values * weights
     for _ in range(doublings):
-        values, weights = _doubled(values), _doubled(weights)
+        values, weights = _double_sampling(values), _double_sampling(weights)
     defined = weights > 0.5
     filled = np.where(defined, values / np.where(defined, weights, 1.0), 0.0)
     return TactileImage(filled, defined, image.step_mm / 2**doublings, image.corner_mm)
@@ -110,7 +110,7 @@ def sobel(image: TactileImage) -> tuple[Array, Array]:
     return x / (8 * image.step_mm), y / (8 * image.step_mm)
 
 
-def _doubled(values: Array) -> Array:
+def _double_sampling(values: Array) -> Array:
     for axis in (0, 1):
         rows = np.moveaxis(values, axis, 0)
         finer = np.empty((2 * len(rows) - 1, *rows.shape[1:]))
@@ -120,6 +120,6 @@ def _doubled(values: Array) -> Array:
     return values
 
 
-def _with(image: TactileImage, values: Array) -> TactileImage:
+def _replace_values(image: TactileImage, values: Array) -> TactileImage:
     values.setflags(write=False)
     return replace(image, values=values)

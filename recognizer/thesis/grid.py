@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.thesis.settings import Acceptance
+from recognizer.thesis.settings import AcceptanceSettings
 from recognizer.thesis.skeleton.symbols import Symbol
 
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ class Grid:
 
 
 def grid(
-    found: Sequence[Symbol], pitch_mm: float, acceptance: Acceptance | None = None
+    found: Sequence[Symbol], pitch_mm: float, acceptance: AcceptanceSettings | None = None
 ) -> Grid | None:
     """Return the largest grid among symbols; None if there is no symbol.
 
@@ -58,16 +58,16 @@ def grid(
     pitch_mm
         Distance of neighbours.
     """
-    chosen = acceptance or Acceptance()
+    chosen = acceptance or AcceptanceSettings()
     named = [k for k, symbol in enumerate(found) if symbol.label >= 0]
     best: dict[Cell, int] = {}
     left = set(named)
     for seed in sorted(named, key=lambda k: found[k].off_mm):
         if seed in left and len(left) > len(best):
-            members = _grown(found, seed, named, pitch_mm, chosen)
+            members = _grow_grid(found, seed, named, pitch_mm, chosen)
             left -= set(members.values())
             best = members if len(members) > len(best) else best
-    return _windowed(found, best, pitch_mm, chosen) if best else None
+    return _grid_of(found, best, pitch_mm, chosen) if best else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,8 +83,12 @@ class _Lattice:
         return (_centre(cell, pitch_mm) - self.shift) / self.turn
 
 
-def _grown(
-    found: Sequence[Symbol], seed: int, named: list[int], pitch_mm: float, acceptance: Acceptance
+def _grow_grid(
+    found: Sequence[Symbol],
+    seed: int,
+    named: list[int],
+    pitch_mm: float,
+    acceptance: AcceptanceSettings,
 ) -> dict[Cell, int]:
     members: dict[Cell, int] = {(0, 0): seed}
     free = {k for k in named if k != seed}
@@ -99,20 +103,20 @@ def _grown(
             cell = (i + di, j + dj)
             expected = complex(symbol.x_mm, symbol.y_mm) + complex(di, dj) * pitch_mm / turn
             if cell not in members:
-                joined = _accepted(found, free, expected, turn, pitch_mm, acceptance)
+                joined = _accept_symbol(found, free, expected, turn, pitch_mm, acceptance)
                 if joined is not None:
                     members[cell] = joined
                     free.discard(joined)
                     waiting.append(cell)
-    return _joined(found, members, free, pitch_mm, acceptance)
+    return _join_beyond_gaps(found, members, free, pitch_mm, acceptance)
 
 
-def _joined(
+def _join_beyond_gaps(
     found: Sequence[Symbol],
     members: dict[Cell, int],
     free: set[int],
     pitch_mm: float,
-    acceptance: Acceptance,
+    acceptance: AcceptanceSettings,
 ) -> dict[Cell, int]:
     """Return members with those beyond gaps that stand where the whole lattice expects them."""
     while len(members) > 1:
@@ -127,7 +131,7 @@ def _joined(
         more = {}
         for cell in sorted(expected):
             place = lattice.place(cell, pitch_mm)
-            joined = _accepted(found, free, place, lattice.turn, pitch_mm, acceptance)
+            joined = _accept_symbol(found, free, place, lattice.turn, pitch_mm, acceptance)
             if joined is not None:
                 more[cell] = joined
                 free.discard(joined)
@@ -137,13 +141,13 @@ def _joined(
     return members
 
 
-def _accepted(
+def _accept_symbol(
     found: Sequence[Symbol],
     free: set[int],
     expected: complex,
     turn: complex,
     pitch_mm: float,
-    acceptance: Acceptance,
+    acceptance: AcceptanceSettings,
 ) -> int | None:
     """Return the symbol that fits an expectation best, if one does."""
     fits = [
@@ -156,7 +160,10 @@ def _accepted(
 
 
 def _lattice(
-    found: Sequence[Symbol], members: dict[Cell, int], pitch_mm: float, acceptance: Acceptance
+    found: Sequence[Symbol],
+    members: dict[Cell, int],
+    pitch_mm: float,
+    acceptance: AcceptanceSettings,
 ) -> _Lattice:
     """Return the lattice through members by least squares, from their places and their axes.
 
@@ -178,8 +185,11 @@ def _lattice(
     return _Lattice(turn, complex(cells.mean()) - turn * middle, spread, middle)
 
 
-def _windowed(
-    found: Sequence[Symbol], members: dict[Cell, int], pitch_mm: float, acceptance: Acceptance
+def _grid_of(
+    found: Sequence[Symbol],
+    members: dict[Cell, int],
+    pitch_mm: float,
+    acceptance: AcceptanceSettings,
 ) -> Grid:
     lattice = _lattice(found, members, pitch_mm, acceptance)
     cells = np.array(list(members), np.int64)
@@ -205,7 +215,9 @@ def _windowed(
     )
 
 
-def _covariance(lattice: _Lattice, number: int, off_mm: float, acceptance: Acceptance) -> Array:
+def _covariance(
+    lattice: _Lattice, number: int, off_mm: float, acceptance: AcceptanceSettings
+) -> Array:
     """Return the covariance (3, 3) of x, y and theta at the image's origin."""
     variance = max(acceptance.place_mm, off_mm / math.sqrt(2)) ** 2
     turning = 1 / (lattice.spread / variance + number / acceptance.axes_rad**2)

@@ -18,11 +18,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from probe.sensor import SensorType
-from recognizer.scan.mosaic.planar import between, composed, inverse, moved, planar_pose
+from recognizer.scan.mosaic.planar import (
+    compose_poses,
+    inverse,
+    planar_pose,
+    relative_pose,
+    transform_points,
+)
 from recognizer.scan.mosaic.settings import CANVAS
-from recognizer.thesis.filters import magnified
+from recognizer.thesis.filters import magnify_image
 from recognizer.thesis.product import product_shift
-from recognizer.thesis.settings import ROUNDING, Merging
+from recognizer.thesis.settings import ROUNDING, MergingSettings
 from recognizer.touch.tactile_image import ImageError, TactileImage, tactile_image, touch_image
 
 Array = NDArray[np.float64]
@@ -55,7 +61,7 @@ def relative_poses(poses: ArrayLike) -> Array:
     """
     given = np.asarray(poses, np.float64)
     if given.ndim == 2 and given.shape[1:] == (3,) and len(given) and np.isfinite(given).all():
-        return between(given[0], given)
+        return relative_pose(given[0], given)
     if given.ndim == 3 and given.shape[1:] == (4, 4) and len(given) and np.isfinite(given).all():
         first = np.linalg.inv(given[0])
         return np.array([planar_pose(first @ T) for T in given])
@@ -65,11 +71,11 @@ def relative_poses(poses: ArrayLike) -> Array:
     )
 
 
-def merged(
+def merge_touches(
     sensor: SensorType,
     readings: Sequence[ArrayLike],
     poses: ArrayLike,
-    merging: Merging | None = None,
+    merging: MergingSettings | None = None,
     trust: ArrayLike | None = None,
 ) -> MergedImage:
     """Merge the touches of a scan.
@@ -92,7 +98,7 @@ def merged(
     ImageError
         If readings and poses do not belong together, or a reading is no number.
     """
-    chosen = merging or Merging()
+    chosen = merging or MergingSettings()
     believed = relative_poses(poses)
     images = [touch_image(sensor, values, trust) for values in readings]
     if len(images) != len(believed):
@@ -103,33 +109,35 @@ def merged(
     corrected = np.zeros(len(images), np.bool_)
     origin = placed if chosen.placing == "bounded" else believed
     for k in range(1, len(images) if chosen.placing != "believed" else 0):
-        near = _nearest(sensor, believed, k, chosen)
-        step = between(origin[k - 1 if near is None else near], believed[k])
+        near = _nearest_touch(sensor, believed, k, chosen)
+        step = relative_pose(origin[k - 1 if near is None else near], believed[k])
         shift = None if near is None else _shift(sensor, images[near], images[k], step, chosen)
         if shift is not None:
             step = np.array([*shift, step[2]])
-        placed[k] = composed(placed[k - 1 if near is None else near], step)
+        placed[k] = compose_poses(placed[k - 1 if near is None else near], step)
         corrected[k] = shift is not None
-    return MergedImage(laid(sensor, images, placed), placed, corrected)
+    return MergedImage(average_touches(sensor, images, placed), placed, corrected)
 
 
-def laid(sensor: SensorType, images: Sequence[TactileImage], placed: Array) -> TactileImage:
+def average_touches(
+    sensor: SensorType, images: Sequence[TactileImage], placed: Array
+) -> TactileImage:
     """Return the mean of images laid at poses (n, 3), sampled four times as finely."""
     cell = sensor.pitch_mm / CANVAS.magnified
     half = np.array(sensor.half_mm) - sensor.pitch_mm / 2
     corners = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    ends = np.concatenate([moved(pose, corners) for pose in placed])
+    ends = np.concatenate([transform_points(pose, corners) for pose in placed])
     low, high = np.floor(ends.min(axis=0) / cell), np.ceil(ends.max(axis=0) / cell)
     columns, rows = (high - low).astype(int) + 1
     total, weight = np.zeros((rows, columns)), np.zeros((rows, columns))
     for image, pose in zip(images, placed, strict=True):
-        fine = magnified(image)
-        box = moved(pose, corners) / cell
+        fine = magnify_image(image)
+        box = transform_points(pose, corners) / cell
         left, down = np.floor(box.min(axis=0) - low).astype(int)
         right, up = np.ceil(box.max(axis=0) - low).astype(int) + 1
         x, y = np.meshgrid((np.arange(left, right) + low[0]), (np.arange(down, up) + low[1]))
-        at = moved(inverse(pose), np.stack([x, y], axis=-1) * cell)
-        values, known = _asked(fine, at)
+        at = transform_points(inverse(pose), np.stack([x, y], axis=-1) * cell)
+        values, known = _interpolate(fine, at)
         total[down:up, left:right] += values
         weight[down:up, left:right] += known
     values = np.divide(total, weight, out=np.zeros_like(total), where=weight > 0)
@@ -141,9 +149,11 @@ def laid(sensor: SensorType, images: Sequence[TactileImage], placed: Array) -> T
     )
 
 
-def _nearest(sensor: SensorType, believed: Array, k: int, merging: Merging) -> int | None:
+def _nearest_touch(
+    sensor: SensorType, believed: Array, k: int, merging: MergingSettings
+) -> int | None:
     """Return the earlier touch that overlaps most, of equals the latest; None if none does."""
-    steps = between(believed[:k], believed[k])
+    steps = relative_pose(believed[:k], believed[k])
     width = 2 * np.array(sensor.half_mm)
     share = 1 - np.abs(steps[:, :2]) / width
     fit = (share >= merging.overlap).all(axis=1) & (np.abs(steps[:, 2]) <= merging.turn_rad)
@@ -154,7 +164,7 @@ def _nearest(sensor: SensorType, believed: Array, k: int, merging: Merging) -> i
 
 
 def _shift(
-    sensor: SensorType, a: TactileImage, b: TactileImage, step: Array, merging: Merging
+    sensor: SensorType, a: TactileImage, b: TactileImage, step: Array, merging: MergingSettings
 ) -> Array | None:
     """Return where b lies on a, mm; None where what they have in common shows nothing."""
     faint = merging.faint * max(a.values.max(), b.values.max())
@@ -168,7 +178,7 @@ def _shift(
     return np.asarray(found * sensor.pitch_mm)
 
 
-def _asked(image: TactileImage, at_mm: Array) -> tuple[Array, Array]:
+def _interpolate(image: TactileImage, at_mm: Array) -> tuple[Array, Array]:
     """Return values, 0 where not defined, and shares that are defined, by the four around."""
     rows, columns = image.values.shape
     column = (at_mm[..., 0] - image.corner_mm[0]) / image.step_mm

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 H = np.outer([0.5, 1.0, 0.5], [0.5, 1.0, 0.5])
 
 
-def magnified(image: Array) -> Array:
+def magnify_samples(image: Array) -> Array:
     """Return an image of four times the rows and columns, by H."""
     from scipy.ndimage import convolve
 
@@ -48,7 +48,7 @@ def product_shift(a: Array, b: Array, believed: tuple[float, float], window: flo
     -------
     (2,) shift along x and y, tactels, in steps of a quarter.
     """
-    first, second = magnified(a), magnified(b)
+    first, second = magnify_samples(a), magnify_samples(b)
     rows, columns = first.shape
     right, down = round(believed[0] * CANVAS.magnified), -round(believed[1] * CANVAS.magnified)
     i0, i1 = max(0, down), min(rows, rows + down)

@@ -29,7 +29,7 @@ from decoder import (
     decode_good_tuple,
 )
 from generator.array import ProductArray
-from recognizer.thesis.filters import median, unbiased
+from recognizer.thesis.filters import median, subtract_bias
 from recognizer.thesis.grid import Grid, grid
 from recognizer.thesis.settings import ThesisSettings
 from recognizer.thesis.skeleton.symbols import Symbol, symbols
@@ -93,11 +93,11 @@ def read_classically(
         Its margin is the decoder's, in nats; None with conversions that weigh nothing.
     """
     chosen = settings or ThesisSettings()
-    over = unbiased(image)
+    over = subtract_bias(image)
     if not over.values.any():
         return ClassicalReading(refusal(seq, NO_CONTACT), None, (), None)
     T = np.eye(4) if T_image_probe is None else T_image_probe
-    readings = [_read(encoding, over, chosen, T, seq) for encoding in lab.arrays]
+    readings = [_read_encoding(encoding, over, chosen, T, seq) for encoding in lab.arrays]
     answers = [reading for reading in readings if reading.recognition]
     if len(answers) > 1:  # two ways of embossing explain the image
         first = answers[0].recognition
@@ -106,14 +106,14 @@ def read_classically(
             runner_up = RunnerUp(other.object, other.face, other.index)
             value = refusal(seq, AMBIGUOUS, margin=first.margin, runner_up=runner_up)
             return ClassicalReading(value, answers[0].encoding, answers[0].symbols, answers[0].grid)
-    return answers[0] if answers else max(readings, key=_seen)
+    return answers[0] if answers else max(readings, key=_symbol_count)
 
 
-def _seen(reading: ClassicalReading) -> int:
+def _symbol_count(reading: ClassicalReading) -> int:
     return 0 if reading.grid is None else len(reading.grid.members)
 
 
-def _read(
+def _read_encoding(
     encoding: EmbossedArray,
     image: TactileImage,
     settings: ThesisSettings,
@@ -128,12 +128,12 @@ def _read(
     laid = grid(found, style.pitch_mm, settings.acceptance)
     if laid is None:
         return ClassicalReading(refusal(seq, TOO_FEW), encoding, found, None)
-    decoded = _converted(encoding, laid, settings)
-    answer = _answered(encoding, laid, decoded, settings, T_image_probe, seq)
+    decoded = _convert_window(encoding, laid, settings)
+    answer = _answer_of(encoding, laid, decoded, settings, T_image_probe, seq)
     return ClassicalReading(answer, encoding, found, laid)
 
 
-def _converted(encoding: EmbossedArray, laid: Grid, settings: ThesisSettings) -> Decoded:
+def _convert_window(encoding: EmbossedArray, laid: Grid, settings: ThesisSettings) -> Decoded:
     """Return the place of a window by the conversion that is asked for."""
     array = encoding.array
     if settings.conversion == "exact":
@@ -143,28 +143,30 @@ def _converted(encoding: EmbossedArray, laid: Grid, settings: ThesisSettings) ->
             return decode_good_tuple(array, laid.window)[0]
         except MethodError:  # a window smaller than the tuple
             return decode_exact(array, laid.window)[0]
-    return _likeliest(encoding, laid, settings.error)[0]
+    return _decode_likeliest(encoding, laid, settings.error)[0]
 
 
-def _likeliest(encoding: EmbossedArray, laid: Grid, error: float) -> Decodings:
+def _decode_likeliest(encoding: EmbossedArray, laid: Grid, error: float) -> Decodings:
     """Decode with the prior that the first member lies on a registered cell, if it can be held."""
     array = encoding.array
     i, j = laid.cells[0].tolist()
     rows, columns = np.divmod(encoding.keys, np.uint64(array.columns))
     down, along = laid.first[1] - j, i - laid.first[0]
-    prior = np.stack([_back(rows, down, array.rows), _back(columns, along, array.columns)], axis=1)
+    prior = np.stack(
+        [_step_back(rows, down, array.rows), _step_back(columns, along, array.columns)], axis=1
+    )
     try:
         return Likelihood(array, prior=prior, error=error).decode(laid.window)
     except WindowError:  # more places than it holds at a time
         return Likelihood(array, error=error).decode(laid.window)
 
 
-def _back(places: NDArray[np.uint64], steps: int, cycle: int) -> NDArray[np.uint64]:
+def _step_back(places: NDArray[np.uint64], steps: int, cycle: int) -> NDArray[np.uint64]:
     """Return places - steps on a cycle."""
     return np.asarray((places + np.uint64(-steps % cycle)) % np.uint64(cycle))
 
 
-def _answered(
+def _answer_of(
     encoding: EmbossedArray,
     laid: Grid,
     decoded: Decoded,
@@ -174,7 +176,7 @@ def _answered(
 ) -> Recognition:
     pitch, array = encoding.style.pitch_mm, encoding.array
     fit = _as_fit(laid)
-    at_mm = _moved(fit, T_image_probe)  # the probe's centre on the lattice
+    at_mm = _probe_on_lattice(fit, T_image_probe)  # the probe's centre on the lattice
     under = (math.floor(at_mm[0] / pitch), math.floor(at_mm[1] / pitch))
 
     def index(place: Hypothesis) -> tuple[int, int]:
@@ -182,13 +184,13 @@ def _answered(
 
     runner_up = None
     if decoded.runner_up is not None:
-        place, _ = _placed(encoding, laid, decoded.runner_up.row, decoded.runner_up.column)
+        place, _ = _place_of_window(encoding, laid, decoded.runner_up.row, decoded.runner_up.column)
         if place.face >= 0:
             other = encoding.face(place.face)
             runner_up = RunnerUp(other.object, other.face, index(place))
     if decoded.row is None or decoded.column is None:
         return refusal(seq, decoded.reason, margin=decoded.margin, runner_up=runner_up)
-    place, held = _placed(encoding, laid, decoded.row, decoded.column)
+    place, held = _place_of_window(encoding, laid, decoded.row, decoded.column)
     if place.face < 0 or held < 1 - settings.strangers:
         return refusal(seq, NOT_ENCODED, margin=decoded.margin, runner_up=runner_up)
     face = encoding.face(place.face)
@@ -211,7 +213,9 @@ def _answered(
     )
 
 
-def _placed(encoding: EmbossedArray, laid: Grid, row: int, column: int) -> tuple[Hypothesis, float]:
+def _place_of_window(
+    encoding: EmbossedArray, laid: Grid, row: int, column: int
+) -> tuple[Hypothesis, float]:
     """Return a window's place and the share of its symbols that one face holds."""
     array = encoding.array
     i, j = laid.first
@@ -245,7 +249,7 @@ def _as_fit(laid: Grid) -> Fit:
     )
 
 
-def _moved(fit: Fit, T_image_probe: Array) -> tuple[float, float]:
+def _probe_on_lattice(fit: Fit, T_image_probe: Array) -> tuple[float, float]:
     """Return where the probe's centre lies on the lattice, mm."""
     c, s = math.cos(fit.theta_rad), math.sin(fit.theta_rad)
     x, y = float(T_image_probe[0, 3]), float(T_image_probe[1, 3])

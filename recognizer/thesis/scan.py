@@ -17,13 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from probe.arm.carried import SensorPose
 from probe.sensor import SensorType
-from recognizer.scan.mosaic.grow import added
+from recognizer.scan.mosaic.grow import add_touch
 from recognizer.scan.mosaic.mosaic import no_touches
 from recognizer.scan.session import TouchPlaces
 from recognizer.scan.settings import ScanSettings
-from recognizer.thesis.image import MergedImage, merged
+from recognizer.thesis.image import MergedImage, merge_touches
 from recognizer.thesis.read import ClassicalReading, read_classically
-from recognizer.thesis.settings import Merging, ThesisSettings
+from recognizer.thesis.settings import MergingSettings, ThesisSettings
 from recognizer.touch.lab import Lab
 from recognizer.touch.recognition import NO_CONTACT, TOO_FEW, Recognition, refusal
 from recognizer.touch.signal import Signal, signal_of
@@ -46,7 +46,7 @@ def read_scan(
     readings: Sequence[ArrayLike],
     poses: ArrayLike,
     settings: ThesisSettings | None = None,
-    merging: Merging | None = None,
+    merging: MergingSettings | None = None,
     *,
     trust: ArrayLike | None = None,
     seq: int = 0,
@@ -76,7 +76,7 @@ def read_scan(
     ImageError
         If readings and poses do not belong together.
     """
-    image = merged(sensor, readings, poses, merging, trust)
+    image = merge_touches(sensor, readings, poses, merging, trust)
     found = read_classically(
         lab, image.image, settings, T_image_probe=spatial_pose(image.poses[-1]), seq=seq
     )
@@ -96,7 +96,7 @@ def read_while_scanning(
     readings: Sequence[ArrayLike],
     poses: ArrayLike,
     settings: ThesisSettings | None = None,
-    merging: Merging | None = None,
+    merging: MergingSettings | None = None,
     every: int = 1,
 ) -> Iterator[ScanReading]:
     """Yield what is read after the first touches of a scan, `every` more at a time, and all.
@@ -131,13 +131,13 @@ class ThesisScan:
         *,
         sensor: SensorType | None = None,
         settings: ThesisSettings | None = None,
-        merging: Merging | None = None,
+        merging: MergingSettings | None = None,
         every: int = 8,
     ) -> None:
         self._lab, self._settings, self._merging = (
             lab,
             settings,
-            merging or Merging(placing="bounded"),
+            merging or MergingSettings(placing="bounded"),
         )
         self._mosaic = no_touches(sensor or SensorType())
         self._places = TouchPlaces(ScanSettings())
@@ -178,7 +178,7 @@ class ThesisScan:
         number = self.touches if seq is None else seq
         if not signal.contact:
             return refusal(number, NO_CONTACT)
-        self._mosaic = added(self._mosaic, self._places.place(signal, pose, number))
+        self._mosaic = add_touch(self._mosaic, self._places.place(signal, pose, number))
         self._places.keep(pose)
         self._unread += 1
         if self._unread < self._every:

@@ -119,7 +119,7 @@ class InkSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class Counting:
+class CountingSettings:
     """When a bend or a branch counts, in lattice units of the alphabet (reach x pitch)."""
 
     spur: float = 0.4  #: branches with a free end that are shorter are pruned
@@ -136,7 +136,7 @@ class SkeletonSettings:
     share: float = 0.58  #: of the strongest reading nearby, from which a sample is ink
     least_area: float = 0.3  #: of a symbol's stroke area; smaller specks are no symbols
     shape: float = 0.35  #: lattice units, rms, that the points may be off; inf: counts alone
-    counting: Counting = field(default_factory=Counting)
+    counting: CountingSettings = field(default_factory=CountingSettings)
     thick: int = 6  #: samples that a stroke is magnified to before it is thinned
     fine: int = 101  #: points along a symbol's box, by which the middle of a glyph is found
 
@@ -147,7 +147,7 @@ class SkeletonSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class Acceptance:
+class AcceptanceSettings:
     """When a symbol is the neighbour that was expected."""
 
     off: float = 0.25  #: pitches from where it is expected
@@ -158,7 +158,7 @@ class Acceptance:
 
 
 @dataclass(frozen=True, slots=True)
-class Merging:
+class MergingSettings:
     """How touches are laid on each other."""
 
     placing: Placing = "product"  #: by products around the step, around the pose, or as believed
@@ -174,7 +174,7 @@ class ThesisSettings:
 
     median: bool = True  #: where strokes are wide enough to survive it
     symbols: SkeletonSettings = field(default_factory=SkeletonSettings)
-    acceptance: Acceptance = field(default_factory=Acceptance)
+    acceptance: AcceptanceSettings = field(default_factory=AcceptanceSettings)
     conversion: Conversion = "likelihood"
     error: float = 0.02  #: probability that a symbol is read wrong (likelihood)
     strangers: float = 0.1  #: share of the symbols that the face may not hold

@@ -34,14 +34,14 @@ from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from probe.surface.face import FaceSurface
 from probe.surface.polygon import polygon
-from recognizer.scan.mosaic.planar import between, moved
+from recognizer.scan.mosaic.planar import relative_pose, transform_points
 from recognizer.thesis.edges.find import classical_edges, outline
-from recognizer.thesis.filters import median, unbiased
+from recognizer.thesis.filters import median, subtract_bias
 from recognizer.thesis.grid import grid
-from recognizer.thesis.image import merged
+from recognizer.thesis.image import merge_touches
 from recognizer.thesis.read import read_classically
 from recognizer.thesis.scan import read_while_scanning, spatial_pose
-from recognizer.thesis.settings import Merging
+from recognizer.thesis.settings import MergingSettings
 from recognizer.thesis.skeleton.symbols import symbols
 from recognizer.touch.lab import open_lab
 from recognizer.touch.tactile_image import touch_image
@@ -195,7 +195,7 @@ def scanned(scene, level, rng, theta, sigma_tactels):
 
 def counted(found, face, first):
     """Right, wrong and rejected symbols of a face."""
-    at = moved(first, np.array([[s.x_mm, s.y_mm] for s in found]).reshape(-1, 2))
+    at = transform_points(first, np.array([[s.x_mm, s.y_mm] for s in found]).reshape(-1, 2))
     count = Counter()
     for centre, label in zip(face.centres_mm, face.labels, strict=True):
         near = np.flatnonzero(np.linalg.norm(at - centre, axis=1) < 4)
@@ -257,15 +257,17 @@ def bench_scans(url, scans, seed, sigmas):
             scene = registered_surface(url, name, side)
             believed, readings, true = scanned(scene, level, rng, 0.4 * copy, sigma)
             for placing, tally in tallies.items():
-                merging = Merging(placing=placing, window_tactels=max(0.75, 2 * (sigma or 0)))
+                merging = MergingSettings(
+                    placing=placing, window_tactels=max(0.75, 2 * (sigma or 0))
+                )
                 begun = time.process_time()
-                image = merged(SENSOR, readings, believed, merging)
+                image = merge_touches(SENSOR, readings, believed, merging)
                 found = read_classically(
                     lab, image.image, T_image_probe=spatial_pose(image.poses[-1])
                 )
                 tally.spent.append((time.process_time() - begun) / len(readings))
                 tally.symbols += counted(found.symbols, faces[name, side], true[0])
-                away = (image.poses - between(true[0], true))[:, :2]
+                away = (image.poses - relative_pose(true[0], true))[:, :2]
                 away = away - away.mean(axis=0)
                 tally.mosaic.append(np.sqrt((away**2).sum(axis=1).mean()) / SENSOR.pitch_mm)
                 tally.touches.append(len(readings))
@@ -294,10 +296,10 @@ def bench_stages(lab, url, seed):
         timed[name] = np.median(spent) * 1e3
         return result
 
-    image = stage("merge by products", lambda: merged(SENSOR, readings, believed)).image
-    stage("merge as believed", lambda: merged(SENSOR, readings, believed,
-                                              Merging(placing="believed")))  # fmt: skip
-    over = stage("bias, median", lambda: median(unbiased(image)))
+    image = stage("merge by products", lambda: merge_touches(SENSOR, readings, believed)).image
+    stage("merge as believed", lambda: merge_touches(SENSOR, readings, believed,
+                                              MergingSettings(placing="believed")))  # fmt: skip
+    over = stage("bias, median", lambda: median(subtract_bias(image)))
     found = stage("ink, thinning, counting", lambda: symbols(over, encoding.alphabet,
                                                              encoding.style))  # fmt: skip
     stage("grid", lambda: grid(found, encoding.style.pitch_mm))

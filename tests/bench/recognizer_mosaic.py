@@ -39,19 +39,19 @@ from probe.scan.places import surface_to_sensor
 from probe.scan.raster import raster
 from probe.sensor import SensorType
 from probe.simulate.registered import registered_object, registered_surface
-from recognizer.scan.mosaic.grow import added, settled
+from recognizer.scan.mosaic.grow import add_touch, settle_mosaic
 from recognizer.scan.mosaic.mosaic import Mosaic, MosaicSettings, no_touches, outliers
-from recognizer.scan.mosaic.pair import registered
+from recognizer.scan.mosaic.pair import register_patches
 from recognizer.scan.mosaic.patch import TouchPatch, patch_of
 from recognizer.scan.mosaic.planar import (
-    between,
-    between_covariance,
-    composed,
+    compose_poses,
     planar_covariance,
     planar_pose,
-    wrapped,
+    relative_covariance,
+    relative_pose,
+    wrap_angle,
 )
-from recognizer.scan.mosaic.touch import PlacedTouch, PlanarBelief, decoded_place, placed
+from recognizer.scan.mosaic.touch import PlacedTouch, PlanarBelief, decoded_place, planar_belief
 from recognizer.thesis.product import product_shift
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
@@ -111,7 +111,7 @@ def scanned(database: str, name: str, pitch_mm: float, tactels: float, counts: b
     believed = []
     for stand, covariance in zip(track.believed, track.covariance, strict=True):
         spread = planar_covariance(covariance, back[:3, :3])
-        believed.append(placed(back @ stand, spread))
+        believed.append(planar_belief(back @ stand, spread))
     return Scan(signals, believed, np.array(true), pitch_mm)
 
 
@@ -150,13 +150,13 @@ def pairs(scan: Scan, patches: list[TouchPatch]) -> None:
         for a in range(b):
             if math.hypot(*(at[b] - at[a])[:2]) > 4.6 * P:
                 continue
-            true = between(scan.true[a], scan.true[b])
-            belief = between(at[a], at[b])
-            sure = between_covariance(
+            true = relative_pose(scan.true[a], scan.true[b])
+            belief = relative_pose(at[a], at[b])
+            sure = relative_covariance(
                 at[a], at[b], scan.believed[a].covariance, scan.believed[b].covariance
             )
             start = time.process_time()
-            found = registered(patches[a], patches[b], belief, sure, period_mm=scan.pitch_mm)
+            found = register_patches(patches[a], patches[b], belief, sure, period_mm=scan.pitch_mm)
             ms += time.process_time() - start
             start = time.process_time()
             window = min(7.5, 3 * math.sqrt(max(sure[0, 0], sure[1, 1])) / P)
@@ -193,7 +193,7 @@ def chained(links, scan: Scan, number: int) -> list[float]:
         befores = [a for a in range(b) if (a, b) in links and a in poses]
         if befores:
             a = max(befores)
-            poses[b] = composed(poses[a], links[a, b][number])
+            poses[b] = compose_poses(poses[a], links[a, b][number])
     return [math.hypot(*(poses[n] - scan.true[n])[:2]) / P for n in poses if n]
 
 
@@ -202,10 +202,10 @@ def grown(touches: list[PlacedTouch], pitch_mm: float) -> tuple[Mosaic, float, f
     mosaic, times = no_touches(SENSOR, MosaicSettings(period_mm=pitch_mm)), []
     for touch in touches:
         start = time.process_time()
-        mosaic = added(mosaic, touch)
+        mosaic = add_touch(mosaic, touch)
         times.append(time.process_time() - start)
     start = time.process_time()
-    mosaic = settled(mosaic)
+    mosaic = settle_mosaic(mosaic)
     return mosaic, 1e3 * float(np.median(times)), 1e3 * (time.process_time() - start)
 
 
@@ -213,7 +213,7 @@ def told(name: str, scan: Scan, touches: list[PlacedTouch], *, face: bool) -> No
     """Grow a mosaic and print what it is worth."""
     mosaic, ms, settle = grown(touches, scan.pitch_mm)
     away = mosaic.poses - scan.true
-    away[:, 2] = wrapped(away[:, 2])
+    away[:, 2] = wrap_angle(away[:, 2])
     shape = shape_errors(mosaic.poses, scan.true)
     line = f"  {name:16} shape rms {rms(shape):.3f} max {shape.max():.2f}"
     if face:
@@ -279,13 +279,13 @@ def measure(database: str, profile: str, tactels: float, counts: bool, seed: int
     steps = []
     for k, signal in enumerate(scan.signals):
         before = scan.true[k - 1] if k else np.zeros(3)
-        step = between(before, scan.true[k]) + rng.normal(0, spread) * (k > 0)
-        first = placed(scan.true[0], (0.01, 0.01, 1e-4)) if k == 0 else None
-        stepped = placed(step, spread) if k else None
+        step = relative_pose(before, scan.true[k]) + rng.normal(0, spread) * (k > 0)
+        first = planar_belief(scan.true[0], (0.01, 0.01, 1e-4)) if k == 0 else None
+        stepped = planar_belief(step, spread) if k else None
         steps.append(PlacedTouch(signal, believed=first, stepped=stepped, seq=k))
     reckoned = [scan.true[0]]
     for touch in steps[1:]:
-        reckoned.append(composed(reckoned[-1], touch.stepped.pose))
+        reckoned.append(compose_poses(reckoned[-1], touch.stepped.pose))
     away = np.array(reckoned) - scan.true
     print(f"  steps as counted drift rms {rms(np.hypot(*away.T[:2])) / P:.2f}")
     told("steps", scan, steps, face=True)

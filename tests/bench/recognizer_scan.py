@@ -39,10 +39,10 @@ from probe.simulate.registered import registered_surface
 from probe.simulate.world.levels import LEVELS, READOUT, read_sensor
 from probe.simulate.world.worn import wear_face
 from recognizer.scan.grow import begin_scan, extend_scan
-from recognizer.scan.mosaic.planar import inverse, moved, planar_covariance, planar_pose
-from recognizer.scan.mosaic.touch import PlacedTouch, placed
+from recognizer.scan.mosaic.planar import inverse, planar_covariance, planar_pose, transform_points
+from recognizer.scan.mosaic.touch import PlacedTouch, planar_belief
 from recognizer.thesis.scan import read_scan as read_classically
-from recognizer.thesis.settings import Merging
+from recognizer.thesis.settings import MergingSettings
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
@@ -185,7 +185,9 @@ def scanned(scene, encoding, kind, level, sigma_tactels, most, rng, manner=None)
             continue  # the plate slips off
         felt.counts.append(counts.astype(float))
         felt.touches.append(
-            PlacedTouch(signal_of(counts.astype(float)), placed(believed[k], spread[k]), seq=k)
+            PlacedTouch(
+                signal_of(counts.astype(float)), planar_belief(believed[k], spread[k]), seq=k
+            )
         )
         stood.append(at)
     felt.true = np.array(stood)
@@ -194,7 +196,7 @@ def scanned(scene, encoding, kind, level, sigma_tactels, most, rng, manner=None)
 
 def in_view(encoding, face, felt):
     """Return which symbols of a face some touch had whole under the sensor."""
-    away = np.array([moved(inverse(pose), face.centres_mm) for pose in felt.true])
+    away = np.array([transform_points(inverse(pose), face.centres_mm) for pose in felt.true])
     reach = np.array(SENSOR.half_mm) - 0.35 * encoding.style.pitch_mm
     return (np.abs(away) < reach).all(axis=2).any(axis=0)
 
@@ -253,7 +255,7 @@ def alone(reader, felt, name, tally):
 
 def classical(lab, felt, name, sigma, tally):
     """Read a scan the thesis's way, after every eighth touch and at the end."""
-    merging = Merging(window_tactels=max(0.75, 2 * (sigma or 0)))
+    merging = MergingSettings(window_tactels=max(0.75, 2 * (sigma or 0)))
     poses = np.array([touch.believed.pose for touch in felt.touches])
     images = [np.maximum(counts - READOUT.bias, 0) for counts in felt.counts]
     first, n = None, len(images)
@@ -273,7 +275,9 @@ def counted(found, face_of, felt):
     """Right, wrong and rejected symbols in view, of the thesis's way."""
     encoding, face = face_of
     symbols = found.reading.symbols
-    at = moved(felt.true[0], np.array([[s.x_mm, s.y_mm] for s in symbols]).reshape(-1, 2))
+    at = transform_points(
+        felt.true[0], np.array([[s.x_mm, s.y_mm] for s in symbols]).reshape(-1, 2)
+    )
     count = Counter()
     for n in np.flatnonzero(in_view(encoding, face, felt)):
         near = np.flatnonzero(np.linalg.norm(at - face.centres_mm[n], axis=1) < 4)

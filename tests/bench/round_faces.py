@@ -48,7 +48,7 @@ from probe.simulate.round import RoundPart, round_part  # noqa: E402
 from probe.simulate.touch import Touches, random_touches  # noqa: E402
 from probe.simulate.world.levels import LEVELS, read_sensor  # noqa: E402
 from recognizer.scan.grow import begin_scan, extend_scan  # noqa: E402
-from recognizer.scan.mosaic.touch import PlacedTouch, placed  # noqa: E402
+from recognizer.scan.mosaic.touch import PlacedTouch, planar_belief  # noqa: E402
 from recognizer.touch.lab import open_lab  # noqa: E402
 from recognizer.touch.reader import Reader  # noqa: E402
 from recognizer.touch.recognise import recognise  # noqa: E402
@@ -178,7 +178,7 @@ def one_scan(job: tuple[str, str, str, int]) -> Outcome:
                 inside = False
         if inside:
             pose = np.array([touch.x_mm, touch.y_mm, touch.theta_rad])
-            believed = placed(pose + rng.standard_normal(3) * ARM, ARM)
+            believed = planar_belief(pose + rng.standard_normal(3) * ARM, ARM)
             signal = signal_of(counts.astype(np.float64))
             begin = time.process_time()
             scan = extend_scan(scan, PlacedTouch(signal, believed=believed, seq=k))

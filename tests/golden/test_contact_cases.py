@@ -26,9 +26,9 @@ from probe.sensor import Overlay, SensorType
 from probe.surface.face import endless
 from probe.surface.indenters import FlatPlate, HalfPlane, RaisedStrip
 from probe.surface.polygon import polygon
-from recognizer.scan.mosaic.pair import registered
+from recognizer.scan.mosaic.pair import register_patches
 from recognizer.scan.mosaic.patch import patch_of
-from recognizer.scan.mosaic.planar import composed
+from recognizer.scan.mosaic.planar import compose_poses
 from recognizer.touch.settings import SignalSettings
 from recognizer.touch.signal import signal_of
 
@@ -181,11 +181,11 @@ def test_case_12_raw_products_fail_where_registration_does_not(scene):
         place = np.array([*rng.uniform(20, 120, 2), rng.uniform(0, 2 * math.pi)])
         true = np.array([4.25 * P * rng.choice([-1, 1]), 0.3 * P, 0.0])
         believed = true + np.array([*rng.uniform(-P, P, 2), 0.0])
-        images = [felt(faces[pair % 2], at) for at in (place, composed(place, true))]
+        images = [felt(faces[pair % 2], at) for at in (place, compose_poses(place, true))]
         shift = raw_product(*images, believed[:2] / P, 4)
         raw_wrong += math.hypot(*(shift - true[:2] / P)) > 1
         patches = [patch_of(TAB, signal_of(image, floor=0.0, settings=FELT)) for image in images]
-        found = registered(*patches, believed, spread, period_mm=7.0)
+        found = register_patches(*patches, believed, spread, period_mm=7.0)
         answered += bool(found)
         wrong += bool(found) and math.hypot(*(found.pose - true)[:2]) > P
     assert raw_wrong >= 0.2 * pairs

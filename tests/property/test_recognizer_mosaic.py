@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from probe.sensor import SensorType
-from recognizer.scan.mosaic.canvas import Laid, empty_canvas, laid
-from recognizer.scan.mosaic.correlation import correlated
-from recognizer.scan.mosaic.graph import PLANE, Constraint, covariances, solved
+from recognizer.scan.mosaic.canvas import CanvasEntry, empty_canvas, lay_touch
+from recognizer.scan.mosaic.correlation import cross_correlate
+from recognizer.scan.mosaic.graph import PLANE, Constraint, covariances, solve_pose_graph
 from recognizer.scan.mosaic.image import image_of
 from recognizer.scan.mosaic.patch import patch_of
-from recognizer.scan.mosaic.planar import between, composed, inverse, moved
+from recognizer.scan.mosaic.planar import compose_poses, inverse, relative_pose, transform_points
 from recognizer.scan.mosaic.raster import KnownRaster
 from recognizer.touch.signal import signal_of
 
@@ -33,11 +33,13 @@ def same(a, b):
 
 @given(poses, poses, poses)
 def test_poses_are_a_group(a, b, c):
-    assert same(composed(composed(a, b), c), composed(a, composed(b, c)))
-    assert same(composed(a, inverse(a)), np.zeros(3))
-    assert same(composed(a, between(a, b)), b)
+    assert same(compose_poses(compose_poses(a, b), c), compose_poses(a, compose_poses(b, c)))
+    assert same(compose_poses(a, inverse(a)), np.zeros(3))
+    assert same(compose_poses(a, relative_pose(a, b)), b)
     point = np.array([3.0, -4.0])
-    assert moved(composed(a, b), point) == pytest.approx(moved(a, moved(b, point)), abs=1e-8)
+    assert transform_points(compose_poses(a, b), point) == pytest.approx(
+        transform_points(a, transform_points(b, point)), abs=1e-8
+    )
 
 
 @given(seeds, st.floats(1e-3, 1e3), st.floats(-1e3, 1e3))
@@ -46,9 +48,9 @@ def test_gain_and_offset_leave_the_correlation_as_it_is(seed, gain, offset):
     rng = np.random.default_rng(seed)
     values, known = rng.normal(size=(14, 13)), rng.random((14, 13)) > 0.1
     image, seen = rng.normal(size=(9, 9)), rng.random((9, 9)) > 0.1
-    first = correlated(KnownRaster(values, known, 0, 0, 1), KnownRaster(image, seen, 0, 0, 1))
+    first = cross_correlate(KnownRaster(values, known, 0, 0, 1), KnownRaster(image, seen, 0, 0, 1))
     other = KnownRaster(gain * image + offset, seen, 0, 0, 1)
-    second = correlated(KnownRaster(values, known, 0, 0, 1), other)
+    second = cross_correlate(KnownRaster(values, known, 0, 0, 1), other)
     assert second.rho == pytest.approx(first.rho, abs=1e-4, nan_ok=True)
     assert np.nanmax(np.abs(first.rho)) <= 1
 
@@ -59,14 +61,14 @@ def test_the_order_of_touches_does_not_matter_to_the_canvas(seed, places):
     rng = np.random.default_rng(seed)
     sure = np.diag([1e-3, 1e-3, 1e-6])
     some = [
-        (patch_of(SENSOR, signal_of(rng.uniform(0, 9, (16, 16)))), Laid(pose, sure, 1.0))
+        (patch_of(SENSOR, signal_of(rng.uniform(0, 9, (16, 16)))), CanvasEntry(pose, sure, 1.0))
         for pose in places
     ]
     there, back = empty_canvas(SENSOR.pitch_mm), empty_canvas(SENSOR.pitch_mm)
     for patch, how in some:
-        there = laid(there, patch, how)
+        there = lay_touch(there, patch, how)
     for patch, how in reversed(some):
-        back = laid(back, patch, how)
+        back = lay_touch(back, patch, how)
     assert there.tiles.keys() == back.tiles.keys()
     one = image_of(there) if np.ptp(np.array(places)[:, :2], axis=0).max() < 100 else None
     if one is not None:
@@ -75,7 +77,7 @@ def test_the_order_of_touches_does_not_matter_to_the_canvas(seed, places):
         assert one.values == pytest.approx(two.values, abs=1e-9)
         assert np.isfinite(one.error).all()
     for patch, how in some:
-        there = laid(there, patch, how, -1)
+        there = lay_touch(there, patch, how, -1)
     assert not there.tiles
 
 
@@ -91,7 +93,7 @@ def test_whatever_the_ties_say_there_is_a_pose_with_a_covariance(seed, n):
         a, b = rng.choice(n, 2, replace=False).tolist()
         root = rng.normal(size=(3, rng.integers(1, 4))) * 10.0 ** rng.uniform(-2, 3)
         constraints.append(Constraint(a, b, rng.normal(0, [50, 50, 2]), root @ root.T, "pair"))
-    found = solved(constraints, rng.normal(0, 50, (n, 3)), np.zeros(3), arm_stands=True)
+    found = solve_pose_graph(constraints, rng.normal(0, 50, (n, 3)), np.zeros(3), arm_stands=True)
     assert np.isfinite(found.poses).all()
     assert ((found.weights > 0) & (found.weights <= 1)).all()
     spread = covariances(found.normal, range(n))

@@ -17,8 +17,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.scan.mosaic.patch import TouchPatch, asked, covered, nearest
-from recognizer.scan.mosaic.planar import inverse, moved
+from recognizer.scan.mosaic.patch import (
+    TouchPatch,
+    covers_points,
+    interpolate_patch,
+    nearest_tactel,
+)
+from recognizer.scan.mosaic.planar import inverse, transform_points
 from recognizer.scan.mosaic.raster import KnownRaster
 from recognizer.scan.mosaic.settings import CANVAS
 
@@ -36,7 +41,7 @@ class Canvas:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Laid:
+class CanvasEntry:
     """How a touch lies on a canvas; the same value takes it off again."""
 
     pose: Array  #: (3,) T_plane_touch
@@ -49,7 +54,7 @@ def empty_canvas(pitch_mm: float) -> Canvas:
     return Canvas(pitch_mm / CANVAS.magnified, {})
 
 
-def laid(canvas: Canvas, patch: TouchPatch, how: Laid, sign: int = 1) -> Canvas:
+def lay_touch(canvas: Canvas, patch: TouchPatch, how: CanvasEntry, sign: int = 1) -> Canvas:
     """Return the canvas with a touch more, or with one less (sign -1)."""
     h, (half_x, half_y) = canvas.cell_mm, patch.sensor.half_mm
     x, y, theta = how.pose.tolist()
@@ -59,10 +64,10 @@ def laid(canvas: Canvas, patch: TouchPatch, how: Laid, sign: int = 1) -> Canvas:
     i0, i1 = math.floor((-y - high) / h), math.ceil((-y + high) / h)
     i, j = np.mgrid[i0:i1, j0:j1]
     points = np.stack([(j + 0.5) * h, -(i + 0.5) * h], axis=-1).reshape(-1, 2)
-    inside = moved(inverse(how.pose), points)
-    known = np.flatnonzero(covered(patch.sensor, inside, beyond=0.5))
-    known = known[patch.good.reshape(-1)[nearest(patch.sensor, inside[known])]]
-    values, by_x, by_y = asked(patch, inside[known])
+    inside = transform_points(inverse(how.pose), points)
+    known = np.flatnonzero(covers_points(patch.sensor, inside, beyond=0.5))
+    known = known[patch.good.reshape(-1)[nearest_tactel(patch.sensor, inside[known])]]
+    values, by_x, by_y = interpolate_patch(patch, inside[known])
     slope_x, slope_y = c * by_x - s * by_y, s * by_x + c * by_y
     away = points[known] - how.pose[:2]
     slopes = np.stack([slope_x, slope_y, slope_y * away[:, 0] - slope_x * away[:, 1]], axis=-1)
@@ -74,10 +79,10 @@ def laid(canvas: Canvas, patch: TouchPatch, how: Laid, sign: int = 1) -> Canvas:
     sums[WEIGHT, known], sums[COUNT, known] = weight, 1.0
     sums[VALUE, known] = weight * unit * values
     sums[SQUARE, known] = weight * (unit * values) ** 2
-    return _put(canvas, sign * sums.reshape(4, i1 - i0, j1 - j0), i0, j0)
+    return _add_sums(canvas, sign * sums.reshape(4, i1 - i0, j1 - j0), i0, j0)
 
 
-def cut(canvas: Canvas, i0: int, j0: int, rows: int, columns: int) -> Array:
+def rectangle_sums(canvas: Canvas, i0: int, j0: int, rows: int, columns: int) -> Array:
     """Return the sums (4, rows, columns) of a rectangle of cells."""
     found, size = np.zeros((4, rows, columns)), CANVAS.tile
     for (k, m), tile in canvas.tiles.items():
@@ -94,13 +99,13 @@ def reference(canvas: Canvas, x_mm: float, y_mm: float, reach_mm: float) -> Know
     h = canvas.cell_mm
     size = 2 * math.ceil(reach_mm / h)
     j0, i0 = round(x_mm / h) - size // 2, round(-y_mm / h) - size // 2
-    sums = cut(canvas, i0, j0, size, size)
+    sums = rectangle_sums(canvas, i0, j0, size, size)
     known = sums[COUNT] > 0.5
     values = np.where(known, sums[VALUE] / np.where(known, sums[WEIGHT], 1.0), 0.0)
     return KnownRaster(values, known, (j0 + 0.5) * h, -(i0 + 0.5) * h, h)
 
 
-def _put(canvas: Canvas, sums: Array, i0: int, j0: int) -> Canvas:
+def _add_sums(canvas: Canvas, sums: Array, i0: int, j0: int) -> Canvas:
     tiles, size = dict(canvas.tiles), CANVAS.tile
     rows, columns = sums.shape[1:]
     for k in range(i0 // size, (i0 + rows - 1) // size + 1):

@@ -32,7 +32,7 @@ class Correlation:
     overlap: Array  #: the same shape, cells that both know
 
 
-def correlated(reference: KnownRaster, image: KnownRaster) -> Correlation:
+def cross_correlate(reference: KnownRaster, image: KnownRaster) -> Correlation:
     """Correlate an image with a reference that reaches further on all sides.
 
     Parameters
@@ -53,7 +53,7 @@ def correlated(reference: KnownRaster, image: KnownRaster) -> Correlation:
     down, right = (
         n - m + 1 for n, m in zip(reference.values.shape, image.values.shape, strict=True)
     )
-    a, b = _centred(reference), _centred(image)
+    a, b = _centre_values(reference), _centre_values(image)
     of_a = rfft2(np.stack([reference.known, a, a * a]), size)
     of_b = np.conj(rfft2(np.stack([image.known, b, b * b]), size))
     pairs = np.stack(
@@ -107,7 +107,7 @@ def _vertex(before: float, at: float, after: float) -> float:
     return min(0.5, max(-0.5, 0.5 * (before - after) / bend))
 
 
-def _centred(raster: KnownRaster) -> Array:
+def _centre_values(raster: KnownRaster) -> Array:
     """Return values less their mean (sums of squares then lose no digits), 0 where not known."""
     mean = float(raster.values[raster.known].mean()) if raster.known.any() else 0.0
     return np.where(raster.known, raster.values - mean, 0.0)

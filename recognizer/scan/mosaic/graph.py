@@ -23,7 +23,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.scan.mosaic.planar import between, wrapped
+from recognizer.scan.mosaic.planar import relative_pose, wrap_angle
 from recognizer.scan.mosaic.settings import GRAPH
 
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ class PoseGraphSolution:
     normal: Any  #: sparse matrix (3 n + 3) square, inverse covariance of poses and arm
 
 
-def solved(
+def solve_pose_graph(
     constraints: Sequence[Constraint], poses: Array, arm: Array, *, arm_stands: bool
 ) -> PoseGraphSolution:
     """Return the poses that agree best with all constraints.
@@ -79,14 +79,14 @@ def solved(
     graph = _graph(constraints, len(poses), arm_stands=arm_stands)
     at = np.concatenate([poses, arm[None]])
     damping, steps = 1e-6, 0
-    now = _linear(graph, at)
+    now = _linearise(graph, at)
     while steps < GRAPH.steps:
         steps += 1
         diagonal = diags(now.normal.diagonal() * damping)
         step = splu((now.normal + diagonal).tocsc()).solve(now.pull).reshape(-1, 3)
         moved = at + step
-        moved[:, 2] = wrapped(moved[:, 2])
-        then = _linear(graph, moved)
+        moved[:, 2] = wrap_angle(moved[:, 2])
+        then = _linearise(graph, moved)
         if then.cost > now.cost * (1 + 1e-12) and damping < 1e6:
             damping *= 10
             continue
@@ -130,7 +130,7 @@ class _Graph:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Linear:
+class _Linearisation:
     cost: float
     chi2: Array
     weights: Array
@@ -153,14 +153,14 @@ def _graph(constraints: Sequence[Constraint], n: int, *, arm_stands: bool) -> _G
     )
 
 
-def _linear(graph: _Graph, at: Array) -> _Linear:
+def _linearise(graph: _Graph, at: Array) -> _Linearisation:
     """Return cost, gradient and normal equations at poses (n + 1, 3), the arm's last."""
     from scipy.sparse import coo_matrix
 
     every = np.concatenate([at, np.zeros((1, 3))])
-    relative = between(every[graph.a], every[graph.b])
+    relative = relative_pose(every[graph.a], every[graph.b])
     residual = relative - graph.pose
-    residual[:, 2] = wrapped(residual[:, 2])
+    residual[:, 2] = wrap_angle(residual[:, 2])
     pushed = (graph.information @ residual[:, :, None])[:, :, 0]
     chi2 = (residual * pushed).sum(axis=1)
     scale = np.minimum(1.0, 2 * GRAPH.free / (GRAPH.free + chi2))
@@ -195,7 +195,7 @@ def _linear(graph: _Graph, at: Array) -> _Linear:
         ),
         shape=(3 * graph.n + 3, 3 * graph.n + 3),
     ).tocsc()
-    return _Linear(cost, chi2, weights, normal, pull[:-1].reshape(-1))
+    return _Linearisation(cost, chi2, weights, normal, pull[:-1].reshape(-1))
 
 
 def _slopes(theta_a: Array, relative: Array) -> tuple[Array, Array]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.scan.mosaic.canvas import COUNT, SQUARE, VALUE, WEIGHT, Canvas, cut
+from recognizer.scan.mosaic.canvas import COUNT, SQUARE, VALUE, WEIGHT, Canvas, rectangle_sums
 from recognizer.scan.mosaic.settings import CANVAS
 from recognizer.touch.tactile_image import TactileImage, tactile_image
 
@@ -43,7 +43,7 @@ def image_of(canvas: Canvas) -> GlobalImage:
         return GlobalImage(none, none, none, none.astype(np.int64), h, (0.0, 0.0))
     at = np.array(list(canvas.tiles))
     low, high = at.min(axis=0) * CANVAS.tile, (at.max(axis=0) + 1) * CANVAS.tile
-    sums = cut(canvas, low[0], low[1], *(high - low).tolist())
+    sums = rectangle_sums(canvas, low[0], low[1], *(high - low).tolist())
     rows, columns = (np.flatnonzero((sums[COUNT] > 0.5).any(axis=axis)) for axis in (1, 0))
     sums = sums[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     count = np.rint(sums[COUNT]).astype(np.int64)

@@ -22,15 +22,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.scan.mosaic.patch import TouchPatch, asked, covered
-from recognizer.scan.mosaic.planar import inverse, moved, wrapped
+from recognizer.scan.mosaic.patch import TouchPatch, covers_points, interpolate_patch
+from recognizer.scan.mosaic.planar import inverse, transform_points, wrap_angle
 from recognizer.scan.mosaic.settings import LUCAS_KANADE
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Aligned:
+class Alignment:
     """How b lies on a."""
 
     pose: Array  #: (3,) T_a_b, mm and rad
@@ -60,9 +60,9 @@ class _Step:
     rho: float
 
 
-def aligned(
+def align_patches(
     a: TouchPatch, b: TouchPatch, start: Array, believed: Array, prior: Array
-) -> Aligned | None:
+) -> Alignment | None:
     """Return the pose that explains both images best, or None where there is none near.
 
     Parameters
@@ -81,7 +81,7 @@ def aligned(
         rows, steps = _rows(a, b, pose), steps + 1
         if rows is None:
             return None
-        found = _solved(rows, pose, believed, prior)
+        found = _solve_step(rows, pose, believed, prior)
         if found is None:
             return None
         farthest, widest = LUCAS_KANADE.farthest * pitch, LUCAS_KANADE.widest_rad
@@ -90,22 +90,22 @@ def aligned(
         moves = max(np.abs(shift).max(), abs(turn) * a.sensor.reach_mm)
         if moves < LUCAS_KANADE.done * pitch or steps == LUCAS_KANADE.steps:
             break
-        pose = np.append(pose[:2] + shift, wrapped(pose[2] + turn))
+        pose = np.append(pose[:2] + shift, wrap_angle(pose[2] + turn))
         if math.hypot(*(pose[:2] - start[:2])) > LUCAS_KANADE.reach * pitch:
             return None
     tactels = len(rows.target) / 2
-    return Aligned(pose, found.information, found.gain, found.rho, tactels, steps)
+    return Alignment(pose, found.information, found.gain, found.rho, tactels, steps)
 
 
 def _rows(a: TouchPatch, b: TouchPatch, pose: Array) -> _Rows | None:
-    there, here = moved(inverse(pose), a.points_mm), moved(pose, b.points_mm)
-    over_b = a.good.reshape(-1) & covered(a.sensor, there)
-    over_a = b.good.reshape(-1) & covered(b.sensor, here)
+    there, here = transform_points(inverse(pose), a.points_mm), transform_points(pose, b.points_mm)
+    over_b = a.good.reshape(-1) & covers_points(a.sensor, there)
+    over_a = b.good.reshape(-1) & covers_points(b.sensor, here)
     if min(over_b.sum(), over_a.sum()) < LUCAS_KANADE.least:
         return None
     v, u = there[over_b], here[over_a]
-    of_v, b_x, b_y = asked(b, v)
-    of_u, a_x, a_y = asked(a, u)
+    of_v, b_x, b_y = interpolate_patch(b, v)
+    of_u, a_x, a_y = interpolate_patch(a, u)
     c, s = math.cos(pose[2]), math.sin(pose[2])
     x, y = (u - pose[:2]).T
     by_b = (s * b_y - c * b_x, -s * b_x - c * b_y, b_x * v[:, 1] - b_y * v[:, 0])
@@ -120,7 +120,7 @@ def _rows(a: TouchPatch, b: TouchPatch, pose: Array) -> _Rows | None:
     )
 
 
-def _solved(rows: _Rows, pose: Array, believed: Array, prior: Array) -> _Step | None:
+def _solve_step(rows: _Rows, pose: Array, believed: Array, prior: Array) -> _Step | None:
     """Return a step of pose, gain and offset together; None where the images are not alike."""
     target, n, floor = rows.target, len(rows.slopes_b), LUCAS_KANADE.floor
     nuisance = np.concatenate([rows.values[:, None] * rows.plane, rows.plane], axis=1)
@@ -146,7 +146,7 @@ def _solved(rows: _Rows, pose: Array, believed: Array, prior: Array) -> _Step | 
     information = (information + information.T) / 2
     pull = scale * (right[:3] - normal[:3, 3:] @ held[:, 3])
     away = pose - believed
-    away[2] = wrapped(away[2])
+    away[2] = wrap_angle(away[2])
     damping = np.diag([1e-6, 1e-6, 1e-4]) * (1 + np.trace(information))
     step = np.linalg.solve(information + prior + damping, pull - prior @ away)
     mean = float(weights @ target / weights.sum())

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import SensorType
-from recognizer.scan.mosaic.canvas import Canvas, Laid, empty_canvas
+from recognizer.scan.mosaic.canvas import Canvas, CanvasEntry, empty_canvas
 from recognizer.scan.mosaic.graph import Constraint
 from recognizer.scan.mosaic.image import GlobalImage, image_of
 from recognizer.scan.mosaic.patch import TouchPatch
@@ -55,7 +55,7 @@ class Mosaic:
     constraints: tuple[Constraint, ...]
     weights: Array  #: (m,) of the constraints
     chi2: Array  #: (m,)
-    laid: tuple[Laid | None, ...]  #: how each touch lies on the canvas
+    laid: tuple[CanvasEntry | None, ...]  #: how each touch lies on the canvas
     canvas: Canvas
 
     def __len__(self) -> int:

@@ -17,13 +17,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.scan.mosaic.lucas_kanade import Aligned, aligned
-from recognizer.scan.mosaic.patch import TouchPatch, covered
-from recognizer.scan.mosaic.planar import inverse, moved, wrapped
-from recognizer.scan.mosaic.raster import magnified
-from recognizer.scan.mosaic.search import nats, searched, window_mm
+from recognizer.scan.mosaic.lucas_kanade import Alignment, align_patches
+from recognizer.scan.mosaic.patch import TouchPatch, covers_points
+from recognizer.scan.mosaic.planar import inverse, transform_points, wrap_angle
+from recognizer.scan.mosaic.raster import magnify_patch
+from recognizer.scan.mosaic.search import nats, search_reference, window_mm
 from recognizer.scan.mosaic.settings import ImageSearchSettings
-from recognizer.scan.mosaic.texture import far_apart, held, kept, scales, seen_motions
+from recognizer.scan.mosaic.texture import (
+    far_apart,
+    holding_information,
+    restrict_information,
+    scales,
+    seen_motions,
+)
 
 Array = NDArray[np.float64]
 
@@ -50,7 +56,7 @@ class ImageRegistration:
         return not self.reason
 
 
-def registered(
+def register_patches(
     a: TouchPatch,
     b: TouchPatch,
     believed: Array,
@@ -82,44 +88,48 @@ def registered(
     """
     limits = settings or ImageSearchSettings()
     reach = window_mm(covariance, limits)
-    reason = _hopeless(a, b, believed, limits, math.hypot(*reach))
+    reason = _reject_reason(a, b, believed, limits, math.hypot(*reach))
     if reason:
-        return refused(believed, covariance, reason)
+        return refused_registration(believed, covariance, reason)
     prior: Array = np.asarray(np.linalg.inv(covariance), np.float64)
     tried = 1.0
     if starts is None:
         turn = limits.sigmas * math.sqrt(covariance[2, 2]) * a.sensor.reach_mm
         starts = [believed]
         if max(*reach, turn) > limits.near_tactels * a.sensor.pitch_mm:
-            found = searched(magnified(a), b, believed, covariance, limits)
+            found = search_reference(magnify_patch(a), b, believed, covariance, limits)
             starts, tried = [candidate.pose for candidate in found.candidates], found.tried
-    refined: list[tuple[float, float, Aligned]] = []
+    refined: list[tuple[float, float, Alignment]] = []
     for start in starts:
-        match = aligned(a, b, start, believed, prior)
+        match = align_patches(a, b, start, believed, prior)
         if match is None:
             continue
         away = match.pose - believed
-        away[2] = wrapped(away[2])
+        away[2] = wrap_angle(away[2])
         images = float(nats(np.array(match.rho), np.array(match.tactels), limits))
         refined.append((images - 0.5 * float(away @ prior @ away), images, match))
     refined.sort(key=lambda item: -item[0])
     if not refined or refined[0][1] < limits.significance + math.log(tried):
-        return refused(believed, covariance, NOISE)
+        return refused_registration(believed, covariance, NOISE)
     score, _, best = refined[0]
-    over = a.good.reshape(-1) & covered(a.sensor, moved(inverse(best.pose), a.points_mm))
+    over = a.good.reshape(-1) & covers_points(
+        a.sensor, transform_points(inverse(best.pose), a.points_mm)
+    )
     motions = seen_motions(a, over, best.pose)
     if motions.shape[1] == 0:
-        return refused(believed, covariance, CONSTANT)
+        return refused_registration(believed, covariance, CONSTANT)
     if motions.shape[1] < 3:
-        again = _held(a, b, best, motions, believed, prior)
+        again = _align_seen_motions(a, b, best, motions, believed, prior)
         if again is None:
-            return refused(believed, covariance, NOISE)
+            return refused_registration(believed, covariance, NOISE)
         best = again
-    information = kept(best.information, motions, a.sensor, covariance)
-    others = [v for v, _, other in refined[1:] if _elsewhere(best.pose, other.pose, information, a)]
+    information = restrict_information(best.information, motions, a.sensor, covariance)
+    others = [
+        v for v, _, other in refined[1:] if _is_elsewhere(best.pose, other.pose, information, a)
+    ]
     margin = score - max(others, default=-math.inf)
     if margin < (limits.margin_beyond if max(reach) > period_mm / 2 else limits.margin):
-        return refused(believed, covariance, AMBIGUOUS, margin)
+        return refused_registration(believed, covariance, AMBIGUOUS, margin)
     return ImageRegistration(
         pose=best.pose,
         covariance=np.asarray(np.linalg.inv(information + prior), np.float64),
@@ -131,7 +141,7 @@ def registered(
     )
 
 
-def refused(
+def refused_registration(
     believed: Array, covariance: Array, reason: str, margin: float = 0.0
 ) -> ImageRegistration:
     """Return a registration that says nothing but why."""
@@ -147,7 +157,7 @@ def refused(
     )
 
 
-def varies(patch: TouchPatch, over: NDArray[np.bool_], contrast: float) -> bool:
+def shows_texture(patch: TouchPatch, over: NDArray[np.bool_], contrast: float) -> bool:
     """Whether a patch shows more than a plane on some of its tactels (n,)."""
     values = patch.values.reshape(-1)[over]
     if len(values) < 4:
@@ -157,37 +167,37 @@ def varies(patch: TouchPatch, over: NDArray[np.bool_], contrast: float) -> bool:
     return bool(rest.std() > contrast)
 
 
-def _hopeless(
+def _reject_reason(
     a: TouchPatch, b: TouchPatch, believed: Array, limits: ImageSearchSettings, reach_mm: float
 ) -> str:
     """Return why two patches cannot be registered, before anything is tried; or nothing."""
     if min(a.scale, b.scale) <= 0:
         return CONSTANT
     for patch, T_patch_other in ((a, believed), (b, inverse(believed))):
-        there = moved(inverse(T_patch_other), patch.points_mm)
+        there = transform_points(inverse(T_patch_other), patch.points_mm)
         beyond = reach_mm / patch.sensor.pitch_mm + 0.5
-        over = patch.good.reshape(-1) & covered(patch.sensor, there, beyond)
+        over = patch.good.reshape(-1) & covers_points(patch.sensor, there, beyond)
         if over.sum() < limits.overlap * over.size:
             return APART
-        if not varies(patch, over, limits.contrast):
+        if not shows_texture(patch, over, limits.contrast):
             return CONSTANT
     return ""
 
 
-def _held(
-    a: TouchPatch, b: TouchPatch, found: Aligned, motions: Array, believed: Array, prior: Array
-) -> Aligned | None:
+def _align_seen_motions(
+    a: TouchPatch, b: TouchPatch, found: Alignment, motions: Array, believed: Array, prior: Array
+) -> Alignment | None:
     """Align again in the motions that are seen; what they leave open stays as believed."""
     away = found.pose - believed
-    away[2] = wrapped(away[2])
+    away[2] = wrap_angle(away[2])
     unit = scales(a.sensor)
     start = believed + unit * (motions @ (motions.T @ (away / unit)))
-    return aligned(a, b, start, believed, prior + held(motions, a.sensor))
+    return align_patches(a, b, start, believed, prior + holding_information(motions, a.sensor))
 
 
-def _elsewhere(best: Array, other: Array, information: Array, a: TouchPatch) -> bool:
+def _is_elsewhere(best: Array, other: Array, information: Array, a: TouchPatch) -> bool:
     """Whether two candidates differ by more than the images leave open (along an edge, say)."""
     away = other - best
-    away[2] = wrapped(away[2])
+    away[2] = wrap_angle(away[2])
     far = far_apart(other, best, a.sensor) > 0.5
     return far and float(away @ information @ away) > 9.0

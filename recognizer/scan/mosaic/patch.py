@@ -46,14 +46,14 @@ def patch_of(sensor: SensorType, signal: Signal) -> TouchPatch:
     >>> readings = np.zeros((16, 16))
     >>> readings[:, 8:] = 100.0
     >>> patch = patch_of(SensorType(), signal_of(readings))
-    >>> value, slope_x, _ = asked(patch, np.array([[0.0, 0.0]]))
+    >>> value, slope_x, _ = interpolate_patch(patch, np.array([[0.0, 0.0]]))
     >>> bool(0.4 < value[0] < 0.6 and slope_x[0] > 0)
     True
     """
     from scipy.ndimage import gaussian_filter, spline_filter
 
     good = signal.trust >= PATCH.least_trust
-    filled = _filled(signal.forces, good)
+    filled = _fill_bad_tactels(signal.forces, good)
     scale = float(np.quantile(filled, 0.95))
     if scale <= 0:
         scale = float(filled.max())
@@ -71,8 +71,8 @@ def patch_of(sensor: SensorType, signal: Signal) -> TouchPatch:
     )
 
 
-def asked(patch: TouchPatch, points_mm: Array) -> tuple[Array, Array, Array]:
-    """Return values and slopes by x and y (1/mm) at points (n, 2) inside `covered`."""
+def interpolate_patch(patch: TouchPatch, points_mm: Array) -> tuple[Array, Array, Array]:
+    """Return values and slopes by x and y (1/mm) at points (n, 2) inside `covers_points`."""
     sensor, pitch = patch.sensor, patch.sensor.pitch_mm
     column = points_mm[:, 0] / pitch + ((sensor.columns - 1) / 2 + RIM)
     row = (sensor.rows - 1) / 2 + RIM - points_mm[:, 1] / pitch
@@ -89,13 +89,13 @@ def asked(patch: TouchPatch, points_mm: Array) -> tuple[Array, Array, Array]:
     return value, slope_x, slope_y
 
 
-def covered(sensor: SensorType, points_mm: Array, beyond: float = 0.0) -> NDArray[np.bool_]:
+def covers_points(sensor: SensorType, points_mm: Array, beyond: float = 0.0) -> NDArray[np.bool_]:
     """Whether points lie between tactels' centres, or up to `beyond` tactels outside."""
     half = (np.array([sensor.columns, sensor.rows]) - 1) / 2 + beyond
     return np.asarray((np.abs(points_mm) <= half * sensor.pitch_mm + 1e-9).all(axis=-1))
 
 
-def nearest(sensor: SensorType, points_mm: Array) -> NDArray[np.intp]:
+def nearest_tactel(sensor: SensorType, points_mm: Array) -> NDArray[np.intp]:
     """Return the number of the tactel whose centre is nearest to each point inside the matrix."""
     column = np.rint(points_mm[..., 0] / sensor.pitch_mm + (sensor.columns - 1) / 2)
     row = np.rint((sensor.rows - 1) / 2 - points_mm[..., 1] / sensor.pitch_mm)
@@ -104,7 +104,7 @@ def nearest(sensor: SensorType, points_mm: Array) -> NDArray[np.intp]:
     return np.asarray(row * sensor.columns + column)
 
 
-def _filled(forces: Array, good: NDArray[np.bool_]) -> Array:
+def _fill_bad_tactels(forces: Array, good: NDArray[np.bool_]) -> Array:
     """Return forces with bad tactels taken from good ones around, weighted by nearness."""
     if good.all():
         return forces.astype(np.float64)

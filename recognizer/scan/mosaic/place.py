@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.scan.mosaic.canvas import laid, reference
+from recognizer.scan.mosaic.canvas import lay_touch, reference
 from recognizer.scan.mosaic.errors import MosaicError
 from recognizer.scan.mosaic.graph import ARM, PLANE, Constraint, Kind
 from recognizer.scan.mosaic.mosaic import ALONE, PARTLY, Mosaic
@@ -23,19 +23,19 @@ from recognizer.scan.mosaic.pair import (
     CONSTANT,
     NOISE,
     ImageRegistration,
-    registered,
-    varies,
+    register_patches,
+    shows_texture,
 )
-from recognizer.scan.mosaic.patch import TouchPatch, covered
+from recognizer.scan.mosaic.patch import TouchPatch, covers_points
 from recognizer.scan.mosaic.planar import (
-    between,
-    between_covariance,
-    composed,
+    compose_poses,
     composed_covariance,
-    moved,
-    wrapped,
+    relative_covariance,
+    relative_pose,
+    transform_points,
+    wrap_angle,
 )
-from recognizer.scan.mosaic.search import searched, window_mm
+from recognizer.scan.mosaic.search import search_reference, window_mm
 from recognizer.scan.mosaic.settings import GRAPH
 from recognizer.scan.mosaic.texture import scales, seen_motions
 from recognizer.scan.mosaic.touch import PlacedTouch, PlanarBelief
@@ -44,7 +44,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Placing:
+class TouchPlacement:
     """What is known of a touch when it comes in."""
 
     pose: Array  #: (3,) T_plane_touch to start from
@@ -53,20 +53,22 @@ class Placing:
     reason: str  #: "" where decoded or registered in all directions
 
 
-def placing(mosaic: Mosaic, touch: PlacedTouch, patch: TouchPatch, number: int) -> Placing:
+def place_touch(
+    mosaic: Mosaic, touch: PlacedTouch, patch: TouchPatch, number: int
+) -> TouchPlacement:
     """Return where a touch belongs in a mosaic that may hold it already under this number."""
-    given = _given(touch, number)
-    predicted = _predicted(mosaic, touch, number)
-    if touch.decoded is not None and _contradicted(mosaic, touch, number):
+    given = _given_constraints(touch, number)
+    predicted = _predict_pose(mosaic, touch, number)
+    if touch.decoded is not None and _contradicts_decoded(mosaic, touch, number):
         # neighbours shall say who is right
-        other = placing(mosaic, replace(touch, decoded=None), patch, number)
+        other = place_touch(mosaic, replace(touch, decoded=None), patch, number)
         if not other.reason:
             return replace(other, constraints=(given[0], *other.constraints))
-    near = _near(mosaic, patch, predicted, number)
-    reason, start = _found(mosaic, patch, predicted, near, number)
+    near = _overlapping_neighbours(mosaic, patch, predicted, number)
+    reason, start = _search_mosaic(mosaic, patch, predicted, near, number)
     pairs: list[tuple[int, ImageRegistration]] = []
     if not reason:
-        pairs = _registered(mosaic, patch, predicted, start, near)
+        pairs = _register_neighbours(mosaic, patch, predicted, start, near)
     softer = 1 / mosaic.settings.inflation
     constraints = given + [
         Constraint(j, number, pair.pose, pair.information * softer, "pair", math.log(pair.gain))
@@ -82,15 +84,15 @@ def placing(mosaic: Mosaic, touch: PlacedTouch, patch: TouchPatch, number: int) 
         reason = PARTLY
     starts = [predicted.pose, start]
     starts += [
-        composed(_pose(mosaic, constraint.a), constraint.pose)
+        compose_poses(_pose(mosaic, constraint.a), constraint.pose)
         for constraint in constraints
         if constraint.a != ARM
     ]
     pose = min(starts, key=lambda pose: _disagreement(mosaic, constraints, pose))
-    return Placing(pose, tuple(constraints), _gain(mosaic, pairs), reason)
+    return TouchPlacement(pose, tuple(constraints), _gain(mosaic, pairs), reason)
 
 
-def _given(touch: PlacedTouch, number: int) -> list[Constraint]:
+def _given_constraints(touch: PlacedTouch, number: int) -> list[Constraint]:
     """Return what arm, steps and reader say."""
 
     def constraint(a: int, place: PlanarBelief, kind: Kind) -> Constraint:
@@ -106,13 +108,13 @@ def _given(touch: PlacedTouch, number: int) -> list[Constraint]:
     return constraints
 
 
-def _contradicted(mosaic: Mosaic, touch: PlacedTouch, number: int) -> bool:
+def _contradicts_decoded(mosaic: Mosaic, touch: PlacedTouch, number: int) -> bool:
     """Whether a decoded place is not where the touch should stand."""
     if touch.decoded is None or not len(mosaic) or not (touch.believed or touch.stepped):
         return False
-    expected = _predicted(mosaic, replace(touch, decoded=None), number)
+    expected = _predict_pose(mosaic, replace(touch, decoded=None), number)
     away = touch.decoded.pose - expected.pose
-    away[2] = wrapped(away[2])
+    away[2] = wrap_angle(away[2])
     spread = expected.covariance + touch.decoded.covariance
     return float(away @ np.linalg.solve(spread, away)) > GRAPH.free
 
@@ -123,7 +125,7 @@ def _pose(mosaic: Mosaic, frame: int) -> Array:
     return mosaic.arm if frame == ARM else np.asarray(mosaic.poses[frame])
 
 
-def _predicted(mosaic: Mosaic, touch: PlacedTouch, number: int) -> PlanarBelief:
+def _predict_pose(mosaic: Mosaic, touch: PlacedTouch, number: int) -> PlanarBelief:
     """Return where a touch should stand, before its image is looked at."""
     if touch.decoded is not None:
         return touch.decoded
@@ -131,12 +133,12 @@ def _predicted(mosaic: Mosaic, touch: PlacedTouch, number: int) -> PlanarBelief:
     if touch.believed is not None and np.isfinite(mosaic.arm_covariance).all():
         pose, covariance = touch.believed.pose, touch.believed.covariance
         spread = composed_covariance(mosaic.arm, pose, mosaic.arm_covariance, covariance)
-        found.append(PlanarBelief(composed(mosaic.arm, pose), spread))
+        found.append(PlanarBelief(compose_poses(mosaic.arm, pose), spread))
     if touch.stepped is not None and number > 0:
         pose, covariance = touch.stepped.pose, touch.stepped.covariance
         before, sure = mosaic.poses[number - 1], mosaic.covariances[number - 1]
         spread = composed_covariance(before, pose, sure, covariance)
-        found.append(PlanarBelief(composed(before, pose), spread))
+        found.append(PlanarBelief(compose_poses(before, pose), spread))
     if not found:
         raise MosaicError(
             "a touch that hangs on nothing: no touch before it tells how its frame lies",
@@ -146,7 +148,9 @@ def _predicted(mosaic: Mosaic, touch: PlacedTouch, number: int) -> PlanarBelief:
     return min(found, key=lambda place: float(np.trace(place.covariance[:2, :2])))
 
 
-def _near(mosaic: Mosaic, patch: TouchPatch, predicted: PlanarBelief, number: int) -> list[int]:
+def _overlapping_neighbours(
+    mosaic: Mosaic, patch: TouchPatch, predicted: PlanarBelief, number: int
+) -> list[int]:
     """Return neighbours that may be registered with, by overlap."""
     sensor, least = mosaic.sensor, mosaic.settings.overlap
     away = np.hypot(*(mosaic.poses[:, :2] - predicted.pose[:2]).T)
@@ -154,15 +158,17 @@ def _near(mosaic: Mosaic, patch: TouchPatch, predicted: PlanarBelief, number: in
     shares = {}
     for j in some:
         if mosaic.laid[j] is not None and mosaic.reasons[j] != CONSTANT:
-            T_j_touch = between(mosaic.poses[j], predicted.pose)
-            shares[j] = float(covered(sensor, moved(T_j_touch, patch.points_mm), 0.5).mean())
+            T_j_touch = relative_pose(mosaic.poses[j], predicted.pose)
+            shares[j] = float(
+                covers_points(sensor, transform_points(T_j_touch, patch.points_mm), 0.5).mean()
+            )
     order = sorted(shares, key=lambda j: -shares[j])
     decoded = float(np.trace(predicted.covariance[:2, :2])) < (0.2 * sensor.pitch_mm) ** 2
     count = mosaic.settings.partners_decoded if decoded else mosaic.settings.partners
     return [j for j in order if shares[j] >= least][:count]
 
 
-def _found(
+def _search_mosaic(
     mosaic: Mosaic,
     patch: TouchPatch,
     predicted: PlanarBelief,
@@ -172,7 +178,7 @@ def _found(
     """Return a reason or none, and where the touch lies on the mean of the others."""
     limits, pitch = mosaic.settings.search, mosaic.sensor.pitch_mm
     good = patch.good.reshape(-1)
-    if patch.scale <= 0 or not varies(patch, good, limits.contrast):
+    if patch.scale <= 0 or not shows_texture(patch, good, limits.contrast):
         return CONSTANT, predicted.pose
     if not near:
         return ALONE, predicted.pose
@@ -183,10 +189,10 @@ def _found(
         return "", predicted.pose
     canvas = mosaic.canvas
     if number < len(mosaic) and (own := mosaic.laid[number]) is not None:
-        canvas = laid(canvas, patch, own, -1)
+        canvas = lay_touch(canvas, patch, own, -1)
     around = mosaic.sensor.reach_mm + math.hypot(*reach) + pitch
     shown = reference(canvas, float(predicted.pose[0]), float(predicted.pose[1]), around)
-    found = searched(shown, patch, predicted.pose, spread, limits)
+    found = search_reference(shown, patch, predicted.pose, spread, limits)
     if not found.candidates:
         return NOISE, predicted.pose
     best = found.candidates[0]
@@ -199,14 +205,14 @@ def _found(
     least = limits.margin_beyond if beyond else limits.margin
     for other in found.candidates[1:]:
         away = other.pose - best.pose
-        away[2] = wrapped(away[2])
+        away[2] = wrap_angle(away[2])
         apart = float(np.linalg.norm(motions.T @ (back @ away / scales(mosaic.sensor))))
         if apart > 1.0 and best.score - other.score < least:
             return AMBIGUOUS, predicted.pose
     return "", best.pose
 
 
-def _registered(
+def _register_neighbours(
     mosaic: Mosaic,
     patch: TouchPatch,
     predicted: PlanarBelief,
@@ -219,13 +225,13 @@ def _registered(
     pairs = []
     for j in near:
         at, sure = mosaic.poses[j], mosaic.covariances[j]
-        belief = between_covariance(at, predicted.pose, sure, predicted.covariance)
-        pair = registered(
+        belief = relative_covariance(at, predicted.pose, sure, predicted.covariance)
+        pair = register_patches(
             mosaic.patches[j],
             patch,
-            between(at, predicted.pose),
+            relative_pose(at, predicted.pose),
             belief + np.diag(loose),
-            starts=[between(at, start)],
+            starts=[relative_pose(at, start)],
             period_mm=settings.period_mm,
             settings=limits,
         )
@@ -250,8 +256,8 @@ def _disagreement(mosaic: Mosaic, constraints: Sequence[Constraint], pose: Array
     """Return the robust cost of a touch's constraints at a pose."""
     total = 0.0
     for constraint in constraints:
-        away = between(_pose(mosaic, constraint.a), pose) - constraint.pose
-        away[2] = wrapped(away[2])
+        away = relative_pose(_pose(mosaic, constraint.a), pose) - constraint.pose
+        away[2] = wrap_angle(away[2])
         chi2 = float(away @ constraint.information @ away)
         scale = min(1.0, 2 * GRAPH.free / (GRAPH.free + chi2))
         total += scale**2 * chi2 + GRAPH.free * (1 - scale) ** 2

@@ -18,10 +18,10 @@ from recognizer.scan.mosaic.settings import PLANAR
 Array = NDArray[np.float64]
 
 
-def composed(T_a_b: Array, T_b_c: Array) -> Array:
+def compose_poses(T_a_b: Array, T_b_c: Array) -> Array:
     """Return T_a_c."""
-    at = moved(T_a_b, T_b_c[..., :2])
-    turn = wrapped(T_a_b[..., 2] + T_b_c[..., 2])
+    at = transform_points(T_a_b, T_b_c[..., :2])
+    turn = wrap_angle(T_a_b[..., 2] + T_b_c[..., 2])
     return np.concatenate([at, turn[..., None]], axis=-1)
 
 
@@ -29,31 +29,31 @@ def inverse(T_a_b: Array) -> Array:
     """Return T_b_a."""
     c, s = np.cos(T_a_b[..., 2]), np.sin(T_a_b[..., 2])
     x, y = T_a_b[..., 0], T_a_b[..., 1]
-    return np.stack([-c * x - s * y, s * x - c * y, wrapped(-T_a_b[..., 2])], axis=-1)
+    return np.stack([-c * x - s * y, s * x - c * y, wrap_angle(-T_a_b[..., 2])], axis=-1)
 
 
-def between(T_m_a: Array, T_m_b: Array) -> Array:
+def relative_pose(T_m_a: Array, T_m_b: Array) -> Array:
     """Return T_a_b of two poses in one frame m."""
-    return composed(inverse(T_m_a), T_m_b)
+    return compose_poses(inverse(T_m_a), T_m_b)
 
 
-def moved(T_a_b: Array, points_mm: Array) -> Array:
+def transform_points(T_a_b: Array, points_mm: Array) -> Array:
     """Take points (..., 2) of frame b to frame a."""
     c, s = np.cos(T_a_b[..., 2]), np.sin(T_a_b[..., 2])
     x, y = points_mm[..., 0], points_mm[..., 1]
     return np.stack([T_a_b[..., 0] + c * x - s * y, T_a_b[..., 1] + s * x + c * y], axis=-1)
 
 
-def wrapped(angle: Array) -> Array:
+def wrap_angle(angle: Array) -> Array:
     """Return angles from -pi up to pi."""
     return np.asarray((angle + math.pi) % (2 * math.pi) - math.pi)
 
 
-def between_covariance(T_m_a: Array, T_m_b: Array, of_a: Array, of_b: Array) -> Array:
+def relative_covariance(T_m_a: Array, T_m_b: Array, of_a: Array, of_b: Array) -> Array:
     """Return the covariance (3, 3) of T_a_b from those of T_m_a and T_m_b, errors independent."""
     c, s = math.cos(T_m_a[2]), math.sin(T_m_a[2])
     back = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    x, y = between(T_m_a, T_m_b)[:2]
+    x, y = relative_pose(T_m_a, T_m_b)[:2]
     by_a = back.copy()
     by_a[:2, 2] = -y, x  # a turn of a moves b the other way round
     found = by_a @ of_a @ by_a.T + back @ of_b @ back.T

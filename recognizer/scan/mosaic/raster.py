@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.scan.mosaic.patch import RIM, TouchPatch, basis
-from recognizer.scan.mosaic.planar import moved
+from recognizer.scan.mosaic.planar import transform_points
 from recognizer.scan.mosaic.settings import CANVAS
 
 Array = NDArray[np.float64]
@@ -31,11 +31,11 @@ class KnownRaster:
     cell_mm: float
 
 
-def magnified(patch: TouchPatch) -> KnownRaster:
+def magnify_patch(patch: TouchPatch) -> KnownRaster:
     """Return a patch at four times its resolution, sensor frame."""
     rows, columns = patch.values.shape
     h = patch.sensor.pitch_mm / CANVAS.magnified
-    values = _between(rows) @ patch.coefficients @ _between(columns).T
+    values = _spline_matrix(rows) @ patch.coefficients @ _spline_matrix(columns).T
     known = patch.good.repeat(CANVAS.magnified, axis=0).repeat(CANVAS.magnified, axis=1)
     width, height = columns * CANVAS.magnified, rows * CANVAS.magnified
     return KnownRaster(
@@ -43,7 +43,7 @@ def magnified(patch: TouchPatch) -> KnownRaster:
     )
 
 
-def enlarged(raster: KnownRaster, rows: int, columns: int) -> KnownRaster:
+def pad_raster(raster: KnownRaster, rows: int, columns: int) -> KnownRaster:
     """Return a raster with so many unknown cells more on each side."""
     margin = ((rows, rows), (columns, columns))
     return KnownRaster(
@@ -69,7 +69,7 @@ def laid_under(source: KnownRaster, like: KnownRaster, T_source_like: Array) -> 
 
     A cell is known where all four are.
     """
-    at = moved(T_source_like, points_mm(like))
+    at = transform_points(T_source_like, points_mm(like))
     column = (at[..., 0] - source.x0_mm) / source.cell_mm
     row = (source.y0_mm - at[..., 1]) / source.cell_mm
     rows, columns = source.values.shape
@@ -92,7 +92,7 @@ def laid_under(source: KnownRaster, like: KnownRaster, T_source_like: Array) -> 
 
 
 @lru_cache(maxsize=8)
-def _between(tactels: int) -> Array:
+def _spline_matrix(tactels: int) -> Array:
     """Return what spline coefficients give at the cells of a row of tactels."""
     cells = (np.arange(tactels * CANVAS.magnified) + 0.5) / CANVAS.magnified - 0.5 + RIM
     first = np.floor(cells).astype(np.intp)

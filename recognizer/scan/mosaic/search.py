@@ -19,10 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.scan.mosaic.correlation import correlated, peaks
+from recognizer.scan.mosaic.correlation import cross_correlate, peaks
 from recognizer.scan.mosaic.patch import TouchPatch
-from recognizer.scan.mosaic.planar import composed
-from recognizer.scan.mosaic.raster import KnownRaster, enlarged, laid_under, magnified
+from recognizer.scan.mosaic.planar import compose_poses
+from recognizer.scan.mosaic.raster import KnownRaster, laid_under, magnify_patch, pad_raster
 from recognizer.scan.mosaic.settings import CANVAS, ImageSearchSettings
 
 Array = NDArray[np.float64]
@@ -38,7 +38,7 @@ class PlaceCandidate:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Searched:
+class SearchResult:
     """What the search found."""
 
     candidates: tuple[PlaceCandidate, ...]  #: best first
@@ -58,13 +58,13 @@ def window_mm(covariance: Array, settings: ImageSearchSettings) -> tuple[float, 
     return float(x), float(y)
 
 
-def searched(
+def search_reference(
     reference: KnownRaster,
     patch: TouchPatch,
     believed: Array,
     covariance: Array,
     settings: ImageSearchSettings,
-) -> Searched:
+) -> SearchResult:
     """Return where a patch may lie on a reference.
 
     Parameters
@@ -74,7 +74,7 @@ def searched(
     believed, covariance
         T_reference_patch (3,) and (3, 3).
     """
-    image = magnified(patch)
+    image = magnify_patch(patch)
     h = image.cell_mm
     # the window along the patch's axes
     c, s = math.cos(believed[2]), math.sin(believed[2])
@@ -82,7 +82,7 @@ def searched(
     inside = turned @ covariance @ turned.T
     x_mm, y_mm = window_mm(inside, settings)
     columns, rows = math.ceil(x_mm / h) + 1, math.ceil(y_mm / h) + 1
-    wide = enlarged(image, rows, columns)
+    wide = pad_raster(image, rows, columns)
     prior = np.linalg.inv(inside)
     down, right = np.mgrid[-rows : rows + 1, -columns : columns + 1]
     found: list[PlaceCandidate] = []
@@ -91,7 +91,7 @@ def searched(
         stands = np.array([believed[0], believed[1], believed[2] + turn])
         # shifts are along the turned axes; for the prior that is the same to second order
         away = np.stack([right * h, -down * h, np.full(right.shape, turn)], axis=-1)
-        seen = correlated(laid_under(reference, wide, stands), image)
+        seen = cross_correlate(laid_under(reference, wide, stands), image)
         tactels = seen.overlap / CANVAS.magnified**2
         images = nats(seen.rho, tactels, settings)
         score = images - 0.5 * np.einsum("kni,ij,knj->kn", away, prior, away)
@@ -99,10 +99,10 @@ def searched(
         for i, j, value in peaks(score, settings.candidates):
             shift = np.array([(j - columns) * h, (rows - i) * h, 0.0])
             alone = float(images[round(i), round(j)])
-            found.append(PlaceCandidate(composed(stands, shift), value, alone))
+            found.append(PlaceCandidate(compose_poses(stands, shift), value, alone))
     found.sort(key=lambda candidate: -candidate.score)
     tried = down.size * len(turns) / CANVAS.magnified**2
-    return Searched(tuple(found[: settings.candidates]), tried)
+    return SearchResult(tuple(found[: settings.candidates]), tried)
 
 
 def _turns(sigma_rad: float, patch: TouchPatch, settings: ImageSearchSettings) -> Array:

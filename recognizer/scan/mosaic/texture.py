@@ -51,7 +51,9 @@ def seen_motions(a: TouchPatch, over: NDArray[np.bool_], pose: Array) -> Array:
     return np.asarray(motions[:, values > TEXTURE.least], np.float64)
 
 
-def kept(information: Array, motions: Array, sensor: SensorType, believed: Array) -> Array:
+def restrict_information(
+    information: Array, motions: Array, sensor: SensorType, believed: Array
+) -> Array:
     """Return what an information says of some motions, all others being unknown.
 
     Parameters
@@ -78,7 +80,7 @@ def kept(information: Array, motions: Array, sensor: SensorType, believed: Array
     return np.asarray((found + found.T) / 2)
 
 
-def held(motions: Array, sensor: SensorType) -> Array:
+def holding_information(motions: Array, sensor: SensorType) -> Array:
     """Return an information (3, 3) that holds a pose in all motions but these."""
     unit = np.outer(scales(sensor), scales(sensor))
     return np.asarray(TEXTURE.stiff * (np.eye(3) - motions @ motions.T) / unit)

@@ -48,7 +48,7 @@ class PlacedTouch:
             )
 
 
-def placed(pose: ArrayLike, covariance: ArrayLike) -> PlanarBelief:
+def planar_belief(pose: ArrayLike, covariance: ArrayLike) -> PlanarBelief:
     """Return a checked place.
 
     Parameters
@@ -91,4 +91,4 @@ def decoded_place(recognition: Recognition) -> PlanarBelief | None:
     """Return where the reader says that a touch stands on its face; None without an answer."""
     if recognition.T_face_probe is None or recognition.covariance is None:
         return None
-    return placed(recognition.T_face_probe, recognition.covariance)
+    return planar_belief(recognition.T_face_probe, recognition.covariance)

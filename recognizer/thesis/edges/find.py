@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import SensorType
-from recognizer.thesis.edges.fit import FittedEdges, fitted
+from recognizer.thesis.edges.fit import FittedEdges, fit_edges
 from recognizer.thesis.edges.hough import segments
-from recognizer.thesis.edges.line import Corner, Edge, meeting
+from recognizer.thesis.edges.line import Corner, Edge, corner_between
 from recognizer.thesis.edges.points import edge_points
-from recognizer.thesis.edges.syntax import fused, vertices
-from recognizer.thesis.filters import magnified, median, unbiased
+from recognizer.thesis.edges.syntax import fuse_segments, vertices
+from recognizer.thesis.filters import magnify_image, median, subtract_bias
 from recognizer.thesis.settings import EDGE_RESPONSE, EdgeSearchSettings, SyntaxRules
 from recognizer.touch.signal import Signal
 from recognizer.touch.tactile_image import TactileImage, touch_image
@@ -49,11 +49,11 @@ def classical_edges(
         Readings of a touch or a mosaic.
     """
     chosen = finding or EdgeSearchSettings()
-    over = unbiased(image)
+    over = subtract_bias(image)
     if chosen.median:
         over = median(over)
-    fine = magnified(over, chosen.doublings)
-    return fused(segments(edge_points(fine, chosen.steep), chosen.hough), chosen.rules)
+    fine = magnify_image(over, chosen.doublings)
+    return fuse_segments(segments(edge_points(fine, chosen.steep), chosen.hough), chosen.rules)
 
 
 def face_edges(
@@ -100,7 +100,7 @@ def outline(
 ) -> Outline:
     """Return edges and corners that one touch feels, in the sensor frame; see `face_edges`."""
     chosen = finding or EdgeSearchSettings()
-    over = unbiased(image)
+    over = subtract_bias(image)
     rough = tuple(edge for edge in classical_edges(image, chosen) if _bounds(over, edge, chosen))[
         : chosen.most
     ]
@@ -127,7 +127,7 @@ def _best(
     reflex = False
     if len(edges) > 1:
         ways = [
-            fitted(
+            fit_edges(
                 image,
                 sensor,
                 edges,
@@ -139,7 +139,7 @@ def _best(
         ]
         off = [math.inf if way is None else way.off for way in ways]
         reflex = off[1] < off[0]
-    return fitted(image, sensor, edges, reflex=reflex, fitting=finding.fitting)
+    return fit_edges(image, sensor, edges, reflex=reflex, fitting=finding.fitting)
 
 
 def _bounds(image: TactileImage, edge: Edge, finding: EdgeSearchSettings) -> bool:
@@ -175,6 +175,6 @@ def _corners(found: FittedEdges, rules: SyntaxRules) -> tuple[Corner, ...]:
         k, m = (next(n for n, e in enumerate(found.edges) if e is edge)
                 for edge in (corner.first, corner.second))  # fmt: skip
         rows = [2 * k, 2 * k + 1, 2 * m, 2 * m + 1]
-        joint = meeting(corner.first, corner.second, found.covariance[np.ix_(rows, rows)])
+        joint = corner_between(corner.first, corner.second, found.covariance[np.ix_(rows, rows)])
         corners.append(joint or corner)
     return tuple(corners)

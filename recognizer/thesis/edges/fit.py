@@ -40,7 +40,7 @@ class FittedEdges:
     inside: Mask  #: (rows, columns) tactels that lie on the face
 
 
-def fitted(
+def fit_edges(
     image: TactileImage,
     sensor: SensorType,
     edges: tuple[Edge, ...],
@@ -77,7 +77,7 @@ def fitted(
     best: tuple[float, Array, float, Array] | None = None
     for blur in blurs_mm:
         table = tables[EDGE_RESPONSE.blurs_mm.index(blur)]
-        found = _settled(at, readings, table, lines, reflex, chosen)
+        found = _fit_with_blur(at, readings, table, lines, reflex, chosen)
         if found is not None and (best is None or found[0] < best[0]):
             best = (found[0], found[1], blur, found[2])
     if best is None:
@@ -87,15 +87,15 @@ def fitted(
     model = np.diag(np.tile([chosen.model_rad**2, chosen.model_mm**2], len(lines)))
     covariance = np.asarray(np.linalg.pinv(information), np.float64) * max(1.0, off) ** 2 + model
     moved = tuple(
-        _moved(edge, lines[k], covariance[2 * k : 2 * k + 2, 2 * k : 2 * k + 2])
+        _edge_on_line(edge, lines[k], covariance[2 * k : 2 * k + 2, 2 * k : 2 * k + 2])
         for k, edge in enumerate(edges)
     )
     inside = np.zeros(image.values.shape, np.bool_)
-    inside[image.defined] = _joined(_inside(at, lines), reflex) > 0
+    inside[image.defined] = _combine_edges(_depth_inside(at, lines), reflex) > 0
     return FittedEdges(moved, covariance, blur, off, inside)
 
 
-def _settled(
+def _fit_with_blur(
     at: Array, readings: Array, table: Array, lines: Array, reflex: bool, fitting: EdgeFitSettings
 ) -> tuple[float, Array, Array] | None:
     """Return the mean cost, lines and information (2 k, 2 k) with one blur."""
@@ -127,7 +127,7 @@ def _pressure(
     at: Array, readings: Array, lines: Array, reflex: bool, fitting: EdgeFitSettings
 ) -> Array | None:
     """Return what each tactel would read if the face reached everywhere; None if unknown."""
-    inside = _joined(_inside(at, lines), reflex)
+    inside = _combine_edges(_depth_inside(at, lines), reflex)
     well = (inside > fitting.inner_mm) & (readings > 0)
     if well.sum() < fitting.least_tactels:
         return None
@@ -145,19 +145,19 @@ def _pressure(
     return np.asarray(np.exp(np.clip(terms @ found, math.log(level) - 5, math.log(level) + 2)))
 
 
-def _inside(at: Array, lines: Array) -> Array:
+def _depth_inside(at: Array, lines: Array) -> Array:
     """Return how far points (n, 2) lie inside each edge, (n, k)."""
     normals = np.stack([np.cos(lines[:, 0]), np.sin(lines[:, 0])])
     return np.asarray(at @ normals - lines[:, 1])
 
 
-def _joined(values: Array, reflex: bool) -> Array:
+def _combine_edges(values: Array, reflex: bool) -> Array:
     """Return what holds for a face inside of all edges, or of any."""
     return np.asarray(values.max(axis=1) if reflex else values.min(axis=1))
 
 
 def _response(at: Array, table: Array, lines: Array, reflex: bool) -> Array:
-    each = felt_at(table, _inside(at, lines))
+    each = felt_at(table, _depth_inside(at, lines))
     return np.asarray(1 - (1 - each).prod(axis=1) if reflex else each.prod(axis=1))
 
 
@@ -180,10 +180,10 @@ def _slopes(at: Array, table: Array, lines: Array, reflex: bool, fitting: EdgeFi
 
 
 def _band(at: Array, lines: Array, fitting: EdgeFitSettings) -> Mask:
-    return np.asarray(np.abs(_inside(at, lines)).min(axis=1) < fitting.band_mm)
+    return np.asarray(np.abs(_depth_inside(at, lines)).min(axis=1) < fitting.band_mm)
 
 
-def _moved(edge: Edge, line: Array, covariance: Array) -> Edge:
+def _edge_on_line(edge: Edge, line: Array, covariance: Array) -> Edge:
     """Return an edge on a line near it, its ends the places nearest to those it had."""
     moved = replace(
         edge,

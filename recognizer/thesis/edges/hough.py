@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.thesis.edges.line import Edge, through
+from recognizer.thesis.edges.line import Edge, fit_line
 from recognizer.thesis.edges.points import EdgePoints
 from recognizer.thesis.settings import HoughSettings
 
@@ -41,16 +41,16 @@ def segments(points: EdgePoints, settings: HoughSettings | None = None) -> list[
         best: Segment | None = None
         taken = np.zeros(len(left), np.bool_)
         for angle, offset in _peaks(left, chosen):
-            run = _run(left, angle, offset, chosen)
+            run = _longest_run(left, angle, offset, chosen)
             if len(run) < chosen.least_points:
                 continue
             members = left.chosen(run)
-            edge = through(members.at_mm, members.normals, chosen.spread_mm)
-            run = _run(left, edge.angle_rad, edge.offset_mm, chosen)
+            edge = fit_line(members.at_mm, members.normals, chosen.spread_mm)
+            run = _longest_run(left, edge.angle_rad, edge.offset_mm, chosen)
             if len(run) < chosen.least_points:
                 continue
             members = left.chosen(run)
-            edge = through(members.at_mm, members.normals, chosen.spread_mm)
+            edge = fit_line(members.at_mm, members.normals, chosen.spread_mm)
             if best is None or edge.length_mm > best.edge.length_mm:
                 best = Segment(members, edge)
                 taken = np.zeros(len(left), np.bool_)
@@ -73,11 +73,11 @@ def _peaks(points: EdgePoints, settings: HoughSettings) -> list[tuple[float, flo
     order = np.argsort(-votes, axis=None, kind="stable")[: settings.starts]
     found = []
     for row, column in zip(*np.unravel_index(order, votes.shape), strict=True):
-        found.append(_refined(points, float(angles[row]), float(offsets[column]), settings))
+        found.append(_refine_line(points, float(angles[row]), float(offsets[column]), settings))
     return found
 
 
-def _refined(
+def _refine_line(
     points: EdgePoints, angle: float, offset: float, settings: HoughSettings
 ) -> tuple[float, float]:
     turn, cell = math.tau / settings.directions, settings.coarse_mm
@@ -102,7 +102,7 @@ def _votes(
     return np.asarray((alike[..., None] * np.maximum(0.0, 1.0 - away)).sum(axis=0))
 
 
-def _run(
+def _longest_run(
     points: EdgePoints, angle: float, offset: float, settings: HoughSettings
 ) -> NDArray[np.intp]:
     """Return the points of the longest unbroken run along a line, in order."""

@@ -77,7 +77,7 @@ class Corner:
     T_image_corner: Array  #: (4, 4) of a frame at the corner, x along the second edge, z outward
 
 
-def through(points_mm: Array, normals: Array, least_mm: float) -> Edge:
+def fit_line(points_mm: Array, normals: Array, least_mm: float) -> Edge:
     """Return the straight line through points by least squares of their distances.
 
     Parameters
@@ -116,7 +116,7 @@ def through(points_mm: Array, normals: Array, least_mm: float) -> Edge:
     )
 
 
-def meeting(first: Edge, second: Edge, joint: Array | None = None) -> Corner | None:
+def corner_between(first: Edge, second: Edge, joint: Array | None = None) -> Corner | None:
     """Return the corner of two edges; None if they are parallel.
 
     Parameters

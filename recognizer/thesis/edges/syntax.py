@@ -16,18 +16,18 @@ import math
 import numpy as np
 
 from recognizer.thesis.edges.hough import Segment
-from recognizer.thesis.edges.line import Corner, Edge, meeting, through
+from recognizer.thesis.edges.line import Corner, Edge, corner_between, fit_line
 from recognizer.thesis.edges.points import EdgePoints
 from recognizer.thesis.settings import SyntaxRules
 
 
-def fused(segments: list[Segment], rules: SyntaxRules | None = None) -> tuple[Edge, ...]:
+def fuse_segments(segments: list[Segment], rules: SyntaxRules | None = None) -> tuple[Edge, ...]:
     """Return the edges that segments are parts of, the longest first."""
     chosen = rules or SyntaxRules()
     parts = sorted(segments, key=lambda segment: -segment.edge.length_mm)
     edges: list[Segment] = []
     for part in parts:
-        k = next((k for k, e in enumerate(edges) if _one(e.edge, part.edge, chosen)), None)
+        k = next((k for k, e in enumerate(edges) if _is_one_edge(e.edge, part.edge, chosen)), None)
         if k is not None:
             edges[k] = _union(edges[k], part, chosen)
         elif part.edge.length_mm >= chosen.break_mm:
@@ -42,13 +42,13 @@ def vertices(edges: tuple[Edge, ...], rules: SyntaxRules | None = None) -> tuple
     found = []
     for first, second in itertools.combinations(edges, 2):
         between = math.pi - abs(math.remainder(second.angle_rad - first.angle_rad, math.tau))
-        corner = meeting(first, second) if between < chosen.straight_rad else None
-        if corner is not None and all(_reaches(e, corner, chosen) for e in (first, second)):
+        corner = corner_between(first, second) if between < chosen.straight_rad else None
+        if corner is not None and all(_reaches_corner(e, corner, chosen) for e in (first, second)):
             found.append(corner)
     return tuple(found)
 
 
-def _one(edge: Edge, part: Edge, rules: SyntaxRules) -> bool:
+def _is_one_edge(edge: Edge, part: Edge, rules: SyntaxRules) -> bool:
     between = math.pi - abs(math.remainder(part.angle_rad - edge.angle_rad, math.tau))
     if between < rules.straight_rad:
         return False
@@ -67,10 +67,10 @@ def _union(a: Segment, b: Segment, rules: SyntaxRules) -> Segment:
         np.concatenate([a.points.normals, b.points.normals]),
         np.concatenate([a.points.slopes, b.points.slopes]),
     )
-    return Segment(points, through(points.at_mm, points.normals, rules.spread_mm))
+    return Segment(points, fit_line(points.at_mm, points.normals, rules.spread_mm))
 
 
-def _reaches(edge: Edge, corner: Corner, rules: SyntaxRules) -> bool:
+def _reaches_corner(edge: Edge, corner: Corner, rules: SyntaxRules) -> bool:
     way = edge.end_mm - edge.start_mm
     length = max(float(np.linalg.norm(way)), 1e-9)
     along = float((corner.at_mm - edge.start_mm) @ way) / length

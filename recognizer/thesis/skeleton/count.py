@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 
 from encoded_objects.errors import require
 from generator.alphabet import Glyph
-from recognizer.thesis.settings import ROUNDING, Counting
+from recognizer.thesis.settings import ROUNDING, CountingSettings
 from recognizer.thesis.skeleton.graph import Path, graph
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Points:
+class KeyPoints:
     """What symbols are told apart by."""
 
     ends: Array  #: (e, 2)
@@ -36,7 +36,9 @@ class Points:
         return len(self.ends), len(self.vertices), self.loops
 
 
-def points_of_skeleton(skeleton: NDArray[np.bool_], unit: float, counting: Counting) -> Points:
+def points_of_skeleton(
+    skeleton: NDArray[np.bool_], unit: float, counting: CountingSettings
+) -> KeyPoints:
     """Return the end-points and vertices, (row, column), of a connected skeleton.
 
     Parameters
@@ -52,23 +54,23 @@ def points_of_skeleton(skeleton: NDArray[np.bool_], unit: float, counting: Count
         inner = _without_hooks(branch.path, free, counting.hook * unit)
         vertices += _corners(inner, counting.bow * unit, counting.turn_rad)
     loops = len(found.branches) - len(found.nodes) + 1
-    merged = _merged(vertices, counting.near * unit)
-    return Points(_stacked(ends), _stacked(merged), loops)
+    merged = _merge_points(vertices, counting.near * unit)
+    return KeyPoints(_stack_points(ends), _stack_points(merged), loops)
 
 
-def points_of_glyph(glyph: Glyph) -> Points:
+def points_of_glyph(glyph: Glyph) -> KeyPoints:
     """Return the end-points and vertices, (x, y) in lattice units, of a stroke graph."""
     strokes = [(complex(*a), complex(*b)) for a, b in glyph.strokes]
     places = {end for stroke in strokes for end in stroke}
     for one, other in itertools.combinations(strokes, 2):
-        places |= _crossing(one, other)
+        places |= _crossing_points(one, other)
     ends, vertices = [], []
     spokes = 0
     for at in sorted(places, key=lambda z: (z.real, z.imag)):
         leaving = {
-            _rounded((to - at) / abs(to - at))
+            _round_complex((to - at) / abs(to - at))
             for a, b in strokes
-            if _on(at, a, b)
+            if _on_segment(at, a, b)
             for to in (a, b)
             if abs(to - at) > ROUNDING.lattice
         }
@@ -78,7 +80,7 @@ def points_of_glyph(glyph: Glyph) -> Points:
             ends.append((at.real, at.imag))
         elif not straight:
             vertices.append((at.real, at.imag))
-    return Points(_stacked(ends), _stacked(vertices), spokes // 2 - len(places) + 1)
+    return KeyPoints(_stack_points(ends), _stack_points(vertices), spokes // 2 - len(places) + 1)
 
 
 def _corners(path: Path, bow: float, turn_rad: float) -> Path:
@@ -106,7 +108,7 @@ def _without_hooks(path: Path, free: list[bool], hook: float) -> Path:
     return path
 
 
-def _merged(points: Path, near: float) -> Path:
+def _merge_points(points: Path, near: float) -> Path:
     """Return points, those closer together than `near` as their mean."""
     groups: list[Path] = []
     for point in points:
@@ -115,24 +117,24 @@ def _merged(points: Path, near: float) -> Path:
     return [(sum(p[0] for p in g) / len(g), sum(p[1] for p in g) / len(g)) for g in groups]
 
 
-def _crossing(one: tuple[complex, complex], other: tuple[complex, complex]) -> set[complex]:
+def _crossing_points(one: tuple[complex, complex], other: tuple[complex, complex]) -> set[complex]:
     (a, b), (c, d) = one, other
     u, v, w = b - a, d - c, c - a
     cross = (u.conjugate() * v).imag
     if abs(cross) < ROUNDING.lattice:
         return set()
     at = a + u * (w.conjugate() * v).imag / cross
-    inside = _on(at, a, b) and _on(at, c, d)
-    return {_rounded(at)} if inside else set()
+    inside = _on_segment(at, a, b) and _on_segment(at, c, d)
+    return {_round_complex(at)} if inside else set()
 
 
-def _on(at: complex, a: complex, b: complex) -> bool:
+def _on_segment(at: complex, a: complex, b: complex) -> bool:
     return abs(at - a) + abs(b - at) < abs(b - a) + ROUNDING.lattice
 
 
-def _rounded(z: complex) -> complex:
+def _round_complex(z: complex) -> complex:
     return complex(round(z.real, 9) + 0.0, round(z.imag, 9) + 0.0)
 
 
-def _stacked(points: Path) -> Array:
+def _stack_points(points: Path) -> Array:
     return np.array(points, np.float64).reshape(-1, 2)

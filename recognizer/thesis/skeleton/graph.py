@@ -58,7 +58,7 @@ def graph(skeleton: NDArray[np.bool_], shortest: float = 0.0) -> Graph:
     near = _neighbours(set(pixels))
     node_of, places = _nodes(pixels, near)
     branches = _branches(near, node_of, places)
-    return _pruned(places, branches, shortest)
+    return _prune_spurs(places, branches, shortest)
 
 
 def length(path: Path) -> float:
@@ -123,7 +123,7 @@ def _branches(
     return branches
 
 
-def _pruned(
+def _prune_spurs(
     places: dict[int, tuple[float, float]], branches: list[Branch], shortest: float
 ) -> Graph:
     found = Graph(places, tuple(branches))
@@ -135,10 +135,10 @@ def _pruned(
         ]
         if not spurs or min(spurs)[0] >= shortest:
             return found
-        found = _without(found, min(spurs)[1])
+        found = _remove_branch(found, min(spurs)[1])
 
 
-def _without(graph: Graph, number: int) -> Graph:
+def _remove_branch(graph: Graph, number: int) -> Graph:
     """Return the graph without a branch, its free end, and the node that it joined, if passed."""
     gone = graph.branches[number]
     rest = [b for k, b in enumerate(graph.branches) if k != number]
@@ -148,12 +148,12 @@ def _without(graph: Graph, number: int) -> Graph:
             joined = [b for b in rest if node in (b.start, b.end)]
             if len(joined) == 2:
                 one, other = joined
-                rest = [b for b in rest if b not in joined] + [_joined(one, other, node)]
+                rest = [b for b in rest if b not in joined] + [_join_branches(one, other, node)]
     used = {b.start for b in rest} | {b.end for b in rest}
     return Graph({n: p for n, p in graph.nodes.items() if n in used}, tuple(rest))
 
 
-def _joined(a: Branch, b: Branch, node: int) -> Branch:
+def _join_branches(a: Branch, b: Branch, node: int) -> Branch:
     """Return two branches as one, through the node that they share."""
     if a.end != node:
         a = Branch(a.end, a.start, a.path[::-1])

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from encoded_objects.errors import require
 from generator.alphabet import Alphabet, Glyph, SymbolStyle
-from recognizer.thesis.filters import magnified
+from recognizer.thesis.filters import magnify_image
 from recognizer.thesis.settings import SkeletonSettings
-from recognizer.thesis.skeleton.count import Points, points_of_glyph, points_of_skeleton
+from recognizer.thesis.skeleton.count import KeyPoints, points_of_glyph, points_of_skeleton
 from recognizer.thesis.skeleton.ink import ink
 from recognizer.touch.tactile_image import TactileImage
 
@@ -41,7 +41,7 @@ class Symbol:
     theta_rad: float  #: of the symbol's x axis; NaN where it is rejected
     middle_mm: tuple[float, float]  #: of its ink
     off_mm: float  #: rms distance of the points from where they should be; NaN if not named
-    points: Points  #: image frame, mm
+    points: KeyPoints  #: image frame, mm
     rejected: str  #: "", "cut", "counts" or "shape"
 
 
@@ -65,7 +65,7 @@ def symbols(
     chosen = settings or SkeletonSettings()
     rim = chosen.rim
     thin = chosen.thick * image.step_mm / style.stroke_mm
-    image = magnified(image, max(0, math.ceil(math.log2(thin))))
+    image = magnify_image(image, max(0, math.ceil(math.log2(thin))))
     unit_mm = alphabet.reach * style.pitch_mm
     shown = ink(image, style.pitch_mm, chosen.share)
     numbers, _ = label(shown, structure=np.ones((3, 3)))
@@ -81,8 +81,8 @@ def symbols(
             slice(rows.start, rows.stop + 2 * rim),
             slice(columns.start, columns.stop + 2 * rim),
         )
-        whole = _grown(part, rim)
-        cut = bool((_grown(part, 1) & beyond[box]).any())
+        whole = _dilate(part, rim)
+        cut = bool((_dilate(part, 1) & beyond[box]).any())
         points = points_of_skeleton(skeletonize(part), unit_mm / image.step_mm, chosen.counting)
         weights = np.where(whole, values[box], 0.0)
         middle = (
@@ -95,17 +95,19 @@ def symbols(
             / weights.sum()
         )
         corner = (rows.start - rim, columns.start - rim)
-        placed = Points(
+        placed = KeyPoints(
             image.xy_mm(*(points.ends + corner).T),
             image.xy_mm(*(points.vertices + corner).T),
             points.loops,
         )
-        found.append(_named(placed, image.xy_mm(*(middle + corner)), cut, alphabet, style, chosen))
+        found.append(
+            _identify_symbol(placed, image.xy_mm(*(middle + corner)), cut, alphabet, style, chosen)
+        )
     return found
 
 
-def _named(
-    points: Points,
+def _identify_symbol(
+    points: KeyPoints,
     middle: Array,
     cut: bool,
     alphabet: Alphabet,
@@ -117,7 +119,7 @@ def _named(
     if cut:
         return Symbol(-1, x, y, math.nan, (x, y), math.nan, points, CUT)
     fits = [
-        (*laid(points_of_glyph(glyph), points, unit_mm), label)
+        (*fit_glyph(points_of_glyph(glyph), points, unit_mm), label)
         for label, glyph in enumerate(alphabet.glyphs)
         if points_of_glyph(glyph).counts == points.counts
     ]
@@ -131,7 +133,7 @@ def _named(
     return Symbol(label, at.real, at.imag, theta, (x, y), off, points, "")
 
 
-def laid(glyph: Points, found: Points, unit_mm: float) -> tuple[float, float]:
+def fit_glyph(glyph: KeyPoints, found: KeyPoints, unit_mm: float) -> tuple[float, float]:
     """Lay a glyph's points on found ones of the same counts, by least squares.
 
     Returns
@@ -173,7 +175,7 @@ def _middle(glyph: Glyph, unit_mm: float, stroke_mm: float, fine: int) -> comple
     return complex(at[covered].mean())
 
 
-def _grown(part: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
+def _dilate(part: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
     from scipy.ndimage import binary_dilation
 
     return np.asarray(binary_dilation(part, np.ones((3, 3)), iterations=steps))

@@ -16,11 +16,11 @@ from probe.scan.places import surface_to_sensor, touch_at
 from probe.scan.raster import raster
 from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
-from recognizer.scan.mosaic.planar import between, moved
-from recognizer.thesis.image import laid, merged, relative_poses
+from recognizer.scan.mosaic.planar import relative_pose, transform_points
+from recognizer.thesis.image import average_touches, merge_touches, relative_poses
 from recognizer.thesis.read import read_classically
 from recognizer.thesis.scan import read_scan, read_while_scanning
-from recognizer.thesis.settings import Merging, ThesisSettings
+from recognizer.thesis.settings import MergingSettings, ThesisSettings
 from recognizer.thesis.skeleton.symbols import symbols
 from recognizer.touch.lab import open_lab
 from recognizer.touch.recognition import AMBIGUOUS, NO_CONTACT, NOT_ENCODED, TOO_FEW
@@ -86,7 +86,7 @@ def scan(url):
 
 def off_mm(poses, true):
     """Rms distance of merged touches from where they were, up to a common shift."""
-    away = (poses - between(true[0], true))[:, :2]
+    away = (poses - relative_pose(true[0], true))[:, :2]
     away -= away.mean(axis=0)
     return float(np.sqrt((away**2).sum(axis=1).mean()))
 
@@ -99,7 +99,7 @@ def pattern(x, y):
 
 
 def felt_at(pose):
-    at = moved(np.asarray(pose, float), SENSOR.centres_mm())
+    at = transform_points(np.asarray(pose, float), SENSOR.centres_mm())
     return pattern(at[..., 0], at[..., 1])
 
 
@@ -108,7 +108,7 @@ def test_poses_in_any_frame_become_those_in_the_first_sensor_frame():
     spatial = np.array([surface_to_sensor(*pose, 7.0) for pose in planar])
     tilted = np.eye(4)
     tilted[:3, :3] = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]  # a wall
-    expected = between(planar[0], planar)
+    expected = relative_pose(planar[0], planar)
     assert relative_poses(planar) == pytest.approx(expected)
     assert relative_poses(tilted @ spatial) == pytest.approx(expected, abs=1e-9)
     with pytest.raises(ImageError, match="shape"):
@@ -117,7 +117,9 @@ def test_poses_in_any_frame_become_those_in_the_first_sensor_frame():
 
 def test_touches_lie_where_they_were_felt():
     poses = np.array([[0.0, 0, 0], [6.7, 0.3, 0.02], [6.9, -6.6, -0.01]])
-    found = merged(SENSOR, [felt_at(pose) for pose in poses], poses, Merging(placing="believed"))
+    found = merge_touches(
+        SENSOR, [felt_at(pose) for pose in poses], poses, MergingSettings(placing="believed")
+    )
     image = found.image
     assert image.step_mm == pytest.approx(SENSOR.pitch_mm / 4)
     at = image.xy_mm(*np.indices(image.values.shape))
@@ -135,7 +137,7 @@ def test_products_find_steps_to_a_quarter_of_a_tactel():
     blob[10:12, 8:10] = 0.8
     moved_blob = np.roll(blob, -4, axis=1)
     wrong = np.array([[0, 0, 0], [2 * quarter, quarter, 0]])
-    found = merged(SENSOR, [blob, moved_blob], believed + wrong)
+    found = merge_touches(SENSOR, [blob, moved_blob], believed + wrong)
     assert found.poses[1, :2] == pytest.approx([16 * quarter, 0.0], abs=1e-9)
     assert found.corrected.tolist() == [False, True]
 
@@ -144,7 +146,7 @@ def test_where_nothing_is_felt_in_common_the_belief_stays():
     blob = np.zeros((16, 16))
     blob[6:9, 0:2] = 1.0
     poses = np.array([[0.0, 0, 0], [6.3, 0.2, 0]])
-    found = merged(SENSOR, [blob, np.roll(blob, 12, axis=1)], poses)
+    found = merge_touches(SENSOR, [blob, np.roll(blob, 12, axis=1)], poses)
     assert found.poses == pytest.approx(relative_poses(poses))
     assert not found.corrected.any()
 
@@ -154,7 +156,7 @@ def test_bad_tactels_are_filled_by_other_touches():
     trust = np.ones((16, 16))
     trust[:, 9] = 0
     readings = [np.where(trust > 0, felt_at(pose), np.nan) for pose in poses]
-    found = merged(SENSOR, readings, poses, Merging(placing="believed"), trust)
+    found = merge_touches(SENSOR, readings, poses, MergingSettings(placing="believed"), trust)
     at = found.image.xy_mm(*np.indices(found.image.values.shape))
     inner = (np.abs(at[..., 0] - 2.4) < 0.5) & (np.abs(at[..., 1]) < 10)
     assert found.image.defined[inner].all()
@@ -163,12 +165,12 @@ def test_bad_tactels_are_filled_by_other_touches():
 
 def test_touches_without_poses_are_refused():
     with pytest.raises(ImageError, match="2 touches with 1 poses"):
-        merged(SENSOR, [np.zeros((16, 16))] * 2, np.zeros((1, 3)))
+        merge_touches(SENSOR, [np.zeros((16, 16))] * 2, np.zeros((1, 3)))
 
 
 def test_image_of_one_touch_is_the_magnified_touch():
     image = touch_image(SENSOR, felt_at([0, 0, 0]))
-    found = laid(SENSOR, [image], np.zeros((1, 3)))
+    found = average_touches(SENSOR, [image], np.zeros((1, 3)))
     place = found.xy_mm(*np.indices(found.values.shape))
     middle = np.abs(place).max(axis=-1) < 5
     assert np.abs(found.values - pattern(place[..., 0], place[..., 1]))[middle].max() < 0.25
@@ -177,7 +179,10 @@ def test_image_of_one_touch_is_the_magnified_touch():
 def test_bounded_errors_do_not_add_up(scan):
     errors = {
         placing: off_mm(
-            merged(SENSOR, scan.readings, scan.believed, Merging(placing=placing)).poses, scan.true
+            merge_touches(
+                SENSOR, scan.readings, scan.believed, MergingSettings(placing=placing)
+            ).poses,
+            scan.true,
         )
         for placing in ("product", "bounded", "believed")
     }
@@ -191,7 +196,9 @@ def test_bounded_errors_do_not_add_up(scan):
 
 @pytest.mark.parametrize("placing", ["product", "bounded"])
 def test_a_scan_names_object_face_and_place(lab, scan, placing):
-    found = read_scan(lab, SENSOR, scan.readings, scan.believed, merging=Merging(placing=placing))
+    found = read_scan(
+        lab, SENSOR, scan.readings, scan.believed, merging=MergingSettings(placing=placing)
+    )
     answer = found.recognition
     assert (answer.object, answer.face) == ("Cube", "F2")
     assert found.reading.grid.window.shape == (6, 6)
@@ -205,7 +212,7 @@ def test_a_scan_names_object_face_and_place(lab, scan, placing):
         for encoded in map(lab.arrays[0].face, range(len(lab.arrays[0].faces)))
         if (encoded.object, encoded.face) == ("Cube", "F2")
     )
-    at = moved(scan.true[0], np.array([[s.x_mm, s.y_mm] for s in found.reading.symbols]))
+    at = transform_points(scan.true[0], np.array([[s.x_mm, s.y_mm] for s in found.reading.symbols]))
     right = wrong = 0
     for centre, label in zip(face.centres_mm, face.labels, strict=True):
         near = np.linalg.norm(at - centre, axis=1) < 4
@@ -218,7 +225,9 @@ def test_a_scan_names_object_face_and_place(lab, scan, placing):
 
 def test_a_turned_scan_of_a_triangle(url, lab):
     scan = Scan(url, "Prism", "F1", seed=4, theta=0.35)
-    found = read_scan(lab, SENSOR, scan.readings, scan.believed, merging=Merging(placing="bounded"))
+    found = read_scan(
+        lab, SENSOR, scan.readings, scan.believed, merging=MergingSettings(placing="bounded")
+    )
     if found.recognition:
         assert (found.recognition.object, found.recognition.face) == ("Prism", "F1")
         assert math.dist(found.recognition.T_face_probe[:2, 3], scan.true[-1, :2]) < 3
@@ -229,7 +238,9 @@ def test_a_turned_scan_of_a_triangle(url, lab):
 
 @pytest.mark.parametrize("conversion", ["likelihood", "good tuple", "exact"])
 def test_every_conversion_reads_the_window(lab, scan, conversion):
-    image = merged(SENSOR, scan.readings, scan.believed, Merging(placing="believed")).image
+    image = merge_touches(
+        SENSOR, scan.readings, scan.believed, MergingSettings(placing="believed")
+    ).image
     answer = read_classically(lab, image, ThesisSettings(conversion=conversion)).recognition
     assert (answer.object, answer.face) in {("Cube", "F2"), (None, None)}
     if conversion == "likelihood":
@@ -238,7 +249,7 @@ def test_every_conversion_reads_the_window(lab, scan, conversion):
 
 def test_an_answer_comes_before_the_scan_is_over_and_never_a_wrong_one(lab, scan):
     first = None
-    merging = Merging(placing="bounded")
+    merging = MergingSettings(placing="bounded")
     for found in read_while_scanning(
         lab, SENSOR, scan.readings, scan.believed, merging=merging, every=15
     ):
@@ -267,14 +278,16 @@ def test_no_contact_and_blank_surfaces_are_told(lab):
 
 def test_an_object_of_another_lab_is_not_taken_for_one_of_ours(lab, tmp_path):
     scan = Scan(made(tmp_path, OTHER), "Stranger", "F1", seed=5)
-    merging = Merging(placing="believed")
+    merging = MergingSettings(placing="believed")
     found = read_scan(lab, SENSOR, scan.readings, scan.believed, merging=merging)
     assert len(found.reading.grid.members) > 24  # its symbols are read, and are none of ours
     assert not found.recognition
 
 
 def test_symbols_of_a_face_are_read_as_the_database_has_them(lab, scan):
-    image = merged(SENSOR, scan.readings, scan.true, Merging(placing="believed")).image
+    image = merge_touches(
+        SENSOR, scan.readings, scan.true, MergingSettings(placing="believed")
+    ).image
     encoding = lab.arrays[0]
     found = symbols(image, encoding.alphabet, encoding.style)
     named = [symbol for symbol in found if symbol.label >= 0]

@@ -14,10 +14,10 @@ from probe.surface.face import FaceSurface
 from probe.surface.polygon import polygon
 from recognizer.thesis.edges.find import classical_edges, face_edges, outline
 from recognizer.thesis.edges.hough import segments
-from recognizer.thesis.edges.line import meeting, through
+from recognizer.thesis.edges.line import corner_between, fit_line
 from recognizer.thesis.edges.points import EdgePoints, edge_points
 from recognizer.thesis.edges.response import felt_at, responses
-from recognizer.thesis.edges.syntax import fused, vertices
+from recognizer.thesis.edges.syntax import fuse_segments, vertices
 from recognizer.thesis.settings import EDGE_RESPONSE, EdgeSearchSettings
 from recognizer.touch.tactile_image import tactile_image, touch_image
 
@@ -65,7 +65,7 @@ def test_line_through_points_and_its_covariance(degrees):
     normed = []
     for _ in range(40):
         points = on_line(angle, 3.0, np.linspace(2, 14, 15), rng, 0.2)
-        edge = through(points.at_mm, points.normals, 0.05)
+        edge = fit_line(points.at_mm, points.normals, 0.05)
         error = np.array([math.remainder(edge.angle_rad - angle, math.tau), edge.offset_mm - 3.0])
         normed.append(error @ np.linalg.solve(edge.covariance, error))
         way = edge.end_mm - edge.start_mm
@@ -110,7 +110,7 @@ def test_pieces_that_run_on_are_one_edge_and_breaks_are_dropped():
     stray = on_line(1.3, -7.0, np.linspace(0, 3, 5), rng)
     pieces = segments(joined(first, second, stray))
     assert len(pieces) == 3
-    (edge,) = fused(pieces)
+    (edge,) = fuse_segments(pieces)
     assert edge.length_mm == pytest.approx(23, abs=0.5)
     assert edge.points == 24
 
@@ -119,15 +119,15 @@ def test_edges_that_turn_make_a_vertex_and_parallel_ones_none():
     rng = np.random.default_rng(4)
     below = on_line(math.pi / 2, -5.0, np.linspace(-9, 5, 20), rng, 0.02)
     left = on_line(0.0, -6.0, np.linspace(-9, 5, 20), rng, 0.02)
-    edges = fused(segments(joined(below, left)))
+    edges = fuse_segments(segments(joined(below, left)))
     (corner,) = vertices(edges)
     assert corner.at_mm == pytest.approx([-6.0, -5.0], abs=0.1)
     assert corner.opening_rad == pytest.approx(math.pi / 2, abs=0.02)
     assert corner.second.angle_rad == pytest.approx(math.pi / 2, abs=0.02)  # leads away along x
     assert corner.T_image_corner[:2, 0] == pytest.approx([1, 0], abs=0.02)
     far = on_line(0.02, 8.0, np.linspace(-9, 5, 20), rng, 0.02)
-    assert meeting(edges[0], through(far.at_mm, far.normals, 0.1)) is None
-    assert meeting(edges[0], edges[0]) is None
+    assert corner_between(edges[0], fit_line(far.at_mm, far.normals, 0.1)) is None
+    assert corner_between(edges[0], edges[0]) is None
 
 
 # --- response ---------------------------------------------------------------------------

@@ -5,8 +5,8 @@ import pytest
 from scipy import ndimage
 
 from probe.sensor import SensorType
-from recognizer.thesis.filters import magnified, median, sobel, unbiased
-from recognizer.thesis.product import magnified as by_convolution
+from recognizer.thesis.filters import magnify_image, median, sobel, subtract_bias
+from recognizer.thesis.product import magnify_samples as by_convolution
 from recognizer.touch.tactile_image import ImageError, tactile_image, touch_image
 
 
@@ -18,7 +18,7 @@ def test_frame_has_x_along_columns_and_y_against_rows():
     sensor = SensorType()
     image = touch_image(sensor, noise())
     assert image.xy_mm(*np.indices((16, 16))) == pytest.approx(sensor.centres_mm(), abs=1e-12)
-    fine = magnified(image)
+    fine = magnify_image(image)
     assert fine.xy_mm(0, 0) == pytest.approx(image.xy_mm(0, 0))
     assert fine.xy_mm(60, 60) == pytest.approx(image.xy_mm(15, 15))
 
@@ -50,20 +50,20 @@ def test_nan_where_undefined_stays_outside():
     values, known = noise(), np.ones((16, 16), bool)
     values[3, 4], known[3, 4] = np.nan, False
     image = tactile_image(values, step_mm=1.0, defined=known)
-    for made in (unbiased(image), median(image), magnified(image)):
+    for made in (subtract_bias(image), median(image), magnify_image(image)):
         assert np.isfinite(made.values).all()
     # beside the hole counts what is left
-    assert magnified(image).values[12, 19] == pytest.approx(values[3, 5])
-    assert not magnified(image).defined[12, 16]
+    assert magnify_image(image).values[12, 19] == pytest.approx(values[3, 5])
+    assert not magnify_image(image).defined[12, 16]
 
 
 def test_bias_is_what_is_read_without_force():
     image = tactile_image(100 + np.pad(noise(shape=(4, 4)) * 50, 6), step_mm=1.0)
-    over = unbiased(image)
+    over = subtract_bias(image)
     assert over.values.min() == 0
     assert over.values[0, 0] == 0
     assert over.values.max() == pytest.approx(image.values.max() - 100)
-    assert unbiased(image, 120.0).values.max() == pytest.approx(image.values.max() - 120)
+    assert subtract_bias(image, 120.0).values.max() == pytest.approx(image.values.max() - 120)
 
 
 def test_median_is_that_of_the_neighbourhood():
@@ -96,7 +96,7 @@ def test_median_takes_spikes_and_keeps_edges_but_erases_thin_lines():
 def test_magnification_is_the_thesis_convolution():
     """Zeros between the tactels and H, twice; the last three rows and columns are beyond."""
     values = noise(4)
-    fine = magnified(tactile_image(values, step_mm=1.0))
+    fine = magnify_image(tactile_image(values, step_mm=1.0))
     assert fine.values.shape == (61, 61)
     assert fine.step_mm == 0.25
     assert fine.values == pytest.approx(by_convolution(values)[:61, :61], abs=1e-12)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from recognizer.scan.mosaic.graph import ARM, PLANE, Constraint, covariances, solved
-from recognizer.scan.mosaic.planar import between, composed, wrapped
+from recognizer.scan.mosaic.graph import ARM, PLANE, Constraint, covariances, solve_pose_graph
+from recognizer.scan.mosaic.planar import compose_poses, relative_pose, wrap_angle
 from recognizer.scan.mosaic.settings import GRAPH
 
 BELIEF, PAIR = np.diag([0.4, 0.4, 4e3]), np.diag([90.0, 60.0, 6e4])
@@ -28,12 +28,17 @@ def test_ties_without_errors_give_the_truth_from_afar():
     true, near = scene(rng)
     arm = np.array([5.0, -8.0, 0.6])
     constraints = [
-        Constraint(ARM, n, between(arm, pose), BELIEF, "believed") for n, pose in enumerate(true)
+        Constraint(ARM, n, relative_pose(arm, pose), BELIEF, "believed")
+        for n, pose in enumerate(true)
     ]
-    constraints += [Constraint(a, b, between(true[a], true[b]), PAIR, "pair") for a, b in near]
+    constraints += [
+        Constraint(a, b, relative_pose(true[a], true[b]), PAIR, "pair") for a, b in near
+    ]
     constraints += [Constraint(PLANE, n, true[n], SURE, "decoded") for n in (0, 7)]
     start = true + rng.normal(0, [2, 2, 0.02], true.shape)
-    found = solved(constraints, start, arm + 0.05 * np.array([40, -40, 1]), arm_stands=False)
+    found = solve_pose_graph(
+        constraints, start, arm + 0.05 * np.array([40, -40, 1]), arm_stands=False
+    )
     assert found.poses == pytest.approx(true, abs=1e-5)
     assert found.arm == pytest.approx(arm, abs=1e-4)
     assert found.cost < 1e-6
@@ -48,11 +53,11 @@ def test_wrong_pairs_are_let_go_and_named():
     ]
     wrong = set(range(3, len(near), 7))
     for k, (a, b) in enumerate(near):
-        pose = noisy(rng, between(true[a], true[b]), PAIR)
+        pose = noisy(rng, relative_pose(true[a], true[b]), PAIR)
         constraints.append(
             Constraint(a, b, pose + np.array([7.0 * (k in wrong), 0, 0]), PAIR, "pair")
         )
-    found = solved(
+    found = solve_pose_graph(
         constraints, np.array([t.pose for t in constraints[:16]]), np.zeros(3), arm_stands=True
     )
     assert set((np.flatnonzero(found.weights < GRAPH.outlier) - 16).tolist()) == wrong
@@ -70,14 +75,14 @@ def test_covariances_are_true():
             for n, p in enumerate(true)
         ]
         for a, b in near:
-            pose = noisy(rng, between(true[a], true[b]), PAIR)
+            pose = noisy(rng, relative_pose(true[a], true[b]), PAIR)
             constraints.append(Constraint(a, b, pose, PAIR, "pair"))
-        found = solved(constraints, true, np.zeros(3), arm_stands=True)
+        found = solve_pose_graph(constraints, true, np.zeros(3), arm_stands=True)
         spread = covariances(found.normal, range(len(true)))
         dense = np.linalg.inv(found.normal.toarray())
         assert spread[5] == pytest.approx(dense[15:18, 15:18], rel=1e-6, abs=1e-12)
         away = found.poses - true
-        away[:, 2] = wrapped(away[:, 2])
+        away[:, 2] = wrap_angle(away[:, 2])
         inside.append(np.einsum("ni,nij,nj->n", away, np.linalg.inv(spread), away) < 7.815)
     assert 0.9 < np.mean(inside) < 0.99
 
@@ -89,7 +94,7 @@ def test_a_tie_along_a_ridge_leaves_the_rest_to_belief():
         Constraint(ARM, 1, np.array([5.0, 1.0, 0.0]), BELIEF, "believed"),
         Constraint(0, 1, np.array([4.0, 9.0, 0.01]), across_only, "pair"),
     ]
-    found = solved(constraints, np.zeros((2, 3)), np.zeros(3), arm_stands=True)
+    found = solve_pose_graph(constraints, np.zeros((2, 3)), np.zeros(3), arm_stands=True)
     assert found.poses[1] == pytest.approx([4.0, 1.0, 0.01], abs=0.01)
     spread = covariances(found.normal, [1])[0]
     assert spread[1, 1] == pytest.approx(2.5, rel=0.01)
@@ -101,15 +106,16 @@ def test_the_frame_does_not_matter():
     true, near = scene(rng)
     T = np.array([100.0, -40.0, 2.5])
     poses = [noisy(rng, pose, SURE) for pose in true]
-    links = [(a, b, noisy(rng, between(true[a], true[b]), PAIR)) for a, b in near]
+    links = [(a, b, noisy(rng, relative_pose(true[a], true[b]), PAIR)) for a, b in near]
 
     def solution(shift):
         sure = np.diag([1e3, 1e3, 3e5])  # round, so that it may be turned
         constraints = [
-            Constraint(PLANE, n, composed(shift, p), sure, "decoded") for n, p in enumerate(poses)
+            Constraint(PLANE, n, compose_poses(shift, p), sure, "decoded")
+            for n, p in enumerate(poses)
         ]
         constraints += [Constraint(a, b, pose, PAIR, "pair") for a, b, pose in links]
-        start = composed(shift, np.array(poses))
-        return solved(constraints, start, np.zeros(3), arm_stands=False).poses
+        start = compose_poses(shift, np.array(poses))
+        return solve_pose_graph(constraints, start, np.zeros(3), arm_stands=False).poses
 
-    assert composed(T, solution(np.zeros(3))) == pytest.approx(solution(T), abs=1e-5)
+    assert compose_poses(T, solution(np.zeros(3))) == pytest.approx(solution(T), abs=1e-5)

@@ -13,11 +13,11 @@ from probe.contact.tabs import tabs
 from probe.sensor import SensorType
 from probe.surface.face import endless
 from recognizer.scan.mosaic.errors import MosaicError
-from recognizer.scan.mosaic.grow import added, mosaic_of, settled
+from recognizer.scan.mosaic.grow import add_touch, mosaic_of, settle_mosaic
 from recognizer.scan.mosaic.mosaic import ALONE, no_touches, outliers
 from recognizer.scan.mosaic.pair import AMBIGUOUS, CONSTANT
-from recognizer.scan.mosaic.planar import between, composed
-from recognizer.scan.mosaic.touch import PlacedTouch, placed
+from recognizer.scan.mosaic.planar import compose_poses, relative_pose
+from recognizer.scan.mosaic.touch import PlacedTouch, planar_belief
 from recognizer.touch.settings import SignalSettings
 from recognizer.touch.signal import signal_of
 
@@ -47,7 +47,7 @@ def scanned(n=4):
     poses, signals = [], []
     for k in range(n * n):
         row, column = divmod(k, n)
-        pose = composed(T_FACE_ARM, np.array([column, -row, 0.0]) * 4.25 * P)
+        pose = compose_poses(T_FACE_ARM, np.array([column, -row, 0.0]) * 4.25 * P)
         pose = pose + rng.normal(0, SPREAD)
         forces = tabs(face, SENSOR, Touch(*pose, 80.0)).forces_n * gains
         forces = np.maximum(forces + rng.normal(0, 0.02, (16, 16)), 0)
@@ -63,9 +63,9 @@ def touches(decoded=(), wrong=(), n=4):
     found = []
     for k, signal in enumerate(signals):
         row, column = divmod(k, n)
-        believed = placed(np.array([column, -row, 0.0]) * 4.25 * P, SPREAD)
+        believed = planar_belief(np.array([column, -row, 0.0]) * 4.25 * P, SPREAD)
         place = true[k] + rng.normal(0, DECODED) + np.array([21.0, 7.0, 0.0]) * (k in wrong)
-        read = placed(place, DECODED) if k in decoded else None
+        read = planar_belief(place, DECODED) if k in decoded else None
         found.append(PlacedTouch(signal, believed, read, seq=k))
     return found
 
@@ -126,13 +126,13 @@ def test_one_by_one_is_nearly_all_at_once_and_a_value():
     mosaic, before = no_touches(SENSOR), []
     for touch in touches(decoded=(5,))[:9]:
         before.append((mosaic, mosaic.poses.copy(), len(mosaic.canvas.tiles)))
-        mosaic = added(mosaic, touch)
+        mosaic = add_touch(mosaic, touch)
     for old, poses, tiles in before:
         assert (old.poses == poses).all()
         assert len(old.canvas.tiles) == tiles
     at_once = mosaic_of(SENSOR, touches(decoded=(5,))[:9])
     assert mosaic.poses == pytest.approx(at_once.poses, abs=0.05)
-    assert settled(at_once).poses == pytest.approx(at_once.poses, abs=1e-3)
+    assert settle_mosaic(at_once).poses == pytest.approx(at_once.poses, abs=1e-3)
     assert (np.trace(mosaic.covariances, axis1=1, axis2=2) > 0.99 * np.trace(
         at_once.covariances, axis1=1, axis2=2)).all()  # fmt: skip
 
@@ -141,12 +141,12 @@ def test_steps_do_not_drift():
     true, signals = scanned()
     rng = np.random.default_rng(3)
     spread = np.array([0.5 * P, 0.5 * P, 0.5 * DEG])
-    some = [PlacedTouch(signals[0], placed(true[0], DECODED))]
+    some = [PlacedTouch(signals[0], planar_belief(true[0], DECODED))]
     counted = [true[0]]
     for k in range(1, 16):
-        step = between(true[k - 1], true[k]) + rng.normal(0, spread)
-        counted.append(composed(counted[-1], step))
-        some.append(PlacedTouch(signals[k], stepped=placed(step, spread), seq=k))
+        step = relative_pose(true[k - 1], true[k]) + rng.normal(0, spread)
+        counted.append(compose_poses(counted[-1], step))
+        some.append(PlacedTouch(signals[k], stepped=planar_belief(step, spread), seq=k))
     mosaic = mosaic_of(SENSOR, some)
     assert errors(mosaic).max() < 0.4
     assert errors(mosaic).max() < np.hypot(*(np.array(counted) - true)[:, :2].T).max() / P / 3
@@ -157,7 +157,7 @@ def test_blank_touches_stay_where_they_are_believed():
     flat = [
         signal_of(0.3 + rng.normal(0, 0.01, (16, 16)), floor=0.0, settings=FELT) for _ in range(3)
     ]
-    places = [placed((k * 4.25 * P, 0.0, 0.0), SPREAD) for k in range(3)]
+    places = [planar_belief((k * 4.25 * P, 0.0, 0.0), SPREAD) for k in range(3)]
     some = [PlacedTouch(f, p, seq=k) for k, (f, p) in enumerate(zip(flat, places, strict=True))]
     mosaic = mosaic_of(SENSOR, some)
     assert mosaic.reasons == (CONSTANT,) * 3
@@ -172,7 +172,7 @@ def test_a_surface_that_repeats_is_ambiguous():
     some = []
     for k in range(2):
         forces = tabs(face, SENSOR, Touch(30 + 6.0 * k, 40, 0.2, 80.0)).forces_n
-        pose = placed((6.0 * k * math.cos(0.2), -6.0 * k * math.sin(0.2), 0.0), wide)
+        pose = planar_belief((6.0 * k * math.cos(0.2), -6.0 * k * math.sin(0.2), 0.0), wide)
         some.append(PlacedTouch(signal_of(forces, floor=0.0, settings=FELT), pose, seq=k))
     mosaic = mosaic_of(SENSOR, some)
     assert mosaic.reasons == (ALONE, AMBIGUOUS)
@@ -185,11 +185,11 @@ def test_nothing_and_touches_that_cannot_be_placed():
     assert nothing.image.values.shape == (0, 0)
     small = signal_of(np.ones((8, 8)))
     with pytest.raises(MosaicError, match="8 x 8"):
-        added(nothing, PlacedTouch(small, placed(np.zeros(3), SPREAD)))
+        add_touch(nothing, PlacedTouch(small, planar_belief(np.zeros(3), SPREAD)))
     first, second = touches(decoded=(1,))[:2]
     decoded_only = PlacedTouch(second.signal, decoded=second.decoded)
-    on_face, by_arm = added(nothing, decoded_only), added(nothing, first)
+    on_face, by_arm = add_touch(nothing, decoded_only), add_touch(nothing, first)
     with pytest.raises(MosaicError, match="hangs on nothing"):
-        added(on_face, first)
+        add_touch(on_face, first)
     with pytest.raises(MosaicError, match="where it stands for the arm"):
-        added(by_arm, decoded_only)
+        add_touch(by_arm, decoded_only)

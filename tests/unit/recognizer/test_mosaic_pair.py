@@ -11,9 +11,9 @@ from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.sensor import SensorType
 from probe.surface.face import endless
-from recognizer.scan.mosaic.pair import AMBIGUOUS, APART, CONSTANT, NOISE, registered
+from recognizer.scan.mosaic.pair import AMBIGUOUS, APART, CONSTANT, NOISE, register_patches
 from recognizer.scan.mosaic.patch import patch_of
-from recognizer.scan.mosaic.planar import composed, inverse
+from recognizer.scan.mosaic.planar import compose_poses, inverse
 from recognizer.touch.settings import SignalSettings
 from recognizer.touch.signal import signal_of
 
@@ -63,14 +63,16 @@ def felt(surface, pose, seed=0, trust=None, force=80.0):
 
 
 def two(surface, true, **options):
-    return felt(surface, A, 1, **options), felt(surface, composed(A, np.array(true)), 2, **options)
+    return felt(surface, A, 1, **options), felt(
+        surface, compose_poses(A, np.array(true)), 2, **options
+    )
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_symbols_lock_to_a_tenth_of_a_tactel(seed):
     rng = np.random.default_rng(seed)
     true = np.array([4.25 * P, 0.3 * P, 0.5 * DEG]) + rng.normal(0, [1, 1, 0.003])
-    found = registered(
+    found = register_patches(
         *two(symbols(seed), true), true + np.array([1.0, -1.2, 0.01]), BELIEF, period_mm=7
     )
     assert found
@@ -85,8 +87,8 @@ def test_symbols_lock_to_a_tenth_of_a_tactel(seed):
 def test_the_other_way_round_it_is_the_inverse():
     true = np.array([5.0, -3.0, 0.02])
     a, b = two(symbols(1), true)
-    there = registered(a, b, true + np.array([0.5, 0.5, 0]), BELIEF, period_mm=7)
-    back = registered(b, a, inverse(true + np.array([0.5, 0.5, 0])), BELIEF, period_mm=7)
+    there = register_patches(a, b, true + np.array([0.5, 0.5, 0]), BELIEF, period_mm=7)
+    back = register_patches(b, a, inverse(true + np.array([0.5, 0.5, 0])), BELIEF, period_mm=7)
     assert inverse(back.pose)[:2] == pytest.approx(there.pose[:2], abs=0.05)
 
 
@@ -94,7 +96,7 @@ def test_dead_tactels_and_a_dead_row_stay_out():
     trust = np.ones((16, 16))
     trust[5, :] = trust[2, 3] = trust[11, 9] = 0
     true = np.array([4.0, 5.0, 0.0])
-    found = registered(
+    found = register_patches(
         *two(symbols(2), true, trust=trust), true + np.array([1, 1, 0]), BELIEF, period_mm=7
     )
     assert found
@@ -103,15 +105,15 @@ def test_dead_tactels_and_a_dead_row_stay_out():
 
 def test_a_stronger_touch_is_a_gain():
     surface, true = symbols(3), np.array([3.0, 0.0, 0.0])
-    a, b = felt(surface, A, 1, force=30.0), felt(surface, composed(A, true), 2, force=60.0)
-    assert registered(a, b, true, BELIEF).gain == pytest.approx(0.5, rel=0.15)
+    a, b = felt(surface, A, 1, force=30.0), felt(surface, compose_poses(A, true), 2, force=60.0)
+    assert register_patches(a, b, true, BELIEF).gain == pytest.approx(0.5, rel=0.15)
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.6, 1.9])
 def test_ridges_define_what_lies_across_them(angle):
     true = np.array([3.0, 2.0, 0.01])
     off = np.array([0.8, -0.6, 0.003])
-    found = registered(*two(Ridges(angle), true), true + off, BELIEF, period_mm=math.inf)
+    found = register_patches(*two(Ridges(angle), true), true + off, BELIEF, period_mm=math.inf)
     assert found
     assert found.rank == 2
     local = angle - A[2]
@@ -127,10 +129,10 @@ def test_one_pitch_away_all_looks_the_same():
     true = np.array([3.0, 2.0, 0.0])
     pair = two(symbols(alike=True), true)
     wide = np.diag([(2.5 * P) ** 2, (2.5 * P) ** 2, (0.3 * DEG) ** 2])
-    found = registered(*pair, true + np.array([2.5, -2.0, 0]), wide, period_mm=7)
+    found = register_patches(*pair, true + np.array([2.5, -2.0, 0]), wide, period_mm=7)
     assert found.reason == AMBIGUOUS
     assert (found.pose == true + np.array([2.5, -2.0, 0])).all()
-    near = registered(*pair, true + np.array([0.3, 0.2, 0]), BELIEF / 9, period_mm=7)
+    near = register_patches(*pair, true + np.array([0.3, 0.2, 0]), BELIEF / 9, period_mm=7)
     assert near
     assert math.hypot(*(near.pose - true)[:2]) < 0.15 * P
 
@@ -138,13 +140,13 @@ def test_one_pitch_away_all_looks_the_same():
 def test_reasons_for_no_answer():
     rng = np.random.default_rng(0)
     flat = [patch_of(SENSOR, signal_of(70 + rng.normal(0, 2, (16, 16)), floor=0.0)) for _ in "ab"]
-    assert registered(*flat, np.zeros(3), BELIEF).reason == CONSTANT
+    assert register_patches(*flat, np.zeros(3), BELIEF).reason == CONSTANT
     nothing = patch_of(SENSOR, signal_of(np.zeros((16, 16))))
-    assert registered(nothing, flat[0], np.zeros(3), BELIEF).reason == CONSTANT
+    assert register_patches(nothing, flat[0], np.zeros(3), BELIEF).reason == CONSTANT
     a, b = two(symbols(1), [3.0, 0.0, 0.0])
-    assert registered(a, b, np.array([30.0, 0.0, 0.0]), BELIEF).reason == APART
+    assert register_patches(a, b, np.array([30.0, 0.0, 0.0]), BELIEF).reason == APART
     rough = [patch_of(SENSOR, signal_of(rng.exponential(9, (16, 16)), floor=0.0)) for _ in "ab"]
-    refused = registered(*rough, np.zeros(3), BELIEF, period_mm=7)
+    refused = register_patches(*rough, np.zeros(3), BELIEF, period_mm=7)
     assert refused.reason == NOISE
     assert (refused.information == 0).all()
     assert math.isnan(refused.gain)

@@ -9,24 +9,24 @@ import pytest
 
 from probe.scan.places import surface_to_sensor
 from probe.sensor import SensorType
-from recognizer.scan.mosaic.canvas import Laid, empty_canvas, laid, reference
-from recognizer.scan.mosaic.correlation import correlated, peaks
+from recognizer.scan.mosaic.canvas import CanvasEntry, empty_canvas, lay_touch, reference
+from recognizer.scan.mosaic.correlation import cross_correlate, peaks
 from recognizer.scan.mosaic.errors import MosaicError
 from recognizer.scan.mosaic.image import as_tactile_image, image_of
-from recognizer.scan.mosaic.patch import asked, patch_of
+from recognizer.scan.mosaic.patch import interpolate_patch, patch_of
 from recognizer.scan.mosaic.planar import (
-    between,
-    between_covariance,
-    composed,
+    compose_poses,
     composed_covariance,
     inverse,
-    moved,
     planar_covariance,
     planar_pose,
+    relative_covariance,
+    relative_pose,
+    transform_points,
 )
-from recognizer.scan.mosaic.raster import KnownRaster, laid_under, magnified, points_mm
-from recognizer.scan.mosaic.texture import kept, seen_motions
-from recognizer.scan.mosaic.touch import PlacedTouch, decoded_place, placed
+from recognizer.scan.mosaic.raster import KnownRaster, laid_under, magnify_patch, points_mm
+from recognizer.scan.mosaic.texture import restrict_information, seen_motions
+from recognizer.scan.mosaic.touch import PlacedTouch, decoded_place, planar_belief
 from recognizer.thesis.product import product_shift
 from recognizer.touch.recognition import Recognition, refusal
 from recognizer.touch.signal import Signal, signal_of
@@ -54,8 +54,8 @@ def sampled(shift=(0.0, 0.0)):
 
 def test_a_quarter_turn_by_hand():
     T_a_b = np.array([10.0, 5.0, math.pi / 2])
-    assert moved(T_a_b, np.array([1.0, 0.0])) == pytest.approx([10, 6])
-    assert composed(T_a_b, np.array([1.0, 2.0, 0.0])) == pytest.approx([8, 6, math.pi / 2])
+    assert transform_points(T_a_b, np.array([1.0, 0.0])) == pytest.approx([10, 6])
+    assert compose_poses(T_a_b, np.array([1.0, 2.0, 0.0])) == pytest.approx([8, 6, math.pi / 2])
     assert inverse(T_a_b) == pytest.approx([-5, 10, -math.pi / 2])
 
 
@@ -65,9 +65,9 @@ def test_covariances_are_those_of_a_sample(rule):
     a, b = np.array([20.0, -7.0, 0.8]), np.array([31.0, 4.0, -0.3])
     of_a, of_b = np.diag([0.04, 0.01, 1e-5]), np.diag([0.02, 0.03, 4e-5])
     if rule == "between":
-        stated, function = between_covariance(a, b, of_a, of_b), between
+        stated, function = relative_covariance(a, b, of_a, of_b), relative_pose
     else:
-        stated, function = composed_covariance(a, b, of_a, of_b), composed
+        stated, function = composed_covariance(a, b, of_a, of_b), compose_poses
     some_a = a + rng.multivariate_normal(np.zeros(3), of_a, 40_000)
     some_b = b + rng.multivariate_normal(np.zeros(3), of_b, 40_000)
     scale = np.sqrt(np.diag(stated))
@@ -89,7 +89,9 @@ def test_spatial_poses_and_covariances_in_the_plane():
 
 
 def test_places_are_checked():
-    assert placed(surface_to_sensor(1, 2, 0.3), (1, 1, 0.1)).pose == pytest.approx([1, 2, 0.3])
+    assert planar_belief(surface_to_sensor(1, 2, 0.3), (1, 1, 0.1)).pose == pytest.approx(
+        [1, 2, 0.3]
+    )
     for pose, spread in (
         ((1, 2), (1, 1, 1)),
         ((1, 2, math.nan), (1, 1, 1)),
@@ -98,7 +100,7 @@ def test_places_are_checked():
         (LEVEL, [[1, 2, 0], [0, 1, 0], [0, 0, 1]]),
     ):
         with pytest.raises(MosaicError):
-            placed(pose, spread)
+            planar_belief(pose, spread)
     with pytest.raises(MosaicError, match="touch 7 has no place"):
         PlacedTouch(Signal(np.zeros((16, 16)), np.ones((16, 16)), False, True), seq=7)
 
@@ -129,7 +131,7 @@ def test_correlation_in_parts_is_that_of_every_overlap():
     rng = np.random.default_rng(4)
     wide = KnownRaster(rng.normal(5, 1, (20, 23)), rng.random((20, 23)) > 0.2, 0, 0, 1)
     image = KnownRaster(rng.normal(9, 3, (12, 11)), rng.random((12, 11)) > 0.2, 0, 0, 1)
-    found = correlated(wide, image)
+    found = cross_correlate(wide, image)
     assert found.rho.shape == (9, 13)
     for i in range(9):
         for j in range(13):
@@ -141,10 +143,10 @@ def test_correlation_in_parts_is_that_of_every_overlap():
 def test_where_nothing_varies_there_is_no_correlation():
     known = np.ones((12, 12), bool)
     varied = np.random.default_rng(1).normal(size=(8, 8))
-    flat = correlated(KnownRaster(np.full((12, 12), 3.0), known, 0, 0, 1),
+    flat = cross_correlate(KnownRaster(np.full((12, 12), 3.0), known, 0, 0, 1),
                       KnownRaster(varied, known[:8, :8], 0, 0, 1))  # fmt: skip
     assert np.isnan(flat.rho).all()
-    nothing = correlated(KnownRaster(np.zeros((12, 12)), ~known, 0, 0, 1),
+    nothing = cross_correlate(KnownRaster(np.zeros((12, 12)), ~known, 0, 0, 1),
                          KnownRaster(varied, known[:8, :8], 0, 0, 1))  # fmt: skip
     assert np.isnan(nothing.rho).all()
     assert (nothing.overlap == 0).all()
@@ -174,10 +176,12 @@ def test_the_thesis_s_product_finds_whole_tactels():
 def test_a_patch_between_the_tactels():
     points = np.random.default_rng(2).uniform(-9, 9, (200, 2))
     found = patch(sampled())
-    value, by_x, by_y = asked(found, points)
+    value, by_x, by_y = interpolate_patch(found, points)
     assert np.abs(value * found.scale - waves(points)).max() < 0.12
     for slope, step in ((by_x, (1e-4, 0)), (by_y, (0, 1e-4))):
-        ahead, behind = (asked(found, points + sign * np.array(step))[0] for sign in (1, -1))
+        ahead, behind = (
+            interpolate_patch(found, points + sign * np.array(step))[0] for sign in (1, -1)
+        )
         assert slope == pytest.approx((ahead - behind) / 2e-4, abs=1e-6)
 
 
@@ -191,11 +195,11 @@ def test_bad_tactels_are_filled_from_around():
 
 
 def test_a_raster_laid_under_another():
-    found = magnified(patch(sampled()))
+    found = magnify_patch(patch(sampled()))
     assert found.values.shape == (64, 64)
     pose = np.array([2.0, -1.0, 0.3])
     under = laid_under(found, found, pose)
-    at = moved(pose, points_mm(found)[under.known])
+    at = transform_points(pose, points_mm(found)[under.known])
     inside = (np.abs(at) < 10).all(axis=1)
     scale = patch(sampled()).scale
     assert np.abs(under.values[under.known] * scale - waves(at))[inside].max() < 0.15
@@ -212,7 +216,7 @@ def test_a_ridge_moved_along_itself_is_not_seen(angle):
     along = np.array([-math.sin(angle), math.cos(angle), 0.0])
     assert np.abs(along @ motions).max() < 0.05
     belief = np.diag([2.0, 2.0, 1e-4])
-    information = kept(np.diag([300.0, 200.0, 4e4]), motions, SENSOR, belief)
+    information = restrict_information(np.diag([300.0, 200.0, 4e4]), motions, SENSOR, belief)
     assert along @ information @ along < 0.1
     assert np.linalg.eigvalsh(information).min() > -1e-6
 
@@ -224,7 +228,7 @@ def test_a_dome_turned_about_its_middle_is_not_seen():
     assert seen_motions(dome, everywhere, np.array([2.0, 1.0, 0.0])).shape == (3, 2)
     assert seen_motions(patch(sampled()), everywhere, np.zeros(3)).shape == (3, 3)
     assert seen_motions(patch(np.ones((16, 16))), everywhere, np.zeros(3)).shape == (3, 0)
-    assert (kept(np.eye(3), np.zeros((3, 0)), SENSOR, np.eye(3)) == 0).all()
+    assert (restrict_information(np.eye(3), np.zeros((3, 0)), SENSOR, np.eye(3)) == 0).all()
 
 
 # --- canvas and image ----------------------------------------------------------------------
@@ -233,16 +237,16 @@ def test_a_dome_turned_about_its_middle_is_not_seen():
 def test_what_is_taken_off_again_leaves_nothing():
     canvas = empty_canvas(P)
     sure = np.diag([1e-4, 1e-4, 1e-7])
-    first = Laid(np.array([5.0, 40.0, 0.2]), sure, 1.0)
-    second = Laid(np.array([-9.0, 33.0, -0.7]), sure, 1.3)
-    one = laid(canvas, patch(sampled()), first)
-    both = laid(one, patch(sampled((1, 0))), second)
-    back = laid(both, patch(sampled((1, 0))), second, -1)
+    first = CanvasEntry(np.array([5.0, 40.0, 0.2]), sure, 1.0)
+    second = CanvasEntry(np.array([-9.0, 33.0, -0.7]), sure, 1.3)
+    one = lay_touch(canvas, patch(sampled()), first)
+    both = lay_touch(one, patch(sampled((1, 0))), second)
+    back = lay_touch(both, patch(sampled((1, 0))), second, -1)
     assert not canvas.tiles
     assert back.tiles.keys() == one.tiles.keys()
     for key, tile in one.tiles.items():
         assert back.tiles[key] == pytest.approx(tile, rel=1e-9, abs=1e-6)
-    assert not laid(back, patch(sampled()), first, -1).tiles
+    assert not lay_touch(back, patch(sampled()), first, -1).tiles
     assert image_of(canvas).values.shape == (0, 0)
 
 
@@ -250,8 +254,8 @@ def test_the_image_is_the_mean_with_its_errors():
     canvas = empty_canvas(P)
     sure = np.diag([1e-4, 1e-4, 1e-7])
     for k, level in enumerate((1.0, 1.0, 1.3)):
-        how = Laid(np.array([0.0, 0.0, 0.0]), sure, 1.0)
-        canvas = laid(canvas, patch(np.full((16, 16), level)), how)
+        how = CanvasEntry(np.array([0.0, 0.0, 0.0]), sure, 1.0)
+        canvas = lay_touch(canvas, patch(np.full((16, 16), level)), how)
         image = image_of(canvas)
         assert image.values.shape == (64, 64)
         assert (image.count == k + 1).all()
@@ -269,10 +273,10 @@ def test_the_image_is_the_mean_with_its_errors():
 
 
 def test_the_canvas_shows_a_touch_where_it_lies():
-    how = Laid(np.array([30.0, -20.0, 0.4]), np.diag([1e-4, 1e-4, 1e-7]), 1.0)
-    canvas = laid(empty_canvas(P), patch(sampled()), how)
+    how = CanvasEntry(np.array([30.0, -20.0, 0.4]), np.diag([1e-4, 1e-4, 1e-7]), 1.0)
+    canvas = lay_touch(empty_canvas(P), patch(sampled()), how)
     shown = reference(canvas, 30.0, -20.0, 12.0)
-    at = moved(inverse(how.pose), points_mm(shown)[shown.known])
+    at = transform_points(inverse(how.pose), points_mm(shown)[shown.known])
     inside = (np.abs(at) < 9).all(axis=1)
     assert inside.sum() > 1000
     assert np.abs(shown.values[shown.known] - waves(at))[inside].max() < 0.15
@@ -281,6 +285,8 @@ def test_the_canvas_shows_a_touch_where_it_lies():
 def test_a_doubtful_place_counts_little_at_edges_only():
     points = SENSOR.centres_mm().reshape(-1, 2)
     step = patch(1 + (points[:, 0] > 0).reshape(16, 16).astype(float))
-    canvas = laid(empty_canvas(P), step, Laid(np.zeros(3), np.diag([1.0, 1.0, 1e-4]), 1.0))
+    canvas = lay_touch(
+        empty_canvas(P), step, CanvasEntry(np.zeros(3), np.diag([1.0, 1.0, 1e-4]), 1.0)
+    )
     error = image_of(canvas).error
     assert error[32, 32] > 5 * error[32, 4]

@@ -15,7 +15,7 @@ from probe.simulate.registered import registered_surface
 from probe.simulate.world.levels import MISMATCH, TYPICAL, read_sensor
 from recognizer.scan.grow import begin_scan, extend_scan, read_scan
 from recognizer.scan.mosaic.errors import MosaicError
-from recognizer.scan.mosaic.touch import PlacedTouch, placed
+from recognizer.scan.mosaic.touch import PlacedTouch, planar_belief
 from recognizer.scan.session import Scan, TouchPlaces
 from recognizer.scan.settings import ScanSettings
 from recognizer.touch.lab import open_lab
@@ -59,7 +59,7 @@ def scanned(surface, places, theta, level, seed):
         error = rng.normal(0, 1, 3) * SPREAD
         pose = np.array([c * x - s * y + 200, s * x + c * y - 70, theta + 0.6]) + error
         signal = signal_of(counts.astype(float))
-        touches.append(PlacedTouch(signal, placed(pose, SPREAD), seq=k))
+        touches.append(PlacedTouch(signal, planar_belief(pose, SPREAD), seq=k))
         true.append((x, y, theta))
     return touches, np.array(true)
 
@@ -127,16 +127,16 @@ def test_steps_without_an_arm_are_enough(lab, reader):
     touches, true = scanned(surface, places, 0.0, TYPICAL, 4)
     rng = np.random.default_rng(4)
     spread = (0.8, 0.8, 0.01)
-    counted = [PlacedTouch(touches[0].signal, placed((0, 0, 0), (0.01, 0.01, 1e-4)))]
+    counted = [PlacedTouch(touches[0].signal, planar_belief((0, 0, 0), (0.01, 0.01, 1e-4)))]
     for k in range(1, len(touches)):
         step = true[k] - true[k - 1] + rng.normal(0, 1, 3) * spread
-        counted.append(PlacedTouch(touches[k].signal, stepped=placed(step, spread), seq=k))
+        counted.append(PlacedTouch(touches[k].signal, stepped=planar_belief(step, spread), seq=k))
     scan = begin_scan(reader)
     for touch in counted:
         scan = extend_scan(scan, touch)
         assert scan.recognition.object in (None, "Cube")
         assert scan.recognition.face in (None, "F2")
-    assert scan.stands.mosaic is not None
+    assert scan.touch_poses.mosaic is not None
     assert scan.recognition
     assert np.hypot(*(scan.recognition.T_face_probe[:2, 3] - true[-1, :2])) < 0.5
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from recognizer.scan.composite import composite, expected_fit
-from recognizer.scan.lattice import agreed, alike, expected_at, seeded
-from recognizer.scan.mosaic.planar import composed, inverse
+from recognizer.scan.lattice import expected_at, refine_agreement, same_lattice, seed_lattice
+from recognizer.scan.mosaic.planar import compose_poses, inverse
 from recognizer.scan.settings import ScanSettings
-from recognizer.scan.views import LatticeView, Stands, views_of
+from recognizer.scan.views import LatticeView, TouchPoses, views_of
 from recognizer.touch.symbols.fit import Fit
 
 PITCH = 12.0
@@ -54,11 +54,11 @@ def a_scan(number=6, sigma_mm=0.3, seed=1):
         [7.0 * np.arange(number), 4.0 * np.arange(number) % 11, np.zeros(number)]
     )
     true[:, 2] = 0.3
-    plane = composed(T_PLANE_LATTICE, true)
+    plane = compose_poses(T_PLANE_LATTICE, true)
     believed = plane + rng.normal(0, sigma_mm, (number, 3)) * [1, 1, 0.01]
     spread = np.tile(np.diag([sigma_mm, sigma_mm, 0.01 * sigma_mm]) ** 2, (number, 1, 1))
     fits = [fit_at(pose, rng.integers(-9, 9, 2)) for pose in true]
-    return true, Stands(believed, spread, None), fits
+    return true, TouchPoses(believed, spread, None), fits
 
 
 def views_from(fits):
@@ -66,11 +66,11 @@ def views_from(fits):
 
 
 def test_touches_on_one_lattice_agree_and_their_cells_meet():
-    true, stands, fits = a_scan()
+    true, touch_poses, fits = a_scan()
     views = views_from([(f,) for f in fits])
-    found = agreed(views, stands, seeded(views, stands, 0), PITCH, LIMITS)
+    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH, LIMITS)
     assert (found.chosen == np.arange(6)).all()
-    both = composite(views, stands, found, PITCH, LIMITS)
+    both = composite(views, touch_poses, found, PITCH, LIMITS)
     assert both is not None
     # counted from the origin of the first touch, every cell has its own symbol, once
     origin = np.round((true[0, :2] - [fits[0].x_mm, fits[0].y_mm]) / PITCH).astype(int)
@@ -86,12 +86,12 @@ def test_touches_on_one_lattice_agree_and_their_cells_meet():
 
 
 def test_the_lattice_is_found_better_than_the_arm_stands():
-    _true, stands, fits = a_scan(number=25, sigma_mm=0.4)
+    _true, touch_poses, fits = a_scan(number=25, sigma_mm=0.4)
     views = views_from([(f,) for f in fits])
-    found = agreed(views, stands, seeded(views, stands, 3), PITCH, LIMITS)
-    middle = composed(T_PLANE_LATTICE, np.array([80.0, 5.0, 0.3]))
+    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 3), PITCH, LIMITS)
+    middle = compose_poses(T_PLANE_LATTICE, np.array([80.0, 5.0, 0.3]))
     at, covariance = expected_at(found.lattice, middle, np.zeros((3, 3)))
-    away = at[:2] - composed(inverse(T_PLANE_LATTICE), middle)[:2]
+    away = at[:2] - compose_poses(inverse(T_PLANE_LATTICE), middle)[:2]
     away -= np.rint(away / PITCH) * PITCH
     assert np.hypot(*away) < 0.25
     sigma = np.sqrt(np.diag(covariance)[:2])
@@ -101,50 +101,56 @@ def test_the_lattice_is_found_better_than_the_arm_stands():
 
 @pytest.mark.parametrize("worse", [0.0, 200.0])
 def test_a_wrong_lattice_of_one_touch_is_passed_over(worse):
-    _true, stands, fits = a_scan()
+    _true, touch_poses, fits = a_scan()
     wrong = replace(fits[2], x_mm=fits[2].x_mm + 4.0, theta_rad=fits[2].theta_rad + 1.2)
     each = [(f,) for f in fits]
     each[2] = (wrong, replace(fits[2], value=fits[2].value - worse))
     views = views_from(each)
-    found = agreed(views, stands, seeded(views, stands, 0), PITCH, LIMITS)
+    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH, LIMITS)
     assert found.chosen.tolist() == [0, 1, 3, 4, 5, 6]
-    other = agreed(views, stands, seeded(views, stands, 2), PITCH, LIMITS)
+    other = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 2), PITCH, LIMITS)
     assert (other.chosen >= 0).sum() == 1
     assert other.score < found.score - 40
-    assert not alike(found.lattice, other.lattice, stands.poses[2], PITCH)
+    assert not same_lattice(found.lattice, other.lattice, touch_poses.poses[2], PITCH)
     # however much better it explains its image, it costs what leaving it out costs
     assert found.score > 5 * LIMITS.agreement - LIMITS.left_out - 10
 
 
 def test_a_touch_that_plainly_shows_another_lattice_is_left_out():
-    _true, stands, fits = a_scan()
+    _true, touch_poses, fits = a_scan()
     wrong = replace(fits[2], x_mm=fits[2].x_mm + 4.0, theta_rad=fits[2].theta_rad + 1.2)
     each = [(f,) for f in fits]
     each[2] = (wrong, replace(fits[2], value=fits[2].value - 2 * LIMITS.plainly))
     views = views_from(each)
-    found = agreed(views, stands, seeded(views, stands, 0), PITCH, LIMITS)
+    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH, LIMITS)
     assert found.chosen.tolist() == [0, 1, -1, 4, 5, 6]
 
 
 def test_a_touch_whose_whole_pitches_are_not_told_is_left_out():
-    _true, stands, fits = a_scan()
+    _true, touch_poses, fits = a_scan()
     views = views_from([(f,) for f in fits])
-    wide = stands.covariances.copy()
+    wide = touch_poses.covariances.copy()
     wide[4] = np.diag([PITCH / 2, PITCH / 2, 0.01]) ** 2
-    found = agreed(views, Stands(stands.poses, wide, None), seeded(views, stands, 0), PITCH, LIMITS)
+    found = refine_agreement(
+        views,
+        TouchPoses(touch_poses.poses, wide, None),
+        seed_lattice(views, touch_poses, 0),
+        PITCH,
+        LIMITS,
+    )
     assert found.chosen.tolist() == [0, 1, 2, 3, -1, 5]
-    both = composite(views, stands, found, PITCH, LIMITS)
+    both = composite(views, touch_poses, found, PITCH, LIMITS)
     assert both is not None
     assert (both.fit.scores.max(axis=1) == 0).all()
 
 
 def test_looks_at_a_cell_are_no_independent_witnesses():
-    true, stands, _fits = a_scan(number=30, sigma_mm=0.1)
+    true, touch_poses, _fits = a_scan(number=30, sigma_mm=0.1)
     still = true[:1].repeat(30, axis=0)
-    stands = Stands(composed(T_PLANE_LATTICE, still), stands.covariances, None)
+    touch_poses = TouchPoses(compose_poses(T_PLANE_LATTICE, still), touch_poses.covariances, None)
     views = views_from([(fit_at(pose, (0, 0), sure=2.0),) for pose in still])
-    found = agreed(views, stands, seeded(views, stands, 0), PITCH, LIMITS)
-    both = composite(views, stands, found, PITCH, LIMITS)
+    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH, LIMITS)
+    both = composite(views, touch_poses, found, PITCH, LIMITS)
     assert both is not None
     assert both.looks == pytest.approx(30)
     assert -both.fit.scores.min() == pytest.approx(2.0 * 30 / (1 + 29 * LIMITS.alike))
@@ -152,40 +158,40 @@ def test_looks_at_a_cell_are_no_independent_witnesses():
 
 
 def test_one_touch_says_a_bounded_amount_of_a_cell():
-    true, stands, _fits = a_scan(number=1)
+    true, touch_poses, _fits = a_scan(number=1)
     views = views_from([(fit_at(true[0], (0, 0), sure=500.0),)])
-    only = agreed(views, stands, seeded(views, stands, 0), PITCH, LIMITS)
-    both = composite(views, stands, only, PITCH, LIMITS)
+    only = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH, LIMITS)
+    both = composite(views, touch_poses, only, PITCH, LIMITS)
     assert both is not None
     assert both.fit.scores.min() == -LIMITS.look
 
 
 def test_a_touch_that_contradicts_all_others_is_left_out():
-    true, stands, _fits = a_scan(number=8)
+    true, touch_poses, _fits = a_scan(number=8)
     still = true[:1].repeat(8, axis=0)
-    stands = Stands(composed(T_PLANE_LATTICE, still), stands.covariances, None)
+    touch_poses = TouchPoses(compose_poses(T_PLANE_LATTICE, still), touch_poses.covariances, None)
     each = [(fit_at(pose, (0, 0), flipped=range(9) if k == 7 else ()),)
             for k, pose in enumerate(still)]  # fmt: skip
     views = views_from(each)
-    found = agreed(views, stands, seeded(views, stands, 0), PITCH, LIMITS)
+    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH, LIMITS)
     assert found.chosen[7] == 7  # by its pose it agrees
-    both = composite(views, stands, found, PITCH, LIMITS)
+    both = composite(views, touch_poses, found, PITCH, LIMITS)
     assert both is not None
     assert both.agreement.chosen.tolist() == [0, 1, 2, 3, 4, 5, 6, -1]
     assert both.agreement.score == pytest.approx(both.agreement.scores.sum())
     assert (both.fit.scores.argmax(axis=1) == label(both.fit.cells)).all()
     # it stands where the others and the arm say
-    there = expected_fit(both, stands)
+    there = expected_fit(both, touch_poses)
     assert math.hypot(there.x_mm - both.fit.x_mm, there.y_mm - both.fit.y_mm) < 1e-9
 
 
 def test_fits_that_know_nothing_of_their_place_are_no_views():
-    _true, stands, fits = a_scan(number=2)
+    _true, touch_poses, fits = a_scan(number=2)
     lost = replace(fits[1], covariance=np.zeros((3, 3)))
     vague = replace(fits[1], covariance=np.diag([900.0, 0.01, 1e-4]))
     none = replace(fits[1], covariance=np.full((3, 3), np.nan))
     views = views_from([(fits[0],), (lost, vague, none)])
     assert views.touch.tolist() == [0]
     assert np.isfinite(views.values).all()
-    found = agreed(views, stands, seeded(views, stands, 0), PITCH, LIMITS)
+    found = refine_agreement(views, touch_poses, seed_lattice(views, touch_poses, 0), PITCH, LIMITS)
     assert found.chosen.tolist() == [0, -1]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from generator.alphabet import SymbolStyle, alphabet_named
-from recognizer.thesis.settings import Counting, SkeletonSettings
+from recognizer.thesis.settings import CountingSettings, SkeletonSettings
 from recognizer.thesis.skeleton.count import points_of_glyph, points_of_skeleton
 from recognizer.thesis.skeleton.graph import graph, length
 from recognizer.thesis.skeleton.symbols import COUNTS, CUT, symbols
@@ -89,7 +89,7 @@ def test_spurs_are_pruned_and_the_line_runs_through():
 
 def test_a_ring_is_one_loop_without_ends():
     ring = skeleton(".....\n..#..\n.#.#.\n..#..\n.....")
-    points = points_of_skeleton(ring, 100.0, Counting(spur=0, hook=0, bow=1))
+    points = points_of_skeleton(ring, 100.0, CountingSettings(spur=0, hook=0, bow=1))
     assert points.counts == (0, 0, 1)
 
 
