@@ -90,7 +90,7 @@ def _counts(values: ArrayLike, shape: tuple[int, ...], name: str) -> NDArray[np.
             "0 ... 65535",
             fix="give raw ADC counts, not newtons",
         )
-    return _frozen(array, np.uint16)
+    return _freeze(array, np.uint16)
 
 
 def _pose(values: ArrayLike) -> NDArray[np.float64]:
@@ -100,10 +100,10 @@ def _pose(values: ArrayLike) -> NDArray[np.float64]:
         raise FrameError(
             "the pose is no rigid transform", fix="give a 4x4 matrix T_base_sensor, mm"
         )
-    return _frozen(pose, np.float64)
+    return _freeze(pose, np.float64)
 
 
-def _frozen(values: ArrayLike, dtype: type[np.generic]) -> NDArray[Any]:
+def _freeze(values: ArrayLike, dtype: type[np.generic]) -> NDArray[Any]:
     array = np.array(values, dtype=dtype, order="C")
     array.setflags(write=False)
     return array

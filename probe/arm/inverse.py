@@ -112,11 +112,11 @@ def _elbow_branches(
     for q3 in (bend, -bend) if bend else (0.0,):
         q2 = math.atan2(down, out) - math.atan2(a3 * math.sin(q3), a2 + a3 * math.cos(q3))
         q4 = math.atan2(s234, c234) - q2 - q3
-        solutions.append(np.array([_wrapped(q) for q in (q1, q2, q3, q4, q5)]))
+        solutions.append(np.array([_wrap_angle(q) for q in (q1, q2, q3, q4, q5)]))
     return 0.0, solutions
 
 
-def _wrapped(angle: float) -> float:
+def _wrap_angle(angle: float) -> float:
     """Return the angle in (-pi, pi]."""
     turned = math.remainder(angle, math.tau)
     return math.pi if turned <= -math.pi else turned

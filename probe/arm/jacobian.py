@@ -50,7 +50,7 @@ def jacobian(arm: Arm, q: ArrayLike, point_mm: ArrayLike | None = None) -> NDArr
 
 def condition(arm: Arm, q: ArrayLike) -> float:
     """Return the condition number of the Jacobian, lengths in links; infinite where singular."""
-    values = np.linalg.svd(_scaled(arm, q), compute_uv=False)
+    values = np.linalg.svd(_scaled_jacobian(arm, q), compute_uv=False)
     return float(values[0] / values[-1]) if values[-1] > 0 else np.inf
 
 
@@ -80,7 +80,7 @@ def joint_speeds(arm: Arm, q: ArrayLike, twist: ArrayLike) -> NDArray[np.float64
     if wanted.shape != (6,) or not np.isfinite(wanted).all():
         raise PoseError(f"a twist {wanted.tolist()}", fix="give 3 speeds in mm/s and 3 in rad/s")
     wanted = wanted / np.repeat([ARM_MOTION.length_mm, 1.0], 3)
-    u, values, v = np.linalg.svd(_scaled(arm, q), full_matrices=False)
+    u, values, v = np.linalg.svd(_scaled_jacobian(arm, q), full_matrices=False)
     weak = np.clip(values / ARM_MOTION.least_singular, 0.0, 1.0)
     damping = (1 - weak**2) * (ARM_MOTION.least_singular / 2) ** 2
     safe = np.where(values > 0, values, 1.0)
@@ -89,7 +89,7 @@ def joint_speeds(arm: Arm, q: ArrayLike, twist: ArrayLike) -> NDArray[np.float64
     return speeds
 
 
-def _scaled(arm: Arm, q: ArrayLike) -> NDArray[np.float64]:
+def _scaled_jacobian(arm: Arm, q: ArrayLike) -> NDArray[np.float64]:
     scaled: NDArray[np.float64] = (
         jacobian(arm, q) / np.repeat([ARM_MOTION.length_mm, 1.0], 3)[:, None]
     )

@@ -11,7 +11,7 @@ apply      counts -> newtons, and back
 drift      whether a calibration still holds
 """
 
-from probe.calibration.apply import Calibrated, calibrate_image, expected_counts
+from probe.calibration.apply import CalibratedImage, calibrate_image, expected_counts
 from probe.calibration.condition import ConditionThresholds
 from probe.calibration.drift import Drift, drift_of
 from probe.calibration.file import calibration_hash, read_calibration, write_calibration
@@ -20,7 +20,7 @@ from probe.calibration.load import CalibrationLoad, even_load, known_load
 from probe.calibration.value import Calibration, Condition
 
 __all__ = [
-    "Calibrated",
+    "CalibratedImage",
     "Calibration",
     "CalibrationLoad",
     "Condition",

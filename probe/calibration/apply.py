@@ -15,14 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 from probe.calibration.law import law_s
 from probe.calibration.settings import FELT
 from probe.calibration.value import Calibration, Condition, Image
-from probe.circuit import Inverted, invert_readings
+from probe.circuit import ConductanceEstimate, invert_readings
 from probe.circuit.readout import scan_shares, shares
 from probe.errors import CalibrationError
 from probe.frame import Frame
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Calibrated:
+class CalibratedImage:
     """An image in newtons, or in counts where there is no calibration."""
 
     values: Image  #: (..., rows, columns) N, 0 or more; 0 where bad
@@ -31,7 +31,9 @@ class Calibrated:
     unit: Literal["N", "counts"]
 
 
-def calibrate_image(image: Frame | ArrayLike, calibration: Calibration | None = None) -> Calibrated:
+def calibrate_image(
+    image: Frame | ArrayLike, calibration: Calibration | None = None
+) -> CalibratedImage:
     """Return the forces that an image shows.
 
     Parameters
@@ -63,7 +65,7 @@ def calibrate_image(image: Frame | ArrayLike, calibration: Calibration | None = 
     counts = np.asarray(image.counts if isinstance(image, Frame) else image, dtype=np.float64)
     if calibration is None:
         rounding = np.full(counts.shape, 1 / np.sqrt(12.0))
-        return Calibrated(counts, rounding, np.zeros(counts.shape, np.bool_), "counts")
+        return CalibratedImage(counts, rounding, np.zeros(counts.shape, np.bool_), "counts")
     c = calibration
     if counts.shape[-2:] != c.shape:
         raise CalibrationError(
@@ -84,7 +86,7 @@ def calibrate_image(image: Frame | ArrayLike, calibration: Calibration | None = 
         force = np.where(felt, np.maximum(c.break_n + over, 0.0), 0.0)
         silent = np.maximum(c.break_n, 0.0) + over / FELT.sigmas
         sigma = np.where(bad, np.inf, np.where(felt, np.sqrt(variance), silent))
-    return Calibrated(force, sigma, bad, "N")
+    return CalibratedImage(force, sigma, bad, "N")
 
 
 def expected_counts(forces_n: ArrayLike, calibration: Calibration) -> Image:
@@ -118,14 +120,14 @@ def expected_counts(forces_n: ArrayLike, calibration: Calibration) -> Image:
     return np.clip(read, 0.0, float(c.full))
 
 
-def _conductances(counts: Image, c: Calibration) -> Inverted:
+def _conductances(counts: Image, c: Calibration) -> ConductanceEstimate:
     """Return conductances by the board, or counts above the bias where there is none."""
     if c.board is not None:
         return invert_readings(counts, c.board, bias_counts=c.bias_counts)
     above = counts - c.bias_counts
     sigma = np.broadcast_to(np.sqrt(c.noise_counts**2 + 1.0 / 12.0), above.shape)
     lost = above < sigma
-    return Inverted(np.maximum(above, 0.0), sigma, lost, (~lost).sum(axis=(-2, -1)))
+    return ConductanceEstimate(np.maximum(above, 0.0), sigma, lost, (~lost).sum(axis=(-2, -1)))
 
 
 def _of_the_law(over: Image, c: Calibration) -> Image:

@@ -108,7 +108,7 @@ def read_calibration(
             place=place,
         )
     try:
-        calibration = _parsed(document)
+        calibration = _calibration_of(document)
     except (KeyError, TypeError, ValueError, CircuitError, CalibrationError) as error:
         raise CalibrationError(
             f"is damaged: {error}", fix="calibrate again", place=place
@@ -117,11 +117,11 @@ def read_calibration(
         raise CalibrationError(
             "was changed: its content does not give its sha256", fix="calibrate again", place=place
         )
-    _matched(calibration, sensor, shape, place)
+    _check_sensor(calibration, sensor, shape, place)
     return calibration
 
 
-def _matched(
+def _check_sensor(
     calibration: Calibration, sensor: str | None, shape: tuple[int, int] | None, place: str
 ) -> None:
     if sensor is not None and sensor != calibration.sensor:
@@ -155,28 +155,28 @@ def _text(calibration: Calibration) -> str:
         "loads": list(c.loads),
         "condition": rows,
     }
-    parts = [f'  "{key}": {_written(value)}' for key, value in head.items()]
+    parts = [f'  "{key}": {_to_json(value)}' for key, value in head.items()]
     for name in _ARRAYS:
         array = getattr(c, name)
-        lines = ",\n".join("    " + json.dumps(_plain(row)) for row in array)
+        lines = ",\n".join("    " + json.dumps(_json_numbers(row)) for row in array)
         parts.append(f'  "{name}": [\n{lines}\n  ]')
     return "{\n" + ",\n".join(parts) + "\n}\n"
 
 
-def _written(value: Any) -> str:
+def _to_json(value: Any) -> str:
     """Return a value in JSON, lists of names in a line, the rest indented."""
     flat = isinstance(value, list) and not any(len(str(item)) >= 16 for item in value)
     return json.dumps(value, indent=None if flat else 2).replace("\n", "\n  ")
 
 
-def _plain(row: np.ndarray) -> list[Any]:
+def _json_numbers(row: np.ndarray) -> list[Any]:
     """Return numbers as JSON has them: null for nan."""
     if row.ndim > 1:
-        return [_plain(part) for part in row]
+        return [_json_numbers(part) for part in row]
     return [None if math.isnan(v) else v for v in row.tolist()]
 
 
-def _parsed(document: dict[str, Any]) -> Calibration:
+def _calibration_of(document: dict[str, Any]) -> Calibration:
     board = document["board"]
     if board is not None:
         board = Electronics(**{**board, "noise": Noise(**board["noise"])})

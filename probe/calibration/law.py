@@ -54,15 +54,15 @@ def fit_laws(force_n: Array, read_s: Array, error_s: Array, used: NDArray[np.boo
     firm = used & (read_s > LAW_FIT.firm * error_s) & (force_n > 0)
     least = np.where(firm, force_n, np.inf).min(axis=0)  # smallest force that is clearly felt
     least = np.where(np.isfinite(least), np.maximum(least, LAW_FIT.tiny_n), 1.0)
-    theta = _started(force_n, read_s, weight, firm, least, preloaded)
+    theta = _best_start(force_n, read_s, weight, firm, least, preloaded)
     damping, cost = np.full(least.size, 1e-3), _cost(theta, force_n, read_s, weight, least)
     for _ in range(LAW_FIT.steps):
-        slopes, residual = _linearised(theta, force_n, read_s, weight, least)
+        slopes, residual = _linearise(theta, force_n, read_s, weight, least)
         normal = np.einsum("lti,ltj->tij", slopes, slopes)
         descent = np.einsum("lti,lt->ti", slopes, residual)
         damped = normal + damping[:, None, None] * _diagonal(normal)
         move = np.linalg.solve(damped, descent[..., None])[..., 0]
-        ahead = _bounded(theta + move, least, preloaded)
+        ahead = _clip_to_bounds(theta + move, least, preloaded)
         there = _cost(ahead, force_n, read_s, weight, least)
         better = there < cost
         theta = np.where(better[:, None], ahead, theta)
@@ -71,7 +71,7 @@ def fit_laws(force_n: Array, read_s: Array, error_s: Array, used: NDArray[np.boo
         damping = np.clip(np.where(better, damping / 5, damping * 5), 1e-12, 1e12)
         if done or bool((damping > 1e10).all()):
             break
-    slopes, residual = _linearised(theta, force_n, read_s, weight, least)
+    slopes, residual = _linearise(theta, force_n, read_s, weight, least)
     normal = np.einsum("lti,ltj->tij", slopes, slopes)
     freedom = np.maximum(used.sum(axis=0) - 3, 1)
     scatter = np.sqrt((residual[:-1] ** 2).sum(axis=0) / freedom)
@@ -79,7 +79,7 @@ def fit_laws(force_n: Array, read_s: Array, error_s: Array, used: NDArray[np.boo
     return FittedLaw(np.exp(theta[:, 0]), theta[:, 1], theta[:, 2], covariance, scatter)
 
 
-def _started(force: Array, read: Array, weight: Array, firm: NDArray[np.bool_], least: Array,
+def _best_start(force: Array, read: Array, weight: Array, firm: NDArray[np.bool_], least: Array,
              preloaded: NDArray[np.bool_]) -> Array:  # fmt: skip
     """Return the best of a ladder of break forces, (T, 3) ln gain, exponent, break force."""
     up = np.linspace(0.0, 0.98, LAW_FIT.break_forces)
@@ -103,7 +103,7 @@ def _started(force: Array, read: Array, weight: Array, firm: NDArray[np.bool_], 
     return best
 
 
-def _linearised(theta: Array, force: Array, read: Array, weight: Array, least: Array
+def _linearise(theta: Array, force: Array, read: Array, weight: Array, least: Array
                 ) -> tuple[Array, Array]:  # fmt: skip
     """Return (L + 1, T, 3) slopes and (L + 1, T) residuals, in errors.
 
@@ -123,12 +123,12 @@ def _linearised(theta: Array, force: Array, read: Array, weight: Array, least: A
 
 
 def _cost(theta: Array, force: Array, read: Array, weight: Array, least: Array) -> Array:
-    _, residual = _linearised(theta, force, read, weight, least)
+    _, residual = _linearise(theta, force, read, weight, least)
     cost: Array = (residual**2).sum(axis=0)
     return cost
 
 
-def _bounded(theta: Array, least: Array, preloaded: NDArray[np.bool_]) -> Array:
+def _clip_to_bounds(theta: Array, least: Array, preloaded: NDArray[np.bool_]) -> Array:
     bounded = theta.copy()
     bounded[:, 0] = np.clip(theta[:, 0], -700.0, 700.0)
     bounded[:, 1] = np.clip(theta[:, 1], *LAW_FIT.exponents)

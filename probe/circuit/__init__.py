@@ -12,7 +12,7 @@ inverse      counts -> conductances, and what is lost
 
 from probe.circuit.electronics import QUIET, Electronics, Noise, Readout
 from probe.circuit.fsr import FilmState, Fsr, conductances, fsr_of
-from probe.circuit.inverse import Inverted, invert_readings
+from probe.circuit.inverse import ConductanceEstimate, invert_readings
 from probe.circuit.network import effective_resistances, transconductances
 from probe.circuit.reading import read_counts, read_sequence
 from probe.circuit.spread import DATASHEET, MEASURED, Spread, draw_fsr
@@ -21,10 +21,10 @@ __all__ = [
     "DATASHEET",
     "MEASURED",
     "QUIET",
+    "ConductanceEstimate",
     "Electronics",
     "FilmState",
     "Fsr",
-    "Inverted",
     "Noise",
     "Readout",
     "Spread",

@@ -73,13 +73,13 @@ def solve_floating(resistance_ohm: Image, tolerance: float = 1e-9) -> FloatingSo
     for steps in range(1, FLOATING.steps + 1):
         gradient = 1.0 - (network.resistances_ohm / measured).ravel()
         hessian = _hessian(network, measured)
-        wanted, free = _bounded(hessian, gradient - hessian @ y, free)
+        wanted, free = _minimise_bounded(hessian, gradient - hessian @ y, free)
         move = wanted - y
         misfit = float(np.abs(gradient[free]).max(initial=0.0))
         if (np.abs(move) <= tolerance * y).all() or misfit <= 64 * EPSILON:
             conductance = y.reshape(shape) / measured / scale
             return FloatingSolution(conductance, y.reshape(shape), hessian, steps)
-        y, network = _searched(y, move, gradient, network, measured)
+        y, network = _search_line(y, move, gradient, network, measured)
     raise CircuitError(
         f"the network did not settle in {FLOATING.steps} steps; misfit {misfit:.1e}",
         fix="the readings contradict each other: average more frames",
@@ -94,13 +94,13 @@ def _hessian(network: Network, measured: Image) -> NDArray[np.float64]:
     return np.square(transfer, out=transfer)
 
 
-def _bounded(
+def _minimise_bounded(
     hessian: NDArray[np.float64], linear: Vector, free: NDArray[np.bool_]
 ) -> tuple[Vector, NDArray[np.bool_]]:
     """Minimise z' hessian z / 2 + linear' z over z >= 0; start from a guess of what is free."""
     patience, fewest = FLOATING.patience, linear.size + 1
     for _ in range(FLOATING.pivots):
-        z = _unbounded(hessian, linear, free)
+        z = _minimise_free(hessian, linear, free)
         slope = hessian @ z + linear
         wrong = (free & (z < 0)) | (~free & (slope < -64 * EPSILON))
         number = int(wrong.sum())
@@ -118,7 +118,7 @@ def _bounded(
     return np.maximum(z, 0.0), free
 
 
-def _unbounded(hessian: NDArray[np.float64], linear: Vector, free: NDArray[np.bool_]) -> Vector:
+def _minimise_free(hessian: NDArray[np.float64], linear: Vector, free: NDArray[np.bool_]) -> Vector:
     """Minimise with the variables that are not free held at 0."""
     from scipy.linalg import cho_factor, cho_solve
 
@@ -134,7 +134,7 @@ def _unbounded(hessian: NDArray[np.float64], linear: Vector, free: NDArray[np.bo
     return z
 
 
-def _searched(
+def _search_line(
     y: Vector, move: Vector, gradient: Vector, network: Network, measured: Image
 ) -> tuple[Vector, Network]:
     """Go along the step until the function falls; stay if it does not."""

@@ -26,7 +26,7 @@ from probe.errors import CircuitError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Inverted:
+class ConductanceEstimate:
     """Conductances that were read."""
 
     conductance_s: Image  #: (..., rows, columns) S; nan where the readings contradict each other
@@ -52,7 +52,7 @@ def invert_readings(
     *,
     bias_counts: ArrayLike | None = None,
     sigma_counts: ArrayLike | None = None,
-) -> Inverted:
+) -> ConductanceEstimate:
     """Return the conductances behind counts.
 
     Parameters
@@ -94,7 +94,7 @@ def invert_readings(
     beyond = max(e.volts_ratio - 1.0, 1.0) / np.sqrt(12.0)
     spread = np.where(saturated, beyond, np.maximum(sigma, 1e-12) / e.full)
     share = unscan_shares((read - bias) / e.full, e)
-    found = (_floating if e.readout == "floating" else _driven)(share, spread, e)
+    found = (_invert_floating if e.readout == "floating" else _invert_driven)(share, spread, e)
     found.sigma_s[saturated] = np.inf
     found.lost[saturated] = True
     return found
@@ -106,7 +106,7 @@ def _sample_sigma(signal: Image, e: Electronics) -> Image:
     return np.sqrt((noise.idle_lsb * lsb) ** 2 + 1.0 / 12.0 + contact)
 
 
-def _driven(share: Image, spread: Image, e: Electronics) -> Inverted:
+def _invert_driven(share: Image, spread: Image, e: Electronics) -> ConductanceEstimate:
     """Invert a readout whose rows are all driven."""
     scale = e.volts_ratio * (e.load_ohm if e.readout == "grounded" else e.feedback_ohm)
     column = e.load_ohm if e.readout == "grounded" else e.column_ohm
@@ -120,9 +120,9 @@ def _driven(share: Image, spread: Image, e: Electronics) -> Inverted:
     ) ** 2 * (noise**2).sum(axis=-2, keepdims=True)
     sigma = np.sqrt(variance)
     if e.row_ohm > 0:
-        g, sigma = _unled(g, sigma, current, noise, e.row_ohm, column)
+        g, sigma = _undo_row_resistance(g, sigma, current, noise, e.row_ohm, column)
     lost = ~possible | ~(g >= sigma)
-    return Inverted(
+    return ConductanceEstimate(
         np.maximum(g, 0.0),
         np.where(possible, sigma, np.inf),
         lost,
@@ -130,7 +130,7 @@ def _driven(share: Image, spread: Image, e: Electronics) -> Inverted:
     )
 
 
-def _unled(
+def _undo_row_resistance(
     start: Image, first: Image, current: Image, noise: Image, row: float, column: float
 ) -> tuple[Image, Image]:
     """Undo the row resistances, frame by frame."""
@@ -172,7 +172,7 @@ def _newton(
     return g, np.sqrt(np.square(back) @ np.square(noise).ravel()).reshape(g.shape)
 
 
-def _floating(share: Image, spread: Image, e: Electronics) -> Inverted:
+def _invert_floating(share: Image, spread: Image, e: Electronics) -> ConductanceEstimate:
     """Invert floating rows, frame by frame."""
     shape = share.shape
     g, sigma, lost = np.empty(shape), np.empty(shape), np.empty(shape, np.bool_)
@@ -185,14 +185,14 @@ def _floating(share: Image, spread: Image, e: Electronics) -> Inverted:
         ratio = e.volts_ratio * e.load_ohm / (offered**2 * resistance)
         relative = np.minimum(spread[index] * ratio, 1.0).ravel()
         found = solve_floating(resistance)
-        deviation, rank[index] = _determined(found, relative)
+        deviation, rank[index] = _deviation_and_rank(found, relative)
         g[index] = found.conductance_s
         sigma[index] = (deviation / resistance.ravel()).reshape(shape[-2:])
         lost[index] = (found.own.ravel() <= deviation).reshape(shape[-2:])
-    return Inverted(g, sigma, lost, rank)
+    return ConductanceEstimate(g, sigma, lost, rank)
 
 
-def _determined(
+def _deviation_and_rank(
     found: FloatingSolution, relative: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], int]:
     """Return the deviation of y = gR, and how many of its directions the readings determine.

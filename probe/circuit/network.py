@@ -66,7 +66,7 @@ def eliminate(conductance_s: ArrayLike) -> Network:
     rows = g.shape[-2]
     sums = g.sum(axis=-2)
     if not ((g.sum(axis=-1) > 0).all() and (sums > 0).all()):
-        raise _apart()
+        raise _disconnected_error()
     shares = g / sums[..., None, :]
     joined = shares @ np.swapaxes(g, -1, -2)
     modes = _sources(shares)
@@ -75,7 +75,7 @@ def eliminate(conductance_s: ArrayLike) -> Network:
         row = joined[..., k, k + 1 :]
         pivot = row.sum(axis=-1)
         if not (pivot > 0).all():
-            raise _apart()
+            raise _disconnected_error()
         share = row / pivot[..., None]
         joined[..., k + 1 :, k + 1 :] += row[..., :, None] * share[..., None, :]
         modes[..., k + 1 :, :, :] += share[..., :, None, None] * modes[..., k : k + 1, :, :]
@@ -170,7 +170,7 @@ def _sources(shares: Image) -> NDArray[np.float64]:
     return injected
 
 
-def _apart() -> CircuitError:
+def _disconnected_error() -> CircuitError:
     return CircuitError(
         "the network falls into parts that no conductance joins",
         fix="give every tactel at least its leak, say 1e-8 S",

@@ -65,9 +65,9 @@ def read_counts(
     passed = electronics.frame_s if elapsed_s is None else elapsed_s
     fresh = state is None
     conductance, now = conductances(fsr, forces_n, state, passed)
-    flutter = _fluttered(now.flutter, electronics, fresh, passed, rng)
+    flutter = _contact_noise(now.flutter, electronics, fresh, passed, rng)
     offered = scan_shares(shares(conductance, electronics), electronics) * electronics.full
-    counts = _sampled(offered, flutter, electronics, rng)
+    counts = _sample_adc(offered, flutter, electronics, rng)
     return counts, FilmState(now.effective_n, now.age_s, flutter)
 
 
@@ -97,7 +97,7 @@ def read_sequence(
     return counts, state
 
 
-def _fluttered(
+def _contact_noise(
     before: Image, electronics: Electronics, fresh: bool, passed_s: float, rng: np.random.Generator
 ) -> Image:
     """Return the contact's noise of this frame: unit variance, exponential correlation."""
@@ -108,7 +108,7 @@ def _fluttered(
     return kept * before + math.sqrt(1.0 - kept * kept) * rng.standard_normal(before.shape)
 
 
-def _sampled(
+def _sample_adc(
     offered: Image, flutter: Image, electronics: Electronics, rng: np.random.Generator
 ) -> Counts:
     """Return the ADC's counts of offered voltages, in counts."""

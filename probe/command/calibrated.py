@@ -25,7 +25,7 @@ from probe.calibration.condition import ConditionThresholds, common_bias, raised
 from probe.circuit import Electronics
 from probe.command.laws import condition_map, describe_laws, places
 from probe.command.listen import Counts, frames_of
-from probe.command.loads import Given
+from probe.command.loads import LoadRecording
 from probe.errors import CalibrationError, CircuitError
 from probe.recording.read import Recording
 
@@ -77,7 +77,7 @@ def report_bias(
 
 
 def calibrate_loads(
-    given: list[Given],
+    given: list[LoadRecording],
     output: Path,
     board: Electronics | None,
     *,
@@ -148,7 +148,7 @@ def board_from(text: str) -> Electronics | None:
     return Electronics(**values)
 
 
-def _one_sensor(given: list[Given]) -> str:
+def _one_sensor(given: list[LoadRecording]) -> str:
     names = {Recording(load.recording).origin.sensor for load in given}
     if len(names) != 1 or "" in names:
         shown = ", ".join(sorted(name or "not named" for name in names))
@@ -159,5 +159,5 @@ def _one_sensor(given: list[Given]) -> str:
     return names.pop()
 
 
-def _counts(load: Given) -> Counts:
+def _counts(load: LoadRecording) -> Counts:
     return Recording(load.recording).block().counts

@@ -17,7 +17,7 @@ Described = tuple[dict[str, Any], dict[str, str]]
 """What `--json` prints, and what people read."""
 
 
-def probe(url: str, sensor: int | None, seconds: float) -> Described:
+def describe_probe(url: str, sensor: int | None, seconds: float) -> Described:
     """Listen to a probe for a while.
 
     Raises
@@ -77,7 +77,7 @@ def probe(url: str, sensor: int | None, seconds: float) -> Described:
     return values, lines | ({"notice": notices[-1]} if notices else {})
 
 
-def recording(name: str) -> Described:
+def describe_recording(name: str) -> Described:
     """Read a recording through.
 
     Raises
@@ -126,11 +126,11 @@ def recording(name: str) -> Described:
         "size": f"{values['bytes'] / 1000:,.0f} kB",
         "written by": held.tool_version or "another programme",
     }
-    more = {str(key): _short(value) for key, value in origin.more.items()}
+    more = {str(key): _shorten(value) for key, value in origin.more.items()}
     return values, lines | more
 
 
-def calibration(name: str) -> Described:
+def describe_calibration(name: str) -> Described:
     """Read a calibration.
 
     Raises
@@ -160,6 +160,6 @@ def _gaps(seq: NDArray[np.int64], t_ns: NDArray[np.int64]) -> dict[str, Any]:
     }
 
 
-def _short(value: Any) -> str:
+def _shorten(value: Any) -> str:
     text = str(value)
     return text if len(text) <= 90 else f"{text[:87]}..."

@@ -1,4 +1,4 @@
-"""`probe-sensor list | info`: which probes are there, what a probe or a file is."""
+"""`describe_probe-sensor list | info`: which probes are there, what a probe or a file is."""
 
 from __future__ import annotations
 
@@ -66,11 +66,11 @@ def info(
 
         values: dict[str, Any]
         if is_url(what) or what.startswith("/dev/"):
-            values, lines = described.probe(what, sensor, seconds)
+            values, lines = described.describe_probe(what, sensor, seconds)
         elif what.endswith(".json"):
-            values, lines = described.calibration(what)
+            values, lines = described.describe_calibration(what)
         else:
-            values, lines = described.recording(what)
+            values, lines = described.describe_recording(what)
         if as_json:
             output.write_json(values)
         else:

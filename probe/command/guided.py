@@ -21,7 +21,7 @@ from probe.circuit import Electronics
 from probe.client.stream import Stream, name_of
 from probe.command.calibrated import calibrate_loads
 from probe.command.listen import Counts
-from probe.command.loads import Given, write_list
+from probe.command.loads import LoadRecording, write_list
 from probe.command.settings import COMMAND
 from probe.errors import CalibrationError, PortError
 from probe.frame import Frame
@@ -69,7 +69,7 @@ def guide(
     with Stream(url, sensor=sensor) as stream:
         bench = CalibrationBench(url, stream, folder, seconds, name_of(stream.ident(), url))
         message(f"{bench.sensor or url}; recordings go to {folder}")
-        given: list[Given] = []
+        given: list[LoadRecording] = []
         rest: Counts | None = None
         for force in [0.0, *forces_n]:
             load, counts = _step(bench, force, rest, len(given), 1 + len(forces_n))
@@ -91,19 +91,19 @@ def guide(
 
 def _step(
     bench: CalibrationBench, force: float, rest: Counts | None, done: int, steps: int
-) -> tuple[Given, Counts]:
+) -> tuple[LoadRecording, Counts]:
     """Have one load put on, record it, and say how it was felt; again if the operator wants."""
     what = f"put {force:g} N on the whole sensor, evenly" if force else "unload the sensor"
     path = bench.folder / f"load-{done}-{force:g}N.h5"
     while True:
-        _asked(f"{done + 1}/{steps}  {what}, then press Enter: ")
-        counts = _recorded(bench, path)
-        message(f"     {_felt(counts, rest)}")
-        if _asked("     Enter goes on, r reads it again: ") != "r":
-            return Given(path, force), counts
+        _ask(f"{done + 1}/{steps}  {what}, then press Enter: ")
+        counts = _record_load(bench, path)
+        message(f"     {_describe_load(counts, rest)}")
+        if _ask("     Enter goes on, r reads it again: ") != "r":
+            return LoadRecording(path, force), counts
 
 
-def _recorded(bench: CalibrationBench, path: Path) -> Counts:
+def _record_load(bench: CalibrationBench, path: Path) -> Counts:
     """Record what is on the sensor now."""
     stream, frames = bench.stream, list[Frame]()
     while stream.take(0.0):
@@ -121,7 +121,7 @@ def _recorded(bench: CalibrationBench, path: Path) -> Counts:
     return np.stack([frame.counts for frame in frames])
 
 
-def _felt(counts: Counts, rest: Counts | None) -> str:
+def _describe_load(counts: Counts, rest: Counts | None) -> str:
     """Return in words what a load did."""
     mean = counts.mean(axis=0)
     if rest is None:
@@ -139,7 +139,7 @@ def _felt(counts: Counts, rest: Counts | None) -> str:
     return words
 
 
-def _asked(prompt: str) -> str:
+def _ask(prompt: str) -> str:
     """Return a line of the operator's.
 
     Raises
@@ -158,7 +158,7 @@ def _asked(prompt: str) -> str:
 
 def _another_load() -> float | None:
     """Return the force of a load that the operator will add; None to give up."""
-    while text := _asked("another load: its newtons, or Enter to give up: "):
+    while text := _ask("another load: its newtons, or Enter to give up: "):
         with suppress(ValueError):
             if 0 < float(text) < math.inf:
                 return float(text)

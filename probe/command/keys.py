@@ -10,15 +10,15 @@ import tty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-Pressed = Callable[[float], str]
+KeyReader = Callable[[float], str]
 """Returns what was typed within so many seconds, as soon as something was; else nothing."""
 
 
 @contextmanager
-def keys() -> Iterator[Pressed]:
+def keys() -> Iterator[KeyReader]:
     """Yield a function that returns what is typed; the terminal is put back at the end."""
     if not sys.stdin.isatty():
-        yield _nothing
+        yield _no_keys
         return
     descriptor = sys.stdin.fileno()
     before = termios.tcgetattr(descriptor)
@@ -34,6 +34,6 @@ def keys() -> Iterator[Pressed]:
         termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
 
 
-def _nothing(timeout_s: float) -> str:
+def _no_keys(timeout_s: float) -> str:
     select.select([], [], [], max(timeout_s, 0.0))
     return ""

@@ -17,7 +17,7 @@ from encoded_objects.console.interruption import interruption
 from encoded_objects.console.output import message, write, write_json
 from probe.calibration import read_calibration
 from probe.client.stream import Stream, name_of
-from probe.command.keys import Pressed, keys
+from probe.command.keys import KeyReader, keys
 from probe.command.live_state import LiveState
 from probe.command.live_view import line_of, render_frame
 from probe.command.settings import COMMAND
@@ -75,7 +75,7 @@ def _on_terminal(state: LiveState, stream: Stream, interrupted: Event, until_s: 
     return 0
 
 
-def _obey(state: LiveState, stream: Stream, pressed: Pressed) -> bool:
+def _obey(state: LiveState, stream: Stream, pressed: KeyReader) -> bool:
     """Wait for the next picture's time, do what the keys say; False to quit."""
     actions: dict[str, Callable[[], None]] = {
         "b": state.toggle_bias,

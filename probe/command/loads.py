@@ -18,7 +18,7 @@ COLUMNS_OF_LIST = ("recording", "newtons", "footprint")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Given:
+class LoadRecording:
     """A recording of one steady load."""
 
     recording: Path
@@ -26,7 +26,7 @@ class Given:
     footprint: NDArray[np.float64] | None = None  #: (rows, columns) shares covered; None: all
 
 
-def loads_given(words: list[str]) -> list[Given]:
+def loads_given(words: list[str]) -> list[LoadRecording]:
     """Read loads as they stand on the command line.
 
     Parameters
@@ -39,13 +39,13 @@ def loads_given(words: list[str]) -> list[Given]:
     CalibrationError
         When a word is neither, or a table cannot be read.
     """
-    given: list[Given] = []
+    given: list[LoadRecording] = []
     for word in words:
         name, mark, newtons = word.rpartition("=")
         if mark:
-            given.append(Given(Path(name), _newtons(newtons, word)))
+            given.append(LoadRecording(Path(name), _newtons(newtons, word)))
         elif Path(word).suffix.lower() == ".csv":
-            given += _listed(Path(word))
+            given += _read_list(Path(word))
         else:
             raise CalibrationError(
                 "no load is given with it", fix=f"write {word}=NEWTONS, 0 for the unloaded sensor",
@@ -54,7 +54,7 @@ def loads_given(words: list[str]) -> list[Given]:
     return given
 
 
-def write_list(path: Path, given: Iterable[Given]) -> None:
+def write_list(path: Path, given: Iterable[LoadRecording]) -> None:
     """Write loads as a table; names are those of files beside it."""
     with open(path, "w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -62,7 +62,7 @@ def write_list(path: Path, given: Iterable[Given]) -> None:
         writer.writerows((load.recording.name, f"{load.newtons:g}") for load in given)
 
 
-def _listed(path: Path) -> list[Given]:
+def _read_list(path: Path) -> list[LoadRecording]:
     try:
         with open(path, encoding="utf-8-sig", newline="") as file:
             rows = list(csv.DictReader(file))
@@ -83,7 +83,7 @@ def _listed(path: Path) -> list[Given]:
             )  # fmt: skip
         footprint = row.get("footprint") or ""
         given.append(
-            Given(
+            LoadRecording(
                 path.parent / row["recording"],
                 _newtons(row["newtons"], place),
                 _footprint(path.parent / footprint) if footprint else None,

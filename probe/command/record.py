@@ -37,9 +37,9 @@ def record(
     """Record a probe until Ctrl-C, or as long as asked; the file is complete however it ends."""
 
     def action() -> int:
-        from probe.command.recorded import Limits, record_port
+        from probe.command.recorded import RecordingLimits, record_port
 
-        limits = Limits(seconds, frames)
+        limits = RecordingLimits(seconds, frames)
         return record_port(
             url, output, limits, sensor=sensor, bits=bits, calibration=calibration,
             replace=replace, as_json=as_json,

@@ -22,7 +22,7 @@ from probe.recording.record import Recorder
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class RecordingLimits:
     """When a recording ends by itself."""
 
     seconds: float | None = None  #: s, device time
@@ -41,7 +41,7 @@ class Limits:
 def record_port(
     url: str,
     output: Path,
-    limits: Limits,
+    limits: RecordingLimits,
     *,
     sensor: int | None,
     bits: int | None,
@@ -125,7 +125,7 @@ def _run(
     stream: Stream,
     recorder: Recorder,
     frames: list[Frame],
-    limits: Limits,
+    limits: RecordingLimits,
     interrupted: Event,
     told: ProgressBar,
 ) -> tuple[str, float]:

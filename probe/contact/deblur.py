@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Deblurred:
+class DeblurredImage:
     """What presses on the top of the pad."""
 
     forces_n: Array  #: (rows, columns) over each tactel, >= 0
@@ -47,7 +47,7 @@ class Deblurred:
     arrives: float  #: share of a wave at the tactels' Nyquist frequency that the pad passes
 
 
-def deblur(forces_n: ArrayLike, sensor: SensorType, *, noise_n: float) -> Deblurred:
+def deblur(forces_n: ArrayLike, sensor: SensorType, *, noise_n: float) -> DeblurredImage:
     """Return the forces on top of the pad.
 
     Parameters
@@ -77,7 +77,7 @@ def deblur(forces_n: ArrayLike, sensor: SensorType, *, noise_n: float) -> Deblur
             f"a noise of {noise_n:g} N", fix="give the standard deviation of one reading, >= 0"
         )
     influence(sensor, DEBLUR.cells)  # refuses what is no pad
-    arrives = arriving(sensor)
+    arrives = transmitted_share(sensor)
     if arrives < DEBLUR.least:
         raise ContactError(
             f"a pad of {sensor.overlay.height_mm:g} mm passes {arrives:.2g} of a wave that is two "
@@ -89,18 +89,18 @@ def deblur(forces_n: ArrayLike, sensor: SensorType, *, noise_n: float) -> Deblur
     blur, strengths = blur_of(sensor)
     level = math.sqrt(float(np.mean(np.square(read))))
     if level == 0:
-        return Deblurred(np.zeros(shape), 0.0, 0, arrives)
+        return DeblurredImage(np.zeros(shape), 0.0, 0, arrives)
     share = noise_n / level
     kept = strengths / (np.square(strengths) + share**2)
-    return Deblurred(
-        _pressing(blur, read.ravel(), share).reshape(shape),
+    return DeblurredImage(
+        _fit_pressures(blur, read.ravel(), share).reshape(shape),
         noise_n * math.sqrt(float(np.mean(np.square(kept)))),
         int(np.count_nonzero(strengths > share)),
         arrives,
     )
 
 
-def arriving(sensor: SensorType) -> float:
+def transmitted_share(sensor: SensorType) -> float:
     """Return the share of a wave two tactels long that arrives at the base of the pad."""
     s = math.pi / sensor.pitch_mm * sensor.overlay.height_mm
     return float(base_ratio(np.array(s), sensor.overlay.poisson))
@@ -117,7 +117,7 @@ def thickest_mm(sensor: SensorType) -> float:
     return float(s) * sensor.pitch_mm / math.pi
 
 
-def _pressing(blur: Array, read: Array, share: float) -> Array:
+def _fit_pressures(blur: Array, read: Array, share: float) -> Array:
     from scipy.optimize import nnls
 
     if share == 0:

@@ -71,7 +71,7 @@ def elements(
         number, nothing under the pad, strokes too thin for the mesh, a plate that tips, a tilt
         that is not small, or a surface that would go through the pad.
     """
-    _checked(sensor, touch)
+    _check_touch(sensor, touch)
     pad = condensed_pad(sensor, per_tactel, layers, margin_mm, walls_mm, memory_gb)
     nodes = pad.nodes_mm
     heights = heights_at(surface, touch, nodes)
@@ -121,11 +121,11 @@ def condensed_pad(
 ) -> CondensedPad:
     """Return the pad of a sensor, from memory if it has been there; parameters as `elements`."""
     walls = tuple(tuple(np.unique(np.abs(np.asarray(w, float))).tolist()) for w in walls_mm)
-    return _condensed(sensor, per_tactel, layers, float(margin_mm), walls[0], walls[1], memory_gb)
+    return _condense(sensor, per_tactel, layers, float(margin_mm), walls[0], walls[1], memory_gb)
 
 
 @lru_cache(maxsize=ELEMENTS.kept)
-def _condensed(
+def _condense(
     sensor: SensorType,
     per_tactel: int,
     layers: int,
@@ -142,8 +142,8 @@ def _condensed(
         )
     overlay, pitch = sensor.overlay, sensor.pitch_mm
     lines = PadLines(
-        _along(sensor.columns, pitch, per_tactel, margin_mm, walls_x),
-        _along(sensor.rows, pitch, per_tactel, margin_mm, walls_y),
+        _element_boundaries(sensor.columns, pitch, per_tactel, margin_mm, walls_x),
+        _element_boundaries(sensor.rows, pitch, per_tactel, margin_mm, walls_y),
         overlay.height_mm * (1 - (1 - np.linspace(0, 1, layers + 1)) ** ELEMENTS.finer),
     )
     tactels = ((sensor.rows + 1) // 2) * ((sensor.columns + 1) // 2)
@@ -162,7 +162,7 @@ def _edges(tactels: int, pitch: float) -> Array:
     return np.asarray((np.arange(tactels + 1) - tactels / 2) * pitch, dtype=np.float64)
 
 
-def _along(
+def _element_boundaries(
     tactels: int, pitch: float, per_tactel: int, margin: float, walls: tuple[float, ...]
 ) -> Array:
     """Return element boundaries from 0 to the pad's edge: tactels divided, margin, walls."""
@@ -195,7 +195,7 @@ def _along(
     return np.asarray(lines[np.append(True, np.diff(lines) > ELEMENTS.tiny * size)])
 
 
-def _checked(sensor: SensorType, touch: Touch) -> None:
+def _check_touch(sensor: SensorType, touch: Touch) -> None:
     overlay = sensor.overlay
     if overlay.kind != "pad":
         raise ContactError(

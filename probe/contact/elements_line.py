@@ -23,7 +23,7 @@ POINTS = {0: 3, 1: 3, 2: 5}  #: order of the quadrature by order of the displace
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Along:
+class LineBasis:
     """Shape functions of one order on a line."""
 
     basis: Any
@@ -42,7 +42,7 @@ class Along:
         return points
 
 
-def along(boundaries: Array, *degrees: int) -> tuple[Along, ...]:
+def line_bases(boundaries: Array, *degrees: int) -> tuple[LineBasis, ...]:
     """Return shape functions of some degrees (0 ... 2) over elements between boundaries.
 
     All share the quadrature of the first.
@@ -50,11 +50,11 @@ def along(boundaries: Array, *degrees: int) -> tuple[Along, ...]:
     mesh = MeshLine(np.asarray(boundaries, dtype=np.float64))
     basis = Basis(mesh, ELEMENTS[degrees[0]](), intorder=POINTS[degrees[0]])
     bases = [basis, *(basis.with_element(ELEMENTS[d]()) for d in degrees[1:])]
-    return tuple(Along(b, np.argsort(b.doflocs[0], kind="stable")) for b in bases)
+    return tuple(LineBasis(b, np.argsort(b.doflocs[0], kind="stable")) for b in bases)
 
 
 def integral(
-    form: Callable[[Any, Any], Any], trial: Along, test: Along, weight: Array | float = 1.0
+    form: Callable[[Any, Any], Any], trial: LineBasis, test: LineBasis, weight: Array | float = 1.0
 ) -> sp.csr_matrix:
     """Integrate form(u, v) times a weight at the quadrature's points: (test, trial)."""
     found = BilinearForm(lambda u, v, _: form(u, v) * weight).assemble(trial.basis, test.basis)
@@ -76,7 +76,7 @@ class Quadratic:
 
 def quadratic(boundaries: Array) -> Quadratic:
     """Return the integrals over elements between ascending boundaries (n + 1,), mm."""
-    f, one = along(boundaries, 2, 0)
+    f, one = line_bases(boundaries, 2, 0)
     beside = f.points - one.places[:, None]
     return Quadratic(
         nodes=f.places,

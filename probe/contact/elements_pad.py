@@ -77,7 +77,7 @@ class CondensedPad:
         w = np.zeros((self.x.size, self.y.size))
         for parity, matrix in zip(PARITIES, self.compliance, strict=True):
             part = self._folded(forces, parity)
-            w += _unfolded((matrix @ part.ravel()).reshape(part.shape), parity)
+            w += _unfold_symmetry((matrix @ part.ravel()).reshape(part.shape), parity)
         return w.ravel()
 
     def between(self, nodes: NDArray[np.intp]) -> Array:
@@ -100,7 +100,7 @@ class CondensedPad:
         total = np.zeros((self.rows, self.columns))
         for (px, py), matrix in zip(PARITIES, self.tactels, strict=True):
             corner = matrix @ self._folded(forces, (px, py)).ravel()
-            total += _completed(_completed(corner, self.columns, px).T, self.rows, py).T
+            total += _mirror_half(_mirror_half(corner, self.columns, px).T, self.rows, py).T
         return total[::-1]  # row 0 is at the top, y grows upwards
 
     def _folded(self, forces: Array, parity: tuple[int, int]) -> Array:
@@ -215,12 +215,12 @@ def _parity(
     sense = -(rows[:, base] @ take.T).toarray()  # against: the load presses, the base bears
     top = np.flatnonzero((component[free] == 2) & (iz[free] == shape[2] - 1))
     node = ix[free][top] * shape[1] + iy[free][top]
-    gram = _swept(rows[:, free].tocsr(), starts, sense, top, node, shape[0] * shape[1])
+    gram = _sweep_slabs(rows[:, free].tocsr(), starts, sense, top, node, shape[0] * shape[1])
     t = sense.shape[1]
     return gram[t:, t:], gram[:t, t:]
 
 
-def _swept(
+def _sweep_slabs(
     stiffness: sp.csr_matrix,
     starts: NDArray[np.intp],
     sense: Array,
@@ -255,12 +255,12 @@ def _swept(
     return gram
 
 
-def _unfolded(part: Array, parity: tuple[int, int]) -> Array:
+def _unfold_symmetry(part: Array, parity: tuple[int, int]) -> Array:
     for sign in parity:
         part = np.concatenate([sign * part[:0:-1], part]).T
     return part
 
 
-def _completed(half: Array, size: int, sign: int) -> Array:
+def _mirror_half(half: Array, size: int, sign: int) -> Array:
     """Take the upper half (..., ceil(size / 2)) of an even or odd row to the whole of it."""
     return np.concatenate([sign * half[..., ::-1][..., : size // 2], half], axis=-1)

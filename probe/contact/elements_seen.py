@@ -78,7 +78,7 @@ def refuse_unseen(
         found = heights_at(surface, touch, asked.reshape(-1, 2)).reshape(points.shape[:2])
         after = np.searchsorted(along, fine)
         # What a node beside it bears is no more than an edge that is not on a line of the mesh.
-        around = _highest(top)
+        around = _neighbour_maximum(top)
         hidden = found > np.maximum(around[:, after - 1], around[:, after]) + slack_mm
         # A node that stands out of both of its neighbours has at least its place's share there.
         beside = np.pad(seen, ((0, 0), (1, 1)), constant_values=-np.inf)
@@ -89,7 +89,7 @@ def refuse_unseen(
         half = np.where(np.isfinite(lower), (lower + seen) / 2, lower)
         there = np.add.reduceat(found > half[:, nearest], starts, axis=1)
         full = there >= ELEMENT_SIGHT.covered * np.diff(np.append(starts, fine.size))
-        thin = ridge & ~full & ~_highest(bearing & full)
+        thin = ridge & ~full & ~_neighbour_maximum(bearing & full)
         if hidden.any() or thin.any():
             height = found[hidden].max() if hidden.any() else seen[thin].max()
             raise ContactError(
@@ -112,7 +112,7 @@ def _places(along: Array) -> Array:
     )
 
 
-def _highest(rows: NDArray[Value]) -> NDArray[Value]:
+def _neighbour_maximum(rows: NDArray[Value]) -> NDArray[Value]:
     """Return the largest of each value and those in the rows before and after it."""
     found = rows.copy()
     np.maximum(found[1:], rows[:-1], out=found[1:])

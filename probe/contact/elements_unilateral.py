@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rest:
+class UnilateralSolution:
     """Forces of the nodes, and the plate that they hold."""
 
     forces: Array  #: (n,) N
@@ -38,7 +38,7 @@ class Rest:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Press:
+class UnilateralProblem:
     """The problem in one place: what stays the same from set to set."""
 
     lever: Array  #: (n, 3) R
@@ -57,7 +57,7 @@ def rest(
     displaced: Callable[[Array], Array],
     touch: Touch,
     depth_mm: float,
-) -> Rest:
+) -> UnilateralSolution:
     """Return the equilibrium under `touch.force_n` > 0.
 
     Parameters
@@ -75,7 +75,7 @@ def rest(
         When nothing is under the nodes, or the plate, free to turn, tips over.
     """
     ones = np.ones(nodes_mm.shape[0])
-    press = Press(
+    press = UnilateralProblem(
         lever=np.stack([ones, nodes_mm[:, 1], -nodes_mm[:, 0]], axis=-1),
         heights=heights_mm,
         between=between,
@@ -90,24 +90,24 @@ def rest(
             f"{touch.force_n:g} N press, but nothing lies under the pad",
             fix="move the touch over the surface",
         )
-    _standing(press, matter)
+    _require_stable(press, matter)
     clear = heights_mm - press.lever @ press.at_rest
     active = matter & (clear >= clear[matter].max() - depth_mm)
     seen: set[bytes] = set()
     for step in range(1, UNILATERAL.steps + 1):
         seen.add(np.packbits(active).tobytes())
-        forces, plate = _held(press, active)
+        forces, plate = _solve_active(press, active)
         following = (forces > 0) | (_gap(press, forces, plate) < 0)
         following &= matter
         if (following == active).all():
-            return Rest(forces, plate, step)
+            return UnilateralSolution(forces, plate, step)
         active = following
         if np.packbits(active).tobytes() in seen:
             break
-    return _exchanged(press, matter, step)
+    return _solve_by_exchange(press, matter, step)
 
 
-def _held(press: Press, active: NDArray[np.bool_]) -> tuple[Array, Array]:
+def _solve_active(press: UnilateralProblem, active: NDArray[np.bool_]) -> tuple[Array, Array]:
     """Return forces and plate with the gap closed at the active nodes, whatever the signs."""
     nodes = np.flatnonzero(active)
     lever = press.lever[nodes]
@@ -127,7 +127,7 @@ def _held(press: Press, active: NDArray[np.bool_]) -> tuple[Array, Array]:
     return forces, plate
 
 
-def _gap(press: Press, forces: Array, plate: Array) -> Array:
+def _gap(press: UnilateralProblem, forces: Array, plate: Array) -> Array:
     """Return w + zeta - h of all nodes, mm; zero within rounding where forces close it."""
     given = press.displaced(forces)
     gap = given + press.lever @ plate - press.heights
@@ -136,7 +136,7 @@ def _gap(press: Press, forces: Array, plate: Array) -> Array:
     return gap
 
 
-def _standing(press: Press, matter: NDArray[np.bool_]) -> None:
+def _require_stable(press: UnilateralProblem, matter: NDArray[np.bool_]) -> None:
     """Refuse a plate that no wrist holds, and whose centre no matter surrounds."""
     y, x = press.lever[matter, 1], -press.lever[matter, 2]
     about_x, about_y = press.hold[1:] > 0
@@ -163,7 +163,9 @@ def tips() -> ContactError:
     )
 
 
-def _exchanged(press: Press, matter: NDArray[np.bool_], steps: int) -> Rest:
+def _solve_by_exchange(
+    press: UnilateralProblem, matter: NDArray[np.bool_], steps: int
+) -> UnilateralSolution:
     """Solve the same problem as non-negative least squares, one node in or out at a time."""
     nodes = np.flatnonzero(matter)
     lever = press.lever[nodes]
@@ -179,11 +181,11 @@ def _exchanged(press: Press, matter: NDArray[np.bool_], steps: int) -> Rest:
         np.concatenate([la.solve_triangular(root, clear, lower=True), weight * press.load]),
         maxiter=20 * nodes.size,
     )
-    forces, plate = _held(press, forces > 0)
+    forces, plate = _solve_active(press, forces > 0)
     gap = _gap(press, forces, plate)[matter]
     if (
         forces.min() < -UNILATERAL.loose * forces.max()
         or gap.min() < -UNILATERAL.loose * np.abs(plate[0] - clear).max()
     ):
         raise tips()
-    return Rest(forces, plate, steps + int(np.count_nonzero(forces)))
+    return UnilateralSolution(forces, plate, steps + int(np.count_nonzero(forces)))

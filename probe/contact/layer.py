@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.contact.contract import Contact, Touch
-from probe.contact.layer_active_set import Pressed, deep_mm, equilibrium
+from probe.contact.layer_active_set import LayerContact, deep_mm, equilibrium
 from probe.contact.layer_descent import descend
 from probe.contact.layer_influence import Influence, influence
 from probe.contact.layer_kernel import layer_compliance
-from probe.contact.layer_levels import Levels, Look, levels_of
+from probe.contact.layer_levels import DepthWindow, Levels, levels_of
 from probe.contact.layer_patch import LayerPatch, centres_mm, patch_under
 from probe.contact.layer_solve import plate_of
 from probe.contact.neo_hooke import Linear
@@ -71,7 +71,7 @@ def layer(
     """
     influence(sensor, cells_per_tactel)  # refuses overlays and numbers of cells
     if touch.force_n == 0:
-        return _untouched(sensor, touch)
+        return _no_contact(sensor, touch)
     patch = patch_under(surface, sensor, touch, cells_per_tactel=cells_per_tactel, samples=samples)
     return press_patch(patch, touch)
 
@@ -89,9 +89,9 @@ def press_patch(patch: LayerPatch, touch: Touch) -> Contact:
             fix="make the patch with the touch's x, y and theta",
         )
     if touch.force_n == 0:
-        return _untouched(sensor, touch)
+        return _no_contact(sensor, touch)
     grid = influence(sensor, patch.cells_per_tactel)
-    pressed, pose = _settled(patch, grid, touch)
+    pressed, pose = _find_rest(patch, grid, touch)
     return Contact(
         forces_n=grid.base_forces_n(pressed.levels.image(pressed.pressures)),
         z_mm=pose.z_mm,
@@ -102,7 +102,7 @@ def press_patch(patch: LayerPatch, touch: Touch) -> Contact:
     )
 
 
-def _settled(patch: LayerPatch, grid: Influence, touch: Touch) -> tuple[Pressed, PlatePose]:
+def _find_rest(patch: LayerPatch, grid: Influence, touch: Touch) -> tuple[LayerContact, PlatePose]:
     """Return the contact and the plate at rest.
 
     Cells and points far below the foreseen plate are left out. Those that turn out to be run
@@ -110,16 +110,16 @@ def _settled(patch: LayerPatch, grid: Influence, touch: Touch) -> tuple[Pressed,
     in once stays, so the passes end. A plate that falls far over has too few levels below it:
     it goes a part of the way, and looks again.
     """
-    pose, depth = _foreseen(patch, touch)
-    looks: list[Look] = []
+    pose, depth = _foresee_rest(patch, touch)
+    looks: list[DepthWindow] = []
     floor = -depth
     for _ in range(LAYER.passes):
         above = patch.highest_mm - pose.heights_mm(patch.centres_mm)
         some = above >= min(floor, float(above.max()))
         patch = patch.with_cells(np.flatnonzero(patch.neighbours(some)))
-        looks.append(Look(pose, floor))
+        looks.append(DepthWindow(pose, floor))
         levels = levels_of(patch, grid, looks[-1], looks[:-1])
-        pressed, held = _pressed(levels, touch)
+        pressed, held = _press_levels(levels, touch)
         turn = float(np.abs(pressed.plate[1:]).max()) / levels.reach_mm
         b = min(1.0, LAYER.farthest_rad / max(turn, 1e-300)) * pressed.plate
         moved = PlatePose(float(b[0]), float(b[1]) / levels.reach_mm, float(b[2]) / levels.reach_mm)
@@ -148,7 +148,7 @@ def _settled(patch: LayerPatch, grid: Influence, touch: Touch) -> tuple[Pressed,
     )
 
 
-def _pressed(levels: Levels, touch: Touch) -> tuple[Pressed, bool]:
+def _press_levels(levels: Levels, touch: Touch) -> tuple[LayerContact, bool]:
     """Return the contact on these levels, and whether the plate had to be held, softly, for it."""
     plate = plate_of(touch, levels)
     pressed = equilibrium(levels, plate)
@@ -157,7 +157,7 @@ def _pressed(levels: Levels, touch: Touch) -> tuple[Pressed, bool]:
     return descend(pressed, plate.held(levels.reach_mm)), True
 
 
-def _foreseen(patch: LayerPatch, touch: Touch) -> tuple[PlatePose, float]:
+def _foresee_rest(patch: LayerPatch, touch: Touch) -> tuple[PlatePose, float]:
     """Return about where the plate comes to rest, and how deep (mm) it stands in the pad.
 
     The plate is put on springs that do not know of each other: about what a stroke of one
@@ -177,12 +177,12 @@ def _foreseen(patch: LayerPatch, touch: Touch) -> tuple[PlatePose, float]:
     return pose, float((heights - pose.heights_mm(points)).max())
 
 
-def _turn(pose: PlatePose) -> float:
+def _largest_tilt(pose: PlatePose) -> float:
     return max(abs(pose.tilt_x_rad), abs(pose.tilt_y_rad))
 
 
 def _refuse_steep(pose: PlatePose) -> None:
-    turn = _turn(pose)
+    turn = _largest_tilt(pose)
     if turn > CONTACT.steepest_rad:
         raise ContactError(
             f"the plate tips: it comes to rest at a tilt of {math.degrees(turn):.3g} degrees, "
@@ -191,7 +191,7 @@ def _refuse_steep(pose: PlatePose) -> None:
         )
 
 
-def _refuse_deep(pressed: Pressed, sunk_mm: Array, deepest_mm: float, touch: Touch) -> None:
+def _refuse_deep(pressed: LayerContact, sunk_mm: Array, deepest_mm: float, touch: Touch) -> None:
     """Refuse strains that are not small."""
     height = pressed.levels.grid.sensor.overlay.height_mm
     p = pressed.pressures
@@ -230,6 +230,6 @@ def _refuse_thin(patch: LayerPatch, pose: PlatePose, sunk_mm: Array) -> None:
         )
 
 
-def _untouched(sensor: SensorType, touch: Touch) -> Contact:
+def _no_contact(sensor: SensorType, touch: Touch) -> Contact:
     zeros = np.zeros((sensor.rows, sensor.columns))
     return Contact(zeros, math.inf, touch.tilt_x_rad, touch.tilt_y_rad, "layer", iterations=0)

@@ -32,14 +32,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.contact.layer_levels import Levels
-from probe.contact.layer_solve import RigidPlate, glued_system, solve_glued
+from probe.contact.layer_solve import RigidPlate, contact_system, solve_glued
 from probe.contact.settings import ACTIVE_SET
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Pressed:
+class LayerContact:
     """The pad in equilibrium, or an iterate on the way."""
 
     levels: Levels
@@ -50,7 +50,7 @@ class Pressed:
     converged: bool
 
 
-def equilibrium(levels: Levels, plate: RigidPlate) -> Pressed:
+def equilibrium(levels: Levels, plate: RigidPlate) -> LayerContact:
     """Return the contact in equilibrium, or the last iterate if the sets come again.
 
     Parameters
@@ -80,13 +80,13 @@ def equilibrium(levels: Levels, plate: RigidPlate) -> Pressed:
             loosest = tolerance = ACTIVE_SET.fine
             seen.clear()
         seen.add(key)
-        pressures, b = solve_glued(glued_system(levels, touching), plate, pressures, b, tolerance)
+        pressures, b = solve_glued(contact_system(levels, touching), plate, pressures, b, tolerance)
         springs = springs_mm(levels, pressures, b)
-        total, wrong = _judged(levels, springs, touching)
+        total, wrong = _wrong_sided_force(levels, springs, touching)
         if wrong > ACTIVE_SET.tolerance * total:
             touching = springs > 0
         elif tolerance <= ACTIVE_SET.fine:
-            return Pressed(levels, touching, pressures, b, iteration, converged=True)
+            return LayerContact(levels, touching, pressures, b, iteration, converged=True)
         else:
             seen.clear()  # the same set once more, finer
         tolerance = (
@@ -94,7 +94,7 @@ def equilibrium(levels: Levels, plate: RigidPlate) -> Pressed:
             if total > 0
             else loosest
         )
-    return Pressed(levels, touching, pressures, b, iteration, converged=False)
+    return LayerContact(levels, touching, pressures, b, iteration, converged=False)
 
 
 def deep_mm(levels: Levels, b: Array) -> Array:
@@ -109,7 +109,9 @@ def springs_mm(levels: Levels, pressures: Array, b: Array) -> Array:
     return levels.depths_mm - (b @ levels.levers + sunk)
 
 
-def _judged(levels: Levels, springs: Array, touching: NDArray[np.bool_]) -> tuple[float, float]:
+def _wrong_sided_force(
+    levels: Levels, springs: Array, touching: NDArray[np.bool_]
+) -> tuple[float, float]:
     """Return the force of the levels in touch and how much of it is on the wrong side."""
     total = float(np.vdot(levels.shares[touching], springs[touching]))
     different = (springs > 0) != touching

@@ -25,9 +25,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.contact.layer_active_set import Pressed, deep_mm
+from probe.contact.layer_active_set import LayerContact, deep_mm
 from probe.contact.layer_levels import Levels
-from probe.contact.layer_solve import RigidPlate, answers, glued_system, pseudo_inverse
+from probe.contact.layer_solve import RigidPlate, contact_system, pseudo_inverse, solve_pressures
 from probe.contact.settings import DESCENT
 from probe.errors import ContactError
 
@@ -86,7 +86,7 @@ class _Springs:
         raise _no_rest()
 
 
-def descend(begun: Pressed, plate: RigidPlate) -> Pressed:
+def descend(begun: LayerContact, plate: RigidPlate) -> LayerContact:
     """Return the contact in equilibrium, begun at the plane of the levels.
 
     Raises
@@ -117,11 +117,11 @@ def descend(begun: Pressed, plate: RigidPlate) -> Pressed:
         size = plate.force_n + float((K * np.abs(b - plate.start)).max())
         if np.abs(gradient).max() <= 10 * DESCENT.tolerance * size:
             pressures = (levels.shares * f).sum(axis=0) / edge
-            return Pressed(levels, f > 0, pressures, b, iteration, converged=True)
+            return LayerContact(levels, f > 0, pressures, b, iteration, converged=True)
         if (f > 0).any():
-            system = glued_system(levels, f > 0)
+            system = contact_system(levels, f > 0)
             R = system.levers[free]
-            stiff = area * (R @ answers(system, R.T, DESCENT.hessian)) + np.diag(K[free])
+            stiff = area * (R @ solve_pressures(system, R.T, DESCENT.hessian)) + np.diag(K[free])
             step = -pseudo_inverse((stiff + stiff.T) / 2) @ gradient
         else:  # nothing is touched: go down to the highest level and a little deeper
             step = np.zeros(int(free.sum()))

@@ -53,7 +53,7 @@ class Levels:
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class DepthWindow:
     """What was looked at: matter that stands over a plane that lies deeper by the floor."""
 
     plane: PlatePose  #: about where the plate comes to rest
@@ -68,7 +68,7 @@ class Look:
 
 
 def levels_of(
-    patch: LayerPatch, grid: Influence, look: Look, earlier: Sequence[Look] = ()
+    patch: LayerPatch, grid: Influence, look: DepthWindow, earlier: Sequence[DepthWindow] = ()
 ) -> Levels:
     """Return the levels of the cells of a patch that were sampled in full.
 

@@ -76,7 +76,7 @@ class LayerPatch:
 
     def neighbours(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return the cells of a mask (all cells,) and the eight around each."""
-        return _spread(mask.reshape(self.shape), np.logical_or).ravel()
+        return _join_neighbours(mask.reshape(self.shape), np.logical_or).ravel()
 
 
 def patch_under(
@@ -115,8 +115,8 @@ def patch_under(
     dx = sensor.pitch_mm / cells_per_tactel
     coarse = _heights(surface, touch, _coarse_points(*shape, dx, samples))
     highest = coarse.max(axis=0)
-    high = _spread(highest.reshape(shape), np.maximum)
-    low = _spread(coarse.min(axis=0).reshape(shape), np.minimum)
+    high = _join_neighbours(highest.reshape(shape), np.maximum)
+    low = _join_neighbours(coarse.min(axis=0).reshape(shape), np.minimum)
     _refuse_hidden(surface, sensor, touch, high, low, dx / samples)
     return LayerPatch(
         surface=surface,
@@ -222,7 +222,7 @@ def _coarse_points(rows: int, columns: int, dx: float, samples: int) -> Array:
     return centres_mm(rows, columns, dx) + offsets[:, which]
 
 
-def _spread(image: NDArray[Number], join: np.ufunc) -> NDArray[Number]:
+def _join_neighbours(image: NDArray[Number], join: np.ufunc) -> NDArray[Number]:
     """Return an image in which each cell joins the eight around it."""
     spread = image.copy()
     spread[1:] = join(spread[1:], image[:-1])

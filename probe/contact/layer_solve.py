@@ -59,7 +59,7 @@ class RigidPlate:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Glued:
+class ContactSystem:
     """The linear system of a set of levels in touch; m cells."""
 
     levels: Levels
@@ -92,7 +92,7 @@ def plate_of(touch: Touch, levels: Levels) -> RigidPlate:
     return RigidPlate(touch.force_n, start, stiffness / reach**2)
 
 
-def glued_system(levels: Levels, touching: NDArray[np.bool_]) -> Glued:
+def contact_system(levels: Levels, touching: NDArray[np.bool_]) -> ContactSystem:
     """Return the system of the levels in touch (levels, cells)."""
     some = np.flatnonzero(touching.any(axis=0))
     touching = touching[:, some]
@@ -100,11 +100,11 @@ def glued_system(levels: Levels, touching: NDArray[np.bool_]) -> Glued:
     share = shares.sum(axis=0)
     moment = (shares * np.where(touching, levels.depths_mm[:, some], 0.0)).sum(axis=0)
     soft = levels.grid.edge_mm_mpa * np.maximum(1 / share - 1, 0.0)
-    return Glued(levels, some, soft, moment / share, levels.levers[:, some])
+    return ContactSystem(levels, some, soft, moment / share, levels.levers[:, some])
 
 
 def solve_glued(
-    system: Glued, plate: RigidPlate, pressures: Array, b: Array, tolerance: float
+    system: ContactSystem, plate: RigidPlate, pressures: Array, b: Array, tolerance: float
 ) -> tuple[Array, Array]:
     """Return pressures (of all cells of the levels,) and plate (3,) in balance.
 
@@ -162,7 +162,7 @@ def solve_glued(
     return full, b
 
 
-def answers(system: Glued, rhs: Array, tolerance: float) -> Array:
+def solve_pressures(system: ContactSystem, rhs: Array, tolerance: float) -> Array:
     """Return A^-1 rhs, (n, k): pressures under given depths, the plate held fast.
 
     Parameters

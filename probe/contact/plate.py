@@ -124,7 +124,7 @@ def rest(
             f"there is nothing under the plate to bear {load.force_n:g} N",
             fix="move the sensor over the object",
         )
-    problem = _posed(points_mm, heights_mm, law, columns, load)
+    problem = _pose_problem(points_mm, heights_mm, law, columns, load)
     state, iterations = newton(problem, _unknowns(problem, load, foreseen), tolerance)
     a = np.zeros(3)
     a[problem.free] = state.a
@@ -135,11 +135,11 @@ def rest(
         tilt_y_rad=load.tilt_y_rad - float(a[2]) / half,
     )
     if iterations is None:
-        raise _restless(pose, load)
+        raise _no_rest_error(pose, load)
     return PlateRest(pose, state.force, iterations)
 
 
-def _restless(pose: PlatePose, load: PlateLoad) -> ContactError:
+def _no_rest_error(pose: PlatePose, load: PlateLoad) -> ContactError:
     turned = math.hypot(pose.tilt_x_rad - load.tilt_x_rad, pose.tilt_y_rad - load.tilt_y_rad)
     if turned > PLATE.far_turned_rad:
         return ContactError(
@@ -175,7 +175,7 @@ def checked_load(load: PlateLoad) -> None:
         )
 
 
-def _posed(
+def _pose_problem(
     points: Array, heights: Array, law: Law, columns: Columns | None, load: PlateLoad
 ) -> PlateProblem:
     x, y = points.T
@@ -186,7 +186,7 @@ def _posed(
     datum = float(level.max())
     f = np.array([load.force_n, -load.moment_x_nmm / half, -load.moment_y_nmm / half])
     if (stiffness[free[1:]] == 0).any():
-        _standing(points[heights > -math.inf] / half, stiffness, f, half)
+        _require_stable(points[heights > -math.inf] / half, stiffness, f, half)
     rows = np.empty((3, len(heights)))
     rows[0] = 1.0
     np.divide(y, half, out=rows[1])
@@ -204,7 +204,7 @@ def _posed(
     )
 
 
-def _standing(points: Array, stiffness: Array, f: Array, half: float) -> None:
+def _require_stable(points: Array, stiffness: Array, f: Array, half: float) -> None:
     """Refuse a load whose centre of pressure no tips can bear, as the wrist does not hold."""
     at = np.array([-f[2], f[1]]) / f[0]  # x and y, of the half width
     free_x, free_y = stiffness[2] == 0, stiffness[1] == 0  # a turn about y moves it along x

@@ -66,15 +66,15 @@ class NewtonState:
 
 def newton(problem: PlateProblem, a: Array, tolerance: float) -> tuple[NewtonState, int | None]:
     """Return the state at rest, begun at unknowns `a`, and the steps taken; None: no rest."""
-    state = _begun(problem, a)
+    state = _first_state(problem, a)
     for iteration in range(PLATE_NEWTON.most_steps + 1):
-        if _resting(problem, state, tolerance):
+        if _is_at_rest(problem, state, tolerance):
             return state, iteration
-        state = _searched(problem, state, *_step(problem, state))
+        state = _search_line(problem, state, *_step(problem, state))
     return state, None
 
 
-def _begun(problem: PlateProblem, a: Array) -> NewtonState:
+def _first_state(problem: PlateProblem, a: Array) -> NewtonState:
     """Return the state to begin with: the unknowns, withdrawn to within the laws' limits."""
     columns, limit = problem.columns, problem.law.limit_mm
     whole = limit if columns is None else limit + columns.law.limit_mm
@@ -85,13 +85,13 @@ def _begun(problem: PlateProblem, a: Array) -> NewtonState:
     back = min(max(least - deepest, 0.0), PLATE_NEWTON.near_limit * whole - deepest)
     a[0] += back
     if columns is None:
-        return _at(problem, a, _NONE)
+        return _evaluate_at(problem, a, _NONE)
     v = np.maximum.reduceat(pressed, columns.starts) + (back - PLATE_NEWTON.near_limit * limit)
     v = np.maximum(columns.foreseen_mm, v)
-    return _at(problem, a, np.minimum(v, PLATE_NEWTON.near_limit * columns.law.limit_mm))
+    return _evaluate_at(problem, a, np.minimum(v, PLATE_NEWTON.near_limit * columns.law.limit_mm))
 
 
-def _at(problem: PlateProblem, a: Array, v: Array) -> NewtonState:
+def _evaluate_at(problem: PlateProblem, a: Array, v: Array) -> NewtonState:
     """Evaluate forces, tangents and gradient."""
     columns = problem.columns
     compression = a @ problem.rows
@@ -108,7 +108,7 @@ def _at(problem: PlateProblem, a: Array, v: Array) -> NewtonState:
     return NewtonState(a, v, compression, force, tangent, behind, gradient, unbalance)
 
 
-def _resting(problem: PlateProblem, state: NewtonState, tolerance: float) -> bool:
+def _is_at_rest(problem: PlateProblem, state: NewtonState, tolerance: float) -> bool:
     """Tell whether what is left of the forces is below tolerance or rounding."""
     # Three numbers are sooner done without arrays.
     moved: list[float] = [abs(a) for a in state.a.tolist()]
@@ -131,16 +131,16 @@ def _step(problem: PlateProblem, state: NewtonState) -> tuple[Array, Array]:
     np.fill_diagonal(system, system.diagonal() + problem.K)
     wanted = -state.gradient
     if columns is None:
-        return _solved(system, wanted), _NONE
+        return _solve_scaled(system, wanted), _NONE
     sums = np.add.reduceat(weighted, columns.starts, axis=1)
     # The rows' first is 1, so the first sums are those of the tangents.
     pivots = 1.0 / (state.behind + sums[0])
     eliminated = sums * pivots
-    step = _solved(system - eliminated @ sums.T, wanted - eliminated @ state.unbalance)
+    step = _solve_scaled(system - eliminated @ sums.T, wanted - eliminated @ state.unbalance)
     return step, step @ eliminated - pivots * state.unbalance
 
 
-def _solved(system: Array, wanted: Array) -> Array:
+def _solve_scaled(system: Array, wanted: Array) -> Array:
     """Solve the scaled system; where it is singular go down the null space, if that is down."""
     rows = system.tolist()
     size = [row[i] for i, row in enumerate(rows)]
@@ -149,7 +149,7 @@ def _solved(system: Array, wanted: Array) -> Array:
     scaled = [[v * b * a for v, b in zip(row, scale, strict=True)]
               for row, a in zip(rows, scale, strict=True)]  # fmt: skip
     right = [w * a for w, a in zip(wanted.tolist(), scale, strict=True)]
-    quick = _eliminated([row[:] for row in scaled], right[:])
+    quick = _eliminate([row[:] for row in scaled], right[:])
     if quick is not None:
         return np.array([v * a for v, a in zip(quick, scale, strict=True)])
     values, vectors = np.linalg.eigh(scaled)
@@ -160,7 +160,7 @@ def _solved(system: Array, wanted: Array) -> Array:
     return np.asarray(scale * (vectors[:, regular] @ (along[regular] / values[regular])))
 
 
-def _eliminated(system: list[list[float]], right: list[float]) -> list[float] | None:
+def _eliminate(system: list[list[float]], right: list[float]) -> list[float] | None:
     """Solve up to three equations of unit diagonal; None where a pivot all but vanishes."""
     m = len(right)
     for i in range(m):
@@ -179,7 +179,7 @@ def _eliminated(system: list[list[float]], right: list[float]) -> list[float] | 
     return right
 
 
-def _searched(problem: PlateProblem, state: NewtonState, da: Array, dv: Array) -> NewtonState:
+def _search_line(problem: PlateProblem, state: NewtonState, da: Array, dv: Array) -> NewtonState:
     """Return the state along a step where the slope has all but vanished."""
     rate = da @ problem.rows
     if problem.columns is not None:
@@ -189,7 +189,7 @@ def _searched(problem: PlateProblem, state: NewtonState, da: Array, dv: Array) -
     t = min(1.0, PLATE_NEWTON.near_limit * high)
     found = state
     for _ in range(PLATE_NEWTON.searches):
-        found = _at(problem, state.a + t * da, state.v + t * dv)
+        found = _evaluate_at(problem, state.a + t * da, state.v + t * dv)
         slope = float(found.gradient @ da + found.unbalance @ dv)
         if (
             abs(slope)

@@ -38,7 +38,7 @@ DEFAULTS = {"tabs": "tabs-19", "layer": "layer-4"}  #: a name without its finene
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class LevelAccuracy:
     """A line of the table."""
 
     level: str
@@ -128,11 +128,11 @@ def accuracy_of(text: str) -> Accuracy:
 
 
 @lru_cache(maxsize=1)
-def table() -> dict[str, tuple[Measured, ...]]:
+def table() -> dict[str, tuple[LevelAccuracy, ...]]:
     """Return the measured errors and times of every level, per kind of overlay."""
     text = resources.files("probe.contact").joinpath("precision.json").read_text("utf-8")
     return {
-        kind: tuple(Measured(line["level"], line["error"], line["ms"]) for line in lines)
+        kind: tuple(LevelAccuracy(line["level"], line["error"], line["ms"]) for line in lines)
         for kind, lines in json.loads(text)["levels"].items()
     }
 

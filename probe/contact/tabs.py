@@ -76,9 +76,11 @@ def tabs(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips | None
     if touch.force_n * sensor.reach_mm > TABS.hopeless_rad * stiffness > 0:
         # Springs tell for any force whether it would turn the plate over.
         law = Linear(overlay.young_mpa * sensor.pitch_mm**2 / overlay.height_mm)
-        _standing(rest(points.reshape(-1, 2), heights.ravel(), law, load).pose, TABS.hopeless_rad)
+        _require_stable(
+            rest(points.reshape(-1, 2), heights.ravel(), law, load).pose, TABS.hopeless_rad
+        )
     found, forces = tabs_at_rest(points, heights, overlay, load)
-    _standing(found.pose, CONTACT.steepest_rad)
+    _require_stable(found.pose, CONTACT.steepest_rad)
     if by_chance := _met_by_chance(heights, forces, overlay):
         finer = next((q for q in TABS.finer if q > tips.points), None)
         if finer:
@@ -99,7 +101,7 @@ def tabs(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips | None
     )
 
 
-def _standing(pose: PlatePose, steepest_rad: float) -> None:
+def _require_stable(pose: PlatePose, steepest_rad: float) -> None:
     tilt = max(abs(pose.tilt_x_rad), abs(pose.tilt_y_rad))
     if tilt > steepest_rad:
         raise ContactError(

@@ -57,18 +57,18 @@ def tip_points(sensor: SensorType, tips: Tips) -> tuple[Array, Array]:
     ContactError
         When the number of points is none of the patterns', or a shape is wrong.
     """
-    points, drop = _drawn(sensor, tips.points, tips.dome_mm)
+    points, drop = _draw_tips(sensor, tips.points, tips.dome_mm)
     shape = (sensor.rows, sensor.columns)
     if tips.shifts_mm is not None:
-        shifts = _shaped(tips.shifts_mm, (*shape, 2), "shifts")
+        shifts = _require_shape(tips.shifts_mm, (*shape, 2), "shifts")
         points = points + shifts.reshape(-1, 1, 2)
     if tips.lengths_mm is not None:
-        drop = drop - _shaped(tips.lengths_mm, shape, "lengths").reshape(-1, 1)
+        drop = drop - _require_shape(tips.lengths_mm, shape, "lengths").reshape(-1, 1)
     return points, drop
 
 
 @lru_cache(maxsize=16)
-def _drawn(sensor: SensorType, number: int, dome_mm: float) -> tuple[Array, Array]:
+def _draw_tips(sensor: SensorType, number: int, dome_mm: float) -> tuple[Array, Array]:
     """Return points and drops of tips without defects."""
     tabs = sensor.rows * sensor.columns
     if sensor.overlay.kind == "tab":
@@ -115,7 +115,7 @@ def square(n: int) -> Array:
     return np.stack(np.meshgrid(middle, middle), axis=-1).reshape(-1, 2)
 
 
-def _shaped(values: Array, shape: tuple[int, ...], name: str) -> Array:
+def _require_shape(values: Array, shape: tuple[int, ...], name: str) -> Array:
     array = np.asarray(values, dtype=np.float64)
     if array.shape != shape or not np.isfinite(array).all():
         raise ContactError(

@@ -67,7 +67,7 @@ def build_firmware(
     settings = (f"BOARD={board}", f"BAUD={baud}", f"SETTLE={int(quarters)}",
                 f"ADC_DIVIDER={adc_divider}")  # fmt: skip
     sources = [*SOURCES.glob("*.[ch]"), *SOURCES.glob("boards/*.h")]
-    return _built("firmware", settings, sources, _FIRMWARE_TOOLS)
+    return _build_cached("firmware", settings, sources, _FIRMWARE_TOOLS)
 
 
 def build_emulator() -> Path:
@@ -78,7 +78,7 @@ def build_emulator() -> Path:
     PortError
         When the compiler or a library is missing.
     """
-    return _built("emulator", (), SOURCES.glob("emulator/*.[ch]"), _HOST_TOOLS)
+    return _build_cached("emulator", (), SOURCES.glob("emulator/*.[ch]"), _HOST_TOOLS)
 
 
 def cache_folder() -> Path:
@@ -88,7 +88,7 @@ def cache_folder() -> Path:
     return root / "encoded-objects" / "firmware"
 
 
-def _built(
+def _build_cached(
     target: str, settings: Sequence[str], sources: Iterable[Path], tools: Sequence[str]
 ) -> Path:
     folder = cache_folder() / f"{target}-{_key(settings, sources)}"

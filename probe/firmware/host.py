@@ -42,7 +42,7 @@ class Host:
         self._log = log
         self._place = place
         self._heard = b""
-        self._process = _started(command, log)
+        self._process = _start_process(command, log)
         try:
             if self._answer() != "ready":
                 raise self._ended()
@@ -102,7 +102,7 @@ class Host:
         )
 
 
-def _started(command: Sequence[str], log: Path) -> subprocess.Popen[bytes]:
+def _start_process(command: Sequence[str], log: Path) -> subprocess.Popen[bytes]:
     try:
         with log.open("wb") as messages:
             return subprocess.Popen(  # noqa: S603 - our own programme, no shell

@@ -68,7 +68,7 @@ def touch_picture(
         patch, felt, read = figure.subplots(1, 3)
         figure.suptitle(title)
         top = _patch(figure, patch, surface, sensor, touch)
-        at_mm, above_mm = _under(surface, sensor, touch)
+        at_mm, above_mm = _heights_under(surface, sensor, touch)
         for axes, values, what, label in (
             (felt, forces, f"force, {forces.sum():.3g} N in all", UNITS["N"]),
             (read, readings, "reading", UNITS.get(unit, f"reading ({unit})")),
@@ -109,7 +109,7 @@ def _patch(
     return top
 
 
-def _under(
+def _heights_under(
     surface: HeightMap, sensor: SensorType, touch: Touch
 ) -> tuple[tuple[Array, Array], Array]:
     """Return x and y (n,), sensor frame, and the finite heights (n, n) under the sensor."""

@@ -45,7 +45,7 @@ def open_serial(address: Address) -> Port:
         )
         line.reset_input_buffer()
     except (OSError, ValueError) as failed:  # pyserial's own error is an OSError
-        raise _refused(address, failed) from failed
+        raise _explain_refusal(address, failed) from failed
     with suppress(OSError, ValueError):  # a pty or a CDC device has no such mode
         line.set_low_latency_mode(True)
     return SerialLine(address.url, line)
@@ -94,7 +94,7 @@ class SerialLine:
         return PortError("the device went away", fix="plug it in again", place=self._url)
 
 
-def _refused(address: Address, failed: Exception) -> PortError:
+def _explain_refusal(address: Address, failed: Exception) -> PortError:
     device, number_ = Path(address.target), getattr(failed, "errno", None)
     if not device.exists():
         there = ", ".join(entry.url for entry in list_ports()) or "none"

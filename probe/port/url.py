@@ -65,7 +65,7 @@ def address_of(url: str) -> Address:
     scheme, colon, _ = url.partition(":")
     if not is_url(url):
         guess = f"serial://{url}" if url.startswith("/dev/") else f"file:{url}"
-        known = [f"{name}:" for name in (*SCHEMES, *sorted(_others()))]
+        known = [f"{name}:" for name in (*SCHEMES, *sorted(_other_schemes()))]
         raise PortError(
             f"this is no port URL, it must begin with {', '.join(known[:-1])} or {known[-1]}",
             fix=f"write {guess}" if not colon else f"write for example {EXAMPLES}",
@@ -82,7 +82,7 @@ def address_of(url: str) -> Address:
 def is_url(text: str) -> bool:
     """Tell whether a text begins with a scheme that can be opened."""
     scheme, colon, _ = text.partition(":")
-    return bool(colon) and (scheme in SCHEMES or scheme in _others())
+    return bool(colon) and (scheme in SCHEMES or scheme in _other_schemes())
 
 
 def _opener(address: Address) -> Callable[[Address], Port]:
@@ -91,7 +91,7 @@ def _opener(address: Address) -> Callable[[Address], Port]:
         opener: Callable[[Address], Port] = getattr(import_module(module), name)
         return opener
     try:
-        opener = _others()[address.scheme]()
+        opener = _other_schemes()[address.scheme]()
     except (ImportError, AttributeError) as broken:
         raise PortError(
             f"the package that opens {address.scheme}: does not load: {broken}",
@@ -101,7 +101,7 @@ def _opener(address: Address) -> Callable[[Address], Port]:
     return opener
 
 
-def _others() -> dict[str, Callable[[], Callable[[Address], Port]]]:
+def _other_schemes() -> dict[str, Callable[[], Callable[[Address], Port]]]:
     """Return the schemes of other packages, and how each is loaded."""
     from importlib.metadata import entry_points
 

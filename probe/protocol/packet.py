@@ -152,7 +152,7 @@ def decode(block: bytes, bits: int = 10) -> Packet | Damage:
     if kind == _BYTES:
         return _byte_frame(seq, t_us, payload, bits)
     if kind == _IDENT_TYPE:
-        return _ident(seq, t_us, payload)
+        return _decode_ident(seq, t_us, payload)
     return StatisticsPacket(seq, t_us, *_STATISTICS.unpack_from(payload, _HEADER.size))
 
 
@@ -194,7 +194,7 @@ def _byte_frame(seq: int, t_us: int, payload: bytes, bits: int) -> FramePacket |
     return FramePacket(seq, t_us, counts.reshape(ROWS, COLUMNS), wrist, byte_wide=True)
 
 
-def _ident(seq: int, t_us: int, payload: bytes) -> IdentPacket | Damage:
+def _decode_ident(seq: int, t_us: int, payload: bytes) -> IdentPacket | Damage:
     fields = _IDENT.unpack_from(payload, _HEADER.size)
     rows, columns, bits, sensors, sensor, major, minor, settling, kbaud, boot, name = fields
     sane = (rows, columns) == (ROWS, COLUMNS) and 8 <= bits <= 16 and sensor < sensors

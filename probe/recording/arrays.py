@@ -28,7 +28,7 @@ _IMAGE = (ROWS, COLUMNS)
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class FileArray:
     """An array in a file."""
 
     name: str
@@ -59,7 +59,7 @@ class Found:
 
 
 @contextmanager
-def arrays_of(path: Path) -> Iterator[list[Found]]:
+def arrays_of(path: Path) -> Iterator[list[FileArray]]:
     """Open a file and give the arrays in it.
 
     Raises
@@ -78,7 +78,7 @@ def arrays_of(path: Path) -> Iterator[list[Found]]:
             yield _hdf5(hdf5)
 
 
-def _numpy(path: Path) -> list[Found]:
+def _numpy(path: Path) -> list[FileArray]:
     try:
         with explain_errors(path, "read"):
             loaded = np.load(path, mmap_mode="r", allow_pickle=False)
@@ -96,7 +96,7 @@ def _numpy(path: Path) -> list[Found]:
         ) from error
 
 
-def _matlab(path: Path) -> list[Found]:
+def _matlab(path: Path) -> list[FileArray]:
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError
 
@@ -114,14 +114,14 @@ def _matlab(path: Path) -> list[Found]:
     ]
 
 
-def _in_memory(name: str, array: NDArray[Any]) -> Found:
-    return Found(name, array.shape, array.dtype, lambda part: array[part])
+def _in_memory(name: str, array: NDArray[Any]) -> FileArray:
+    return FileArray(name, array.shape, array.dtype, lambda part: array[part])
 
 
-def _hdf5(file: h5py.File) -> list[Found]:
+def _hdf5(file: h5py.File) -> list[FileArray]:
     import h5py
 
-    found: list[Found] = []
+    found: list[FileArray] = []
 
     def note(name: str, item: object) -> None:
         if isinstance(item, h5py.Dataset) and item.shape is not None:
@@ -132,7 +132,7 @@ def _hdf5(file: h5py.File) -> list[Found]:
     return found
 
 
-def _dataset(name: str, dataset: h5py.Dataset) -> Found:
+def _dataset(name: str, dataset: h5py.Dataset) -> FileArray:
     def part(slices: tuple[slice, ...]) -> NDArray[Any]:
         with explain_errors(Path(dataset.file.filename), "read"):
             read: NDArray[Any] = dataset[slices[::-1]].T if reverse else dataset[slices]
@@ -140,4 +140,4 @@ def _dataset(name: str, dataset: h5py.Dataset) -> Found:
 
     reverse = "MATLAB_class" in dataset.attrs
     shape = dataset.shape[::-1] if reverse else dataset.shape
-    return Found(name, tuple(map(int, shape)), dataset.dtype, part)
+    return FileArray(name, tuple(map(int, shape)), dataset.dtype, part)

@@ -43,7 +43,7 @@ class CheckedFile:
     poses: bool  #: there is a dataset of poses
 
 
-def look(path: Path, *, live: bool = False) -> CheckedFile:
+def check_recording(path: Path, *, live: bool = False) -> CheckedFile:
     """Check that a file is a recording, without reading its frames.
 
     Raises
@@ -52,7 +52,7 @@ def look(path: Path, *, live: bool = False) -> CheckedFile:
         It is none, is of a newer format, damaged, or not closed (and not `live`).
     """
     with open_recording(path, live=live) as file:
-        seen = look_at(file, path)
+        seen = check_open_file(file, path)
     if seen.own and not seen.even and not live:
         raise RecordingError(
             "its datasets have different lengths", fix="run `repair` on it", place=str(path)
@@ -60,10 +60,10 @@ def look(path: Path, *, live: bool = False) -> CheckedFile:
     return seen
 
 
-def look_at(file: h5py.File, path: Path) -> CheckedFile:
-    """Check that an open file is a recording; see `look`."""
+def check_open_file(file: h5py.File, path: Path) -> CheckedFile:
+    """Check that an open file is a recording; see `check_recording`."""
     with explain_errors(path, "read"):
-        attributes = {name: _plain(value) for name, value in file.attrs.items()}
+        attributes = {name: _attribute_value(value) for name, value in file.attrs.items()}
         names = [name for name in DATASETS if name in file]
         others = ", ".join(sorted(file)) or "nothing"
     own = attributes.get("format") == FORMAT
@@ -98,7 +98,7 @@ def look_at(file: h5py.File, path: Path) -> CheckedFile:
 
 
 def read_block(file: h5py.File, path: Path, start: int, stop: int) -> FrameBlock:
-    """Read and check frames `start` ... `stop` - 1 of an open file that `look` accepted.
+    """Read and check frames `start` ... `stop` - 1 of an open file that `check_recording` accepted.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def read_block(file: h5py.File, path: Path, start: int, stop: int) -> FrameBlock
     values.setdefault("wrist", np.zeros((len(number), 4)))
     for name, array in values.items():
         dtype = DATASETS[name][1]
-        if not _fits(array, dtype):
+        if not _fits_exactly(array, dtype):
             kind, fix = _MEANT[dtype.kind]
             raise RecordingError(
                 f"/{name} holds other things than {kind} in frames {start} ... {stop - 1}",
@@ -156,7 +156,7 @@ def _length(file: h5py.File, path: Path, name: str) -> int:
     )
 
 
-def _fits(values: NDArray[Any], dtype: np.dtype[Any]) -> bool:
+def _fits_exactly(values: NDArray[Any], dtype: np.dtype[Any]) -> bool:
     """Tell whether all values can be told exactly in the type that a frame has."""
     if dtype.kind == "f":
         return _rigid(values)
@@ -179,7 +179,7 @@ def _rigid(poses: NDArray[Any]) -> bool:
     )
 
 
-def _plain(value: Any) -> Any:
+def _attribute_value(value: Any) -> Any:
     """Return an attribute as a text, a number, or an array."""
     if isinstance(value, bytes):
         return value.decode(errors="replace")

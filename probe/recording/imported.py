@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from probe.errors import RecordingError
 from probe.frame import WRIST
-from probe.recording.arrays import Found, arrays_of
+from probe.recording.arrays import FileArray, arrays_of
 from probe.recording.layout import NOMINAL_HZ, FrameBlock, RecordingOrigin
 from probe.recording.names import check_name, final_name, part_of, unless_it_fails
 from probe.recording.read import Recording
@@ -76,7 +76,7 @@ def import_array(
     if not (np.isfinite(rate_hz) and rate_hz > 0):
         raise RecordingError(f"a rate of {rate_hz:g} Hz", fix="give frames per second above 0")
     with arrays_of(path) as arrays:
-        found = _chosen(path, arrays, dataset)
+        found = _choose_array(path, arrays, dataset)
         scale = _scale(path, found)
         more: dict[str, Any] = {"imported_from": path.name, "imported_array": found.name}
         if scale:
@@ -90,7 +90,7 @@ def import_array(
     return Recording(out)
 
 
-def _chosen(path: Path, arrays: list[Found], name: str | None) -> Found:
+def _choose_array(path: Path, arrays: list[FileArray], name: str | None) -> FileArray:
     """Return the array that was asked for, or the only one that may be meant."""
     images = [found for found in arrays if found.frames is not None]
     named = [found for found in images if found.name == (name or "frames").strip("/")]
@@ -106,13 +106,13 @@ def _chosen(path: Path, arrays: list[Found], name: str | None) -> Found:
     raise RecordingError(cause, fix=fix, place=str(path))
 
 
-def _images(found: Found) -> Iterator[tuple[int, NDArray[Any]]]:
+def _images(found: FileArray) -> Iterator[tuple[int, NDArray[Any]]]:
     frames = found.frames or 0
     for first in range(0, frames, _AT_ONCE):
         yield first, found.images(first, min(first + _AT_ONCE, frames))
 
 
-def _scale(path: Path, found: Found) -> Scale | None:
+def _scale(path: Path, found: FileArray) -> Scale | None:
     """Return how the values become counts; None if they are counts."""
     least, most, whole = 0.0, 0.0, True
     for first, images in _images(found):

@@ -41,7 +41,7 @@ def piece_of(path: Path, number: int) -> Path:
 def series_of(path: Path) -> list[tuple[int, Path]]:
     """Return the closed pieces of the series `path`, with their numbers, in order."""
     name = re.compile(re.escape(path.stem) + r"-(\d{4,})" + re.escape(path.suffix))
-    found = [(name.fullmatch(other.name), other) for other in _beside(path)]
+    found = [(name.fullmatch(other.name), other) for other in _files_beside(path)]
     return sorted((int(match[1]), other) for match, other in found if match)
 
 
@@ -127,7 +127,7 @@ def unless_it_fails(path: Path) -> Iterator[Path]:
         raise
 
 
-def _beside(path: Path) -> Iterable[Path]:
+def _files_beside(path: Path) -> Iterable[Path]:
     try:
         return list(path.parent.iterdir())
     except OSError:

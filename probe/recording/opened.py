@@ -53,7 +53,7 @@ def open_recording(path: Path, *, live: bool = False) -> Iterator[h5py.File]:
         )
     if head.writing and not live:
         raise _not_closed(path)
-    with _open(path, head) as file:
+    with _open_file(path, head) as file:
         yield file
 
 
@@ -83,7 +83,7 @@ def open_anyhow(path: Path) -> Iterator[tuple[h5py.File, Superblock]]:
 
 
 @contextmanager
-def _open(path: Path, head: Superblock) -> Iterator[h5py.File]:
+def _open_file(path: Path, head: Superblock) -> Iterator[h5py.File]:
     import h5py
 
     with explain_errors(path, "open"):
@@ -112,14 +112,14 @@ def explain_errors(path: Path, action: str) -> Iterator[None]:
         yield
     except OSError as error:
         if isinstance(error, FileNotFoundError) and action in ("read", "open"):
-            raise _missing(path) from error
+            raise _missing_error(path) from error
         if error.errno is None:
-            raise _damaged(path, action) from error
+            raise _damaged_error(path, action) from error
         reason = os.strerror(error.errno)
         fix = FIXES.get(error.errno, "check the disk and the folder")
         raise RecordingError(f"cannot {action} it: {reason}", fix=fix, place=str(path)) from error
     except (RuntimeError, KeyError, ValueError, TypeError) as error:
-        raise _damaged(path, action) from error
+        raise _damaged_error(path, action) from error
 
 
 _OTHER_FOLDER = "choose a folder that you may read and write"
@@ -137,7 +137,7 @@ FIXES = {
 }
 
 
-def _missing(path: Path) -> RecordingError:
+def _missing_error(path: Path) -> RecordingError:
     part = part_of(path)
     if not is_part(path) and part.exists():
         return _not_closed(part)
@@ -186,7 +186,7 @@ def _no_hdf5(path: Path) -> RecordingError:
     )
 
 
-def _damaged(path: Path, action: str) -> RecordingError:
+def _damaged_error(path: Path, action: str) -> RecordingError:
     return RecordingError(
         f"it is damaged: cannot {action} it",
         fix="copy it again, or save what can be read with `repair`",

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from probe.frame import Frame
-from probe.recording.checked import look, read_block
+from probe.recording.checked import check_recording, read_block
 from probe.recording.layout import FrameBlock, RecordingOrigin
 from probe.recording.names import part_of, series_of
 from probe.recording.opened import is_blank, open_recording
@@ -71,7 +71,8 @@ class Recording:
 
     def __post_init__(self) -> None:
         looks = [
-            (name, look(name, live=self.live)) for name in _files_of(Path(self.path), self.live)
+            (name, check_recording(name, live=self.live))
+            for name in _files_of(Path(self.path), self.live)
         ]
         _, first = looks[0]
         files = tuple(File(name, seen.frames, seen.poses) for name, seen in looks)
@@ -110,7 +111,7 @@ class Recording:
 
     def block(self, start: int = 0, stop: int | None = None) -> FrameBlock:
         """Return frames `start` ... `stop` - 1 at once."""
-        return _joined(list(self.blocks(start, stop)))
+        return _join_blocks(list(self.blocks(start, stop)))
 
     def frames(self, start: int = 0, stop: int | None = None) -> Iterator[Frame]:
         """Yield frames `start` ... `stop` - 1."""
@@ -135,7 +136,7 @@ def _files_of(path: Path, live: bool) -> list[Path]:
     return series or [path]
 
 
-def _joined(blocks: list[FrameBlock]) -> FrameBlock:
+def _join_blocks(blocks: list[FrameBlock]) -> FrameBlock:
     if len(blocks) < 2:
         return blocks[0] if blocks else FrameBlock.empty()
     pose = None

@@ -15,7 +15,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from probe.errors import RecordingError
-from probe.recording.checked import CheckedFile, look_at, read_block
+from probe.recording.checked import CheckedFile, check_open_file, read_block
 from probe.recording.layout import CHUNK, FrameBlock
 from probe.recording.lock import is_locked
 from probe.recording.names import final_of, is_part, part_of, piece_of, series_of
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Repaired:
+class RepairResult:
     """A recording after repair."""
 
     path: Path  #: where it is now
@@ -36,7 +36,7 @@ class Repaired:
     changed: bool  #: whether there was anything to repair
 
 
-def repair(path: Path | str) -> Repaired:
+def repair(path: Path | str) -> RepairResult:
     """Make a recording readable that was not closed, or is damaged or truncated.
 
     Parameters
@@ -61,10 +61,10 @@ def repair(path: Path | str) -> Repaired:
             "it is still being written", fix="stop the recording first", place=str(path)
         )
     with open_anyhow(path) as (source, head):
-        seen = look_at(source, path)
+        seen = check_open_file(source, path)
         target = _free_name(path, seen) if is_part(path) else path
-        if head.whole and seen.even and _readable(source, path, seen) == seen.frames:
-            return _renamed(path, target, seen)
+        if head.whole and seen.even and _count_readable(source, path, seen) == seen.frames:
+            return _rename(path, target, seen)
         copy = path.with_name(f".{target.name}.repair")
         copy.unlink(missing_ok=True)
         frames = _copy(source, path, seen, copy)
@@ -79,12 +79,12 @@ def repair(path: Path | str) -> Repaired:
         os.replace(copy, target)
         if path != target:
             path.unlink()
-    return Repaired(target, frames, lost, changed=True)
+    return RepairResult(target, frames, lost, changed=True)
 
 
 def _copy(source: h5py.File, path: Path, seen: CheckedFile, copy: Path) -> int:
     """Write every block that can be read to a new file; return the number of frames."""
-    lost, origin = seen.frames - _readable(source, path, seen), seen.origin
+    lost, origin = seen.frames - _count_readable(source, path, seen), seen.origin
     if lost:
         note = {**origin.more, "frames_lost": lost}
         origin = replace(origin, more=MappingProxyType(note))
@@ -94,7 +94,7 @@ def _copy(source: h5py.File, path: Path, seen: CheckedFile, copy: Path) -> int:
     return writer.frames
 
 
-def _readable(source: h5py.File, path: Path, seen: CheckedFile) -> int:
+def _count_readable(source: h5py.File, path: Path, seen: CheckedFile) -> int:
     return sum(len(block) for block in _blocks(source, path, seen))
 
 
@@ -107,11 +107,11 @@ def _blocks(source: h5py.File, path: Path, seen: CheckedFile) -> Iterator[FrameB
             continue
 
 
-def _renamed(path: Path, target: Path, seen: CheckedFile) -> Repaired:
+def _rename(path: Path, target: Path, seen: CheckedFile) -> RepairResult:
     if path != target:
         with explain_errors(path, "rename"):
             os.rename(path, target)
-    return Repaired(target, seen.frames, 0, changed=path != target)
+    return RepairResult(target, seen.frames, 0, changed=path != target)
 
 
 def _free_name(part: Path, seen: CheckedFile) -> Path:

@@ -55,12 +55,12 @@ def superblock_of(path: Path) -> Superblock | None:
             file.seek(start)
             head = file.read(64)
             if head.startswith(_SIGNATURE) and len(head) >= 12:
-                return _read(head, start, size)
+                return _parse_superblock(head, start, size)
             start = max(512, 2 * start)
     return None
 
 
-def _read(head: bytes, start: int, size: int) -> Superblock | None:
+def _parse_superblock(head: bytes, start: int, size: int) -> Superblock | None:
     version = head[8]
     if version not in _END_AT:
         return None

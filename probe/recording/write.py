@@ -64,7 +64,7 @@ class FileWriter(Closing):
         self.poses = False  #: whether the file has a place for poses; decided by the first block
         self._sets: dict[str, h5py.Dataset] = {}
         self._reserved = 0
-        self._descriptor = _made(path)
+        self._descriptor = _make_file(path)
         try:
             with explain_errors(path, "write"):
                 self._reserve(0)
@@ -142,7 +142,7 @@ class FileWriter(Closing):
             os.posix_fallocate(self._descriptor, 0, self._reserved)
 
 
-def _made(path: Path) -> int:
+def _make_file(path: Path) -> int:
     """Make the file, lock it, and return its descriptor."""
     try:
         with explain_errors(path, "make"):

@@ -99,10 +99,12 @@ def guarded_approach(
                 return Approach("travel limit", at, force, felt_at, steps)
             feel(0.0)
             return Approach("no contact", 0.0, force, felt_at, steps)
-        at = _between(low, high, limits) if high else _further(before, low, limits)
+        at = (
+            _interpolate_travel(low, high, limits) if high else _advance_travel(before, low, limits)
+        )
 
 
-def _further(
+def _advance_travel(
     before: tuple[float, float], low: tuple[float, float], limits: ApproachLimits
 ) -> float:
     """Return the next travel while the force is still too small."""
@@ -114,7 +116,9 @@ def _further(
     return min(low[0] + max(step, limits.finest_mm), limits.travel_mm)
 
 
-def _between(low: tuple[float, float], high: tuple[float, float], limits: ApproachLimits) -> float:
+def _interpolate_travel(
+    low: tuple[float, float], high: tuple[float, float], limits: ApproachLimits
+) -> float:
     """Return the next travel between too little and too much, by proportion."""
     share = (limits.force_n - low[1]) / (high[1] - low[1])
     return low[0] + min(max(share, 0.1), 0.9) * (high[0] - low[0])

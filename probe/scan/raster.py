@@ -92,9 +92,9 @@ def raster(
     xs, ys = (_positions(low[i], high[i], half[i], step_tactels * sensor.pitch_mm) for i in (0, 1))
     places, cover, lines = [], [], []
     for line, y in enumerate(ys[::-1]):
-        strips = [_between(p, 1, y - half[1], y + half[1]) for p in polygons]
+        strips = [_clip_polygon(p, 1, y - half[1], y + half[1]) for p in polygons]
         for x in xs:
-            areas = [abs(_area(_between(p, 0, x - half[0], x + half[0]))) for p in strips]
+            areas = [abs(_area(_clip_polygon(p, 0, x - half[0], x + half[0]))) for p in strips]
             share = (areas[0] - sum(areas[1:])) / float(4 * half[0] * half[1])
             if share > 0 and share >= least_cover:
                 places.append((x, y))
@@ -138,7 +138,7 @@ def _area(polygon: NDArray[np.float64]) -> float:
     return float(x[:-1] @ y[1:] - x[1:] @ y[:-1]) / 2
 
 
-def _between(
+def _clip_polygon(
     polygon: NDArray[np.float64], axis: int, low: float, high: float
 ) -> NDArray[np.float64]:
     """Cut a polygon to low ... high of one coordinate (Sutherland and Hodgman).

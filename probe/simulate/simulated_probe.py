@@ -31,7 +31,7 @@ from probe.simulate.scan import ScanKind, ScanPath, scan_path
 from probe.simulate.scene import Scene
 from probe.simulate.settings import SIMULATED_SCAN
 from probe.simulate.target import surface_of
-from probe.simulate.touch import Touches, pose_of, random_touches
+from probe.simulate.touch import TouchRanges, pose_of, random_touches
 
 _WAY = 1 << 32  # of the generator that draws a scan's way: no touch has that number
 
@@ -63,7 +63,7 @@ class TouchOptions:
             x, y = scene.centre_mm()
             drawn = Touch(float(x), float(y), 0.0, SIMULATED_SCAN.force_n)
         else:
-            drawn = next(random_touches(scene.region, rng, Touches()))
+            drawn = next(random_touches(scene.region, rng, TouchRanges()))
         touch = Touch(
             _given_or_drawn(self.x_mm, drawn.x_mm),
             _given_or_drawn(self.y_mm, drawn.y_mm),

@@ -25,7 +25,7 @@ from probe.surface.polygon import FaceRegion
 
 
 @dataclass(frozen=True, slots=True)
-class Touches:
+class TouchRanges:
     """Ranges of random touches; any rotation."""
 
     force_n: tuple[float, float] = (20.0, 120.0)
@@ -67,7 +67,7 @@ def simulate(
 
 
 def random_touches(
-    region: FaceRegion, rng: np.random.Generator, ranges: Touches | None = None
+    region: FaceRegion, rng: np.random.Generator, ranges: TouchRanges | None = None
 ) -> Iterator[Touch]:
     """Yield touches without end, their centres uniform over a region.
 
@@ -85,7 +85,7 @@ def random_touches(
     SurfaceError
         When the region has no place so far from its edges, or a range is no range.
     """
-    given = ranges or Touches()
+    given = ranges or TouchRanges()
     low_n, high_n = given.force_n
     if not (0 <= low_n <= high_n < math.inf and given.tilt_rad >= 0 and given.margin_mm >= 0):
         raise SurfaceError(

@@ -56,7 +56,7 @@ class FaceSurface:
         return self.lattice.heights_mm(points) if self.lattice else np.zeros(len(points))
 
 
-def endless(
+def endless_face(
     labels: ArrayLike | Callable[[Index, Index], ArrayLike],
     glyphs: Sequence[Strokes],
     *,

@@ -169,7 +169,7 @@ class HalfPlane:
 
 
 @dataclass(frozen=True, slots=True)
-class Rough:
+class RoughSurface:
     """A random surface of stated rms height and shortest wave: a sum of plane waves.
 
     The same seed is the same surface, everywhere in the plane. Wave lengths run over one

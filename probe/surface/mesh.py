@@ -84,7 +84,7 @@ class MeshSurface:
 
     @cached_property
     def _bins(self) -> _Bins:
-        return _binned(self.corners)
+        return _bin_triangles(self.corners)
 
 
 def mesh(
@@ -109,7 +109,7 @@ def mesh(
     corners = np.array(triangles_mm, dtype=np.float64).reshape(-1, 3, 3)
     if not np.isfinite(corners).all():
         raise SurfaceError("triangles hold NaN or infinity", fix="give lengths in mm", place=place)
-    outward = _outward(corners)
+    outward = _looks_outward(corners)
     if T_surface_part is not None:
         # Term by term: the same corner gives the same bits in all its triangles.
         T = np.asarray(T_surface_part, dtype=np.float64)
@@ -130,7 +130,7 @@ def mesh(
     return MeshSurface(np.take_along_axis(corners, order[:, :, None], axis=1), solid)
 
 
-def _outward(corners: Array) -> NDArray[np.bool_]:
+def _looks_outward(corners: Array) -> NDArray[np.bool_]:
     """Whether each triangle belongs to a closed body and looks out of it; (n,).
 
     In a closed mesh every edge is met once each way, by exactly equal corners. A body (or a
@@ -184,7 +184,7 @@ class _Bins:
         return at[:, 0] * self.shape[1] + at[:, 1], inside
 
 
-def _binned(corners: Array) -> _Bins:
+def _bin_triangles(corners: Array) -> _Bins:
     """Sort triangles into bins of a quarter of the usual triangle: two or three in each."""
     low, high = corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1)
     start, extent = low.min(axis=0), float((high.max(axis=0) - low.min(axis=0)).max())
@@ -203,14 +203,14 @@ def _binned(corners: Array) -> _Bins:
     within = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count, count)
     i, j = np.divmod(within, wide[triangle, 1])
     i, j = i + first[triangle, 0], j + first[triangle, 1]
-    met = _meets(corners, triangle, start, side, i, j)
+    met = _meets_bin(corners, triangle, start, side, i, j)
     triangle, cell = triangle[met], (i * shape[1] + j)[met]
     order = np.argsort(cell, kind="stable")
     starts = np.searchsorted(cell[order], np.arange(int(shape.prod()) + 1))
     return _Bins(start, side, (int(shape[0]), int(shape[1])), starts, triangle[order])
 
 
-def _meets(
+def _meets_bin(
     corners: Array, triangle: Index, start: Array, side: float, i: Index, j: Index
 ) -> NDArray[np.bool_]:
     """Whether a triangle meets a bin: no edge has the whole bin on its outer side."""

@@ -107,7 +107,7 @@ def _free_edges(hulls: Sequence[_Hull], eps: float) -> list[tuple[Array, Array, 
             left = [(0.0, 1.0)]
             for j, other in enumerate(hulls):
                 if j != i:
-                    left = _without(left, _covered(p, q, n, other, j < i, eps))
+                    left = _subtract(left, _covered_part(p, q, n, other, j < i, eps))
             size = math.hypot(*(q - p))
             free += [
                 (p + s * (q - p), p + t * (q - p), n, c) for s, t in left if (t - s) * size > eps
@@ -115,7 +115,7 @@ def _free_edges(hulls: Sequence[_Hull], eps: float) -> list[tuple[Array, Array, 
     return free
 
 
-def _covered(
+def _covered_part(
     p: Array, q: Array, normal: Array, hull: _Hull, first: bool, eps: float
 ) -> tuple[float, float]:
     """Return the part of the edge p q inside a hull; (1, 0) for none.
@@ -137,7 +137,7 @@ def _covered(
     return low, high
 
 
-def _without(
+def _subtract(
     parts: list[tuple[float, float]], cut: tuple[float, float]
 ) -> list[tuple[float, float]]:
     low, high = cut
@@ -168,7 +168,7 @@ def _rings(edges: list[tuple[Array, Array, Array, float]], eps: float) -> list[R
                 )
             chain.append(max(onward, key=lambda k: _turn(normal, edges[k][2])))
             unused.discard(chain[-1])
-        rings.append(_merged([edges[k] for k in chain]))
+        rings.append(_merge_collinear([edges[k] for k in chain]))
     return rings
 
 
@@ -177,7 +177,7 @@ def _turn(a: Array, b: Array) -> float:
     return math.atan2(a[0] * b[1] - a[1] * b[0], a @ b)
 
 
-def _merged(chain: list[tuple[Array, Array, Array, float]]) -> Ring:
+def _merge_collinear(chain: list[tuple[Array, Array, Array, float]]) -> Ring:
     """Join neighbours on one line, across the chain's seam too."""
     kept = [
         (n, c)

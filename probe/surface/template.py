@@ -86,7 +86,7 @@ def template(symbols: SymbolReliefs, pitch_mm: float) -> HeightTemplate:
     middle = (np.arange(SURFACE.bins) + 0.5) / SURFACE.bins - 0.5
     x, y = (pitch_mm * grid.ravel() for grid in np.meshgrid(middle, -middle))
     for label in range(count):
-        crossed = _crossed(symbols, label, pitch_mm)
+        crossed = _crossed_bins(symbols, label, pitch_mm)
         first = sum(map(len, planes)) - 2
         planes.append(symbols.planes(label)[2:])
         near = np.maximum(np.abs(x), np.abs(y)) <= symbols.foot_half_mm + pitch_mm / SURFACE.bins
@@ -98,7 +98,7 @@ def template(symbols: SymbolReliefs, pitch_mm: float) -> HeightTemplate:
     return HeightTemplate(symbols, pitch_mm, table, np.concatenate(planes))
 
 
-def _crossed(symbols: SymbolReliefs, label: int, pitch_mm: float) -> NDArray[np.bool_]:
+def _crossed_bins(symbols: SymbolReliefs, label: int, pitch_mm: float) -> NDArray[np.bool_]:
     """Return which bins of a cell an edge between two pieces may cross."""
     away = symbols.relief.profile()[0]
     found = np.zeros((SURFACE.bins, SURFACE.bins), dtype=bool)

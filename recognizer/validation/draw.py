@@ -18,7 +18,7 @@ from probe.errors import ContactError
 from probe.sensor import Overlay, SensorType
 from probe.simulate.registered import registered_surface
 from probe.simulate.scene import Scene
-from probe.simulate.touch import Touches, random_touches
+from probe.simulate.touch import TouchRanges, random_touches
 from probe.simulate.world.levels import LEVELS, read_sensor
 from probe.simulate.world.worn import wear_face, wear_part
 from probe.surface.contract import HeightMap
@@ -66,7 +66,7 @@ def draw_touch(plan: TouchPlan, number: int, reader: Reader) -> DrawnTouch:
     """Return what is touched in a trial, and the reading."""
     rng = np.random.default_rng([plan.seed, number])
     level = LEVELS[plan.level]
-    ranges = Touches(force_n=plan.force_n, tilt_rad=plan.tilt_rad)
+    ranges = TouchRanges(force_n=plan.force_n, tilt_rad=plan.tilt_rad)
     encoding = reader.lab.arrays[int(rng.integers(len(reader.lab.arrays)))]
     while True:
         scene: Scene | None = None
@@ -112,7 +112,7 @@ def scene_of(database: str, object_name: str, face: str, files: bool) -> Scene:
 
 
 def _draw_on_face(
-    scene: Scene, kind: str, most: float, rng: np.random.Generator, ranges: Touches
+    scene: Scene, kind: str, most: float, rng: np.random.Generator, ranges: TouchRanges
 ) -> Touch:
     """Draw a touch of a face; where a face is too small for its kind, anywhere on it."""
     inside = DRAWING.inside_mm
@@ -142,7 +142,7 @@ def _inradius_mm(database: str, object_name: str, face: str, files: bool) -> flo
     return float(scene.region.distance_mm(points).max())
 
 
-def _draw_anywhere(rng: np.random.Generator, ranges: Touches) -> Touch:
+def _draw_anywhere(rng: np.random.Generator, ranges: TouchRanges) -> Touch:
     low, high = ranges.force_n
     theta, towards = rng.uniform(-math.pi, math.pi, 2)
     tilt = ranges.tilt_rad * math.sqrt(rng.random())

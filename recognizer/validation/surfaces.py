@@ -15,7 +15,7 @@ from generator.alphabet import alphabet_named
 from generator.array import profile
 from probe.simulate.world.foreign import draw_dots, draw_ridges, draw_rough, draw_text
 from probe.surface.contract import HeightMap
-from probe.surface.face import endless
+from probe.surface.face import endless_face
 from probe.surface.indenters import FlatPlate
 from probe.surface.symbols import Relief
 from recognizer.touch.lab import EmbossedArray
@@ -82,7 +82,7 @@ FOREIGN: dict[str, Callable[[EmbossedArray, np.random.Generator], HeightMap]] = 
 
 def _embossed_surface(encoding: EmbossedArray, labels: NDArray[np.int64]) -> HeightMap:
     style, alphabet = encoding.style, encoding.alphabet
-    return endless(
+    return endless_face(
         labels,
         tuple(glyph.strokes for glyph in alphabet.glyphs),
         pitch_mm=style.pitch_mm,

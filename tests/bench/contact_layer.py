@@ -31,9 +31,9 @@ from probe.contact.contract import Touch, WristStiffness
 from probe.contact.layer import layer, press_patch
 from probe.contact.layer_active_set import equilibrium
 from probe.contact.layer_influence import influence
-from probe.contact.layer_levels import Look, levels_of
+from probe.contact.layer_levels import DepthWindow, levels_of
 from probe.contact.layer_patch import patch_under
-from probe.contact.layer_solve import glued_system, plate_of, solve_glued
+from probe.contact.layer_solve import contact_system, plate_of, solve_glued
 from probe.contact.plate import PlatePose
 from probe.errors import ContactError
 from probe.sensor import Overlay, SensorType
@@ -41,7 +41,7 @@ from probe.surface.indenters import (
     Cross,
     HalfPlane,
     RaisedStrip,
-    Rough,
+    RoughSurface,
     Sphere,
     TiltedPlane,
     Washer,
@@ -110,8 +110,8 @@ def left_out(given):
                 depth = float((patch.highest_mm - plane.heights_mm(patch.centres_mm)).max())
                 above = patch.highest_mm - plane.heights_mm(patch.centres_mm) >= -depth
                 patch = patch.with_cells(np.flatnonzero(patch.neighbours(above | (not few))))
-                rest = () if few else (Look(plane, -1e9),)
-                levels = levels_of(patch, grid, Look(plane, -depth), rest)
+                rest = () if few else (DepthWindow(plane, -1e9),)
+                levels = levels_of(patch, grid, DepthWindow(plane, -depth), rest)
                 return levels, equilibrium(levels, plate_of(t, levels))
 
             (levels, pressed), some = cpu(lambda f=seen: f(few=True), given.repeat)
@@ -121,7 +121,7 @@ def left_out(given):
             press_patch(patch, touch)
             _, again = cpu(lambda p=patch, o=other: press_patch(p, o), given.repeat)
             _, new = cpu(lambda c=cells: influence.__wrapped__(PAD, c), given.repeat)
-            system = glued_system(levels, pressed.touching)
+            system = contact_system(levels, pressed.touching)
             (factor, _), factored = cpu(lambda s=system, g=grid: gathered(s, g), 1)
             _, cached = cpu(
                 lambda f=factor, s=system: scipy.linalg.cho_solve(f, s.levers.T), given.repeat
@@ -164,7 +164,7 @@ def scenes(given):
         wrist = WristStiffness(stiffness, stiffness * 10 ** rng.uniform(-1, 1))
         surface = (Washer(), RaisedStrip(rng.uniform(0.01, 3)), Sphere(10 ** rng.uniform(0, 3)),
                    Cross(rng.uniform(0.3, 3), 15.0), TiltedPlane(*rng.uniform(-0.15, 0.15, 2)),
-                   Rough(int(rng.integers(100)), 10 ** rng.uniform(-4, 0)), HalfPlane(),
+                   RoughSurface(int(rng.integers(100)), 10 ** rng.uniform(-4, 0)), HalfPlane(),
                    HalfPlane(-0.6), RaisedStrip(1.0, 10.0, -0.5))[rng.integers(9)]  # fmt: skip
         tilt_x, tilt_y = rng.uniform(-0.17, 0.17, 2) * (rng.random() < 0.6)
         x, y = rng.uniform(-9, 9, 2)

@@ -39,7 +39,7 @@ from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.errors import ContactError
 from probe.sensor import Overlay, SensorType
-from probe.surface.face import endless
+from probe.surface.face import endless_face
 from probe.surface.indenters import RaisedStrip, Sphere, TiltedPlane, Washer
 
 ROOT = Path(__file__).parents[2]
@@ -67,7 +67,7 @@ def cases(rng):
         "washer": (Washer(), 80.0, 80.0, STIFF),
         "strip": (RaisedStrip(2.0), 40.0, 40.0, STIFF),
         "sphere": (Sphere(BALL_MM), 40.0, 40.0, STIFF),
-        "patch": (endless(labels, GLYPHS), 80.0, 80.0, STIFF),
+        "patch": (endless_face(labels, GLYPHS), 80.0, 80.0, STIFF),
         "tilt": (TiltedPlane(0.02, 0.01), 60.0, 60.0, WristStiffness()),
     }
 

@@ -28,7 +28,7 @@ from probe.contact.tab_law import tip_laws
 from probe.contact.tabs import heights_under, tabs, tabs_at_rest
 from probe.contact.tips import Tips, tip_points
 from probe.sensor import SensorType
-from probe.surface.face import endless
+from probe.surface.face import endless_face
 from probe.surface.indenters import Cross, HalfPlane, RaisedStrip, Sphere, Washer
 
 SENSOR = SensorType()
@@ -48,7 +48,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     rng = np.random.default_rng(options.seed)
-    face = endless(rng.integers(0, 4, (63, 65)), DENSE_4)
+    face = endless_face(rng.integers(0, 4, (63, 65)), DENSE_4)
     scenes = {
         "face": (face, 200.0, 0.0),
         "face, tilt 2 deg": (face, 200.0, 0.035),

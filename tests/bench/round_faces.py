@@ -45,7 +45,7 @@ from probe.errors import ContactError  # noqa: E402
 from probe.sensor import SensorType  # noqa: E402
 from probe.simulate.registered import registered_object  # noqa: E402
 from probe.simulate.round import RoundPart, round_part  # noqa: E402
-from probe.simulate.touch import Touches, random_touches  # noqa: E402
+from probe.simulate.touch import TouchRanges, random_touches  # noqa: E402
 from probe.simulate.world.levels import LEVELS, read_sensor  # noqa: E402
 from recognizer.scan.grow import begin_scan, extend_scan  # noqa: E402
 from recognizer.scan.mosaic.touch import PlacedTouch, planar_belief  # noqa: E402
@@ -102,7 +102,7 @@ def reader(database: str) -> Reader:
 
 
 def touches(touched: RoundPart, rng: np.random.Generator) -> Iterator[Touch]:
-    return random_touches(touched.region, rng, Touches(margin_mm=DRAWING.inside_mm))
+    return random_touches(touched.region, rng, TouchRanges(margin_mm=DRAWING.inside_mm))
 
 
 def truth(touched: RoundPart, touch: Touch, height_mm: float) -> np.ndarray:
@@ -235,7 +235,7 @@ def strips(options: argparse.Namespace, databases: dict[str, str]) -> None:
         for force in FORCES_N:
             rng, found = np.random.default_rng(1), []
             for _ in range(min(options.touches, 12)):
-                ranges = Touches((force, force), 0.0, DRAWING.inside_mm)
+                ranges = TouchRanges((force, force), 0.0, DRAWING.inside_mm)
                 drawn = next(random_touches(touched.region, rng, ranges))
                 _, contact = read_sensor(
                     touched.under(drawn).surface, sensor, drawn, LEVELS["low"], rng

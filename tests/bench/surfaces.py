@@ -29,9 +29,9 @@ from probe.sensor import Overlay, SensorType
 from probe.simulate.part import part_surface
 from probe.simulate.registered import registered_surface
 from probe.simulate.source import frames_of
-from probe.simulate.touch import Touches, random_touches, simulate
-from probe.surface.face import endless
-from probe.surface.indenters import Rough, Sphere, Washer
+from probe.simulate.touch import TouchRanges, random_touches, simulate
+from probe.surface.face import endless_face
+from probe.surface.indenters import RoughSurface, Sphere, Washer
 
 SPEC = """
 objects:
@@ -102,7 +102,7 @@ def report(folder, given):
     large = next((folder / "out").rglob("Large.stl"))
     scene = registered_surface(database, "Cube", "F1")
     rng = np.random.default_rng(given.seed)
-    inside = Touches(margin_mm=18.0)
+    inside = TouchRanges(margin_mm=18.0)
     places = list(itertools.islice(random_touches(scene.region, rng, inside), given.touches))
     points = tip_points(SensorType(), Tips())[0].reshape(-1, 2)
     grid = np.random.default_rng(0).integers(0, 2, (63, 65))
@@ -119,10 +119,10 @@ def report(folder, given):
         ("cube of 180 mm, registered", lambda: registered_surface(other, "Large", "F1")),
     ):
         asked(name, lambda make=make: make().surface, places, points)
-    asked("array, as a table", lambda: endless(grid, STEPS), places, points)
-    asked("array, as a function", lambda: endless(lambda r, c: (r * r + c) % 2, STEPS),
+    asked("array, as a table", lambda: endless_face(grid, STEPS), places, points)
+    asked("array, as a function", lambda: endless_face(lambda r, c: (r * r + c) % 2, STEPS),
           places, points)  # fmt: skip
-    for body in (Washer(), Sphere(), Rough()):
+    for body in (Washer(), Sphere(), RoughSurface()):
         asked(type(body).__name__.lower(), lambda body=body: body, places, points)
 
     print(f"\n{'a touch, median of CPU ms':<34}{'all':>12}{'press':>12}{'counts':>12}")

@@ -23,7 +23,7 @@ from probe.contact.press import LEVELS, press
 from probe.contact.tabs import tabs
 from probe.errors import ContactError
 from probe.sensor import Overlay, SensorType
-from probe.surface.face import endless
+from probe.surface.face import endless_face
 from probe.surface.indenters import FlatPlate, HalfPlane, RaisedStrip
 from probe.surface.polygon import polygon
 from recognizer.scan.mosaic.pair import register_patches
@@ -164,7 +164,7 @@ def raw_product(a, b, believed, reach):
 def test_case_12_raw_products_fail_where_registration_does_not(scene):
     """75 % overlap, believed to +-1 tactel; wrong: by more than a tactel. At most 1 % may be."""
     rng = np.random.default_rng(12)
-    faces = [endless(rng.integers(0, 4, (23, 25)), GLYPHS) for _ in range(2)]
+    faces = [endless_face(rng.integers(0, 4, (23, 25)), GLYPHS) for _ in range(2)]
 
     def felt(face, pose):
         forces = tabs(face, TAB, Touch(*pose, 80.0)).forces_n

@@ -22,7 +22,7 @@ from probe.simulate.part import part_surface
 from probe.simulate.registered import DatabaseUnreadableError, registered_object, registered_surface
 from probe.simulate.source import frames_of, options_of
 from probe.simulate.target import surface_of
-from probe.simulate.touch import Touches, pose_of, random_touches, simulate
+from probe.simulate.touch import TouchRanges, pose_of, random_touches, simulate
 from probe.simulate.written import part_mesh
 
 SET = """
@@ -150,7 +150,7 @@ def test_object_without_a_face_is_its_first_with_symbols(lab):
 def test_a_touch_of_the_file_is_a_touch_of_the_registered_face(lab):
     scene = surface_of(f"{lab / 'lab.db'}#Cube/F3")
     part = part_surface(file_of(lab, "Cube-F3"), database=str(lab / "lab.db"))
-    ranges = Touches(margin_mm=14.0)
+    ranges = TouchRanges(margin_mm=14.0)
     touches = itertools.islice(random_touches(scene.region, np.random.default_rng(2), ranges), 5)
     board, film, quiet = Electronics(noise=QUIET), fsr_of(), np.random.default_rng(0)
     for touch in touches:
@@ -179,7 +179,7 @@ def test_same_generator_gives_the_same_frame_and_the_truth_stays_outside(lab):
 
 def test_random_touches_fill_their_region_and_ranges(lab):
     scene = surface_of(f"{lab / 'lab.db'}#Ball/F1")  # a pentagon
-    ranges = Touches(force_n=(20.0, 30.0), tilt_rad=0.02, margin_mm=5.0)
+    ranges = TouchRanges(force_n=(20.0, 30.0), tilt_rad=0.02, margin_mm=5.0)
     found = list(
         itertools.islice(random_touches(scene.region, np.random.default_rng(0), ranges), 1000)
     )
@@ -192,7 +192,7 @@ def test_random_touches_fill_their_region_and_ranges(lab):
     assert max(math.hypot(t.tilt_x_rad, t.tilt_y_rad) for t in found) <= 0.02
     assert np.ptp([t.theta_rad for t in found]) > 6.0
     with pytest.raises(SurfaceError, match="smaller margin"):
-        next(random_touches(scene.region, np.random.default_rng(0), Touches(margin_mm=50.0)))
+        next(random_touches(scene.region, np.random.default_rng(0), TouchRanges(margin_mm=50.0)))
 
 
 def test_pose_of_a_touch_carries_sensor_points_onto_the_tips_plane(lab):

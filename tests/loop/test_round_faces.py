@@ -29,7 +29,7 @@ from generator.spec import read_specs
 from probe.sensor import SensorType
 from probe.simulate.registered import registered_object
 from probe.simulate.round import round_part
-from probe.simulate.touch import Touches, random_touches
+from probe.simulate.touch import TouchRanges, random_touches
 from probe.simulate.world.levels import LEVELS, read_sensor
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
@@ -193,7 +193,7 @@ def touched(tmp_path_factory):
 def test_a_plate_sees_the_written_face_fall_away_under_it(touched, name):
     part = touched[1][name]
     rng = np.random.default_rng(5)
-    drawn = random_touches(part.region, rng, Touches(margin_mm=INSIDE_MM))
+    drawn = random_touches(part.region, rng, TouchRanges(margin_mm=INSIDE_MM))
     for _, touch in zip(range(3), drawn, strict=False):
         about = rng.uniform(-8.0, 8.0, (400, 2))
         at = np.array([touch.x_mm, touch.y_mm])
@@ -211,7 +211,7 @@ def test_one_touch_of_the_written_part_tells_object_face_and_pose(touched, name)
     reader, part = Reader(open_lab(database), SensorType()), parts[name]
     surface = part.face.round.surface
     rng, answered = np.random.default_rng(8), 0
-    drawn = random_touches(part.region, rng, Touches((40.0, 120.0), margin_mm=INSIDE_MM))
+    drawn = random_touches(part.region, rng, TouchRanges((40.0, 120.0), margin_mm=INSIDE_MM))
     for _, touch in zip(range(5), drawn, strict=False):
         counts, _ = read_sensor(
             part.under(touch).surface, reader.sensor, touch, LEVELS["typical"], rng
@@ -245,7 +245,7 @@ def test_the_reader_takes_no_blank_round_face_for_an_encoded_one(touched):
     reader, part = Reader(open_lab(database), SensorType()), parts["Tube"]
     radius = part.face.round.surface.radius_mm
     rng = np.random.default_rng(2)
-    drawn = random_touches(part.region, rng, Touches(margin_mm=INSIDE_MM))
+    drawn = random_touches(part.region, rng, TouchRanges(margin_mm=INSIDE_MM))
     for _, touch in zip(range(3), drawn, strict=False):
         blank = Blank(radius, (touch.x_mm, touch.y_mm))
         counts, _ = read_sensor(blank, reader.sensor, touch, LEVELS["typical"], rng)

@@ -23,7 +23,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 from numpy.typing import NDArray
 
-from probe.contact.elements_line import Along, Array, along, integral
+from probe.contact.elements_line import Array, LineBasis, integral, line_bases
 from probe.errors import ContactError
 
 Kind = Literal["q1", "q2", "q1p0", "q2q1"]
@@ -45,7 +45,7 @@ class Section:
     matrix: sp.csc_matrix
     r: Array  #: (m,) nodes along r, mm
     z: Array  #: (k,) nodes along z from the base up, mm
-    across: Along  #: shape functions along r
+    across: LineBasis  #: shape functions along r
     ring: sp.csr_matrix  #: (m, m) integral of f_i f_j 2 pi r along r, mm^2
     softened: Array  #: (n,) what pressures give way more in the matrix that is factored
 
@@ -119,7 +119,7 @@ def section(r: Array, z: Array, young: float, poisson: float, kind: Kind = "q2q1
         )
     shear = young / (2 * (1 + poisson))
     degrees = (degree,) if pressure is None else (degree, pressure)
-    radial, axial = along(r, *degrees), along(z, *degrees)
+    radial, axial = line_bases(r, *degrees), line_bases(z, *degrees)
     f, g = radial[0], axial[0]
     turn = 2 * np.pi
     ring = turn * f.points

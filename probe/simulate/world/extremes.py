@@ -19,7 +19,7 @@ from probe.contact.press import press
 from probe.errors import ProbeError
 from probe.sensor import Overlay, SensorType
 from probe.surface.contract import HeightMap
-from probe.surface.indenters import Cross, FlatPlate, RaisedStrip, Rough, TiltedPlane
+from probe.surface.indenters import Cross, FlatPlate, RaisedStrip, RoughSurface, TiltedPlane
 
 BALANCE = 1e-6  #: of the load
 FINITE, REFUSED = "finite", "refused"
@@ -81,7 +81,7 @@ SCENES: tuple[ExtremeScene, ...] = (
     ExtremeScene("plane that rises 1 mm a mm", TiltedPlane(1.0, 0.0), expected=EITHER),
     ExtremeScene("stroke of 0.02 mm", RaisedStrip(0.02), replace(_HERE, force_n=1.0)),
     ExtremeScene("cliff through the centre", RaisedStrip(200.0), replace(_HERE, x_mm=100.0)),
-    ExtremeScene("rough, 0.5 mm", Rough(1, 0.5, 4.0)),
+    ExtremeScene("rough, 0.5 mm", RoughSurface(1, 0.5, 4.0)),
     ExtremeScene("1,000 km away", FlatPlate(), replace(_HERE, x_mm=1e9)),
     ExtremeScene("tips: centre beyond the edge, wrist free", RaisedStrip(200.0),
           replace(_HERE, x_mm=110.0, wrist=_FREE), REFUSED),

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.surface.contract import HeightMap
-from probe.surface.face import endless
-from probe.surface.indenters import Rough
+from probe.surface.face import endless_face
+from probe.surface.indenters import RoughSurface
 from probe.surface.symbols import Relief, Strokes
 
 Array = NDArray[np.float64]
@@ -76,7 +76,7 @@ def draw_dots(pitch_mm: float, rng: np.random.Generator) -> HeightMap:
 
 def draw_rough(rng: np.random.Generator) -> HeightMap:
     """Return a random surface."""
-    return Rough(int(rng.integers(1 << 31)), rng.uniform(0.1, 0.5), rng.uniform(2.0, 8.0))
+    return RoughSurface(int(rng.integers(1 << 31)), rng.uniform(0.1, 0.5), rng.uniform(2.0, 8.0))
 
 
 def draw_text(
@@ -102,4 +102,4 @@ def draw_text(
     thin = Relief(relief.height_mm, min(relief.stroke_mm, 0.14 * pitch), relief.draft_rad)
     lines = rng.integers(len(letters), size=(32, 32))
     lines[rng.random(lines.shape) < 0.15] = -1
-    return endless(lines, letters, pitch_mm=pitch, unit_mm=reach * pitch, relief=thin)
+    return endless_face(lines, letters, pitch_mm=pitch, unit_mm=reach * pitch, relief=thin)

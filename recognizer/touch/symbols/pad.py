@@ -15,7 +15,7 @@ from generator.alphabet import Alphabet, SymbolStyle
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.layer import layer
 from probe.sensor import SensorType
-from probe.surface.face import endless
+from probe.surface.face import endless_face
 from probe.surface.symbols import Relief
 from recognizer.touch.settings import TemplateSettings
 
@@ -52,7 +52,7 @@ def pad_responses(
         for _ in range(settings.pad_among):
             labels = rng.integers(alphabet.order, size=(4, 4))
             labels[1, 1] = label
-            face = endless(
+            face = endless_face(
                 labels,
                 tuple(glyph.strokes for glyph in alphabet.glyphs),
                 pitch_mm=pitch,

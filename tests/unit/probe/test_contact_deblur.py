@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from probe.contact.contract import Touch, WristStiffness
-from probe.contact.deblur import arriving, blur_of, deblur, thickest_mm
+from probe.contact.deblur import blur_of, deblur, thickest_mm, transmitted_share
 from probe.contact.layer import layer
 from probe.contact.layer_influence import influence
 from probe.contact.settings import DEBLUR
@@ -41,7 +41,7 @@ def test_the_blur_is_that_of_the_layer(height):
 
 @pytest.mark.parametrize(("height", "passed"), [(1.0, 0.61), (2.0, 0.185), (4.0, 0.0065)])
 def test_what_arrives_of_the_shortest_wave(height, passed):
-    assert arriving(pad(height)) == pytest.approx(passed, rel=5e-3)
+    assert transmitted_share(pad(height)) == pytest.approx(passed, rel=5e-3)
 
 
 @pytest.mark.parametrize("height", [4.0, 6.0, 20.0])
@@ -54,7 +54,7 @@ def test_pads_of_4_mm_and_more_are_refused(height):
 @pytest.mark.parametrize("poisson", [0.0, 0.3, 0.4999, 0.5])
 def test_the_thickest_pad_is_where_the_refusal_begins(poisson):
     most = thickest_mm(pad(2.0, poisson=poisson))
-    assert arriving(pad(most, poisson=poisson)) == pytest.approx(DEBLUR.least, rel=1e-6)
+    assert transmitted_share(pad(most, poisson=poisson)) == pytest.approx(DEBLUR.least, rel=1e-6)
     read = np.ones((16, 16))
     assert deblur(read, pad(0.99 * most, poisson=poisson), noise_n=0.1).arrives > DEBLUR.least
     with pytest.raises(ContactError, match="at most"):

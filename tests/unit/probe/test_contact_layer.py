@@ -10,7 +10,7 @@ from probe.contact.layer import layer, press_patch
 from probe.contact.layer_active_set import deep_mm, equilibrium, springs_mm
 from probe.contact.layer_descent import descend
 from probe.contact.layer_influence import influence
-from probe.contact.layer_levels import Look, levels_of
+from probe.contact.layer_levels import DepthWindow, levels_of
 from probe.contact.layer_patch import patch_under
 from probe.contact.layer_solve import plate_of
 from probe.contact.plate import PlatePose
@@ -24,7 +24,7 @@ from probe.surface.indenters import (
     HalfPlane,
     Paraboloid,
     RaisedStrip,
-    Rough,
+    RoughSurface,
     Sphere,
     TiltedPlane,
     Washer,
@@ -50,7 +50,7 @@ def posed(surface, sensor, touch, cells=2, plane=None, floor=-1.0):
     grid = influence(sensor, cells)
     patch = patch_under(surface, sensor, touch, cells_per_tactel=cells)
     patch = patch.with_cells(np.arange(grid.rows * grid.columns)[: patch.coarse_mm.size])
-    levels = levels_of(patch, grid, Look(plane or PlatePose(0.0, 0.0, 0.0), floor))
+    levels = levels_of(patch, grid, DepthWindow(plane or PlatePose(0.0, 0.0, 0.0), floor))
     return levels, plate_of(touch, levels)
 
 
@@ -59,7 +59,7 @@ SCENES = {
     "off the middle": (Sphere(20.0), Touch(1.0, 0.7, 0.0, 3.0, 0.02, -0.03)),
     "held fast": (Cross(1.3, 7.0), Touch(0.2, 0.1, 0.3, 5.0, 0.01, 0.0, HELD)),
     "free": (FlatPlate(), Touch(0.0, 0.0, 0.0, 10.0, wrist=FREE)),
-    "rough": (Rough(3, 0.05, 1.0), Touch(0.0, 0.0, 0.0, 4.0)),
+    "rough": (RoughSurface(3, 0.05, 1.0), Touch(0.0, 0.0, 0.0, 4.0)),
     "one wrist axis": (
         RaisedStrip(2.0),
         Touch(0.4, 0, 0.2, 4.0, 0, 0.01, WristStiffness(0.0, math.inf)),
@@ -150,7 +150,7 @@ def test_an_independent_solver_finds_the_same(scene, poisson):
 
 
 SURFACES = (Washer(), RaisedStrip(1.3), Sphere(30.0), Cross(1.6, 15.0), TiltedPlane(0.05, -0.08),
-            Rough(1, 0.1, 1.5), HalfPlane(), HalfPlane(-0.6), Paraboloid(200.0))  # fmt: skip
+            RoughSurface(1, 0.1, 1.5), HalfPlane(), HalfPlane(-0.6), Paraboloid(200.0))  # fmt: skip
 
 
 @pytest.mark.parametrize("seed", range(60))

@@ -12,7 +12,7 @@ from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.errors import ContactError
 from probe.sensor import Overlay, SensorType
-from probe.surface.indenters import Rough, Washer
+from probe.surface.indenters import RoughSurface, Washer
 
 TAB, PAD = (SensorType(overlay=Overlay(kind=kind)) for kind in ("tab", "pad"))
 
@@ -67,7 +67,7 @@ def test_every_level_carries_the_force(sensor, accuracy, level):
 
 
 def test_pick_holds_its_error_on_a_surface_that_was_not_measured():
-    surface, touch = Rough(seed=8, rms_mm=0.3, shortest_mm=2.0), Touch(3.0, 1.0, 1.1, 70.0)
+    surface, touch = RoughSurface(seed=8, rms_mm=0.3, shortest_mm=2.0), Touch(3.0, 1.0, 1.1, 70.0)
     fine = tabs(surface, TAB, touch, Tips(127)).forces_n
     for error in (0.1, 0.05):
         found = press(surface, TAB, touch, accuracy=error).forces_n

@@ -21,7 +21,7 @@ from probe.surface.indenters import (
     FlatPlate,
     HalfPlane,
     RaisedStrip,
-    Rough,
+    RoughSurface,
     Sphere,
     TiltedPlane,
     Washer,
@@ -127,7 +127,7 @@ SCENES = {
     "sphere": Sphere(40.0),
     "half": HalfPlane(),
     "step": HalfPlane(floor_mm=-0.3),
-    "rough": Rough(seed=2, rms_mm=0.1),
+    "rough": RoughSurface(seed=2, rms_mm=0.1),
     "plane": TiltedPlane(0.05, -0.03),
 }
 

@@ -14,7 +14,7 @@ from probe.client import Client
 from probe.errors import PortError
 from probe.port import list_ports, open_port
 from probe.port.address import Address, number
-from probe.port.serial_line import _refused, open_serial
+from probe.port.serial_line import _explain_refusal, open_serial
 from probe.port.url import address_of
 
 
@@ -127,7 +127,7 @@ def test_a_second_client_is_refused(line):
 def test_without_permission_the_group_is_named(tmp_path):
     device = tmp_path / "ttyACM0"
     device.touch()
-    refused = _refused(address_of(f"serial://{device}"), OSError(errno.EACCES, "no"))
+    refused = _explain_refusal(address_of(f"serial://{device}"), OSError(errno.EACCES, "no"))
     assert f"no permission to open {device}" in refused.cause
     assert "usermod -a -G" in refused.fix
 

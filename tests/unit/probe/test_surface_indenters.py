@@ -17,7 +17,7 @@ ALL = [
     indenters.Sphere(),
     indenters.Paraboloid(),
     indenters.HalfPlane(),
-    indenters.Rough(seed=3),
+    indenters.RoughSurface(seed=3),
 ]
 
 
@@ -60,12 +60,12 @@ def test_sphere_is_round_and_exact_near_its_top():
 
 def test_rough_surface_is_its_seed_with_the_stated_rms():
     points = np.random.default_rng(0).uniform(-400, 400, (40_000, 2))
-    one = indenters.Rough(seed=5, rms_mm=0.2).heights_mm(points)
-    assert np.array_equal(one, indenters.Rough(seed=5, rms_mm=0.2).heights_mm(points))
-    assert not np.array_equal(one, indenters.Rough(seed=6, rms_mm=0.2).heights_mm(points))
+    one = indenters.RoughSurface(seed=5, rms_mm=0.2).heights_mm(points)
+    assert np.array_equal(one, indenters.RoughSurface(seed=5, rms_mm=0.2).heights_mm(points))
+    assert not np.array_equal(one, indenters.RoughSurface(seed=6, rms_mm=0.2).heights_mm(points))
     assert one.std() == pytest.approx(0.2, rel=0.05)
 
 
 def test_rough_surface_of_no_wave_is_refused():
     with pytest.raises(SurfaceError, match="shortest"):
-        indenters.Rough(shortest_mm=0.0)
+        indenters.RoughSurface(shortest_mm=0.0)

@@ -8,7 +8,7 @@ import shapely
 from shapely.geometry import MultiPoint
 
 from probe.errors import SurfaceError
-from probe.surface.face import endless
+from probe.surface.face import endless_face
 from probe.surface.lattice import LatticeSurface, call_lookup, list_lookup, tile_lookup
 from probe.surface.outline import outline
 from probe.surface.solids import symbol_triangles
@@ -175,12 +175,12 @@ def test_array_as_a_function_is_asked_once_for_every_cell_in_view():
         asked.append(len(rows))
         return (rows * 7 + columns) % 3
 
-    face = endless(label, GLYPHS)
+    face = endless_face(label, GLYPHS)
     points = np.random.default_rng(0).uniform(-12, 12, (5000, 2)) + 1e7 * PITCH
     heights = face.heights_mm(points)
     assert asked[0] <= 25
     assert len(asked) == 1
-    table = endless((np.arange(3)[:, None] * 7 + np.arange(3)) % 3, GLYPHS)
+    table = endless_face((np.arange(3)[:, None] * 7 + np.arange(3)) % 3, GLYPHS)
     assert np.array_equal(heights, table.heights_mm(points))
     assert call_lookup(label)(np.zeros(0, int), np.zeros(0, int)).shape == (0,)
 

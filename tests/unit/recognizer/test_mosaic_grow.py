@@ -11,7 +11,7 @@ import pytest
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.sensor import SensorType
-from probe.surface.face import endless
+from probe.surface.face import endless_face
 from recognizer.scan.mosaic.errors import MosaicError
 from recognizer.scan.mosaic.grow import add_touch, mosaic_of, settle_mosaic
 from recognizer.scan.mosaic.mosaic import ALONE, no_touches, outliers
@@ -42,7 +42,7 @@ def scanned(n=4):
     """Places on the face, and what is felt there."""
     rng = np.random.default_rng(8)
     labels = rng.integers(0, 4, (23, 25))
-    face = endless(labels, GLYPHS, pitch_mm=7.0, unit_mm=0.26 * 7)
+    face = endless_face(labels, GLYPHS, pitch_mm=7.0, unit_mm=0.26 * 7)
     gains = np.exp(rng.normal(0, 0.1, (16, 16)))
     poses, signals = [], []
     for k in range(n * n):
@@ -167,7 +167,7 @@ def test_blank_touches_stay_where_they_are_believed():
 
 
 def test_a_surface_that_repeats_is_ambiguous():
-    face = endless(np.zeros((9, 9), int), GLYPHS, pitch_mm=7.0, unit_mm=0.26 * 7)
+    face = endless_face(np.zeros((9, 9), int), GLYPHS, pitch_mm=7.0, unit_mm=0.26 * 7)
     wide = (2.5 * P, 2.5 * P, 0.3 * DEG)
     some = []
     for k in range(2):

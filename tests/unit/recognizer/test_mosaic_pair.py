@@ -10,7 +10,7 @@ import pytest
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.sensor import SensorType
-from probe.surface.face import endless
+from probe.surface.face import endless_face
 from recognizer.scan.mosaic.pair import AMBIGUOUS, APART, CONSTANT, NOISE, register_patches
 from recognizer.scan.mosaic.patch import patch_of
 from recognizer.scan.mosaic.planar import compose_poses, inverse
@@ -49,7 +49,7 @@ class Ridges:
 
 def symbols(seed=0, alike=False):
     labels = np.random.default_rng(seed).integers(0, 4, (23, 25))
-    return endless(labels * 0 if alike else labels, GLYPHS, pitch_mm=7.0, unit_mm=0.26 * 7)
+    return endless_face(labels * 0 if alike else labels, GLYPHS, pitch_mm=7.0, unit_mm=0.26 * 7)
 
 
 def felt(surface, pose, seed=0, trust=None, force=80.0):

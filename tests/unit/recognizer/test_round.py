@@ -12,7 +12,7 @@ from generator.database.registered import Bend, Developable
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.sensor import SensorType
-from probe.surface.face import endless
+from probe.surface.face import endless_face
 from recognizer.touch.lab import radii_of
 from recognizer.touch.settings import DEFAULTS
 from recognizer.touch.signal import Signal
@@ -37,7 +37,7 @@ class Rolled:
 
     def __init__(self, radius_mm: float, towards_rad: float) -> None:
         self.bend = Bend(radius_mm, towards_rad)
-        self.face = endless([[0]], BARS)
+        self.face = endless_face([[0]], BARS)
 
     def heights_mm(self, points_mm: np.ndarray) -> np.ndarray:
         return self.face.heights_mm(points_mm) - self.bend.falls_mm(points_mm)
