@@ -1,9 +1,12 @@
 """Rivals of what a sensor sees, against every place of small arrays compared with every other."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from generator.array import array_from, profile
+from generator.array import array_from, next_larger, profile
 from generator.array.field import field_of_order
 from generator.array.rivals import RankTest, light_words, rival_shares, serves
 from generator.array.visible import PoseGrid, VisibleSet, visible_sets
@@ -129,6 +132,30 @@ def test_255_columns_hide_more_than_51_rows():
         view = [VisibleSet(cells, 1.0)]
         assert rival_shares(square, view).rivals[0] == times - 1
         assert rival_shares(strip, view).rivals[0] == 0
+
+
+def test_profiles_serve_a_sensor_at_their_pitch():
+    for name in ("one-touch", "large", "fine"):
+        one = profile(name)
+        assert serves(one.array(), one.pitch_mm, SENSOR, 0.36 * one.pitch_mm), name
+    larger = profile("large")
+    for _ in range(4):
+        larger = next_larger(larger)
+        assert serves(larger.array(), 5.5, SENSOR, 0.36 * 5.5), larger.encoding
+
+
+def test_the_guide_says_how_many_rivals_the_profiles_have():
+    text = (Path(__file__).parents[3] / "docs" / "folds.md").read_text()
+    sets = visible_sets(7.0, SENSOR, 2.52)
+    for name in ("one-touch", "large"):
+        array = profile(name).array()
+        (row,) = re.findall(rf"\| {array.rows}x{array.columns} `{name}`.*? \| (.*?) \|", text)
+        poses, rivals = row.rstrip(")").split(" (")
+        shares = rival_shares(array, sets)
+        assert [float(share) for share in poses.split(" / ")] == pytest.approx(
+            [100 * share for share in shares.poses], abs=0.51
+        )
+        assert float(rivals) == pytest.approx(shares.rivals[0], abs=0.01)
 
 
 def test_an_array_serves_a_sensor_up_to_the_limit():
