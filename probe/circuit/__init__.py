@@ -2,7 +2,8 @@
 
 fsr          the law of every tactel, with hysteresis and creep
 spread       how tactels differ; sensors drawn
-network      what a pair of terminals sees of the whole matrix
+network      what a pair of terminals sees of the whole matrix; loaded_column  the
+             same of a column under load, while some rows float
 electronics  readout, multiplexer, ADC, noise
 readout      conductances -> voltages
 reading      forces -> counts

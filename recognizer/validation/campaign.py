@@ -61,6 +61,7 @@ class Campaign:
     overlay: str = "tab"
     files: bool = True  #: touch the written STL files
     engine: str = "own"  #: of contact
+    sensor_per: str = "touch"  #: or `run`: how long the errors of a sensor stay the same
     study: int = 0  #: touches of every reader of `READERS`; 0: no study
     shard: int = SHARING.shard  #: touches in a file: at most so many are lost with a run
 
@@ -156,7 +157,7 @@ def plan_of(
         strange = [name for name in FOREIGN if name != BLANK]
         surface = strange[int(rng.integers(len(strange)))]
     plan = TouchPlan(database, campaign.seed, level, surface, files=campaign.files,
-                     engine=campaign.engine)  # fmt: skip
+                     engine=campaign.engine, sensor_per=campaign.sensor_per)  # fmt: skip
     return kind, plan
 
 

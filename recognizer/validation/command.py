@@ -23,6 +23,7 @@ import typer
 from encoded_objects import console
 from encoded_objects.console import Action, output
 from encoded_objects.console.progress import progress_bar
+from probe.simulate.world.levels import LEVELS
 
 if TYPE_CHECKING:
     from recognizer.validation.result import ValidationResult
@@ -92,7 +93,7 @@ def touch_set(
     ] = "",
     levels: Annotated[
         str, typer.Option("--levels", "--noise", metavar="LIST", show_default=False,
-                          help="Levels of noise and their shares: low, typical, hard, mismatch."),
+                          help=f"Sensors and prints, and their shares: {', '.join(LEVELS)}."),
     ] = "",
     overlay: Annotated[
         str, typer.Option(metavar="tab|pad", show_default=False, help="Elastic overlay; tab."),
@@ -106,6 +107,10 @@ def touch_set(
         str, typer.Option(metavar="own|mujoco", show_default=False,
                           help="Who computes the contact; own. mujoco shares no model with the "
                                "reader, and touches written files alone."),
+    ] = "",
+    sensor_per: Annotated[
+        str, typer.Option(metavar="touch|run", show_default=False,
+                          help="How long a sensor's errors stay the same; touch."),
     ] = "",
     study: Annotated[
         int | None, typer.Option(min=0, show_default=False,
@@ -150,9 +155,9 @@ def touch_set(
         with progress_bar("making the set") as bar:
             result = validate(
                 specs or (), folder=folder, touches=touches, database=database, kinds=kinds,
-                levels=levels, overlay=overlay, surfaces=surfaces, engine=engine, study=study,
-                shard=shard, seed=seed, jobs=processes, cluster=cluster, resume=resume,
-                progress=TouchProgress(bar),
+                levels=levels, overlay=overlay, surfaces=surfaces, engine=engine,
+                sensor_per=sensor_per, study=study, shard=shard, seed=seed, jobs=processes,
+                cluster=cluster, resume=resume, progress=TouchProgress(bar),
             )  # fmt: skip
         _say(result, as_json=as_json)
         return result.exit_code(fail_under)

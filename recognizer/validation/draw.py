@@ -19,7 +19,9 @@ from probe.sensor import Overlay, SensorType
 from probe.simulate.registered import registered_surface
 from probe.simulate.scene import Scene
 from probe.simulate.touch import TouchRanges, random_touches
-from probe.simulate.world.levels import LEVELS, read_sensor
+from probe.simulate.world.levels import LEVELS, Level
+from probe.simulate.world.reading import read_sensor
+from probe.simulate.world.sensor_copy import SensorCopy, draw_copy
 from probe.simulate.world.worn import wear_face, wear_part
 from probe.surface.contract import HeightMap
 from probe.surface.face import FaceSurface
@@ -50,6 +52,7 @@ class TouchPlan:
     worn: float = DRAWING.worn
     files: bool = False  #: touch the written STL files, not what the database says of them
     engine: str = "own"  #: of contact, `probe.contact.engines`
+    sensor_per: str = "touch"  #: or `run`: the errors of the sensor stay the same
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,14 +63,17 @@ class DrawnTouch:
     scene: Scene | None  #: None for a foreign surface
     touch: Touch
     counts: NDArray[np.uint16]
+    drawn_anew: tuple[str, ...] = ()  #: why, for each time that the plate did not come to rest
 
 
 def draw_touch(plan: TouchPlan, number: int, reader: Reader) -> DrawnTouch:
     """Return what is touched in a trial, and the reading."""
     rng = np.random.default_rng([plan.seed, number])
     level = LEVELS[plan.level]
-    ranges = TouchRanges(force_n=plan.force_n, tilt_rad=plan.tilt_rad)
+    ranges = _ranges(plan, level)
+    copy = _copy_of_run(plan.seed, reader.sensor) if plan.sensor_per == "run" else None
     encoding = reader.lab.arrays[int(rng.integers(len(reader.lab.arrays)))]
+    anew: list[str] = []
     while True:
         scene: Scene | None = None
         surface: HeightMap
@@ -87,10 +93,34 @@ def draw_touch(plan: TouchPlan, number: int, reader: Reader) -> DrawnTouch:
                 at, turn = face.centres_mm, face.rotation_rad
                 surface = wear_part(surface, at, turn, pitch, plan.worn, rng)
         try:
-            counts, _ = read_sensor(surface, reader.sensor, touch, level, rng, plan.engine)
-        except ContactError:
-            continue  # the plate slips off: no touch
-        return DrawnTouch(surface, scene, touch, counts)
+            counts, _ = read_sensor(
+                surface, reader.sensor, touch, level, rng, plan.engine,
+                datum_mm=_datum(scene), copy=copy,
+            )  # fmt: skip
+        except ContactError as error:
+            anew.append(DRAWING.why_anew(error.cause))
+            continue
+        return DrawnTouch(surface, scene, touch, counts, tuple(anew))
+
+
+def _ranges(plan: TouchPlan, level: Level) -> TouchRanges:
+    """Return forces and tilts of a plan, or those of a level that has its own."""
+    tilt = plan.tilt_rad if level.tilt_rad is None else level.tilt_rad
+    return TouchRanges(force_n=level.force_n or plan.force_n, tilt_rad=tilt)
+
+
+def _datum(scene: Scene | None) -> tuple[float, float]:
+    """Return what stays in its place when a print shrinks: the middle of the face."""
+    if scene is None:
+        return 0.0, 0.0
+    x, y = scene.centre_mm().tolist()
+    return x, y
+
+
+@lru_cache(maxsize=4)
+def _copy_of_run(seed: int, sensor: SensorType) -> SensorCopy:
+    """Return the one sensor of a run."""
+    return draw_copy(sensor, np.random.default_rng([seed, 0, 4]))
 
 
 @lru_cache(maxsize=8)

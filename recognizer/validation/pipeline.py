@@ -67,6 +67,7 @@ class CampaignOptions:
     overlay: str = ""
     surfaces: str = ""
     engine: str = ""
+    sensor_per: str = ""
     study: int | None = None
     shard: int | None = None
 
@@ -82,6 +83,7 @@ def validate(
     overlay: str = "",
     surfaces: str = "",
     engine: str = "",
+    sensor_per: str = "",
     study: int | None = None,
     shard: int | None = None,
     seed: int | None = None,
@@ -111,6 +113,8 @@ def validate(
     engine
         Of contact: `own`, or `mujoco` (extra `engines`), which touches written files alone and
         draws no surfaces of no database.
+    sensor_per
+        `touch`: every touch is felt by another sensor; `run`: all by one, whose errors stay.
     study
         Touches of each reader in the picture of error against run time; 0: none.
     shard
@@ -144,7 +148,7 @@ def validate(
     named = [Path(spec) for spec in ([specs] if isinstance(specs, str | Path) else specs)]
     place, steps = Path(folder), progress or TouchProgress()
     options = CampaignOptions(touches, seed, kinds, levels, overlay, surfaces, engine,
-                              study, shard)  # fmt: skip
+                              sensor_per, study, shard)  # fmt: skip
     known = resume and (place / RECORD).exists()
     campaign = _campaign(options, read_record(place).campaign if known else None)
     with lock_folder(place):
@@ -183,6 +187,7 @@ def _campaign(options: CampaignOptions, known: Campaign | None) -> Campaign:
         (options.overlay, ("tab", "pad"), "--overlay"),
         (options.surfaces, ("files", "database"), "--surfaces"),
         (options.engine, tuple(ENGINES), "--engine"),
+        (options.sensor_per, ("touch", "run"), "--sensor-per"),
     ):
         if given and given not in allowed:
             raise ValidationError(
@@ -200,6 +205,7 @@ def _campaign(options: CampaignOptions, known: Campaign | None) -> Campaign:
         overlay=options.overlay or base.overlay,
         files=options.surfaces == "files" if options.surfaces else base.files,
         engine=options.engine or base.engine,
+        sensor_per=options.sensor_per or base.sensor_per,
         study=study if options.study is None else options.study,
         shard=base.shard if options.shard is None else options.shard,
     )

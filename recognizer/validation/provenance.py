@@ -80,6 +80,8 @@ def command_of(record: RunRecord) -> str:
         words += ["--overlay", campaign.overlay]
     if campaign.engine != plain.engine:
         words += ["--engine", campaign.engine]
+    if campaign.sensor_per != plain.sensor_per:
+        words += ["--sensor-per", campaign.sensor_per]
     if campaign.files != plain.files:
         words += ["--surfaces", "database"]
     words += ["--study", str(campaign.study)]

@@ -75,6 +75,7 @@ def results_of(rows: Columns) -> dict[str, Any]:
         ],
         "objects": _confusion(rows, _membership_mask(kinds, list(ON_FACES))),
         "reasons": dict(sorted(Counter(rows["reason"][verdicts == REJECTED].tolist()).items())),
+        "drawn_anew": _drawn_anew(rows),
         "pose": _pose(rows),
         "against": {
             name: {
@@ -195,6 +196,12 @@ def _confusion(rows: Columns, on_face: Mask) -> dict[str, Any]:
             {"touched": a, "answered": b, "count": n} for (a, b), n in sorted(confused.items())
         ],
     }
+
+
+def _drawn_anew(rows: Columns) -> dict[str, int]:
+    """Return how often a touch was drawn again because the plate found no rest, by reason."""
+    found = Counter(why for text in rows["drawn_anew"] if text for why in text.split(" | "))
+    return dict(sorted(found.items()))
 
 
 def _natural_key(name: str) -> tuple[str | int, ...]:

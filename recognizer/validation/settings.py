@@ -20,6 +20,18 @@ class DrawSettings:
     inside_mm: float = 9.0
     """A touch inside a face keeps so far from its edges: a sensor of 25 mm then shows most of
     its window; nearer ones are of the kind `edge`, or `corner` about a corner."""
+    anew: tuple[tuple[str, str], ...] = (
+        ("tips", "the plate tips"),
+        ("under the", "nothing bears it"),
+        ("too thin", "strokes too thin"),
+        ("finds no rest", "no rest in the engine"),
+        ("does not settle", "no rest in the engine"),
+    )
+    """A touch without a rest is drawn anew: words of the cause, and what is counted."""
+
+    def why_anew(self, cause: str) -> str:
+        """Return the reason that is counted for a cause of the contact."""
+        return next((reason for words, reason in self.anew if words in cause), "other")
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +41,9 @@ class JudgeSettings:
     near_mm: float = 2.0
     """An answer farther from the truth is wrong: under half of the finest pitch (4.5 mm), so
     that the next cell is never taken for the true one."""
+    near_deg: float = 10.0
+    """An answer turned farther is wrong: a mounting a quarter turn off, or a symbol that looks
+    alike when turned; right ones are within 3 degrees."""
     enough: float = 1.5
     """Symbols in view over those of a window, from which an answer is expected: as many
     as a window has need not stand as a window."""

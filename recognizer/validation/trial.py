@@ -45,6 +45,7 @@ class Trial:
     margin: float  #: nan where there is none
     noise: float
     seconds: float  #: CPU, of reading
+    drawn_anew: str = ""  #: why the touch was drawn again, each time; ` | ` between
 
 
 def trial(plan: TouchPlan, number: int, reader: Reader) -> Trial:
@@ -75,7 +76,8 @@ def judge(
             )
             error, degrees = math.hypot(away[0], away[1]), math.degrees(away[2])
             chi2 = float(away @ np.linalg.solve(answer.covariance, away))
-            verdict = RIGHT if error < JUDGING.near_mm else WRONG
+            near = error < JUDGING.near_mm and abs(degrees) < JUDGING.near_deg
+            verdict = RIGHT if near else WRONG
     edge = math.nan
     if scene is not None:
         edge = float(scene.region.distance_mm(np.array([[touch.x_mm, touch.y_mm]]))[0])
@@ -100,4 +102,5 @@ def judge(
         margin=math.nan if answer.margin is None else answer.margin,
         noise=math.nan if answer.noise is None else answer.noise,
         seconds=seconds,
+        drawn_anew=" | ".join(found.drawn_anew),
     )

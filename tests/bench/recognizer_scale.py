@@ -27,7 +27,8 @@ from generator.alphabet import SymbolStyle, alphabet_named  # noqa: E402
 from generator.array import next_larger, profile  # noqa: E402
 from probe.contact.contract import Touch  # noqa: E402
 from probe.sensor import SensorType  # noqa: E402
-from probe.simulate.world.levels import TYPICAL, read_sensor  # noqa: E402
+from probe.simulate.world.levels import TYPICAL  # noqa: E402
+from probe.simulate.world.reading import read_sensor  # noqa: E402
 from probe.surface.face import FaceSurface  # noqa: E402
 from probe.surface.lattice import LatticeSurface, list_lookup  # noqa: E402
 from probe.surface.polygon import polygon  # noqa: E402

@@ -36,7 +36,8 @@ from probe.scan.places import surface_to_sensor
 from probe.scan.raster import raster
 from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
-from probe.simulate.world.levels import LEVELS, READOUT, read_sensor
+from probe.simulate.world.levels import LEVELS
+from probe.simulate.world.reading import READOUT, read_sensor
 from probe.simulate.world.worn import wear_face
 from recognizer.scan.grow import begin_scan, extend_scan
 from recognizer.scan.mosaic.planar import inverse, planar_covariance, planar_pose, transform_points

@@ -30,7 +30,8 @@ from probe.sensor import SensorType
 from probe.simulate.registered import registered_object
 from probe.simulate.round import round_part
 from probe.simulate.touch import TouchRanges, random_touches
-from probe.simulate.world.levels import LEVELS, read_sensor
+from probe.simulate.world.levels import LEVELS
+from probe.simulate.world.reading import read_sensor
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise

@@ -2,7 +2,8 @@
 
 ::
 
-    levels     how bad a sensor and a print are, and what such a sensor reads
+    levels     how bad sensors and prints are: a table;  sensor_copy  one sensor among its like
+    reading    what a sensor of a level reads of a touch;  mounting  wired otherwise than drawn
     distorted  a print that is off in scale and stroke;  worn  one whose symbols are gone
     foreign    surfaces that no database knows
     extremes   stiff and extreme scenes for the contact models

@@ -1,101 +1,83 @@
-"""How bad sensors and prints are: distributions, and what a sensor of them reads.
+"""How bad sensors and prints are: a table of values, a line a level, none known to a reader.
 
-Level + surface + touch -> counts of the 16x16 matrix. None of it is known to the reader: the
-contact is that of `probe.contact`, not of the reader's template, and a sensor is drawn anew
-for every touch. `MISMATCH` is wrong in everything at once: strokes printed too wide, a scale
-that is off, tabs of other lengths at other places, a force law that is not the one taken
-off, tactels that hear their neighbours.
+`low`, `typical`, `hard` and `mismatch` are sensors as they are made and prints as they come, in
+rising severity; `mismatch` is wrong in everything at once. The others are `TYPICAL` with one
+fault more, but for the three that say otherwise: `sound` has none of the small errors,
+`places-08` and `bleed-2` have the one that they name and no other.
+`docs/validation/README.md` says where each number is from.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
-
-from probe.contact.contract import Contact, Touch
-from probe.contact.engines import engine_named
-from probe.contact.tips import Tips
-from probe.sensor import SensorType
-from probe.simulate.world.distorted import DistortedSurface
-from probe.surface.contract import HeightMap
-
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class ReadoutSettings:
-    """What all levels share: the board, and how finely the contact is computed."""
-
-    counts_per_n: float = 150.0  #: of a tactel under small forces
-    full: int = 1023  #: counts, 10 bits
-    bias: float = 8.0  #: counts of an unloaded tactel
-
-
-READOUT = ReadoutSettings()
+import math
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """Standard deviations over the tactels, and what is wrong with all of them."""
+    """A sensor and a print: film, tips, board, wiring, wrist. Spreads are standard deviations."""
 
     name: str
-    gain: float  #: of the logarithm of the force
-    length_mm: float  #: of the tabs
-    noise_n: float  #: of a reading
-    shift_mm: float = 0.0  #: of the tabs' places, each way
-    dead: int = 0  #: tactels that read nothing, unknown to the reader
-    exponent: float = 1.0  #: reading ~ force^exponent
-    cross_talk: float = 0.0  #: tactels, width of the bell by which neighbours are heard
-    wider_mm: float = 0.0  #: strokes
-    scale: float = 0.0  #: of the print, less 1
+    gain: float = 0.0  #: film: spread of the logarithm of a tactel's gain
+    exponent: float = 1.0  #: film: conductance ~ force^exponent
+    hysteresis: float = 0.0  #: film: reading on the way back over that on the way up, less 1
+    dead: float = 0.0  #: share of the tactels that feel nothing, unknown to the reader
+    length_mm: float = 0.0  #: tips: spread of their lengths
+    shift_mm: float = 0.0  #: tips: spread of their places, each way
+    dome_mm: float = 0.0  #: tips: how far the rim lies below the middle
+    cross_talk: float = 0.0  #: tactels, width of the bell by which neighbours are pressed along
+    load_ohm: float = 22.0  #: board: of the divider; 10 kOhm / N is the film's
+    bleed: float = 0.0  #: board: share of the row above and of the row below in a row's reading
+    floating: float = 0.0  #: board: share of the rows that nothing holds while another is read
+    noise_n: float = 0.0  #: board: of a reading
+    mounting: str = "as drawn"  #: wiring, one of `mounting.MOUNTINGS`
+    slide_mm: float = 0.0  #: wrist: way that the pressed sensor slides within one reading
+    tilt_rad: float | None = None  #: wrist: at most; None: as the campaign draws it
+    force_n: tuple[float, float] | None = None  #: wrist: None: as the campaign draws it
+    wider_mm: float = 0.0  #: print: strokes
+    scale: float = 0.0  #: print: less 1, from the part's datum
 
 
-LOW = Level("low", gain=0.05, length_mm=0.0, noise_n=0.01)
-TYPICAL = Level("typical", gain=0.10, length_mm=0.03, noise_n=0.02, dead=1)
-HARD = Level("hard", gain=0.15, length_mm=0.05, noise_n=0.03, dead=3)
-MISMATCH = Level(
-    "mismatch", gain=0.12, length_mm=0.08, noise_n=0.03, shift_mm=0.12, exponent=0.8,
-    cross_talk=0.45, wider_mm=0.2, scale=0.01,
-)  # fmt: skip
-LEVELS = {level.name: level for level in (LOW, TYPICAL, HARD, MISMATCH)}
+SOUND = Level("sound")
+LOW = Level("low", gain=0.05, exponent=0.95, length_mm=0.02, shift_mm=0.03, dome_mm=0.05,
+            load_ohm=100.0, bleed=0.005, noise_n=0.01)  # fmt: skip
+TYPICAL = Level("typical", gain=0.12, exponent=0.88, dead=1 / 256, length_mm=0.05, shift_mm=0.08,
+                dome_mm=0.10, load_ohm=220.0, bleed=0.02, noise_n=0.02)  # fmt: skip
+HARD = Level("hard", gain=0.15, exponent=0.85, dead=3 / 256, length_mm=0.06, shift_mm=0.10,
+             dome_mm=0.15, load_ohm=330.0, bleed=0.03, noise_n=0.03)  # fmt: skip
+MISMATCH = Level("mismatch", gain=0.12, exponent=0.80, length_mm=0.08, shift_mm=0.12,
+                 dome_mm=0.15, cross_talk=0.45, load_ohm=330.0, bleed=0.03, noise_n=0.03,
+                 wider_mm=0.2, scale=0.01)  # fmt: skip
 
-
-def read_sensor(
-    surface: HeightMap,
-    sensor: SensorType,
-    touch: Touch,
-    level: Level,
-    rng: np.random.Generator,
-    engine: str = "own",
-) -> tuple[NDArray[np.uint16], Contact]:
-    """Return the counts (rows, columns) of a sensor drawn from a level, and the contact.
-
-    Raises
-    ------
-    ContactError
-        The touch has no equilibrium.
-    """
-    shape = (sensor.rows, sensor.columns)
-    if level.wider_mm > 0 or level.scale != 0:
-        about = (touch.x_mm, touch.y_mm)
-        surface = DistortedSurface(surface, level.wider_mm, level.scale, about)
-    contacts, tips = engine_named(engine), Tips()
-    if sensor.overlay.kind == "tab":
-        tips = Tips(
-            points=contacts.points,
-            lengths_mm=level.length_mm * rng.standard_normal(shape),
-            shifts_mm=level.shift_mm * rng.standard_normal((*shape, 2)),
-        )
-    contact = contacts.press(surface, sensor, touch, tips)
-    forces = contact.forces_n
-    if level.cross_talk > 0:
-        from scipy.ndimage import gaussian_filter
-
-        forces = gaussian_filter(forces, level.cross_talk, mode="nearest")
-    forces = np.exp(level.gain * rng.standard_normal(shape)) * forces**level.exponent
-    forces = forces + level.noise_n * rng.standard_normal(shape)
-    forces.reshape(-1)[rng.permutation(forces.size)[: level.dead]] = 0.0
-    counts = np.rint(READOUT.bias + READOUT.counts_per_n * forces)
-    return np.clip(counts, 0, READOUT.full).astype(np.uint16), contact
+LEVELS = {
+    level.name: level
+    for level in (
+        LOW,
+        TYPICAL,
+        HARD,
+        MISMATCH,
+        SOUND,
+        replace(SOUND, name="places-08", shift_mm=0.08),
+        replace(SOUND, name="bleed-2", bleed=0.02),
+        replace(TYPICAL, name="places-25", shift_mm=0.25),
+        replace(TYPICAL, name="domed", dome_mm=0.3),
+        replace(TYPICAL, name="dead-10", dead=0.10),
+        replace(TYPICAL, name="dead-20", dead=0.20),
+        replace(TYPICAL, name="dead-40", dead=0.40),
+        replace(TYPICAL, name="hysteresis-15", hysteresis=0.15),
+        replace(TYPICAL, name="hysteresis-40", hysteresis=0.40),
+        replace(TYPICAL, name="saturated", load_ohm=2200.0),
+        replace(TYPICAL, name="floating-10", floating=0.10),
+        replace(TYPICAL, name="floating-30", floating=0.30),
+        replace(TYPICAL, name="floating", floating=1.0),
+        replace(TYPICAL, name="slide-2", slide_mm=2.0),
+        replace(TYPICAL, name="slide-6", slide_mm=6.0),
+        replace(TYPICAL, name="tilt-5", tilt_rad=math.radians(5)),
+        replace(TYPICAL, name="light", force_n=(3.0, 20.0)),
+        replace(TYPICAL, name="quarter-turn", mounting="quarter turn"),
+        replace(TYPICAL, name="mirrored", mounting="mirrored"),
+        replace(TYPICAL, name="transposed", mounting="transposed"),
+        replace(TYPICAL, name="halves-swapped", mounting="halves swapped"),
+        replace(TYPICAL, name="rolled", mounting="rolled"),
+    )
+}

@@ -15,7 +15,6 @@ from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
-from probe.simulate.world.levels import LEVELS
 from recognizer.touch.belief import Support, symbols_to_name, weigh_cells
 from recognizer.touch.lab import open_lab
 from recognizer.touch.locate import (
@@ -83,14 +82,55 @@ def test_a_clean_touch_is_placed(url, reader, name, face):
         assert found.T_object_probe == pytest.approx(scene.T_object_surface @ T)
 
 
-@pytest.mark.parametrize("level", list(LEVELS))
-def test_touches_of_a_level(url, reader, level):
+@pytest.mark.parametrize(
+    ("level", "rms_mm"),
+    [("sound", 0.1), ("low", 0.1), ("typical", 0.1), ("hard", 0.1), ("mismatch", 0.3)],
+)
+def test_touches_of_a_level(url, reader, level, rms_mm):
+    """A print that is 1 % off costs what it is off from its datum: up to .3 mm on these faces."""
     found = [trial(TouchPlan(url, 3, level), number, reader) for number in range(12)]
     assert all(t.verdict != "wrong" for t in found)
     right = [t for t in found if t.verdict == "right"]
     assert len(right) >= 11
-    assert math.sqrt(np.mean([t.error_mm**2 for t in right])) < 0.1
+    assert math.sqrt(np.mean([t.error_mm**2 for t in right])) < rms_mm
     assert math.sqrt(np.mean([t.error_deg**2 for t in right])) < 0.4
+
+
+def test_a_sensor_a_quarter_turn_off_is_answered_and_counted_as_wrong(url, reader):
+    found = [trial(TouchPlan(url, 3, "quarter-turn"), number, reader) for number in range(4)]
+    assert [t.verdict for t in found] == ["wrong"] * 4
+    assert all(abs(abs(t.error_deg) - 90) < 1 for t in found)
+
+
+def test_columns_that_are_rolled_by_one_shift_the_answer_by_a_tactel(url, reader):
+    found = [trial(TouchPlan(url, 3, "rolled"), number, reader) for number in range(4)]
+    errors = [t.error_mm for t in found if t.answer]
+    assert errors
+    assert errors == pytest.approx([1.5875] * len(errors), abs=0.15)
+
+
+@pytest.mark.parametrize("level", ["mirrored", "dead-40", "floating"])
+def test_sensors_that_cannot_be_read_are_never_wrong(url, reader, level):
+    found = [trial(TouchPlan(url, 3, level), number, reader) for number in range(4)]
+    assert [t.verdict for t in found] == ["rejected"] * 4
+
+
+def test_levels_have_forces_and_tilts_of_their_own(url, reader):
+    light = [draw_touch(TouchPlan(url, 3, "light"), n, reader).touch for n in range(12)]
+    assert all(3 <= touch.force_n <= 20 for touch in light)
+    tilted = [draw_touch(TouchPlan(url, 3, "tilt-5"), n, reader).touch for n in range(12)]
+    tilts = [math.degrees(math.hypot(touch.tilt_x_rad, touch.tilt_y_rad)) for touch in tilted]
+    assert 3 < max(tilts) <= 5
+
+
+def test_one_sensor_for_a_run_keeps_its_errors(url, reader):
+    plan = TouchPlan(url, 3, "dead-40", sensor_per="run")
+    dead = [draw_touch(plan, n, reader).counts < 40 for n in range(24)]
+    assert np.logical_and.reduce(dead).sum() >= 102  # the same tactels feel nothing, touch by touch
+    every = [
+        draw_touch(replace(plan, sensor_per="touch"), n, reader).counts < 16 for n in range(24)
+    ]
+    assert np.logical_and.reduce(every).sum() < 26
 
 
 def test_touches_through_a_pad(url, pad_reader):
