@@ -110,7 +110,7 @@ def run(
         return error.exit_code
     except usage_error as error:
         called = getattr(getattr(error, "ctx", None), "command_path", "")
-        called = called or _called(name, app, arguments)
+        called = called or _command_path(name, app, arguments)
         problem = EncodedObjectsError(_misuse(error), fix=f"see {called} --help")
         output.error(problem, as_json=as_json)
         return BAD_INPUT
@@ -147,7 +147,7 @@ def one_thread() -> None:
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 
-def _called(name: str, app: Typer | None, arguments: list[str]) -> str:
+def _command_path(name: str, app: Typer | None, arguments: list[str]) -> str:
     """Return how the command that was meant is called, with the groups it stands in."""
     from typer.main import get_command
 

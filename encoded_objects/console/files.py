@@ -36,17 +36,17 @@ def refuse_taken(out: Path, suffix: str, *, replace: bool) -> None:
             f"there is no folder {out.parent}", fix="make it first", place=place
         )
     if out.exists() and not replace:
-        raise taken(out)
+        raise file_exists_error(out)
 
 
-def taken(out: Path) -> EncodedObjectsError:
+def file_exists_error(out: Path) -> EncodedObjectsError:
     """Return the refusal of a file that is there already."""
     fix = "choose another name, or replace it with --replace"
     return EncodedObjectsError("the file is there already", fix=fix, place=str(out))
 
 
 @contextmanager
-def staged(out: Path) -> Iterator[Path]:
+def staged_file(out: Path) -> Iterator[Path]:
     """Yield a name beside `out` to write to; it becomes `out` when all went well."""
     draft = out.with_name(f".{out.stem}.{os.getpid()}{out.suffix}")
     try:

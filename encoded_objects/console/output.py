@@ -23,7 +23,7 @@ def write(text: str) -> None:
 
 def write_json(value: Any, *, line: bool = False) -> None:
     """Write one JSON value to stdout, on a line of its own if asked; null for no number."""
-    write(json.dumps(plain(value), indent=None if line else 2, allow_nan=False))
+    write(json.dumps(json_value(value), indent=None if line else 2, allow_nan=False))
 
 
 def version(name: str, *, as_json: bool) -> None:
@@ -84,19 +84,19 @@ def pairs(values: dict[str, str]) -> None:
         write(f"{name:<{wide}}  {value}")
 
 
-def number(count: int, thing: str) -> str:
+def count_of(count: int, thing: str) -> str:
     """Return a count in words: 1 frame, 2,000 frames."""
     return f"{count:,} {thing}" if count == 1 else f"{count:,} {thing}s"
 
 
-def plain(value: Any) -> Any:
+def json_value(value: Any) -> Any:
     """Return a value as JSON has it: numbers of numpy as such, null for inf and nan."""
     if isinstance(value, dict):
-        return {name: plain(item) for name, item in value.items()}
+        return {name: json_value(item) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
+        return [json_value(item) for item in value]
     if hasattr(value, "tolist"):
-        return plain(value.tolist())
+        return json_value(value.tolist())
     if isinstance(value, float) and not math.isfinite(value):
         return None
     if value is None or isinstance(value, (str, int, float, bool)):

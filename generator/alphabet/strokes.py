@@ -54,7 +54,7 @@ def counts(glyph: Glyph) -> Counts:
         spokes.setdefault(a, []).append((b[0] - a[0], b[1] - a[1]))
         spokes.setdefault(b, []).append((a[0] - b[0], a[1] - b[1]))
     ends = sum(len(at) == 1 for at in spokes.values())
-    vertices = sum(not _straight(at) for at in spokes.values() if len(at) > 1)
+    vertices = sum(not _is_straight(at) for at in spokes.values() if len(at) > 1)
     pieces = _pieces(edges)
     return Counts(ends, vertices, len(edges) - len(spokes) + pieces, pieces)
 
@@ -152,7 +152,7 @@ def _meetings(a: Point, b: Point, c: Point, d: Point) -> set[Fraction]:
     return {t for t in ends if 0 < t < 1}
 
 
-def _straight(spokes: list[Point]) -> bool:
+def _is_straight(spokes: list[Point]) -> bool:
     """Whether a point is only passed through: two spokes in opposite directions."""
     if len(spokes) != 2:
         return False

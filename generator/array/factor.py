@@ -140,7 +140,7 @@ def period_factors(order: int, degree: int) -> dict[int, int]:
     return dict(_period_factors(order, degree))
 
 
-def decodes(order: int, degree: int) -> bool:
+def is_decodable(order: int, degree: int) -> bool:
     """Whether the discrete logarithm over GF(order^degree) stays within its tables."""
     return max(period_factors(order, degree), default=1) <= LARGEST_PRIME_FACTOR
 
@@ -148,6 +148,6 @@ def decodes(order: int, degree: int) -> bool:
 def degrees_that_decode(order: int, degree: int) -> list[int]:
     """Return the nearest degrees, below and above, whose logarithm is feasible."""
     longest = next(n for n in range(64, 0, -1) if order**n - 1 <= LARGEST_PERIOD)
-    below = next((n for n in range(degree - 1, 0, -1) if decodes(order, n)), None)
-    above = next((n for n in range(degree + 1, longest + 1) if decodes(order, n)), None)
+    below = next((n for n in range(degree - 1, 0, -1) if is_decodable(order, n)), None)
+    above = next((n for n in range(degree + 1, longest + 1) if is_decodable(order, n)), None)
     return [n for n in (below, above) if n is not None]

@@ -89,7 +89,7 @@ class Field:
     def primitive_labels(self) -> tuple[int, ...]:
         """Labels of the elements that generate the multiplicative group."""
         primes = period_factors(self.order, 1)
-        return tuple(a for a in range(1, self.order) if _generates(self, a, tuple(primes)))
+        return tuple(a for a in range(1, self.order) if _is_generator(self, a, tuple(primes)))
 
 
 def field_of_order(order: int, minimal: Sequence[int] | None = None) -> Field:
@@ -187,7 +187,7 @@ def _first_primitive(prime: int, exponent: int) -> tuple[int, ...]:
     raise AssertionError("every field has a primitive polynomial of every degree")
 
 
-def _generates(field: Field, label: int, primes: tuple[int, ...]) -> bool:
+def _is_generator(field: Field, label: int, primes: tuple[int, ...]) -> bool:
     for prime in primes:
         power = 1
         for _ in range((field.order - 1) // prime):

@@ -102,8 +102,8 @@ class FoldedArray:
     def symbols(self, rows: ArrayLike, columns: ArrayLike) -> Labels:
         """Return the labels at cells (rows, columns), broadcast together, on the torus."""
         field = self.sequence.field
-        r, in_row = _distinct(rows, self.rows)
-        c, in_column = _distinct(columns, self.columns)
+        r, in_row = _distinct_indices(rows, self.rows)
+        c, in_column = _distinct_indices(columns, self.columns)
         maps = self.sequence.functionals(self._beta.at(r))  # (rows, m, D)
         elements = self._gamma.at(c)  # (columns, D)
         in_row, in_column = np.broadcast_arrays(in_row, in_column)
@@ -227,7 +227,9 @@ def sequence_definition(sequence: Sequence) -> dict[str, Any]:
     }
 
 
-def _distinct(indices: ArrayLike, steps: int) -> tuple[NDArray[np.uint64], NDArray[np.intp]]:
+def _distinct_indices(
+    indices: ArrayLike, steps: int
+) -> tuple[NDArray[np.uint64], NDArray[np.intp]]:
     on_cycle = on_torus(indices, steps)
     distinct, place = np.unique(on_cycle.ravel(), return_inverse=True)
     return distinct, place.reshape(on_cycle.shape)

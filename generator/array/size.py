@@ -13,7 +13,7 @@ from math import prod
 from generator.array.factor import (
     LARGEST_PERIOD,
     LARGEST_PRIME_FACTOR,
-    decodes,
+    is_decodable,
     period_factors,
 )
 from generator.errors import ArrayError
@@ -62,7 +62,7 @@ def nearest_sizes(order: int, degree: int) -> list[tuple[int, tuple[int, int]]]:
     for step in (-1, 1):
         n = degree + step
         while n > 1 and order**n - 1 <= LARGEST_PERIOD:
-            fold = usual_fold(order, n) if decodes(order, n) else None
+            fold = usual_fold(order, n) if is_decodable(order, n) else None
             if fold is not None:
                 found.append((n, fold))
                 break

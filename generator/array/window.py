@@ -93,7 +93,7 @@ def least_weight_by_dual(field: Field, columns: Labels) -> int:
     """
     length, dimension = columns.shape
     counts = [0] * (length + 1)
-    for word_weight in _words(field, null_space(field, columns.T)):
+    for word_weight in _weights_of_span(field, null_space(field, columns.T)):
         counts[word_weight] += 1
     for weight in range(1, length + 1):  # MacWilliams: words of each weight, exactly
         if sum(n * _krawtchouk(field.order, length, weight, k) for k, n in enumerate(counts) if n):
@@ -108,7 +108,7 @@ def _krawtchouk(order: int, length: int, weight: int, at: int) -> int:
     )
 
 
-def _words(field: Field, basis: Labels) -> Iterator[int]:
+def _weights_of_span(field: Field, basis: Labels) -> Iterator[int]:
     """Yield the weight of every combination of the rows of `basis`."""
     listed = np.zeros((1, basis.shape[1]), dtype=np.int64)
     for row in basis:

@@ -64,7 +64,7 @@ def _print_object(one: PrintedObject) -> None:
     counts = {v: sum(row.verdicts[v] for row in rows) for v in (SURVIVES, DOUBTFUL, LOST)}
     total = sum(counts.values())
     output.write(
-        f"{counts[SURVIVES]} of {output.number(total, 'symbol')} survive, "
+        f"{counts[SURVIVES]} of {output.count_of(total, 'symbol')} survive, "
         f"{counts[DOUBTFUL]} doubtful, {counts[LOST]} lost"
     )
     if note := _height_note(rows):

@@ -27,7 +27,7 @@ _PREFIX = ".encode-object-"
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class StagedFile:
     """A file that waits to be moved under its final name."""
 
     path: Path  #: final name
@@ -62,7 +62,7 @@ class Staging:
 
     def __init__(self, folder: Path | str) -> None:
         self.folder = Path(folder)
-        self.written: list[Written] = []
+        self.written: list[StagedFile] = []
         self._made: list[Path] = []
         self._lock = -1
 
@@ -89,7 +89,7 @@ class Staging:
         os.close(self._lock)
         self._remove_made()
 
-    def write(self, name: str, content: bytes | Iterable[bytes]) -> Written:
+    def write(self, name: str, content: bytes | Iterable[bytes]) -> StagedFile:
         """Write one file into the staging folder, from bytes or from a stream of pieces."""
         final = self.folder / name
         pieces = (content,) if isinstance(content, bytes) else content
@@ -105,10 +105,10 @@ class Staging:
                     size += len(piece)
                 file.flush()
                 os.fsync(file.fileno())
-        self.written.append(Written(final, self._hidden / name, size, digest.hexdigest()))
+        self.written.append(StagedFile(final, self._hidden / name, size, digest.hexdigest()))
         return self.written[-1]
 
-    def commit(self) -> tuple[Written, ...]:
+    def commit(self) -> tuple[StagedFile, ...]:
         """Move all files under their final names; files of those names are replaced.
 
         Each file is whole at any moment; a process killed between two moves leaves some old

@@ -85,7 +85,7 @@ def triangles_cross(one: Triangle, other: Triangle) -> bool:
     shared = sorted(set(one) & set(other))
     if len(shared) == 3:
         return True
-    return any(not _on_shared(point, shared) for point in _common(one, other))
+    return any(not _on_shared(point, shared) for point in _intersection_points(one, other))
 
 
 def _in_integers(corners: NDArray[np.float64]) -> list[Triangle]:
@@ -97,7 +97,7 @@ def _in_integers(corners: NDArray[np.float64]) -> list[Triangle]:
     return [(vectors[k], vectors[k + 1], vectors[k + 2]) for k in range(0, len(vectors), 3)]
 
 
-def _common(one: Triangle, other: Triangle) -> list[Point]:
+def _intersection_points(one: Triangle, other: Triangle) -> list[Point]:
     """Return points whose convex hull is what two triangles have in common."""
     points: list[Point] = [(*corner, 1) for corner in one]
     for a, b, c, d in _half_spaces(other):
@@ -122,31 +122,31 @@ def _common(one: Triangle, other: Triangle) -> list[Point]:
 def _half_spaces(triangle: Triangle) -> Iterator[HalfSpace]:
     """Yield half spaces whose intersection is the triangle; it may be a segment or a point."""
     a, b, c = triangle
-    normal = _cross(_minus(b, a), _minus(c, a))
+    normal = _cross(_subtract(b, a), _subtract(c, a))
     if any(normal):
         yield from _plane(normal, a)
         for p, q in ((a, b), (b, c), (c, a)):
-            yield _beyond(_cross(normal, _minus(q, p)), p)
+            yield _half_space_from(_cross(normal, _subtract(q, p)), p)
         return
     start, end = min(triangle), max(triangle)  # on a line the first and last in order
-    along = _minus(end, start)
+    along = _subtract(end, start)
     for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1)):
         across = _cross(along, axis) if any(along) else axis
         if any(across):
             yield from _plane(across, start)
     if any(along):
-        yield _beyond(along, start)
-        yield _beyond(_minus(start, end), end)
+        yield _half_space_from(along, start)
+        yield _half_space_from(_subtract(start, end), end)
 
 
 def _plane(normal: Vector, point: Vector) -> Iterator[HalfSpace]:
     """Yield the two half spaces whose intersection is a plane."""
     x, y, z = normal
-    yield _beyond(normal, point)
-    yield _beyond((-x, -y, -z), point)
+    yield _half_space_from(normal, point)
+    yield _half_space_from((-x, -y, -z), point)
 
 
-def _beyond(normal: Vector, point: Vector) -> HalfSpace:
+def _half_space_from(normal: Vector, point: Vector) -> HalfSpace:
     """Return the half space that begins at a point and lies along its normal."""
     return (*normal, -_dot(normal, point))
 
@@ -158,14 +158,14 @@ def _on_shared(point: Point, shared: Sequence[Vector]) -> bool:
     x, y, z, w = point
     start, end = shared[0], shared[-1]
     arm = (x - w * start[0], y - w * start[1], z - w * start[2])
-    along = _minus(end, start)
+    along = _subtract(end, start)
     reach = _dot(arm, along)
     if any(_cross(arm, along)) or not 0 <= reach <= w * _dot(along, along):
         return False
     return any(along) or not any(arm)
 
 
-def _minus(p: Vector, q: Vector) -> Vector:
+def _subtract(p: Vector, q: Vector) -> Vector:
     return p[0] - q[0], p[1] - q[1], p[2] - q[2]
 
 

@@ -20,7 +20,7 @@ Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class LabelRequest:
     """A name to be placed."""
 
     face: int  #: as the map calls it
@@ -30,7 +30,7 @@ class Wanted:
 
 
 def label_places(
-    seen: Index, step: float, wanted: Sequence[Wanted]
+    seen: Index, step: float, wanted: Sequence[LabelRequest]
 ) -> list[tuple[float, float] | None]:
     """Return the centre of each label, px, or None where there is no place for it.
 

@@ -30,7 +30,7 @@ class Label:
     half_width: float  #: px
 
 
-def plain(text: str) -> str:
+def transliterate(text: str) -> str:
     """Return `text` in the letters of the built-in font: ASCII, accents left out."""
     letters = unicodedata.normalize("NFKD", text)
     kept = "".join(letter for letter in letters if not unicodedata.combining(letter))
@@ -65,7 +65,7 @@ def write_lettering(
     draw = ImageDraw.Draw(image)
     width, height = image.size
     large, medium, small = fonts
-    draw.text((MARGIN, 20), plain(name), INK, large)
+    draw.text((MARGIN, 20), transliterate(name), INK, large)
     draw.text((MARGIN, 58), subtitle, GREY, small)
     for i, caption in enumerate(CAPTIONS):
         text = caption + (", panels moved apart" if i and apart else "")

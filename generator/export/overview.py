@@ -12,8 +12,8 @@ from importlib.util import find_spec
 from typing import Any
 
 from generator.export.colours import BODY_RGB
-from generator.export.lettering import plain
-from generator.export.packing import Packed
+from generator.export.lettering import transliterate
+from generator.export.packing import PackedPart
 
 _PAGE = (8.27, 11.69)  # inches
 _LINES = 44  # objects on one page
@@ -27,7 +27,7 @@ def can_draw() -> bool:
 
 
 def overview_pdf(
-    title: str, plates: Sequence[Sequence[Packed]], beds_mm: Sequence[tuple[float, float]]
+    title: str, plates: Sequence[Sequence[PackedPart]], beds_mm: Sequence[tuple[float, float]]
 ) -> bytes:
     """Return the pages.
 
@@ -54,16 +54,16 @@ def overview_pdf(
     return buffer.getvalue()
 
 
-def _object_pages(title: str, plates: Sequence[Sequence[Packed]]) -> list[Any]:
+def _object_pages(title: str, plates: Sequence[Sequence[PackedPart]]) -> list[Any]:
     """Return the table of the objects."""
-    of: dict[tuple[int, str], list[Packed]] = {}
+    of: dict[tuple[int, str], list[PackedPart]] = {}
     for row in (row for packed in plates for row in packed):
         of.setdefault((row.order[0], row.object), []).append(row)
     objects = sorted(of.items())
     counts = f"{len(objects)} objects, {sum(map(len, of.values()))} parts, {len(plates)} plates"
     pages = []
     for first in range(0, len(objects), _LINES):
-        page, axes = _page(f"{plain(title)}: {counts}", (0.08, 0.05, 0.84, 0.85))
+        page, axes = _page(f"{transliterate(title)}: {counts}", (0.08, 0.05, 0.84, 0.85))
         axes.set(xlim=(0, 1), ylim=(_LINES + 1, 0))
         axes.axis("off")
         for text, x in _COLUMNS:
@@ -71,7 +71,7 @@ def _object_pages(title: str, plates: Sequence[Sequence[Packed]]) -> list[Any]:
         for line, ((_, name), rows) in enumerate(objects[first : first + _LINES], 1):
             on = ", ".join(str(number) for number in sorted({row.plate for row in rows}))
             symbols = sum(row.symbols for row in rows)
-            texts = (plain(name), str(len(rows)), str(symbols), on)
+            texts = (transliterate(name), str(len(rows)), str(symbols), on)
             for (_, x), text in zip(_COLUMNS, texts, strict=True):
                 axes.text(x, line + 0.5, text, size=9, color=_INK, va="center")
             axes.plot([0, 1], [line, line], color="#CBD5E1", linewidth=0.4)
@@ -80,13 +80,15 @@ def _object_pages(title: str, plates: Sequence[Sequence[Packed]]) -> list[Any]:
 
 
 def _plate_page(
-    title: str, number: int, packed: Sequence[Packed], bed_mm: tuple[float, float]
+    title: str, number: int, packed: Sequence[PackedPart], bed_mm: tuple[float, float]
 ) -> Any:
     """Return the plan of one plate: every part as a rectangle with its name."""
     from matplotlib.patches import Rectangle
 
     beyond = "" if all(row.fits for row in packed) else "; larger than the bed"
-    head = f"{plain(title)}: plate {number}, {packed[0].printer}, {len(packed)} parts{beyond}"
+    head = (
+        f"{transliterate(title)}: plate {number}, {packed[0].printer}, {len(packed)} parts{beyond}"
+    )
     page, axes = _page(head, (0.08, 0.08, 0.84, 0.8))
     width, depth = bed_mm
     axes.add_patch(Rectangle((0, 0), width, depth, facecolor="#F1F5F9", edgecolor=_EDGE))
@@ -96,7 +98,7 @@ def _plate_page(
         x, y, (w, d) = row.place.x_mm, row.place.y_mm, row.lying_mm
         axes.add_patch(Rectangle((x, y), w, d, facecolor=colour, edgecolor=_EDGE, linewidth=0.6))
         upright = d > 1.5 * w
-        text = plain(row.part)
+        text = transliterate(row.part)
         room = (d if upright else w) / width * 0.84 * _PAGE[0] * 72  # points
         size = max(3.0, min(9.0, 0.9 * room / (0.62 * max(1, len(text)))))
         axes.text(

@@ -19,7 +19,7 @@ COLUMNS = (
 
 
 @dataclass(frozen=True, slots=True)
-class Packed:
+class PackedPart:
     """One part of a set and its place."""
 
     order: tuple[int, int]  #: object and part, as the set lists them
@@ -39,7 +39,7 @@ class Packed:
         return (depth, width) if self.place.turned else (width, depth)
 
 
-def packing_csv(packed: Sequence[Packed]) -> bytes:
+def packing_csv(packed: Sequence[PackedPart]) -> bytes:
     """Return the list, one line for each part."""
     text = io.StringIO(newline="")
     table = csv.writer(text)

@@ -24,9 +24,16 @@ from generator.export.faces import (
     object_faces,
     symbol_triangles,
 )
-from generator.export.labels import Wanted, label_places
-from generator.export.lettering import FONT_SIZES, MARGIN, Font, Label, plain, write_lettering
-from generator.export.raster import Visible, visible
+from generator.export.labels import LabelRequest, label_places
+from generator.export.lettering import (
+    FONT_SIZES,
+    MARGIN,
+    Font,
+    Label,
+    transliterate,
+    write_lettering,
+)
+from generator.export.raster import DepthBuffer, rasterise
 from generator.export.settings import PREVIEW
 from generator.solid.part import Facet, Part
 from generator.solid.triangulate import Mesh
@@ -211,16 +218,16 @@ def _draw_view(
         moved: Points = (points - middle) * np.array([fine, -fine, fine]) + offset
         return moved
 
-    seen = visible(screen(flat), scene.triangles, memory)
+    seen = rasterise(screen(flat), scene.triangles, memory)
     view = picture[top:bottom, left:right]
     seen.paint(view, _shade(scene, flat))
     _draw_edges(view, screen(scene.edges @ axes.T), seen, 0.6 * fine)
-    texts = [plain(name) for name in scene.names]
+    texts = [transliterate(name) for name in scene.names]
     halves = [font.getlength(text) / 2 + 9 for text in texts]
     middles = screen(scene.centres @ axes.T)[:, :2] / PREVIEW.samples
     facing = np.flatnonzero(scene.normals @ axes[2] > PREVIEW.facing).tolist()
     wanted = [
-        Wanted(face, float(middles[face, 0]), float(middles[face, 1]), halves[face])
+        LabelRequest(face, float(middles[face, 0]), float(middles[face, 1]), halves[face])
         for face in facing
     ]
     step = PREVIEW.label_step
@@ -258,7 +265,7 @@ def _pack_colours(rgb: Points) -> Colours:
     return words if sys.byteorder == "little" else words.byteswap()
 
 
-def _draw_edges(view: Colours, edges: Points, seen: Visible, slack: float) -> None:
+def _draw_edges(view: Colours, edges: Points, seen: DepthBuffer, slack: float) -> None:
     """Draw the edges of the bodies where nothing lies in front of them."""
     height, width = view.shape
     line = _pack_colours(np.array([PREVIEW.line_rgb]))

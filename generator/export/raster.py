@@ -28,7 +28,7 @@ _NUMBER_BITS = 26  # up to 67 million triangles
 
 
 @dataclass(frozen=True, slots=True)
-class Visible:
+class DepthBuffer:
     """What is seen at each pixel."""
 
     keys: Index  #: (height, width) depth and triangle, -1 where nothing is seen
@@ -57,7 +57,7 @@ class Visible:
         return steps * self.step + self.nearest
 
 
-def visible(points: Floats, triangles: Index, screen: Index) -> Visible:
+def rasterise(points: Floats, triangles: Index, screen: Index) -> DepthBuffer:
     """Return which triangle is seen at each pixel.
 
     Parameters
@@ -86,7 +86,7 @@ def visible(points: Floats, triangles: Index, screen: Index) -> Visible:
             low,
             step,
         )
-    return Visible(screen, low, step)
+    return DepthBuffer(screen, low, step)
 
 
 def _draw(

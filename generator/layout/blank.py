@@ -75,9 +75,9 @@ def _pitch(region: Region, request: Request) -> float:
     """Return a pitch (mm) at which the face shows a place, symbols in proportion; 0 if none."""
 
     def shows(share: float) -> bool:
-        return _shows(region, request.half_mm * share, request.pitch_mm * share, request)
+        return _shows_place(region, request.half_mm * share, request.pitch_mm * share, request)
 
-    share = _last(shows, LAYOUT.least_pitch, 1.0)
+    share = _largest_share(shows, LAYOUT.least_pitch, 1.0)
     for step in (0.1, 0.05, 0.01):  # the roundest number that still works
         pitch = float(np.floor(share * request.pitch_mm / step + 1e-9)) * step
         if pitch > 0.0 and shows(pitch / request.pitch_mm):
@@ -90,9 +90,9 @@ def _scale(region: Region, request: Request) -> float:
 
     def shows(inverse: float) -> bool:
         larger = Region(region.start / inverse, region.end / inverse, region.clearance)
-        return _shows(larger, request.half_mm, request.pitch_mm, request)
+        return _shows_place(larger, request.half_mm, request.pitch_mm, request)
 
-    inverse = _last(shows, 1.0 / LAYOUT.most_size, 1.0)
+    inverse = _largest_share(shows, 1.0 / LAYOUT.most_size, 1.0)
     if inverse == 0.0:
         return float(np.inf)
     for step in (0.1, 0.01):
@@ -102,7 +102,7 @@ def _scale(region: Region, request: Request) -> float:
     return float(np.inf)
 
 
-def _last(shows: Callable[[float], bool], low: float, high: float) -> float:
+def _largest_share(shows: Callable[[float], bool], low: float, high: float) -> float:
     """Return a share from low (works) to high (does not) that works, by bisection; 0 if none."""
     if not shows(low):
         return 0.0
@@ -115,7 +115,7 @@ def _last(shows: Callable[[float], bool], low: float, high: float) -> float:
     return low
 
 
-def _shows(region: Region, half: float, pitch: float, request: Request) -> bool:
+def _shows_place(region: Region, half: float, pitch: float, request: Request) -> bool:
     lattice = choose_lattice(
         [region], half, pitch, request.window, request.identifies, search=False
     )

@@ -32,7 +32,7 @@ class Board:
 
     def grow(self) -> bool:
         """Open more of the array; False if the whole of it is in sight."""
-        extent = _larger(self._extent, self._whole)
+        extent = _next_extent(self._extent, self._whole)
         if extent == self._extent:
             return False
         self._resize(*extent)
@@ -140,15 +140,15 @@ def board_size(occupancy: Occupancy) -> tuple[int, int]:
         return size
     extent = min(size[0], LAYOUT.corner), min(size[1], LAYOUT.corner)
     low = np.array([(y * TILE, x * TILE) for y, x in occupancy.tiles]).reshape(-1, 2)
-    while extent != (following := _larger(extent, size)):
-        inside = (low < _larger(following, size)).all(axis=1)  # a step for each side
+    while extent != (following := _next_extent(extent, size)):
+        inside = (low < _next_extent(following, size)).all(axis=1)  # a step for each side
         if not (inside & (low >= extent).any(axis=1)).any():
             break
         extent = following
     return extent
 
 
-def _larger(extent: tuple[int, int], size: tuple[int, int]) -> tuple[int, int]:
+def _next_extent(extent: tuple[int, int], size: tuple[int, int]) -> tuple[int, int]:
     """Return the next extent of the corner of an array, the same where it is the whole."""
     rows, columns = extent
     if columns == size[1] or (rows <= columns and rows < size[0]):

@@ -136,7 +136,7 @@ def lay_out(
             if placed[0] is not plans[0]:  # other pieces may show other faces
                 warning = _without_place(task, placed[0], allow_blank_faces)
             return _layout(task, *placed, warning)
-    raise _full(plans[0], occupied)
+    raise _full_array_error(plans[0], occupied)
 
 
 def _without_place(task: LayoutTask, plan: LayoutPlan, allowed: bool) -> tuple[str, ...]:
@@ -222,7 +222,7 @@ def _face_layout(task: LayoutTask, piece: Piece, k: int, spot: Spot) -> FaceLayo
     )
 
 
-def _full(plan: LayoutPlan, occupancy: Occupancy) -> LayoutError:
+def _full_array_error(plan: LayoutPlan, occupancy: Occupancy) -> LayoutError:
     needed = -plan.worth[2]
     cause = (
         f"the array {occupancy.rows}x{occupancy.columns} is full: the object needs {needed} "

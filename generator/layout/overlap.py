@@ -33,15 +33,15 @@ def triangles_of(loops: Sequence[Points]) -> Triangles:
 
 def overlap(first: Triangles, second: Triangles, tolerance: float) -> bool:
     """Whether any triangle of the first set reaches into one of the second (lengths in mm)."""
-    second = _near(second, first, tolerance)
-    first = _near(first, second, tolerance)
+    second = _near_triangles(second, first, tolerance)
+    first = _near_triangles(first, second, tolerance)
     if len(first) == 0 or len(second) == 0:
         return False
     gap = np.maximum(_separation(first, second), _separation(second, first).T)
     return bool((gap < -tolerance).any())
 
 
-def _near(triangles: Triangles, others: Triangles, tolerance: float) -> Triangles:
+def _near_triangles(triangles: Triangles, others: Triangles, tolerance: float) -> Triangles:
     """Return the triangles that reach into the bounding box of the others."""
     if len(others) == 0:
         return triangles[:0]

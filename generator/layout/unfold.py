@@ -126,7 +126,7 @@ def _trees(polyhedron: Polyhedron, surface: _Surface, seed: int) -> Iterator[tup
     for root in roots[: LAYOUT.breadth_roots]:
         yield root, lambda _edge, depth: float(depth)
     for direction in _directions():
-        yield roots[0], _uncut_first(_steepest(polyhedron, direction))
+        yield roots[0], _uncut_first(_steepest_edges(polyhedron, direction))
     random = np.random.default_rng(seed)
     for _ in range(LAYOUT.random_trees):
         yield roots[0], _edge_order(random.permutation(len(polyhedron.edges)))
@@ -148,7 +148,7 @@ def _directions() -> Points:
     return corners * (0.53, 0.31, 0.79)
 
 
-def _steepest(polyhedron: Polyhedron, direction: Points) -> NDArray[np.bool_]:
+def _steepest_edges(polyhedron: Polyhedron, direction: Points) -> NDArray[np.bool_]:
     """Return which edges are cut: from each vertex the edge that rises most steeply."""
     start = np.array([edge.start for edge in polyhedron.edges])
     end = np.array([edge.end for edge in polyhedron.edges])

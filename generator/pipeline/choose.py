@@ -69,15 +69,15 @@ def choose_array(
     if connection is not None:
         for one in specs:
             known = find_object(connection, one.spec.name)
-            kept = None if known is None else _registered(known.profile, connection)
+            kept = None if known is None else _profile_of_object(known.profile, connection)
             if kept is not None:
                 array = kept.array()
-                return Choice(tuple(_with(each, kept, array) for each in specs))
+                return Choice(tuple(_with_array(each, kept, array) for each in specs))
     short: list[str] = []  # why each smaller array does not do
     for candidate in _candidates(connection):
         array = candidate.array()
-        tried = tuple(_with(one, candidate, array) for one in specs)
-        needed, blank = _needs(tried, solid)
+        tried = tuple(_with_array(one, candidate, array) for one in specs)
+        needed, blank = _count_needs(tried, solid)
         room = _room(array, connection)
         size = f"{candidate.name} {array.rows}x{array.columns}"
         if needed is None:
@@ -85,16 +85,16 @@ def choose_array(
         elif needed > room:
             short.append(f"{needed} cells are needed, and {size} has room for {room}")
         else:
-            notes = (_larger(candidate, array, short[-1]),) if short else ()
+            notes = (_larger_note(candidate, array, short[-1]),) if short else ()
             found = Choice(tried, notes)
-            return _finer(found, blank, connection, solid) if blank else found
+            return _choose_finer(found, blank, connection, solid) if blank else found
     raise LayoutError(
         f"the objects fit no array that is made here: {short[-1]}",
         fix="make them in several databases",
     )
 
 
-def _larger(chosen: Profile, array: SymbolArray, why: str) -> str:
+def _larger_note(chosen: Profile, array: SymbolArray, why: str) -> str:
     """Return the note that a larger array was taken than the smallest one."""
     rows, columns = array.window
     of_smallest = "x".join(map(str, PROFILES[DEFAULT_PROFILE].window))
@@ -102,15 +102,15 @@ def _larger(chosen: Profile, array: SymbolArray, why: str) -> str:
     return f"profile {chosen.name} is taken ({window}): {why}"
 
 
-def _finer(
+def _choose_finer(
     coarse: Choice, blank: int, connection: Connection | None, solid: Polyhedron | None
 ) -> Choice:
     """Take the finer symbols where they show faces that stay blank otherwise."""
-    fine = _kept(PROFILES["fine"], connection)
+    fine = _stored_profile(PROFILES["fine"], connection)
     array = fine.array()
     try:
-        finer = tuple(_with(one, fine, array) for one in coarse.specs)
-        needed, left = _needs(finer, solid)
+        finer = tuple(_with_array(one, fine, array) for one in coarse.specs)
+        needed, left = _count_needs(finer, solid)
     except GeneratorError:  # the printer that the spec names cannot make them
         return coarse
     if needed is None or left >= blank or needed > _room(array, connection):
@@ -124,8 +124,8 @@ def _finer(
 
 def _candidates(connection: Connection | None) -> Iterator[Profile]:
     """Yield the arrays from the smallest on."""
-    yield _kept(PROFILES["one-touch"], connection)
-    larger = _kept(PROFILES["large"], connection)
+    yield _stored_profile(PROFILES["one-touch"], connection)
+    larger = _stored_profile(PROFILES["large"], connection)
     yield larger
     for _ in range(CHOICE.larger):
         try:
@@ -136,7 +136,7 @@ def _candidates(connection: Connection | None) -> Iterator[Profile]:
         yield replace(larger, name=f"large-{rows}x{columns}")
 
 
-def _kept(profile: Profile, connection: Connection | None) -> Profile:
+def _stored_profile(profile: Profile, connection: Connection | None) -> Profile:
     """Return a profile on the array that the database has under its name, if it has one."""
     if connection is None:
         return profile
@@ -147,7 +147,7 @@ def _kept(profile: Profile, connection: Connection | None) -> Profile:
     return replace(profile, encoding=kept, window=tuple(kept["window"]))
 
 
-def _registered(name: str, connection: Connection) -> Profile | None:
+def _profile_of_object(name: str, connection: Connection) -> Profile | None:
     """Return the profile of an object that got its array by `auto`, None for another one."""
     base = "large" if name.startswith("large-") else name
     kept = array_of_profile(connection, [name])
@@ -157,17 +157,17 @@ def _registered(name: str, connection: Connection) -> Profile | None:
 
 
 def _keep(located: LocatedSpec, connection: Connection | None) -> LocatedSpec:
-    """Return a spec that names its profile, on the array of `_kept`."""
+    """Return a spec that names its profile, on the array of `_stored_profile`."""
     name = located.spec.profile
     if name not in PROFILES:
         return located
-    kept = _kept(PROFILES[name], connection)
+    kept = _stored_profile(PROFILES[name], connection)
     if kept is PROFILES[name]:
         return located
-    return _with(located, kept, kept.array())
+    return _with_array(located, kept, kept.array())
 
 
-def _with(located: LocatedSpec, profile: Profile, array: SymbolArray) -> LocatedSpec:
+def _with_array(located: LocatedSpec, profile: Profile, array: SymbolArray) -> LocatedSpec:
     defaults = "large" if profile.name.startswith("large") else profile.name
     return with_profile(located, profile.name, defaults, array.definition())
 
@@ -181,7 +181,7 @@ def _follow(
     return with_profile(located, profile, defaults, encoding)
 
 
-def _needs(specs: Sequence[LocatedSpec], solid: Polyhedron | None) -> tuple[int | None, int]:
+def _count_needs(specs: Sequence[LocatedSpec], solid: Polyhedron | None) -> tuple[int | None, int]:
     """Return how many cells the objects need, None if one does not fit, and their blank faces."""
     known: dict[str, tuple[int, int]] = {}
     needed = blank = 0

@@ -27,7 +27,7 @@ from generator.pipeline.made import Encoded, MadeObject, describe_object
 from generator.pipeline.make import Order, make_under_lock
 from generator.pipeline.place import occupancy_of, occupancy_with, place_object
 from generator.pipeline.plan import ObjectPlan, plan_object
-from generator.pipeline.progress import Progress, no_progress, within
+from generator.pipeline.progress import Progress, no_progress, part_of_progress
 from generator.pipeline.sets import make_set, set_folder
 from generator.spec import LocatedSpec
 
@@ -89,7 +89,7 @@ def encode(
         plan = plan_object(located)
         notes = choice.notes if number == 0 else ()
         plans.append(dataclasses.replace(plan, notes=(*plan.notes, *notes)))
-    rest = within(progress, 0.1, 1.0)
+    rest = part_of_progress(progress, 0.1, 1.0)
     files: tuple[Path, ...] = ()
     if dry_run:
         with read_transaction(engine) if engine else nullcontext() as connection:
@@ -125,7 +125,7 @@ def _rehearse(
     taken = occupancy_of(connection, plans[0])
     used = 0
     for number, plan in enumerate(plans):
-        step = within(progress, number / len(plans), (number + 1) / len(plans))
+        step = part_of_progress(progress, number / len(plans), (number + 1) / len(plans))
         step(f"placing {plan.spec.name}", 0.0)
         place = place_object(connection, plan, replace, taken)
         step(f"building {plan.spec.name}", 0.5)

@@ -14,7 +14,7 @@ import numpy as np
 
 from generator.database.registered import RegisteredPart
 from generator.export.array_svg import FaceOnArray, array_svg
-from generator.export.atomic import Staging, Written
+from generator.export.atomic import StagedFile, Staging
 from generator.export.glb import glb_bytes
 from generator.export.preview import preview_png
 from generator.export.step import step_chunks
@@ -25,11 +25,11 @@ from generator.pipeline.blame import errors_at
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress
 from generator.polyhedron import face_polygon
-from generator.solid import Part, panels, prove_closed, triangles, volume, whole
+from generator.solid import Part, emboss_whole, panels, prove_closed, triangles, volume
 
 
 @dataclass(frozen=True, slots=True)
-class Staged:
+class StagedObject:
     """All files of one object, written but not yet under their final names."""
 
     registered: tuple[RegisteredPart, ...]
@@ -45,7 +45,7 @@ def stage(
     *,
     verify: bool,
     progress: Progress,
-) -> Staged:
+) -> StagedObject:
     """Build the parts of an object and write all its files into the staging folder.
 
     Parameters
@@ -109,14 +109,14 @@ def stage(
     size = np.ptp(plan.polyhedron.vertices, axis=0).tolist()
     staging.write(f"{spec.name}.png", preview_png(spec.name, size, parts, meshes))
     staging.write(f"{spec.name}-array.svg", _array_picture(plan, layout).encode())
-    return Staged(tuple(registered), len(parts), warnings)
+    return StagedObject(tuple(registered), len(parts), warnings)
 
 
 def parts_of(plan: ObjectPlan, layout: Layout) -> tuple[tuple[Part, ...], tuple[str, ...]]:
     """Return the parts of an object, panels or the whole body, and what they lack."""
     spec = plan.spec
     if spec.parts == "whole":
-        return (whole(plan.polyhedron, layout, plan.outlines, spec.name),), ()
+        return (emboss_whole(plan.polyhedron, layout, plan.outlines, spec.name),), ()
     with errors_at(plan.located, "print.wall, print, shape"):
         made = panels(
             plan.polyhedron, layout, plan.outlines, spec.wall_mm, plan.printer, name=spec.name
@@ -124,7 +124,7 @@ def parts_of(plan: ObjectPlan, layout: Layout) -> tuple[tuple[Part, ...], tuple[
     return made.parts, made.warnings
 
 
-def _part_entry(part: Part, kind: str, written: Written) -> RegisteredPart:
+def _part_entry(part: Part, kind: str, written: StagedFile) -> RegisteredPart:
     return RegisteredPart(part.name, kind, str(written.path), written.sha256, part.T_object_part)
 
 

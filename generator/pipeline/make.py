@@ -20,11 +20,11 @@ from generator.database.register import ObjectRecord, register
 from generator.database.transaction import LostRaceError, write_transaction
 from generator.database.url import part_file
 from generator.export.atomic import Staging
-from generator.pipeline.files import Staged, stage
+from generator.pipeline.files import StagedObject, stage
 from generator.pipeline.made import MadeObject, describe_object
 from generator.pipeline.place import ObjectPlacement, place_object
 from generator.pipeline.plan import ObjectPlan
-from generator.pipeline.progress import Progress, no_progress, within
+from generator.pipeline.progress import Progress, no_progress, part_of_progress
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ def make_under_lock(engine: Engine, order: Order, progress: Progress = no_progre
         with write_transaction(engine) as connection:
             progress(f"placing {name}", 0.0)
             place = place_object(connection, order.plan, order.replace)
-            files = _stage(order, place, staging, within(progress, 0.1, 0.9))
+            files = _stage(order, place, staging, part_of_progress(progress, 0.1, 0.9))
             progress(f"registering {name}", 0.9)
             _register(connection, order, place, files)
         return _finish(order, place, files, staging)
@@ -65,7 +65,7 @@ def make_at(
     """Make one object at a place chosen before, or anew where that was lost to another writer."""
     try:
         with Staging(order.folder) as staging:
-            files = _stage(order, place, staging, within(progress, 0.0, 0.9))
+            files = _stage(order, place, staging, part_of_progress(progress, 0.0, 0.9))
             with write_transaction(engine) as connection:
                 known = find_object(connection, order.plan.spec.name)
                 if (known is not None) != (place.reused or place.replaces):
@@ -76,13 +76,17 @@ def make_at(
         return make_under_lock(engine, order, progress)
 
 
-def _stage(order: Order, place: ObjectPlacement, staging: Staging, progress: Progress) -> Staged:
+def _stage(
+    order: Order, place: ObjectPlacement, staging: Staging, progress: Progress
+) -> StagedObject:
     return stage(
         order.plan, place.layout, order.formats, staging, verify=order.verify, progress=progress
     )
 
 
-def _register(connection: Connection, order: Order, place: ObjectPlacement, files: Staged) -> None:
+def _register(
+    connection: Connection, order: Order, place: ObjectPlacement, files: StagedObject
+) -> None:
     plan, url = order.plan, connection.engine.url
     registration = ObjectRecord(
         name=plan.spec.name,
@@ -101,7 +105,7 @@ def _register(connection: Connection, order: Order, place: ObjectPlacement, file
     register(connection, registration, replace=place.replaces)
 
 
-def _finish(order: Order, place: ObjectPlacement, files: Staged, staging: Staging) -> Product:
+def _finish(order: Order, place: ObjectPlacement, files: StagedObject, staging: Staging) -> Product:
     written = tuple(w.path for w in staging.commit())
     made = describe_object(
         order.plan, place.layout, files.parts, files.warnings, written, reused=place.reused

@@ -15,13 +15,13 @@ from pathlib import Path
 from generator.export.atomic import Staging
 from generator.export.bed import Plate, arrange_plates
 from generator.export.overview import can_draw, overview_pdf
-from generator.export.packing import Packed, packing_csv
+from generator.export.packing import PackedPart, packing_csv
 from generator.export.threemf import PrintFile, print_file
 from generator.layout.placement import Layout
 from generator.pipeline.files import parts_of
 from generator.pipeline.parallel import Task, Workers
 from generator.pipeline.plan import ObjectPlan
-from generator.pipeline.progress import Progress, within
+from generator.pipeline.progress import Progress, part_of_progress
 from generator.printers import printer_named
 from generator.solid import Part, box
 
@@ -91,7 +91,7 @@ def write_set(
                     Task(f"plate {number}", _plate_files, _plate_task(objects, name, plate))
                     for number, plate in enumerate(plates, 1)
                 ],
-                within(progress, 0.3, 0.9),
+                part_of_progress(progress, 0.3, 0.9),
             )
             for number, content in enumerate(contents, 1):
                 staging.write(f"{name}-plate-{number}.3mf", content.content)
@@ -133,12 +133,12 @@ def _plates(objects: Sequence[SetObject], parts: Sequence[_Measured]) -> list[_S
     return plates
 
 
-def _packing_rows(objects: Sequence[SetObject], plate: _SetPlate, number: int) -> list[Packed]:
+def _packing_rows(objects: Sequence[SetObject], plate: _SetPlate, number: int) -> list[PackedPart]:
     rows = []
     for place in plate.plate.places:
         part = plate.parts[place.part]
         rows.append(
-            Packed(
+            PackedPart(
                 order=(part.number, place.part),
                 object=objects[part.number].plan.spec.name,
                 part=part.name,

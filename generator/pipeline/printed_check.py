@@ -17,7 +17,7 @@ from generator.pipeline.choose import choose_array
 from generator.pipeline.files import parts_of
 from generator.pipeline.place import occupancy_of, occupancy_with, place_object
 from generator.pipeline.plan import ObjectPlan, plan_object
-from generator.pipeline.progress import Progress, no_progress, within
+from generator.pipeline.progress import Progress, no_progress, part_of_progress
 from generator.printed.check import PrintedCheck, check_parts
 from generator.printed.faults import PrintFaults
 from generator.printed.picture import check_png
@@ -72,11 +72,13 @@ def check_printed(
     profiles = [
         print_profile(profile) if profile else profile_of_printer(one.spec.printer) for one in specs
     ]
-    built = _build(specs, database or specs[0].spec.database, within(progress, 0.0, 0.2))
+    built = _build(specs, database or specs[0].spec.database, part_of_progress(progress, 0.0, 0.2))
     found = []
     for number, ((plan, parts), chosen) in enumerate(zip(built, profiles, strict=True)):
         share = [0.2 + 0.8 * (number + k) / len(built) for k in (0, 1)]
-        check = check_parts(parts, chosen, faults=faults, progress=within(progress, *share))
+        check = check_parts(
+            parts, chosen, faults=faults, progress=part_of_progress(progress, *share)
+        )
         symbols = tuple(glyph.name for glyph in plan.alphabet.glyphs)
         picture = None
         if check.tiles:

@@ -11,6 +11,6 @@ def no_progress(_what: str, _share: float) -> None:
     """Tell nobody."""
 
 
-def within(progress: Progress, start: float, end: float) -> Progress:
+def part_of_progress(progress: Progress, start: float, end: float) -> Progress:
     """Return the progress of a step that fills the run from share `start` to `end`."""
     return lambda what, share: progress(what, start + share * (end - start))

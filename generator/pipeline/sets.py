@@ -27,7 +27,7 @@ from generator.pipeline.make import Order, Product, make_at
 from generator.pipeline.parallel import Engines, Task, Workers
 from generator.pipeline.place import ObjectPlacement, occupancy_of, occupancy_with, place_object
 from generator.pipeline.plates import SetObject, write_set
-from generator.pipeline.progress import Progress, within
+from generator.pipeline.progress import Progress, part_of_progress
 
 
 def make_set(
@@ -67,7 +67,7 @@ def make_set(
         taken = occupancy_of(connection, orders[0].plan)
         for number, order in enumerate(orders):
             name = order.plan.spec.name
-            if (skipped := _intact(connection, order)) is not None:
+            if (skipped := _intact_product(connection, order)) is not None:
                 products[number] = skipped
                 progress(f"{name} is there, with all its files: skipped", 0.0)
                 continue
@@ -79,11 +79,11 @@ def make_set(
             tasks.append(Task(f"making {name}", _make, (url, order, place)))
     Engines.keep(url, engine)
     with Workers(jobs) as workers:
-        found = workers.done(tasks, within(progress, 0.1, 0.8))
-        return _together(orders, products, numbers, found, folder, workers, progress)
+        found = workers.done(tasks, part_of_progress(progress, 0.1, 0.8))
+        return _write_whole(orders, products, numbers, found, folder, workers, progress)
 
 
-def _together(
+def _write_whole(
     orders: Sequence[Order],
     products: list[Product | None],
     numbers: Sequence[int],
@@ -100,7 +100,7 @@ def _together(
         SetObject(order.plan, product.placed.layout, order.formats)
         for order, product in zip(orders, done, strict=True)
     ]
-    files = write_set(objects, folder, workers, within(progress, 0.8, 1.0))
+    files = write_set(objects, folder, workers, part_of_progress(progress, 0.8, 1.0))
     made = [product.made for product in done]
     if not can_draw():
         notice = f"the set has no overview: matplotlib is not installed; {install_line('report')}"
@@ -123,7 +123,7 @@ def _make(url: str, order: Order, place: ObjectPlacement) -> Product:
     return make_at(Engines.open(url), order, place)
 
 
-def _intact(connection: Connection, order: Order) -> Product | None:
+def _intact_product(connection: Connection, order: Order) -> Product | None:
     """Return the object if it is registered from the same spec and all its files stand."""
     plan, url = order.plan, connection.engine.url
     known = find_object(connection, plan.spec.name)
@@ -144,7 +144,7 @@ def _intact(connection: Connection, order: Order) -> Product | None:
     if "glb" in order.formats:
         others.append(f"{stem}.glb")
     if "3mf" in order.formats:
-        plates = sorted(order.folder.glob(f"{_literal(plan.spec.name)}-plate-*.3mf"))
+        plates = sorted(order.folder.glob(f"{_escape_glob(plan.spec.name)}-plate-*.3mf"))
         others += map(str, plates or [Path(f"{stem}.3mf"), Path(f"{stem}-prusaslicer.3mf")])
     if not all(os.path.isfile(other) for other in others):
         return None
@@ -161,6 +161,6 @@ def _intact(connection: Connection, order: Order) -> Product | None:
     return Product(made, ObjectPlacement(layout, 0, reused=True, replaces=False))
 
 
-def _literal(name: str) -> str:
+def _escape_glob(name: str) -> str:
     """Return a name with what `glob` would take as a pattern put in brackets."""
     return "".join(f"[{c}]" if c in "*?[" else c for c in name)

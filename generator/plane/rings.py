@@ -70,8 +70,8 @@ def _any_meeting(
     """Whether any of the edge pairs (i, j) meets elsewhere than at a common corner."""
     p, q, r, s = starts[i], ends[i], starts[j], ends[j]
     chained = (b[i] == a[j]) | (b[j] == a[i])
-    d1, d2 = _side(p, q, r), _side(p, q, s)
-    d3, d4 = _side(r, s, p), _side(r, s, q)
+    d1, d2 = _doubled_area(p, q, r), _doubled_area(p, q, s)
+    d3, d4 = _doubled_area(r, s, p), _doubled_area(r, s, q)
     apart = (np.minimum(d1, d2) > 0) | (np.maximum(d1, d2) < 0)
     apart |= (np.minimum(d3, d4) > 0) | (np.maximum(d3, d4) < 0)
     boxes = (np.maximum(p, q) < np.minimum(r, s)) | (np.maximum(r, s) < np.minimum(p, q))
@@ -119,7 +119,7 @@ def boxes_inside(centres: Ring, half: ArrayLike, rings: Sequence[Ring]) -> NDArr
     return free
 
 
-def _side(p: Ring, q: Ring, r: Ring) -> NDArray[np.float64]:
+def _doubled_area(p: Ring, q: Ring, r: Ring) -> NDArray[np.float64]:
     """Twice the signed areas of the triangles p, q, r."""
     side: NDArray[np.float64] = (q[:, 0] - p[:, 0]) * (r[:, 1] - p[:, 1]) - (q[:, 1] - p[:, 1]) * (
         r[:, 0] - p[:, 0]

@@ -65,7 +65,7 @@ def development(polyhedron: Polyhedron, surface: Developable) -> Development:
             low, high = [own[0]], [own[-1]]
         else:
             # The line on the left is where the facet before has its line on the right.
-            turn = _turn(own[-1] - own[0], high[-1] - low[-1])
+            turn = _rotation_between(own[-1] - own[0], high[-1] - low[-1])
             shift = low[-1] - turn @ own[0]
             T_flat_own = np.eye(4)
             T_flat_own[:2, :2], T_flat_own[:2, 3] = turn, shift
@@ -89,7 +89,7 @@ def _bends(normals: Points, closed: bool) -> Points:
     return bends
 
 
-def _turn(of: Points, to: Points) -> Points:
+def _rotation_between(of: Points, to: Points) -> Points:
     """Return the rotation (2, 2) that takes one direction to another."""
     cosine, sine = float(of @ to), float(of[0] * to[1] - of[1] * to[0])
     length = float(np.hypot(cosine, sine))

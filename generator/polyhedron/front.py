@@ -85,13 +85,13 @@ def _slice(
     """Return what a face between two heights covers, seen along z."""
     kept = []
     for loop in loops:
-        points = _cut(_cut(local[list(loop)], low, 1.0), high, -1.0)
+        points = _clip_loop(_clip_loop(local[list(loop)], low, 1.0), high, -1.0)
         if len(points) >= 3:
             kept.append(points[:, :2])
     return CrossSection(kept, FillRule.EvenOdd)
 
 
-def _cut(points: NDArray[np.float64], height: float, sign: float) -> NDArray[np.float64]:
+def _clip_loop(points: NDArray[np.float64], height: float, sign: float) -> NDArray[np.float64]:
     """Return the part of a loop (k, 3) above a height, or below it where the sign is -1."""
     over = sign * (points[:, 2] - height)
     kept: list[NDArray[np.float64]] = []

@@ -31,7 +31,7 @@ def cylinder(diameter: float, height: float) -> Polyhedron:
     count = _count(radius)
     out = radius * (math.pi / count) / math.sin(math.pi / count)
     error = max(out - radius, radius - out * math.cos(math.pi / count))
-    return _round("cylinder", count, (out, 0.0), (out, height), (radius, 0.0, error))
+    return _solid_of_rings("cylinder", count, (out, 0.0), (out, height), (radius, 0.0, error))
 
 
 def cone(diameter: float, height: float, top_diameter: float = 0.0) -> Polyhedron:
@@ -55,7 +55,7 @@ def cone(diameter: float, height: float, top_diameter: float = 0.0) -> Polyhedro
         rings[1] = (0.0, height)
     middle = rings[0][0] * math.cos(math.pi / count)
     error = max(rings[0][0] - radius, radius - middle)
-    return _round("cone", count, rings[0], rings[1], (radius, math.asin(sine), error))
+    return _solid_of_rings("cone", count, rings[0], rings[1], (radius, math.asin(sine), error))
 
 
 def _count(radius: float) -> int:
@@ -64,7 +64,7 @@ def _count(radius: float) -> int:
     return min(max(4 * math.ceil(wanted / 4.0), SOLID.facets[0]), SOLID.facets[1])
 
 
-def _round(
+def _solid_of_rings(
     kind: str,
     count: int,
     low: tuple[float, float],

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.printed.beads import Beads
-from generator.printed.runs import blocks, spread
+from generator.printed.runs import blocks, expand_runs
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -55,7 +55,7 @@ def _lay(heights: NDArray[np.float32], beads: Beads, low: Floats, step: float) -
     half = beads.width_mm / 2
     row0 = np.ceil((np.minimum(a[:, 1], b[:, 1]) - half) / step).clip(0, ny).astype(np.int64)
     row1 = np.floor((np.maximum(a[:, 1], b[:, 1]) + half) / step).clip(-1, ny - 1) + 1
-    owner, row = spread(row0, row1.astype(np.int64) - row0)
+    owner, row = expand_runs(row0, row1.astype(np.int64) - row0)
     if not len(owner):
         return 0
     first, end = _columns(a, b, half, owner, row.astype(np.float64) * step)
@@ -68,7 +68,7 @@ def _lay(heights: NDArray[np.float32], beads: Beads, low: Floats, step: float) -
     owner, row, first, count = owner[shows], row[shows], first[shows], (end - first)[shows]
     worked = 0
     for part in blocks(count, _BLOCK):
-        span, column = spread(first[part], count[part])
+        span, column = expand_runs(first[part], count[part])
         rows, owners = row[part][span], owner[part][span]
         place = rows * nx + column
         lower = heights.ravel()[place] < beads.top_mm[owners]

@@ -120,7 +120,7 @@ class _Machine:
             self._note(mark + comment.rstrip())
         if "(" in code:
             code = _BRACKETS.sub("", code)
-        words = _apart(code) if _JOINED.search(code) else code.split()
+        words = _split_words(code) if _JOINED.search(code) else code.split()
         if not words:
             return
         if words[0][0] in "Nn":
@@ -271,7 +271,7 @@ class _Machine:
 _SETTINGS = ("G18", "G19", "G20", "G21", "G28", "G90", "G91", "G92", "M82", "M83", "M200")
 
 
-def _apart(code: str) -> list[str]:
+def _split_words(code: str) -> list[str]:
     """Return the words of a line without spaces."""
     text = "".join(f" {c}" if c.isalpha() else c for c in code.upper().replace(" ", ""))
     return text.split()

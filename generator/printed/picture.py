@@ -67,7 +67,7 @@ def check_png(title: str, tiles: Sequence[SymbolTile], names: Sequence[str] = ()
         for k, line in enumerate(lines):
             draw.text((_MARGIN, y + 8 + 20 * k), line, _INK, small)
         for x, tile in zip(left, pair, strict=True):
-            for k, pixels in enumerate(_three(tile)):
+            for k, pixels in enumerate(_three_views(tile)):
                 picture = Image.fromarray(pixels[::-1]).resize((TILE, TILE), Image.Resampling.BOX)
                 image.paste(picture, (x + k * (TILE + _GAP), y))
     x, y = _MARGIN, height - _FOOT + 22
@@ -85,7 +85,7 @@ def _median_and_worst(tiles: list[SymbolTile]) -> tuple[SymbolTile, SymbolTile]:
     return order[len(order) // 2], order[0]
 
 
-def _three(tile: SymbolTile) -> tuple[Pixels, Pixels, Pixels]:
+def _three_views(tile: SymbolTile) -> tuple[Pixels, Pixels, Pixels]:
     high = tile.check.designed_mm
     designed, printed = (heights > high / 2 for heights in (tile.designed, tile.deposited))
     both = np.empty((*designed.shape, 3), np.uint8)

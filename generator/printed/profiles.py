@@ -103,7 +103,7 @@ def settings_of(profile: PrintProfile) -> dict[str, str]:
         return _read_exported(profile.file)
     vendor = next((f for f in VENDOR_FOLDERS if (f / f"{_VENDOR}.ini").is_file()), None)
     if vendor is None:
-        return _plain(profile)
+        return _plain_profile(profile)
     sections = _parser()
     sections.read(vendor / f"{_VENDOR}.ini", encoding="utf-8")
     try:
@@ -113,10 +113,10 @@ def settings_of(profile: PrintProfile) -> dict[str, str]:
             **_inherit(sections, "printer", profile.vendor_printer),
         }
     except KeyError:  # another year's vendor file
-        return _plain(profile)
+        return _plain_profile(profile)
 
 
-def _plain(profile: PrintProfile) -> dict[str, str]:
+def _plain_profile(profile: PrintProfile) -> dict[str, str]:
     """Return the few settings that a nozzle and a layer need, else the slicer's defaults."""
     return {
         "nozzle_diameter": f"{profile.nozzle_mm:g}",

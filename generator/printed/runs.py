@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 Index = NDArray[np.int64]
 
 
-def spread(first: Index, count: Index) -> tuple[Index, Index]:
+def expand_runs(first: Index, count: Index) -> tuple[Index, Index]:
     """Return owner and number of first, first + 1, ... of each run of `count` numbers.
 
-    >>> [each.tolist() for each in spread(np.array([5, 1]), np.array([2, 1]))]
+    >>> [each.tolist() for each in expand_runs(np.array([5, 1]), np.array([2, 1]))]
     [[0, 0, 1], [5, 6, 1]]
     """
     count = count.clip(0)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.printed.beads import Beads
-from generator.printed.runs import blocks, spread
+from generator.printed.runs import blocks, expand_runs
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -41,7 +41,7 @@ def heights_sideways(
     row0 = np.ceil((beads.top_mm - beads.height_mm - low_mm[1]) / step_mm)
     row1 = np.floor((beads.top_mm - low_mm[1]) / step_mm) + 1
     row0, row1 = (row.clip(0, nz).astype(np.int64) for row in (row0, row1))
-    owner, row = spread(row0, row1 - row0)
+    owner, row = expand_runs(row0, row1 - row0)
     r = beads.height_mm[owner] / 2
     off = row * step_mm + low_mm[1] - (beads.top_mm[owner] - r)
     half = beads.width_mm[owner] / 2 - r + np.sqrt((r * r - off * off).clip(0))
@@ -51,14 +51,14 @@ def heights_sideways(
     first, end = (column.clip(0, nt).astype(np.int64) for column in (first, end))
     count = (end - first).clip(0)
     for part in blocks(count, _BLOCK):
-        strip, column = spread(first[part], count[part])
+        strip, column = expand_runs(first[part], count[part])
         t = column * step_mm + low_mm[0]
-        n = _outermost(a[part][strip], b[part][strip], half[part][strip], t)
+        n = _highest_of_strips(a[part][strip], b[part][strip], half[part][strip], t)
         np.maximum.at(heights.reshape(-1), row[part][strip] * nt + column, n.astype(np.float32))
     return heights, int(count.sum())
 
 
-def _outermost(a: Floats, b: Floats, half: Floats, t: Floats) -> Floats:
+def _highest_of_strips(a: Floats, b: Floats, half: Floats, t: Floats) -> Floats:
     """Return the highest n of strips at places t, -inf beside them."""
     ends = []
     for end in (a, b):

@@ -169,7 +169,8 @@ def _run(file: Path, settings: str, middle: str, gcode: Path) -> None:
         shutil.copyfile(file, part)
         written = Path(folder) / "part.gcode"
         command = [
-            *_steady(), find_slicer(), "--export-gcode", "--load", f"{folder}/settings.ini",
+            *_repeatable_command(), find_slicer(), "--export-gcode",
+            "--load", f"{folder}/settings.ini",
             "--center", middle, "-o", str(written), str(part),
         ]  # fmt: skip
         try:
@@ -194,7 +195,7 @@ def _run(file: Path, settings: str, middle: str, gcode: Path) -> None:
 
 
 @lru_cache(maxsize=1)
-def _steady() -> tuple[str, ...]:
+def _repeatable_command() -> tuple[str, ...]:
     """Return the command's beginning that makes the slicer give the same G-code again."""
     steady: tuple[str, ...] = ()
     if shutil.which("setarch"):

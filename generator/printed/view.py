@@ -84,7 +84,7 @@ def face_surface(
             points = np.stack(np.meshgrid(x, y), axis=-1)
             heights += printed.bow_at(points).astype(np.float32)
     else:
-        heights, samples, within = _sideways(near, low, high, shape, step_mm, depth_mm)
+        heights, samples, within = _view_sideways(near, low, high, shape, step_mm, depth_mm)
     heights[heights < -depth_mm] = -np.inf
     return PrintedSurface(
         heights=heights,
@@ -107,7 +107,7 @@ def _from_above(
     return heights, samples, int(near.sum())
 
 
-def _sideways(
+def _view_sideways(
     beads: Beads, low: Floats, high: Floats, shape: tuple[int, ...], step: float, depth: float
 ) -> tuple[NDArray[np.float32], int, int]:
     half = beads.width_mm / 2

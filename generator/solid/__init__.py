@@ -1,24 +1,25 @@
 """Printable parts: bodies with embossed faces, their triangles and their proof."""
 
 from generator.solid.closed import prove_closed
-from generator.solid.explicit import Explicit, explicit
+from generator.solid.explicit import ExpandedSolid, expand_part
 from generator.solid.measure import box, volume
 from generator.solid.mitre import symbol_clearance_mm, top_inset_mm
 from generator.solid.panels import Panels, panels, top_insets_mm
 from generator.solid.part import Embossing, Facet, Part
 from generator.solid.triangulate import Mesh, body_mesh, symbol_meshes, triangles
-from generator.solid.whole import whole
+from generator.solid.whole import emboss_whole
 
 __all__ = [
     "Embossing",
-    "Explicit",
+    "ExpandedSolid",
     "Facet",
     "Mesh",
     "Panels",
     "Part",
     "body_mesh",
     "box",
-    "explicit",
+    "emboss_whole",
+    "expand_part",
     "panels",
     "prove_closed",
     "symbol_clearance_mm",
@@ -27,5 +28,4 @@ __all__ = [
     "top_insets_mm",
     "triangles",
     "volume",
-    "whole",
 ]

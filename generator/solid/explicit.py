@@ -25,14 +25,14 @@ class Polygon:
 
 
 @dataclass(frozen=True, slots=True)
-class Explicit:
+class ExpandedSolid:
     """The expanded solid."""
 
     vertices: NDArray[np.float64]  #: (N, 3) mm, part frame
     polygons: tuple[Polygon, ...]
 
 
-def explicit(part: Part) -> Explicit:
+def expand_part(part: Part) -> ExpandedSolid:
     """Return every vertex and every planar polygon of a part.
 
     The body's facets come first, in their order; then per symbol its islands (facet inside a
@@ -76,4 +76,4 @@ def explicit(part: Part) -> Explicit:
     for name, outline, number, symbol in body + found:
         normal = face_vector([vertices[list(loop)] for loop in outline])
         polygons.append(Polygon(name, outline, normal / np.linalg.norm(normal), number, symbol))
-    return Explicit(vertices, tuple(polygons))
+    return ExpandedSolid(vertices, tuple(polygons))

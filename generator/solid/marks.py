@@ -124,9 +124,9 @@ def _place_marks(
         else:
             angle = 0.0
             centres = _middles(mark.start, rings)
-        for centre in centres[_roomy(centres, angle, half, pen.clear, rings)]:
+        for centre in centres[_has_room(centres, angle, half, pen.clear, rings)]:
             box = _Box(mark.text, centre, angle, half)
-            if not any(_near(box, other, pen.clear) for other in [*taken, *placed]):
+            if not any(_closer_than(box, other, pen.clear) for other in [*taken, *placed]):
                 placed.append(box)
                 break
     return placed
@@ -141,7 +141,7 @@ def _middles(centre: Ring, rings: Sequence[Ring]) -> Ring:
     return np.concatenate([centre[None], grid[order]])
 
 
-def _roomy(
+def _has_room(
     centres: Ring, angle: float, half: tuple[float, float], clear: float, rings: Sequence[Ring]
 ) -> NDArray[np.bool_]:
     """Whether rectangles at `centres` keep clear of all edges and lie inside."""
@@ -149,7 +149,7 @@ def _roomy(
     return boxes_inside(centres @ R, np.array(half) + clear, [ring @ R for ring in rings])
 
 
-def _near(one: _Box, other: _Box, clear: float) -> bool:
+def _closer_than(one: _Box, other: _Box, clear: float) -> bool:
     """Whether two turned rectangles are closer than `clear`, by separating axes."""
     between = other.centre - one.centre
     for angle in (one.angle, other.angle):

@@ -44,7 +44,7 @@ class Embossing:
 
 
 @dataclass(frozen=True, slots=True)
-class Wrapped:
+class WrappedSymbols:
     """Symbols on a round face: not instanced, each bends over the facets under it.
 
     Their sides and tops are facets of the part like any other; here stands which ones.
@@ -68,7 +68,7 @@ class Part:
     facets: tuple[Facet, ...]
     embossings: tuple[Embossing, ...]
     T_object_part: NDArray[np.float64]  #: (4, 4)
-    wrapped: tuple[Wrapped, ...] = ()
+    wrapped: tuple[WrappedSymbols, ...] = ()
 
     @property
     def symbols(self) -> int:

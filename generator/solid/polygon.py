@@ -75,7 +75,7 @@ def without_slivers(points: Ring, triangles: Index, share: float = EMBOSS.flat) 
     share
         Of its longest side: a thinner triangle is flat.
     """
-    flat = _flat(points, triangles, share)
+    flat = _is_sliver(points, triangles, share)
     if not flat.any():
         return triangles
     faces = [tuple(face) for face in triangles.tolist()]
@@ -88,7 +88,7 @@ def without_slivers(points: Ring, triangles: Index, share: float = EMBOSS.flat) 
             break
         number = waiting.pop()
         face = faces[number]
-        if not _flat(points, np.array([face]), share)[0]:
+        if not _is_sliver(points, np.array([face]), share)[0]:
             continue
         sides = [(face[k], face[(k + 1) % 3]) for k in range(3)]
         a, c = max(sides, key=lambda side: float(np.hypot(*(points[side[1]] - points[side[0]]))))
@@ -105,7 +105,7 @@ def without_slivers(points: Ring, triangles: Index, share: float = EMBOSS.flat) 
     return np.array(faces, dtype=np.int64)
 
 
-def _flat(points: Ring, triangles: Index, share: float) -> NDArray[np.bool_]:
+def _is_sliver(points: Ring, triangles: Index, share: float) -> NDArray[np.bool_]:
     """Whether triangles are thinner than a share of their longest side."""
     corners = points[triangles]
     u = np.roll(corners, -1, axis=1) - corners

@@ -20,7 +20,9 @@ from generator.solid.part import Facet, Part
 from generator.solid.wrap.wrapped import Body, wrapped_onto
 
 
-def whole(polyhedron: Polyhedron, layout: Layout, tiers: tuple[Tiers, ...], name: str) -> Part:
+def emboss_whole(
+    polyhedron: Polyhedron, layout: Layout, tiers: tuple[Tiers, ...], name: str
+) -> Part:
     """Return the body with all its symbols as one solid.
 
     Parameters

@@ -41,7 +41,9 @@ def explain_errors(error: ValidationError, tree: Tree, model: type[BaseModel]) -
         The model that was to be read.
     """
     items = error.errors(include_url=False)
-    meant = {_meant(item["loc"], model) for item in items if item["type"] == "extra_forbidden"}
+    meant = {
+        _likely_place(item["loc"], model) for item in items if item["type"] == "extra_forbidden"
+    }
     unread = {problem.mark for problem in tree.problems}
     return [
         _problem(item, tree, model)
@@ -51,7 +53,7 @@ def explain_errors(error: ValidationError, tree: Tree, model: type[BaseModel]) -
     ]
 
 
-def _meant(place: Place, model: type[BaseModel]) -> Place:
+def _likely_place(place: Place, model: type[BaseModel]) -> Place:
     """Return the place of the setting that an unknown name was probably meant to be."""
     known = _model_at(model, place[:-1]).model_fields
     return (*place[:-1], did_you_mean(str(place[-1]), known))
@@ -79,7 +81,7 @@ def _unknown_setting(place: Place, mark: SourceMark, model: type[BaseModel]) -> 
     cause = f"unknown {what} '{word[:60]}'" + ("" if what == "shape" else inside)
     if block == ("shape",) and word.lower() in OTHER_NAMES:
         fix = f"write shape: {EXAMPLES[OTHER_NAMES[word.lower()]]}"
-    elif elsewhere := _elsewhere(word, block):
+    elif elsewhere := _other_place(word, block):
         fix = elsewhere
     elif near := did_you_mean(word, known):
         fix = f"did you mean '{near}'?"
@@ -89,7 +91,7 @@ def _unknown_setting(place: Place, mark: SourceMark, model: type[BaseModel]) -> 
     return Problem(cause, fix, mark)
 
 
-def _elsewhere(word: str, block: Place) -> str:
+def _other_place(word: str, block: Place) -> str:
     """Return where a setting of that name belongs, if there is such a place."""
     if not block and word in KINDS:
         return f"write shape: {EXAMPLES[word]}"

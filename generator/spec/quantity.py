@@ -96,7 +96,7 @@ def _number(value: Any, units: dict[str, float], bare: str, what: str, example: 
     if isinstance(value, str):
         match = _QUANTITY.match(value)
         if match is None:
-            raise _unreadable(value, what, example)
+            raise _unreadable_error(value, what, example)
         number, unit = float(match["number"]), match["unit"] or bare
         if unit not in units:
             raise _unknown_unit(unit, units, what)
@@ -110,11 +110,11 @@ def _number(value: Any, units: dict[str, float], bare: str, what: str, example: 
     return number * units[unit]
 
 
-def _unreadable(value: str, what: str, example: str) -> PydanticCustomError:
+def _unreadable_error(value: str, what: str, example: str) -> PydanticCustomError:
     if _COMMA.match(value):
         fix = f"write a point: {value.strip().replace(',', '.', 1)}"
         return refuse(f"'{value}' has a decimal comma", fix)
-    return refuse(f"'{_short(value)}' is not {what}", f"write, for example, {example}")
+    return refuse(f"'{_shorten(value)}' is not {what}", f"write, for example, {example}")
 
 
 def _unknown_unit(unit: str, units: dict[str, float], what: str) -> PydanticCustomError:
@@ -122,10 +122,10 @@ def _unknown_unit(unit: str, units: dict[str, float], what: str) -> PydanticCust
     if len(unit) > 4:
         near = near or did_you_mean(unit, (name for name in units if len(name) > 2))
     fix = f"did you mean '{near}'?" if near else f"use one of {SHOWN_UNITS[what]}"
-    return refuse(f"unknown unit '{_short(unit)}' for {what}", fix)
+    return refuse(f"unknown unit '{_shorten(unit)}' for {what}", fix)
 
 
-def _short(text: str) -> str:
+def _shorten(text: str) -> str:
     return text if len(text) <= 40 else text[:37] + "..."
 
 

@@ -155,11 +155,11 @@ def _merge(shared: Tree, own: Tree) -> Tree:
         else:
             continue
         for marks, source in ((value_marks, shared.values), (key_marks, shared.keys)):
-            marks |= {place: mark for place, mark in source.items() if _within(place, taken)}
+            marks |= {place: mark for place, mark in source.items() if _lies_within(place, taken)}
     return Tree(values, value_marks, key_marks, own.folder)
 
 
-def _within(place: Place, taken: Sequence[Place]) -> bool:
+def _lies_within(place: Place, taken: Sequence[Place]) -> bool:
     return any(place[: len(top)] == top for top in taken)
 
 

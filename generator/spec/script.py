@@ -64,7 +64,7 @@ def tree_from(settings: Mapping[str, Any]) -> Tree:
         A setting that no file can say.
     """
     try:
-        text = yaml.safe_dump(_plain(settings), sort_keys=False, allow_unicode=True)
+        text = yaml.safe_dump(_without_none(settings), sort_keys=False, allow_unicode=True)
     except yaml.YAMLError as error:
         fix = "give numbers, texts, lists and dicts of them, as in a spec file"
         cause = f"a setting is not a plain value: {error}"
@@ -100,10 +100,10 @@ def with_profile(
     return replace(located, spec=own)
 
 
-def _plain(value: Any) -> Any:
+def _without_none(value: Any) -> Any:
     """Return settings without those that are None; paths as text, tuples as lists."""
     if isinstance(value, Mapping):
-        return {key: _plain(inner) for key, inner in value.items() if inner is not None}
+        return {key: _without_none(inner) for key, inner in value.items() if inner is not None}
     if isinstance(value, list | tuple):
-        return [_plain(inner) for inner in value]
+        return [_without_none(inner) for inner in value]
     return str(value) if isinstance(value, Path) else value

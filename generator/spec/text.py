@@ -23,7 +23,7 @@ def read_text(path: Path) -> str:
             data = file.read(BYTES_MAX + 1)
     except FileNotFoundError:
         raise SpecError(
-            [Problem("there is no such file", _similar(path), file=str(path))]
+            [Problem("there is no such file", _suggest_similar(path), file=str(path))]
         ) from None
     except IsADirectoryError:
         fix = f"name the files in it, for example {path / '*.yaml'}"
@@ -46,7 +46,7 @@ def read_text(path: Path) -> str:
     return text
 
 
-def _similar(path: Path) -> str:
+def _suggest_similar(path: Path) -> str:
     """Return a fix that names files like `path` beside it."""
     try:
         beside = sorted(entry.name for entry in path.parent.iterdir())

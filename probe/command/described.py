@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.console.output import number
+from encoded_objects.console.output import count_of
 from probe.client.stream import Stream, name_of
 from probe.command.settings import COMMAND
 
@@ -64,7 +64,7 @@ def describe_probe(url: str, sensor: int | None, seconds: float) -> Described:
         )
     lines["rate"] = f"{counts.rate:.1f} frames a second"
     lines["heard"] = (
-        f"{number(counts.frames, 'frame')}, lost {counts.lost}, failed checks {counts.failed}, "
+        f"{count_of(counts.frames, 'frame')}, lost {counts.lost}, failed checks {counts.failed}, "
         f"doubtful {counts.doubtful}, reboots {counts.reboots}"
     )
     lines["peak"] = f"{peak} counts"
@@ -122,7 +122,7 @@ def describe_recording(name: str) -> Described:
         "sensor": origin.sensor or "not named",
         "calibration": origin.calibration or "none",
         "peak": f"{peak} {origin.units}",
-        "poses": f"of {number(poses, 'frame')}",
+        "poses": f"of {count_of(poses, 'frame')}",
         "size": f"{values['bytes'] / 1000:,.0f} kB",
         "written by": held.tool_version or "another programme",
     }

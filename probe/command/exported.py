@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.console.files import refuse_taken, staged
-from encoded_objects.console.output import number, write, write_json
+from encoded_objects.console.files import refuse_taken, staged_file
+from encoded_objects.console.output import count_of, write, write_json
 from encoded_objects.errors import require
 from probe.calibration import Calibration, calibrate_image, read_calibration
 from probe.errors import CalibrationError, RecordingError
@@ -76,7 +76,7 @@ def export_files(
         write_json({"file": str(path), "frames": len(recording), "written": names})
     else:
         for out in outputs:
-            what = "picture" if out is png else number(len(recording), "frame")
+            what = "picture" if out is png else count_of(len(recording), "frame")
             write(f"{out}: {what}")
     return 0
 
@@ -127,7 +127,7 @@ def _picture(
     title = f"frame {view.frame}, {(block.t_ns[0] - first.t_ns[0]) * 1e-9:.3f} s"
     if view.median:
         title += ", median of 3x3"
-    with staged(out) as draft:
+    with staged_file(out) as draft:
         frame_picture(image, draft, unit=unit, title=title, azimuth_deg=view.azimuth_deg,
                       elevation_deg=view.elevation_deg)  # fmt: skip
 
@@ -150,7 +150,7 @@ def _array(
     recording: Recording, out: Path, known: Calibration | None, pad_mm: float | None
 ) -> None:
     shape = (len(recording), *recording.block(0, 0).counts.shape[1:])
-    with staged(out) as draft, open(draft, "wb") as file:
+    with staged_file(out) as draft, open(draft, "wb") as file:
         dtype = np.dtype("<u2" if known is None else "<f4")
         header = {"descr": dtype.str, "fortran_order": False, "shape": shape}
         np.lib.format.write_array_header_1_0(file, header)

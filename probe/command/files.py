@@ -85,7 +85,7 @@ def import_(
     """Make a recording of others' images; values that are no counts are scaled."""
 
     def action() -> int:
-        from encoded_objects.console.output import number, write, write_json
+        from encoded_objects.console.output import count_of, write, write_json
         from probe.command.recorded import check_output
         from probe.recording.imported import import_array
 
@@ -99,7 +99,7 @@ def import_(
             return 0
         scaled = f"; value = {more['scale_offset']:g} + {more['scale']:g} * count" \
             if "scale" in more else ""  # fmt: skip
-        write(f"{output}: {number(len(made), 'frame')} of {array}{scaled}")
+        write(f"{output}: {count_of(len(made), 'frame')} of {array}{scaled}")
         return 0
 
     return action
@@ -111,16 +111,16 @@ def repair(recording: Recording, as_json: Json = False) -> Action:
     def action() -> int:
         from dataclasses import asdict
 
-        from encoded_objects.console.output import number, write, write_json
+        from encoded_objects.console.output import count_of, write, write_json
         from probe.recording.repair import repair as repaired
 
         done = repaired(recording)
         if as_json:
             write_json(asdict(done))
         elif not done.changed:
-            write(f"{done.path} is whole; {number(done.frames, 'frame')}")
+            write(f"{done.path} is whole; {count_of(done.frames, 'frame')}")
         else:
-            write(f"{done.path}: {number(done.frames, 'frame')} saved, {done.lost} lost")
+            write(f"{done.path}: {count_of(done.frames, 'frame')} saved, {done.lost} lost")
         return 0
 
     return action

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.console.files import staged
+from encoded_objects.console.files import staged_file
 from encoded_objects.errors import MissingExtraError, require
 from probe.calibration import Calibration, calibrate_image, calibration_hash, drift_of
 from probe.calibration.settings import AVERAGE
@@ -138,9 +138,9 @@ class LiveState:
         if self.bias is not None:
             title += ", less bias"
         array = picture.with_suffix(".npy")
-        with staged(picture) as draft:
+        with staged_file(picture) as draft:
             frame_picture(image, draft, unit=self.unit, title=title)
-        with staged(array) as draft:
+        with staged_file(array) as draft:
             np.save(draft, self.frame.counts)
         self.notice = f"saved {picture.name} and .npy"
 

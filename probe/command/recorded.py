@@ -10,7 +10,7 @@ from typing import Any
 
 from encoded_objects.console import INTERRUPTED
 from encoded_objects.console.interruption import interruption
-from encoded_objects.console.output import message, number, write, write_json
+from encoded_objects.console.output import count_of, message, write, write_json
 from encoded_objects.console.progress import ProgressBar, progress_bar
 from probe.calibration import Calibration, calibration_hash, read_calibration
 from probe.client.stream import Stream, name_of
@@ -80,7 +80,7 @@ def record_port(
                 ended, seconds = _run(stream, recorder, first, limits, interrupted, told)
         except ProbeError:
             files = ", ".join(map(str, recorder.files))
-            kept = number(recorder.frames, "frame")
+            kept = count_of(recorder.frames, "frame")
             message(f"{files} is complete and holds {kept}")
             raise
         result = _result(stream, recorder, name, ended, seconds)
@@ -196,7 +196,7 @@ def _say(result: dict[str, Any], as_json: bool) -> None:
         if result[name]
     )
     write(
-        f"{files}: {number(result['frames'], 'frame')} in {result['seconds']:.2f} s "
+        f"{files}: {count_of(result['frames'], 'frame')} in {result['seconds']:.2f} s "
         f"({result['rate']:.1f} a second), lost {result['lost']}"
         + (f", {trouble}" if trouble else "")
     )

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from encoded_objects.console import INTERRUPTED
-from encoded_objects.console.files import refuse_taken, staged
+from encoded_objects.console.files import refuse_taken, staged_file
 from encoded_objects.console.interruption import interruption
 from encoded_objects.console.output import message, write, write_json
 from encoded_objects.console.progress import progress_bar
@@ -57,7 +57,7 @@ def simulate_touches(
         _picture(first, probe, png)
     result = probe.truth(kept)
     if truth is not None:
-        with staged(truth) as draft:
+        with staged_file(truth) as draft:
             draft.write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", "utf-8")
     written = [str(out) for out in (output, png, truth) if out is not None]
     _say(result, first, written, as_json=as_json)
@@ -92,7 +92,7 @@ def _picture(felt: SimulatedTouch, probe: SimulatedProbe, png: Path) -> None:
     what = f"{felt.scene.name}, {felt.touch.force_n:g} N, {probe.overlay} overlay"
     if probe.noise == "quiet":
         what += ", without noise"
-    with staged(png) as draft:
+    with staged_file(png) as draft:
         touch_picture(felt.scene.surface, probe.sensor, felt.touch, felt.contact.forces_n,
                       felt.frames[0].counts, draft, title=what)  # fmt: skip
 

@@ -19,7 +19,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.console.files import staged
+from encoded_objects.console.files import staged_file
 from probe.circuit import QUIET, Electronics, Noise, fsr_of, read_counts
 from probe.contact.contract import Contact, Touch
 from probe.contact.press import accuracy_of, level_for, press
@@ -214,7 +214,7 @@ class SimulatedProbe:
                            "pose_error_deg": math.degrees(error_rad)}  # fmt: skip
         sensor = f"simulated/{self.overlay}"
         with (
-            staged(out) as draft,
+            staged_file(out) as draft,
             Recorder(draft, sensor=sensor, attributes=attributes, roll_over_s=math.inf) as writer,
         ):
             yield writer

@@ -73,13 +73,13 @@ def _face(held: RegisteredObject, number: int) -> dict[str, Any]:
     triangles = triangulate(face.polygon_mm)
     return {
         "name": face.name,
-        "T_object_face": _nested(face.T_object_face, 9),
-        "loops": [_nested(loop) for loop in face.polygon_mm],
+        "T_object_face": _nested_lists(face.T_object_face, 9),
+        "loops": [_nested_lists(loop) for loop in face.polygon_mm],
         "triangles": triangles.tolist(),
         "turn": 0.0 if face.placement is None else -face.placement.rotation_rad,
         "blank": face.placement is None,
         "labels": cells.labels.tolist(),
-        "centres": _nested(cells.centres_mm),
+        "centres": _nested_lists(cells.centres_mm),
     }
 
 
@@ -155,5 +155,5 @@ def _face_names(connection: Connection) -> dict[int, dict[int, str]]:
     return found
 
 
-def _nested(values: NDArray[np.float64], digits: int = DIGITS) -> Any:
+def _nested_lists(values: NDArray[np.float64], digits: int = DIGITS) -> Any:
     return np.round(values, digits).tolist()

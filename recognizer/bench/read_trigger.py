@@ -48,12 +48,15 @@ class ReadTrigger:
             self.touches += 1
             self._since_s = now_s
             return False
-        steady = _apart(forces, before) < TRIGGER.steady
+        steady = _relative_difference(forces, before) < TRIGGER.steady
         if steady:
             self._since_s = now_s
         elif now_s - self._since_s < TRIGGER.restless_s:
             return False
-        if self._read is None or _apart(_shape(forces), _shape(self._read)) > TRIGGER.changed:
+        if (
+            self._read is None
+            or _relative_difference(_shape(forces), _shape(self._read)) > TRIGGER.changed
+        ):
             return True
         return not self._answered and now_s - self._read_s > TRIGGER.again_s
 
@@ -63,7 +66,7 @@ class ReadTrigger:
         self._read_s = now_s
 
 
-def _apart(a: Array, b: Array) -> float:
+def _relative_difference(a: Array, b: Array) -> float:
     return float(np.abs(a - b).sum() / max(float(np.maximum(a, b).sum()), 1e-12))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from threading import Event
 
-from encoded_objects.console.files import refuse_taken, staged, taken
+from encoded_objects.console.files import file_exists_error, refuse_taken, staged_file
 from encoded_objects.console.progress import progress_bar
 from encoded_objects.errors import require
 from recognizer.command.answers import Answer
@@ -23,7 +23,7 @@ def refuse_pictures(plot: Path, *, replace: bool) -> None:
         if path.stem.removeprefix(f"{plot.stem}-").isdecimal()
     ]
     if there and not replace:
-        raise taken(there[0])
+        raise file_exists_error(there[0])
 
 
 def draw_answers(
@@ -45,6 +45,6 @@ def draw_answer(reader: Reader, source: TouchSource, answer: Answer, path: Path)
     from recognizer.command.plot.touch import touch_picture
 
     pose = None if answer.in_base is None else answer.in_base.T_robot_object
-    with staged(path) as draft:
+    with staged_file(path) as draft:
         signal = reader.signal(answer.touch.counts, calibration=source.calibration)
         touch_picture(reader, signal, answer.found, draft, T_robot_object=pose)

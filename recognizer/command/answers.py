@@ -78,7 +78,7 @@ def answers_of(
     if options.port and not options.follow and most is None and belief is None:
         most = 1
     by_touch = read_joints(options.joints_file) if options.joints_file else ()
-    touches = source.touches(_until(interrupted, frames), reader.settings)
+    touches = source.touches(_frames_until(interrupted, frames), reader.settings)
     if belief is not None and options.recording is not None:
         touches = refuse_single(touches, source.place, touches_for(reader))
     warned = ""
@@ -131,7 +131,7 @@ def _answer(
     return Answer(touch, found, in_base, None if belief is None else belief.touches), trouble
 
 
-def _until(interrupted: Event, frames: Iterator[Frame]) -> Iterator[Frame]:
+def _frames_until(interrupted: Event, frames: Iterator[Frame]) -> Iterator[Frame]:
     for frame in frames:
         if interrupted.is_set():
             return

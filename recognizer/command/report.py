@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from encoded_objects.console.output import number
+from encoded_objects.console.output import count_of
 
 if TYPE_CHECKING:
     from recognizer.thesis.edges.line import Edge
@@ -63,6 +63,6 @@ def sentence(touch: TouchImage, found: Recognition, in_base: ObjectPose | None) 
 def summary(read: int, answered: int, frames: int | None) -> str:
     """Return what became of all touches, in words."""
     if read == 0:
-        return "no touch" + ("" if frames is None else f" in {number(frames, 'frame')}")
+        return "no touch" + ("" if frames is None else f" in {count_of(frames, 'frame')}")
     many = "1 touch" if read == 1 else f"{read:,} touches"
     return f"{many}, {answered:,} recognised"

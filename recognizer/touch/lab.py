@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Connection, Engine
 
-from encoded_objects.console.output import number
+from encoded_objects.console.output import count_of
 from generator.alphabet import Alphabet, SymbolStyle, alphabet_from
 from generator.array import FoldedArray, ProductArray, array_from
 from generator.database.cells import held_cells
@@ -117,7 +117,11 @@ class Lab:
         objects = {name for each in self.arrays for name in each.names.values()}
         faces = sum(len(each.faces) for each in self.arrays)
         symbols = sum(len(each.keys) for each in self.arrays)
-        held = (number(len(objects), "object"), number(faces, "face"), number(symbols, "symbol"))
+        held = (
+            count_of(len(objects), "object"),
+            count_of(faces, "face"),
+            count_of(symbols, "symbol"),
+        )
         return f"{self.url}: {', '.join(held)}"
 
 

@@ -194,9 +194,9 @@ def this_project(made: Scene, folder: Path) -> Made:
     """Faces with loops, proved closed, written without a kernel."""
     from generator.export.step import step_chunks
     from generator.export.stl import stl_chunks
-    from generator.solid import prove_closed, triangles, whole
+    from generator.solid import emboss_whole, prove_closed, triangles
 
-    part = whole(made.polyhedron, made.layout, made.tiers, "cube")
+    part = emboss_whole(made.polyhedron, made.layout, made.tiers, "cube")
     prove_closed(part)
     with (folder / "cube.step").open("wb") as file:
         file.writelines(step_chunks(part))

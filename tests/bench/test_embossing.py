@@ -19,7 +19,7 @@ from generator.export.step import step_chunks
 from generator.export.stl import stl_chunks
 from generator.layout.placement import FaceLayout, Layout, Placement
 from generator.polyhedron.shapes import cube
-from generator.solid import prove_closed, triangles, whole
+from generator.solid import emboss_whole, prove_closed, triangles
 
 CAMPAIGN = Path(__file__).with_name("embossing.py")
 
@@ -36,7 +36,7 @@ def part():
         for f in range(6)
     )
     tiers = outlines(alphabet_named("dense-4"), SymbolStyle(pitch))
-    return whole(cube((k + 0.5) * pitch), Layout("faces", pitch, faces), tiers, "cube")
+    return emboss_whole(cube((k + 0.5) * pitch), Layout("faces", pitch, faces), tiers, "cube")
 
 
 def test_prove_closed_600(benchmark, part):

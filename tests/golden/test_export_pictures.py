@@ -18,7 +18,7 @@ from generator.alphabet.outline import SymbolStyle, outlines
 from generator.export.array_svg import FaceOnArray, array_svg
 from generator.export.colours import BODY_RGB, SYMBOL_RGB
 from generator.export.preview import preview_png
-from generator.export.raster import visible
+from generator.export.raster import rasterise
 from generator.export.settings import PREVIEW
 from generator.layout.placement import FaceLayout, Placement
 from generator.polyhedron.shapes import cube
@@ -92,7 +92,7 @@ def test_the_nearest_triangle_wins() -> None:
     )
     order = np.array([[0, 2, 1], [1, 2, 3], [4, 6, 5], [4, 5, 6]])
     screen = np.empty((20, 20), np.int64)
-    seen = visible(points, order, screen)
+    seen = rasterise(points, order, screen)
     picture = np.zeros((20, 20), np.uint32)
     seen.paint(picture, np.array([1, 2, 3, 4], np.uint32))
     assert picture[0, 0] == 1

@@ -32,7 +32,7 @@ from generator.solid.measure import volume
 from generator.solid.panels import panels
 from generator.solid.part import Part
 from generator.solid.triangulate import triangles
-from generator.solid.whole import whole
+from generator.solid.whole import emboss_whole
 
 BED = (250.0, 210.0)
 
@@ -48,7 +48,7 @@ def parts_of(polyhedron: Polyhedron, *, in_panels: bool, chamfer_mm: float = 0.0
         return list(
             panels(polyhedron, layout, tiers, 3.0, printer_named("fdm-0.4"), name="Cube").parts
         )
-    return [whole(polyhedron, layout, tiers, "Body 'ü'")]
+    return [emboss_whole(polyhedron, layout, tiers, "Body 'ü'")]
 
 
 @pytest.fixture(scope="module")

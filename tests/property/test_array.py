@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from generator.array import FoldedArray, ProductArray, Sequence, array_from
-from generator.array.factor import decodes
+from generator.array.factor import is_decodable
 from generator.array.field import field_of_order
 from generator.array.notation import format_polynomial, parse_polynomial
 from generator.array.polynomial import is_primitive, mulmod, norm, powmod
@@ -30,7 +30,7 @@ def sequence_of(entry):
 
 
 def decodable(entry):
-    return decodes(entry.order, entry.degree)
+    return is_decodable(entry.order, entry.degree)
 
 
 @quick

@@ -22,7 +22,7 @@ from generator.plane.rings import boxes_inside, distance, edges_cross
 from generator.polyhedron.frame import face_polygon
 from generator.polyhedron.shapes import prism, pyramid
 from generator.printers import PRINTERS
-from generator.solid import explicit, panels, prove_closed, triangles, volume, whole
+from generator.solid import emboss_whole, expand_part, panels, prove_closed, triangles, volume
 from generator.solid.closed import edges_once
 from generator.solid.emboss import turn
 from generator.solid.inset import inset, regular
@@ -120,7 +120,7 @@ def test_parts_are_closed_planar_and_of_their_volume(solid, name, turned, chamfe
     tiers, half = outlines(alphabet, style), footprint_half_mm(alphabet, style)
     chance = np.random.default_rng(seed)
     layout = scattered(solid, half, 6.5, turned, pitch, alphabet.order, chance)
-    parts = [whole(solid, layout, tiers, "body")]
+    parts = [emboss_whole(solid, layout, tiers, "body")]
     refused = refusal(panels, solid, layout, tiers, 2.0, PRINTERS["fdm-0.4"])
     if refused is None:
         parts += panels(solid, layout, tiers, 2.0, PRINTERS["fdm-0.4"]).parts
@@ -136,7 +136,7 @@ def test_parts_are_closed_planar_and_of_their_volume(solid, name, turned, chamfe
         assert six / 6 == pytest.approx(volume(part), rel=1e-9)
         areas = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
         assert areas.min() > 0.0
-    solid_part = explicit(parts[-1])
+    solid_part = expand_part(parts[-1])
     size = float(np.ptp(solid_part.vertices, axis=0).max())
     for polygon in solid_part.polygons:
         points = solid_part.vertices[[v for loop in polygon.loops for v in loop]]

@@ -57,7 +57,7 @@ def curved_faces(solid: Any, faces: list[Any], kinds: list[str]) -> dict[str, An
     """
     counts: list[int] = []
     for coarser in MODEL.coarser:
-        found = _divide(solid, faces, kinds, coarser)
+        found = _tessellate(solid, faces, kinds, coarser)
         counts.append(len(found.faces))
         if counts[-1] <= MODEL.most_facets:
             break
@@ -86,7 +86,7 @@ def curved_faces(solid: Any, faces: list[Any], kinds: list[str]) -> dict[str, An
     }
 
 
-def _divide(solid: Any, faces: list[Any], kinds: list[str], coarser: float) -> _Found:
+def _tessellate(solid: Any, faces: list[Any], kinds: list[str], coarser: float) -> _Found:
     """Return all facets at so many times the chord errors."""
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.BRepTools import BRepTools
@@ -232,7 +232,7 @@ class _Nodes:
             raise ShapeError("the CAD kernel cannot divide an edge of face", fix=_REMAKE)
         nodes = [polygon.Node(k) for k in range(1, polygon.NbNodes() + 1)]
         key = self.edges.Add(edge)
-        if len(nodes) > 2 and key not in self.divided and _straight(edge):
+        if len(nodes) > 2 and key not in self.divided and _is_straight(edge):
             nodes = [nodes[0], nodes[-1]]
             self.dropped.add(key)
         numbers = self.on_edge.get(key)
@@ -271,7 +271,7 @@ class _Nodes:
         return self.of_face[node]
 
 
-def _straight(edge: Any) -> bool:
+def _is_straight(edge: Any) -> bool:
     from OCP.BRep import BRep_Tool
     from OCP.BRepAdaptor import BRepAdaptor_Curve
     from OCP.GeomAbs import GeomAbs_Line

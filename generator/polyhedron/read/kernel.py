@@ -29,13 +29,13 @@ def main(model: str, answer: str, scale: str) -> None:
     with open(os.devnull, "wb") as nowhere:  # the kernel prints beneath Python
         os.dup2(nowhere.fileno(), 1)
     try:
-        found = _read(model, float(scale))
+        found = _read_model(model, float(scale))
     except ShapeError as error:
         found = {"cause": error.cause, "fix": error.fix}
     Path(answer).write_text(json.dumps(found))
 
 
-def _read(model: str, scale: float) -> dict[str, Any]:
+def _read_model(model: str, scale: float) -> dict[str, Any]:
     try:
         import OCP.Standard
     except ImportError:  # a library of the system may be missing

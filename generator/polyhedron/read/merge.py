@@ -107,7 +107,7 @@ def _coplanar_groups(soup: Soup, twin: Integers) -> Integers:
     swap = np.where(sliver[a] == sliver[b], area[b] > area[a], sliver[a])
     large, small = np.where(swap, b, a), np.where(swap, a, b)
     tolerance = _distance(soup)
-    off = _farthest(soup, large, small, normal, corner)
+    off = _farthest_off_plane(soup, large, small, normal, corner)
     cross = np.linalg.norm(np.cross(normal[large], normal[small]), axis=1)
     turn = np.arctan2(cross, np.einsum("ij,ij->i", normal[large], normal[small]))
     allowed = np.maximum(
@@ -125,7 +125,7 @@ def _distance(soup: Soup) -> float:
     return MODEL.coplanar * size + soup.noise
 
 
-def _farthest(
+def _farthest_off_plane(
     soup: Soup, large: Integers, small: Integers, normal: Floats, corner: Integers
 ) -> Floats:
     """Return for each pair how far the smaller polygon reaches off the larger one's plane, mm."""

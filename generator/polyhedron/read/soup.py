@@ -69,7 +69,7 @@ def _soup(
     first = np.cumsum(lengths) - lengths
 
     # A polygon that lost corners to the weld loses its empty edges; with two corners, itself.
-    following = _next(loop, first, lengths)
+    following = _next_in_loop(loop, first, lengths)
     keep = origin != origin[following]
     origin, loop = origin[keep], loop[keep]
     lengths = np.bincount(loop, minlength=len(lengths))
@@ -82,10 +82,10 @@ def _soup(
         )
     first = np.cumsum(lengths) - lengths
     _, face = np.unique(owner[loop], return_inverse=True)
-    return Soup(welded, origin, _next(loop, first, lengths), face, noise)
+    return Soup(welded, origin, _next_in_loop(loop, first, lengths), face, noise)
 
 
-def _next(
+def _next_in_loop(
     loop: NDArray[np.intp], first: NDArray[np.intp], lengths: NDArray[np.intp]
 ) -> NDArray[np.intp]:
     following = np.arange(1, len(loop) + 1)

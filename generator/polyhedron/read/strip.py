@@ -75,12 +75,12 @@ class _Side:
         slack = MODEL.same * max(1.0, float(np.abs(place).max()))
         if len(numbers) > 2 and np.ptp(height) <= slack and np.ptp(radius) <= slack:
             return cls("circle", numbers)
-        if len(numbers) == 2 and _upright(radial, radius):
+        if len(numbers) == 2 and _is_upright(radial, radius):
             return cls("line", numbers)
         return cls("other", numbers)
 
 
-def _upright(radial: Any, radius: Any) -> bool:
+def _is_upright(radial: Any, radius: Any) -> bool:
     """Whether both ends of a straight edge lie on one side of the axis; the tip counts."""
     if radius.min() <= MODEL.same * radius.max():
         return True

@@ -21,7 +21,7 @@ from generator.solid.wrap.walk import Loop, loops_of, with_holes
 
 
 @dataclass(slots=True)
-class Cut:
+class CutSymbol:
     """A symbol in pieces; points are numbered, pieces name them."""
 
     flat: list[Points] = field(default_factory=list)  #: (2,) in the plane
@@ -37,7 +37,7 @@ class Cut:
 
 def cut_symbol(
     strip: Strip, rings: list[list[Points]], z_mm: list[float], centre: Points, place: str
-) -> Cut:
+) -> CutSymbol:
     """Cut a symbol.
 
     Parameters
@@ -63,7 +63,7 @@ class _Knife:
         self, strip: Strip, rings: list[list[Points]], z_mm: list[float], centre: Points, place: str
     ) -> None:
         self.strip, self.z_mm, self.place = strip, z_mm, place
-        self.made = Cut()
+        self.made = CutSymbol()
         home = strip.facet_of(centre)
         if home < 0:
             raise SolidError("a symbol lies beside its face", place=place)
@@ -80,7 +80,7 @@ class _Knife:
                        for tier, z in zip(rings, z_mm, strict=True)]  # fmt: skip
         self.on_edge: dict[tuple[int, int], list[int]] = {}
 
-    def cut(self) -> Cut:
+    def cut(self) -> CutSymbol:
         """Return all pieces."""
         made = self.made
         cycles = [[self._cycle(ring) for ring in tier] for tier in self.points]
@@ -199,7 +199,7 @@ class _Knife:
                 yield facet, loops
 
 
-def up_the_line(strip: Strip, line: int, numbers: list[int], made: Cut) -> list[int]:
+def up_the_line(strip: Strip, line: int, numbers: list[int], made: CutSymbol) -> list[int]:
     """Return points of a line from the lowest to the highest."""
     heights = strip.along(line, np.array([made.flat[k] for k in numbers])).tolist()
     return [number for _, number in sorted(zip(heights, numbers, strict=True))]

@@ -15,7 +15,7 @@ from generator.polyhedron.development import Development
 from generator.printers import Printer
 
 
-def narrowest(development: Development, height_mm: float) -> float:
+def least_facet_width(development: Development, height_mm: float) -> float:
     """Return the least width of a facet at a height, as a share of its width on the surface.
 
     Over 1 on a convex face, under 1 in a hole; 0 or less where facets vanish below that
@@ -30,7 +30,7 @@ def narrowest(development: Development, height_mm: float) -> float:
         with np.errstate(divide="ignore"):
             share = np.where(width > 0.0, grown / np.where(width > 0.0, width, 1.0), np.inf)
         shares.append(share.max())
-    outward = _convex(d)
+    outward = _widens_outwards(d)
     return 1.0 if outward else 1.0 - float(max(shares))
 
 
@@ -38,7 +38,7 @@ def bend_problem(
     development: Development, tiers: tuple[Tiers, ...], style: SymbolStyle, printer: Printer
 ) -> str:
     """Return why a printer loses symbols on a face, "" where it does not."""
-    share = narrowest(development, style.height_mm)
+    share = least_facet_width(development, style.height_mm)
     if share <= 0.0:
         return f"symbols of {style.height_mm:g} mm meet in its middle"
     stroke = share * style.stroke_mm
@@ -57,7 +57,7 @@ def bend_problem(
     return ""
 
 
-def _convex(development: Development) -> bool:
+def _widens_outwards(development: Development) -> bool:
     """Whether the facets widen as they rise."""
     d = development
     T = d.T_object_flat[0]

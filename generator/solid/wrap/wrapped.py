@@ -20,8 +20,8 @@ from generator.polyhedron.developable import Developable
 from generator.polyhedron.development import development
 from generator.polyhedron.winged import Polyhedron
 from generator.solid.emboss import turn
-from generator.solid.part import Facet, Wrapped
-from generator.solid.wrap.cut import Cut, cut_symbol
+from generator.solid.part import Facet, WrappedSymbols
+from generator.solid.wrap.cut import CutSymbol, cut_symbol
 from generator.solid.wrap.strip import Strip, strip_of
 from generator.solid.wrap.walk import Loop, loops_of, with_holes
 
@@ -35,7 +35,7 @@ class Body:
     vertices: list[Points]  #: blocks (k, 3) mm, object frame
     count: int  #: of vertices in them
     facets: list[Facet]  #: the first ones are the faces of the object, in their order
-    wrapped: list[Wrapped] = field(default_factory=list)
+    wrapped: list[WrappedSymbols] = field(default_factory=list)
 
 
 def wrapped_onto(
@@ -87,7 +87,7 @@ def wrapped_onto(
     _add_symbols(body, surface, name, names, cuts, firsts, np.asarray(layout.labels))
 
 
-def _lift(strip: Strip, cut: Cut) -> Points:
+def _lift(strip: Strip, cut: CutSymbol) -> Points:
     """Return the points of a symbol on the solid."""
     flat, z = np.array(cut.flat), np.array(cut.z_mm)
     facet, line = np.array(cut.facet), np.array(cut.line)
@@ -102,7 +102,7 @@ def _lift(strip: Strip, cut: Cut) -> Points:
 
 
 def _cut_strip(
-    body: Body, strip: Strip, surface: Developable, cuts: list[Cut], firsts: list[int]
+    body: Body, strip: Strip, surface: Developable, cuts: list[CutSymbol], firsts: list[int]
 ) -> None:
     """Cut the feet out of the strip's facets; a facet in several pieces gets more numbers."""
     d = strip.development
@@ -171,7 +171,7 @@ def _add_symbols(
     surface: Developable,
     name: str,
     names: list[str],
-    cuts: list[Cut],
+    cuts: list[CutSymbol],
     firsts: list[int],
     labels: NDArray[np.int64],
 ) -> None:
@@ -193,7 +193,7 @@ def _add_symbols(
     if not names:
         raise SolidError("a round face without symbols needs no wrapping", place=name)
     body.wrapped.append(
-        Wrapped(
+        WrappedSymbols(
             face=surface.carrier,
             facets=surface.facets,
             first=start,

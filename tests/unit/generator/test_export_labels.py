@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from generator.export.labels import Wanted, label_places
+from generator.export.labels import LabelRequest, label_places
 from generator.export.settings import PREVIEW
 
 STEP = 4.0
@@ -20,19 +20,19 @@ def the_map() -> np.ndarray:
 
 
 def test_a_free_middle_is_taken() -> None:
-    (place,) = label_places(the_map(), STEP, [Wanted(1, 200.0, 200.0, 20.0)])
+    (place,) = label_places(the_map(), STEP, [LabelRequest(1, 200.0, 200.0, 20.0)])
     assert place is not None
     assert np.hypot(place[0] - 200, place[1] - 200) <= STEP
 
 
 def test_hidden_faces_have_no_name() -> None:
-    wanted = [Wanted(2, 24.0, 24.0, 20.0), Wanted(3, 200.0, 200.0, 20.0)]
+    wanted = [LabelRequest(2, 24.0, 24.0, 20.0), LabelRequest(3, 200.0, 200.0, 20.0)]
     assert label_places(the_map(), STEP, wanted) == [None, None]
     assert label_places(np.full((100, 100), -1), STEP, wanted) == [None, None]
 
 
 def test_a_covered_middle_gives_way_to_what_is_seen() -> None:
-    (place,) = label_places(the_map(), STEP, [Wanted(0, 200.0, 200.0, 20.0)])
+    (place,) = label_places(the_map(), STEP, [LabelRequest(0, 200.0, 200.0, 20.0)])
     assert place is not None
     x, y = place
     assert the_map()[int(y / STEP), int(x / STEP)] == 0
@@ -48,7 +48,7 @@ def test_labels_do_not_overlap() -> None:
     seen = np.full((60, 60), -1)
     for k in range(6):
         seen[20:40, 6 * k + 10 : 6 * k + 16] = k
-    wanted = [Wanted(k, STEP * (6 * k + 13), 120.0, 18.0) for k in range(6)]
+    wanted = [LabelRequest(k, STEP * (6 * k + 13), 120.0, 18.0) for k in range(6)]
     places = label_places(seen, STEP, wanted)
     found = [place for place in places if place is not None]
     assert len(found) >= 5
@@ -59,7 +59,7 @@ def test_labels_do_not_overlap() -> None:
 
 def test_a_label_stays_in_the_picture() -> None:
     seen = np.full((30, 60), 0)
-    (place,) = label_places(seen, STEP, [Wanted(0, 2.0, 60.0, 70.0)])
+    (place,) = label_places(seen, STEP, [LabelRequest(0, 2.0, 60.0, 70.0)])
     assert place is not None
     assert 70.0 <= place[0] <= 60 * STEP - 70.0
-    assert label_places(seen, STEP, [Wanted(0, 2.0, 60.0, 500.0)]) == [None]
+    assert label_places(seen, STEP, [LabelRequest(0, 2.0, 60.0, 500.0)]) == [None]

@@ -110,7 +110,7 @@ def test_the_box_of_a_part(tmp_path: Path) -> None:
 def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A program in the slicer's place; its script is written by the test."""
     monkeypatch.setattr(slicer, "find_slicer", lambda: str(tmp_path / "slicer"))
-    monkeypatch.setattr(slicer, "_steady", tuple)
+    monkeypatch.setattr(slicer, "_repeatable_command", tuple)
     monkeypatch.setattr(slicer, "slicer_version", lambda: "test")
     return tmp_path / "slicer"
 

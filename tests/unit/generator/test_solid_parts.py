@@ -18,13 +18,13 @@ from generator.printers import PRINTERS
 from generator.solid import (
     body_mesh,
     box,
-    explicit,
+    emboss_whole,
+    expand_part,
     panels,
     prove_closed,
     symbol_meshes,
     triangles,
     volume,
-    whole,
 )
 from generator.solid.closed import edges_once
 from generator.solid.emboss import turn
@@ -113,7 +113,7 @@ def assert_one_solid(mesh, wanted_volume):
 
 def assert_explicit(part):
     """Check planarity to 1e-12, closure and volume of the expanded solid."""
-    solid = explicit(part)
+    solid = expand_part(part)
     size = float(np.ptp(solid.vertices, axis=0).max())
     loops = [loop for polygon in solid.polygons for loop in polygon.loops]
     start = np.concatenate([np.array(loop) for loop in loops])
@@ -141,7 +141,7 @@ def test_whole_bodies_are_closed_and_do_not_meet_themselves(name, turned):
     tiers, half, order = symbols(chamfer_mm=0.1)
     solid = SOLIDS[name]
     layout = filled(solid, 7.0, half + 1.0, turned=turned, order=order)
-    part = whole(solid, layout, tiers, name)
+    part = emboss_whole(solid, layout, tiers, name)
     prove_closed(part)
     assert_explicit(part)
     count = np.bincount(np.concatenate([face.labels for face in layout.faces]), minlength=4)
@@ -179,7 +179,7 @@ def test_panels_are_closed_lie_flat_and_do_not_meet_themselves(name):
 def test_mesh_owners_and_separate_bodies_add_up():
     tiers, half, order = symbols()
     solid = SOLIDS["cube"]
-    part = whole(solid, filled(solid, 7.0, half + 0.8, order=order), tiers, "cube")
+    part = emboss_whole(solid, filled(solid, 7.0, half + 0.8, order=order), tiers, "cube")
     mesh, plain, stands = triangles(part), body_mesh(part), symbol_meshes(part)
     assert_one_solid(plain, body_volume(solid))
     assert len(stands) == 6
@@ -208,7 +208,7 @@ def test_marks_stay_on_a_body_without_symbols():
         for label in embossing.labels.tolist()
     )
     assert groove < 0
-    plain = whole(solid, Layout("faces", 7.0, ()), tiers, "cube")
+    plain = emboss_whole(solid, Layout("faces", 7.0, ()), tiers, "cube")
     assert len(plain.embossings) == 0
     assert_one_solid(
         body_mesh(part),
@@ -230,7 +230,7 @@ def test_symbols_beyond_an_edge_or_on_each_other_are_found():
         centres = face.centres_mm.copy()
         centres[0] += change
         moved = FaceLayout(0, face.placement, face.rows, face.columns, face.labels, centres, 1)
-        return whole(solid, Layout("faces", pitch, (moved,)), tiers, "cube")
+        return emboss_whole(solid, Layout("faces", pitch, (moved,)), tiers, "cube")
 
     prove_closed(with_centres((0.01, 0.0)))  # off the lattice, but free
     assert_one_solid(triangles(with_centres((0.01, 0.0))), volume(with_centres((0.01, 0.0))))
@@ -244,12 +244,12 @@ def test_symbols_beyond_an_edge_or_on_each_other_are_found():
         0, face.placement, face.rows, face.columns, face.labels + 1, face.centres_mm, 1
     )
     with pytest.raises(SolidError, match="symbol 4 on an alphabet of 4"):
-        whole(solid, Layout("faces", 7.0, (missing,)), tiers, "cube")
+        emboss_whole(solid, Layout("faces", 7.0, (missing,)), tiers, "cube")
 
 
 def test_an_open_body_is_found():
     tiers, _, _ = symbols()
-    part = whole(SOLIDS["cube"], Layout("faces", 7.0, ()), tiers, "cube")
+    part = emboss_whole(SOLIDS["cube"], Layout("faces", 7.0, ()), tiers, "cube")
     prove_closed(part)
     opened = type(part)(
         part.name, part.vertices, part.facets[:-1], part.embossings, part.T_object_part

@@ -18,7 +18,7 @@ from generator.plane.polygon import signed_area
 from generator.polyhedron.development import development
 from generator.polyhedron.round import cone, cylinder
 from generator.printers import printer_named
-from generator.solid import body_mesh, prove_closed, symbol_meshes, triangles, volume, whole
+from generator.solid import body_mesh, emboss_whole, prove_closed, symbol_meshes, triangles, volume
 from generator.solid.closed import edges_once
 from generator.solid.measure import symbol_volume
 from generator.solid.settings import EMBOSS
@@ -63,7 +63,7 @@ CENTRES = [(20.0, 12.0), (27.3, 14.0), (40.0, 30.0), (12.0, 24.5), (33.0, 16.0)]
 @pytest.mark.parametrize("kind", SOLIDS)
 def test_wrapped_symbols_make_one_closed_part(kind):
     solid = SOLIDS[kind]
-    part = whole(solid, layout_on(solid, CENTRES, [0, 1, 2, 3, 1], 0.3), TIERS, "Part")
+    part = emboss_whole(solid, layout_on(solid, CENTRES, [0, 1, 2, 3, 1], 0.3), TIERS, "Part")
     prove_closed(part)
     mesh = triangles(part)
     assert is_closed(mesh)
@@ -71,14 +71,16 @@ def test_wrapped_symbols_make_one_closed_part(kind):
     assert mesh_volume(mesh) == pytest.approx(volume(part), rel=1e-12)
     # Symbols spread as they rise: by z / r of the width around the face at most.
     flat = sum(symbol_volume(TIERS[label]) for label in (0, 1, 2, 3, 1))
-    plain = volume(whole(solid, layout_on(solid, np.empty((0, 2)), np.empty(0, int)), TIERS, ""))
+    plain = volume(
+        emboss_whole(solid, layout_on(solid, np.empty((0, 2)), np.empty(0, int)), TIERS, "")
+    )
     assert flat < volume(part) - plain < flat * (1 + 1.0 / 20)
 
 
 @pytest.mark.parametrize("kind", SOLIDS)
 def test_body_and_symbols_are_closed_each_and_add_up(kind):
     solid = SOLIDS[kind]
-    part = whole(solid, layout_on(solid, CENTRES, [0, 1, 2, 3, 1], 0.3), TIERS, "Part")
+    part = emboss_whole(solid, layout_on(solid, CENTRES, [0, 1, 2, 3, 1], 0.3), TIERS, "Part")
     body, (symbols,) = body_mesh(part), symbol_meshes(part)
     assert is_closed(body)
     assert is_closed(symbols)
@@ -88,7 +90,7 @@ def test_body_and_symbols_are_closed_each_and_add_up(kind):
 
 def test_tops_lie_at_their_height_over_the_facets():
     solid = SOLIDS["cylinder"]
-    part = whole(solid, layout_on(solid, CENTRES, [0, 1, 2, 3, 1]), TIERS, "Part")
+    part = emboss_whole(solid, layout_on(solid, CENTRES, [0, 1, 2, 3, 1]), TIERS, "Part")
     d = development(solid, solid.surfaces[0])
     tops = [facet for facet in part.facets if facet.name.endswith("/top")]
     assert tops
@@ -124,7 +126,7 @@ def test_corners_on_a_line_are_moved_off_it():
     d = development(solid, solid.surfaces[0])
     # A symbol upright on a line: edges of its strokes would run along other lines, too.
     on_line = [(float(d.low[k][0]) + 1e-12, 8.0 * k) for k in range(2, 7)]
-    part = whole(solid, layout_on(solid, on_line, [0, 1, 2, 3, 0]), TIERS, "Part")
+    part = emboss_whole(solid, layout_on(solid, on_line, [0, 1, 2, 3, 0]), TIERS, "Part")
     prove_closed(part)
     mesh = triangles(part)
     a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
@@ -135,9 +137,9 @@ def test_corners_on_a_line_are_moved_off_it():
 def test_a_symbol_over_the_seam_is_refused():
     solid = SOLIDS["cylinder"]
     with pytest.raises(SolidError, match="reaches over the side"):
-        whole(solid, layout_on(solid, [(2.0, 30.0)], [0]), TIERS, "Part")
+        emboss_whole(solid, layout_on(solid, [(2.0, 30.0)], [0]), TIERS, "Part")
     with pytest.raises(SolidError, match="lies beside its face"):
-        whole(solid, layout_on(solid, [(-2.0, 30.0)], [0]), TIERS, "Part")
+        emboss_whole(solid, layout_on(solid, [(-2.0, 30.0)], [0]), TIERS, "Part")
 
 
 def test_a_hole_that_is_too_narrow_is_told():
