@@ -4,6 +4,7 @@
 
     validate-set SPEC.yaml...          make the set, touch it, report
     validate-set compare A B           two runs side by side
+    validate-set worlds DIR...         runs of different worlds on one page
     validate-set repeat DIR NUMBER     one touch again, with pictures of each stage
     validate-set report DIR            the report anew from the touches that are there
 
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from recognizer.validation.result import ValidationResult
 
 NAME = "validate-set"
-TOOLS = ("compare", "repeat", "report")
+TOOLS = ("compare", "worlds", "repeat", "report")
 HELP = """Touch a set of objects in simulation, read every touch, and report how far the answers \
 can be trusted.
 
@@ -42,6 +43,8 @@ EPILOG = """Exit codes: 0 done, 1 ran but failed, 2 bad input, 4 database, 130 i
 More commands, each with --help:
 
 [bold]validate-set compare[/] A B           two runs side by side
+
+[bold]validate-set worlds[/] DIR...         runs of different worlds on one page
 
 [bold]validate-set repeat[/] DIR NUMBER     one touch again, with pictures of each stage
 
@@ -115,7 +118,8 @@ def touch_set(
     study: Annotated[
         int | None, typer.Option(min=0, show_default=False,
                                  help="Touches of each reader in the picture of error against run "
-                                      "time; a twentieth of --touches, 200 at most. 0: none."),
+                                      "time: 200, about a minute of CPU; none where --touches "
+                                      "is less. 0: none."),
     ] = None,
     shard: Annotated[
         int | None, typer.Option(min=1, show_default=False,
@@ -182,6 +186,27 @@ def compare(
         from recognizer.validation.compare import compare_runs
 
         text.comparison(compare_runs(first, second, output), output, as_json=as_json)
+        return console.DONE
+
+    return action
+
+
+@tools.command()
+def worlds(
+    folders: Annotated[list[Path], typer.Argument(metavar="DIR...", help="Folders of runs.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE.html", show_default=False,
+                                  help="Page to write; JSON goes beside it, as FILE.json."),
+    ] = None,
+    as_json: Json = False,
+) -> Action:  # fmt: skip
+    """Show runs of different worlds on one page: engines, surfaces, sensors."""
+
+    def action() -> int:
+        from recognizer.validation import text
+        from recognizer.validation.join import join_runs
+
+        text.worlds(join_runs(folders, output), output, as_json=as_json)
         return console.DONE
 
     return action

@@ -1,7 +1,7 @@
 """Two runs side by side: what became better or worse, and what is the same within chance.
 
 Folders -> lines, and a page. Shares differ if the difference exceeds what two samples of the
-same share show in 95 % of all cases (Newcombe's interval, from Wilson's of both); root mean
+same share show in 95 % of all cases (Newcombe's interval, from the exact ones of both); root mean
 squares, if it exceeds twice its standard error, 1/sqrt(4 n) of each.
 """
 
@@ -12,10 +12,9 @@ import math
 from pathlib import Path
 from typing import Any
 
-from recognizer.validation.errors import ValidationError
 from recognizer.validation.files import write_text
+from recognizer.validation.finished import read_finished
 from recognizer.validation.pictures import accuracy
-from recognizer.validation.pipeline import RESULTS, TIMES_FILE
 from recognizer.validation.report import PAIR, environment
 
 SAME, BETTER, WORSE = "same within chance", "better", "worse"
@@ -38,10 +37,10 @@ def compare_runs(first: Path, second: Path, output: Path | None) -> dict[str, An
     Raises
     ------
     ValidationError
-        A folder holds no run that is done.
+        A folder holds no run that is done, or one of another version.
     """
-    a, b = _read_json(first, RESULTS), _read_json(second, RESULTS)
-    times = _read_json(first, TIMES_FILE), _read_json(second, TIMES_FILE)
+    one, other = read_finished(first), read_finished(second)
+    a, b, times = one.results, other.results, (one.times, other.times)
     found = {
         "lines": _lines(a, b, times),
         "differ": _differing_settings(a["provenance"], b["provenance"]),
@@ -51,18 +50,6 @@ def compare_runs(first: Path, second: Path, output: Path | None) -> dict[str, An
         text = page.render(a=a, b=b, found=found, pictures=(accuracy(a), accuracy(b)))
         write_text(output, text)
     return found
-
-
-def _read_json(folder: Path, name: str) -> dict[str, Any]:
-    try:
-        values: dict[str, Any] = json.loads((folder / name).read_text("utf-8"))
-    except (OSError, ValueError) as error:
-        raise ValidationError(
-            f"no {name} of a run that is done",
-            fix="name the folder that -o named; go on with a run by --resume",
-            place=str(folder),
-        ) from error
-    return values
 
 
 def _lines(

@@ -28,6 +28,7 @@ from recognizer.validation.draw import TouchPlan
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.extremes import extremes
 from recognizer.validation.files import write_json, write_text
+from recognizer.validation.flat_faces import flat_objects
 from recognizer.validation.precision import contact_study, decoder_study, reader_study
 from recognizer.validation.progress import TouchProgress
 from recognizer.validation.provenance import circumstances, judging_limits, provenance
@@ -40,7 +41,7 @@ from recognizer.validation.run import (
     prepare_run,
     touch_all,
 )
-from recognizer.validation.savings import find_savings
+from recognizer.validation.savings import engine_lines, find_savings
 from recognizer.validation.settings import STUDIES
 from recognizer.validation.shards import (
     TIMES,
@@ -51,6 +52,7 @@ from recognizer.validation.shards import (
 )
 from recognizer.validation.work import prepare_reader
 from recognizer.validation.workers import workers_of
+from recognizer.validation.worlds import world_times
 
 TRIALS, RESULTS, TIMES_FILE = "trials.parquet", "results.json", "times.json"
 REPORT, PROVENANCE = "report.html", "provenance.json"
@@ -224,28 +226,32 @@ def _finish(record: RunRecord, folder: Path) -> dict[str, Any]:
     rows = columns_of(table)
     spent = columns_of(read_series(folder, series[0], TIMES))
     reader = prepare_reader(work)
-    results = results_of(rows)
+    asked = provenance(record, work.database)
+    results = results_of(rows, asked["campaign"])
     times: dict[str, Any] = {name: _cpu_ms(spent[name]) for name in ("drawing", "reading")}
+    times["worlds"] = world_times(rows, spent, asked["campaign"])
     results["rule"] = judging_limits()
-    results["study"], results["left_out"] = {}, []
+    results["study"], results["left_out"], results["engines"] = {}, [], engine_lines()
     if campaign.study:
         studies = {
             "contact": contact_study(),
             "decoders": decoder_study(reader.lab.arrays[0], campaign.seed),
             "readers": reader_study(folder, campaign),
         }
-        plan = TouchPlan(work.database, campaign.seed, kind="face", files=campaign.files)
+        plan = TouchPlan(work.database, campaign.seed, kind="face", files=campaign.files,
+                         engine=campaign.engine)  # fmt: skip
         saved = find_savings(reader, plan, studies["readers"])
         results["study"] = {name: study.counted for name, study in studies.items()}
         results["left_out"] = saved.counted
         times |= {name: study.spent for name, study in studies.items()}
         times["left_out"] = saved.spent
     results["extremes"] = extremes(reader)
-    results["provenance"] = provenance(record, work.database)
+    results["provenance"] = asked
     write_table(table, folder / TRIALS)
     write_json(folder / RESULTS, results)
     write_json(folder / TIMES_FILE, times)
-    write_text(folder / REPORT, page_of(results, times, rows))
+    flat = flat_objects(reader.lab, rows, results["objects"]["faces"])
+    write_text(folder / REPORT, page_of(results, times, rows, flat))
     return results
 
 

@@ -1,9 +1,9 @@
 """Error against run time: contact models, decoders, and the reader that spends more or less.
 
 What is counted goes to the results, what is timed to the times: `counted` holds the lines,
-`spent` their CPU times, ms, in the same order. Contact models were measured against finer
-references by `tests/bench/contact_precision.py`; decoders read damaged windows of the set's
-own array; readers read the same touches.
+`spent` their CPU times, ms, in the same order. Contact models and engines were measured against
+finer references by `tests/bench/contact_precision.py` and `contact_engines.py`; decoders read
+damaged windows of the set's own array; readers read the same touches.
 """
 
 from __future__ import annotations
@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 
 from decoder import Decodings, Likelihood, decode_exact, decode_good_tuple
 from generator.array import FoldedArray
+from probe.contact.engines import engine_table
 from probe.contact.press import table
 from recognizer.touch.lab import EmbossedArray
 from recognizer.validation.campaign import Campaign, series_of, settings_of
-from recognizer.validation.results import line_of
+from recognizer.validation.lines import line_of
 from recognizer.validation.settings import STUDIES
 from recognizer.validation.shards import TIMES, columns_of, read_series
 
@@ -38,12 +39,17 @@ class Study:
 
 
 def contact_study() -> Study:
-    """Return error and time of every contact level, as they were measured once."""
+    """Return error and time of every contact level and engine, as they were measured once."""
     study = Study()
-    for kind, lines in table().items():
-        for line in lines:
-            study.counted.append({"overlay": kind, "level": line.level, "error": line.error})
-            study.spent.append(line.ms)
+    found = [
+        (f"{kind}, own engine", line.level, line.error, line.ms)
+        for kind, lines in table().items()
+        for line in lines
+    ]
+    found += [(f"tab, {each.engine}", each.level, each.error, each.ms) for each in engine_table()]
+    for series, level, error, ms in found:
+        study.counted.append({"series": series, "level": level, "error": error})
+        study.spent.append(ms)
     return study
 
 

@@ -15,9 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from probe.contact.engines import engine_named
+from probe.contact.press import level_for
 from probe.simulate.world.levels import LEVELS
 from recognizer.validation.campaign import KINDS, LEVEL_SHARES, Campaign, Shares
-from recognizer.validation.draw import TouchPlan
+from recognizer.validation.draw import TouchPlan, sensor_of
 from recognizer.validation.encoded_set import members_of
 from recognizer.validation.record import RunRecord
 from recognizer.validation.settings import DRAWING, JUDGING
@@ -39,6 +40,7 @@ def provenance(record: RunRecord, database: str) -> dict[str, Any]:
         },
         "campaign": asdict(campaign),
         "contact": _contact(campaign),
+        "contact_level": contact_level(campaign),
         "force_n": list(plan.force_n),
         "tilt_deg": round(math.degrees(plan.tilt_rad), 6),
         "levels": [asdict(LEVELS[name]) for name, _ in campaign.levels],
@@ -54,6 +56,14 @@ def _contact(campaign: Campaign) -> str:
     points = engine_named(campaign.engine).points
     engine = "tabs" if campaign.engine == "own" else campaign.engine
     return f"{engine}, {points} points a tab"
+
+
+def contact_level(campaign: Campaign) -> str:
+    """Return the name of the contact model's level as the tables of its error have it."""
+    if campaign.overlay == "pad":
+        return level_for(sensor_of(campaign.overlay))
+    name = "tabs" if campaign.engine == "own" else campaign.engine
+    return f"{name}-{engine_named(campaign.engine).points}"
 
 
 def judging_limits() -> dict[str, float]:

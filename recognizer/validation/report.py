@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from encoded_objects.errors import require
 from recognizer.validation import pictures
+from recognizer.validation.bounds import FAILS, HOLDS, UNTOLD
+from recognizer.validation.precision_pictures import work_precision
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -25,7 +27,9 @@ def require_report(command: str) -> None:
     require("pyarrow", "matplotlib", "jinja2", extra="report", purpose=command)
 
 
-def page_of(results: dict[str, Any], times: dict[str, Any], rows: dict[str, Any]) -> str:
+def page_of(
+    results: dict[str, Any], times: dict[str, Any], rows: dict[str, Any], flat: list[dict[str, Any]]
+) -> str:
     """Return the page of a run.
 
     Parameters
@@ -34,15 +38,19 @@ def page_of(results: dict[str, Any], times: dict[str, Any], rows: dict[str, Any]
         As they are written to `results.json` and `times.json`.
     rows
         Columns of `trials.parquet`.
+    flat
+        The faces of every object drawn flat, as `flat_faces.flat_objects` returns them.
     """
+    study, level = results["study"], results["provenance"]["contact_level"]
     drawn = {
         "confusion": pictures.confusion(results["objects"]),
         "pose": pictures.pose(rows),
         "against": pictures.accuracy(results),
         "margins": pictures.margins(rows),
-        "work": pictures.work_precision(results["study"], times) if results["study"] else "",
+        "work": work_precision(study, times, level) if study else "",
     }
-    return environment().get_template(PAGE).render(r=results, times=times, pictures=drawn)
+    page = environment().get_template(PAGE)
+    return page.render(r=results, times=times, pictures=drawn, flat=flat)
 
 
 @lru_cache(maxsize=1)
@@ -58,8 +66,24 @@ def environment() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    made.filters.update(size=_size, percent=_percent, share=_share, count=_count)
+    made.filters.update(
+        size=_size, percent=_percent, share=_share, count=_count, interval=_interval, tint=_tint
+    )
     return made
+
+
+_TINTS = {HOLDS: "good", FAILS: "bad", UNTOLD: "untold"}
+
+
+def _tint(state: str) -> str:
+    """Return the class of a cell: red is what fails, grey what nobody can tell yet."""
+    return _TINTS.get(state, "")
+
+
+def _interval(ends: tuple[float, float | None], digits: int = 3) -> str:
+    """Return an interval; an end that is not known is left open."""
+    low, high = ends
+    return f"{low:.{digits}f} … {'' if high is None else f'{high:.{digits}f}'}".strip()
 
 
 def _size(value: float | None, digits: int = 3) -> str:
@@ -78,5 +102,5 @@ def _share(share: dict[str, Any], digits: int = 2) -> str:
     return f"{100 * share['share']:.{digits}f} % ({low} … {high})"
 
 
-def _count(value: int) -> str:
-    return f"{value:,}"
+def _count(value: int | None) -> str:
+    return "–" if value is None else f"{value:,}"

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from encoded_objects.console import DONE, FAILED
-from recognizer.validation.results import HOLDS
+from recognizer.validation.bounds import HOLDS
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,13 +19,14 @@ class ValidationBound:
     """A bound of the design beside what was found; prints as a line."""
 
     name: str
-    sign: str  #: of what must hold: =, <= or >=
+    sign: str  #: of what must hold: =, <=, >=, or within two limits
     limit: float  #: a share, or in `unit`
     unit: str  #: empty: shares are bounded
     state: str  #: holds, fails, or too few touches to tell
     value: float | None  #: found: the share, or the size in `unit`; None: nothing to judge
     counted: tuple[int, int] | None = None  #: of a share: how many, of how many
-    interval: tuple[float, float] | None = None  #: of a share, 95 %
+    interval: tuple[float, float | None] | None = None  #: 95 %; None: no end is known
+    upper: float | None = None  #: the other limit of `within`
 
     @property
     def holds(self) -> bool:
@@ -33,16 +34,18 @@ class ValidationBound:
         return self.state == HOLDS
 
     def __str__(self) -> str:
-        if self.counted is None or self.interval is None:
-            found = _size(self.value, self.unit)
-            return f"{self.name}: {found}, bound {self.sign} {self.limit:g} {self.unit}"
         if self.value is None:
             return f"{self.name}: none was drawn"
-        (count, of), (low, high) = self.counted, self.interval
-        return (
-            f"{self.name}: {count:,} of {of:,}, {self.value:.3%} ({low:.3%} ... {high:.3%}), "
-            f"bound {self.sign} {self.limit:.1%}"
-        )
+        low, high = self.interval or (None, None)
+        if self.counted is None:
+            ends = [_size(end, "").strip() for end in (low, high)]
+            said = f"{_size(self.value, self.unit)} ({' ... '.join(ends)})"
+            return f"{self.name}: {said}, bound {self.sign} {self.limit:g} {self.unit}"
+        said = f"{self.counted[0]:,} of {self.counted[1]:,}, {self.value:.3%}"
+        if low is not None and high is not None:
+            said += f" ({low:.3%} ... {high:.3%})"
+        upper = "" if self.upper is None else f" ... {self.upper:.1%}"
+        return f"{self.name}: {said}, bound {self.sign} {self.limit:.1%}{upper}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +120,8 @@ def bound_from(line: dict[str, Any]) -> ValidationBound:
         state=line["state"],
         value=line["share" if of_shares else "value"],
         counted=(line["count"], line["of"]) if of_shares else None,
-        interval=(line["low"], line["high"]) if of_shares else None,
+        interval=(line["low"], line["high"]),
+        upper=line["upper"],
     )
 
 

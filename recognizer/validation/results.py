@@ -1,35 +1,36 @@
 """All rows of a run -> what the report and `results.json` say. No time, no place, no machine.
 
-The order is that of the report: verdict, kinds and levels, confusion, pose, what accuracy
-depends on, margins, the worst touches. `precision`, `extremes` and `savings` add theirs.
+The order is that of the report: worlds and verdict, kinds and levels, confusion and faces, pose,
+what accuracy depends on, margins, the worst touches. `precision`, `extremes` and `savings` add
+theirs. CPU times are in `times.json`, because no two runs agree in them.
 """
 
 from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Mapping
+from dataclasses import asdict
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from probe.simulate.world.levels import LEVELS
-from recognizer.validation.campaign import ON_FACES, STRANGE
+from recognizer.validation.bounds import HOLDS, state_of
+from recognizer.validation.campaign import Campaign
+from recognizer.validation.lines import Columns, Mask, face_is_bad, line_of
 from recognizer.validation.settings import LIMITS
 from recognizer.validation.statistics import (
     calibration,
+    inside_of,
     quantiles_of,
     rms,
     round_digits,
-    share_of,
 )
 from recognizer.validation.trial import REJECTED, RIGHT, WRONG
+from recognizer.validation.worlds import names_in, worlds_of
 
-Columns = dict[str, Any]
-Mask = NDArray[np.bool_]
-
-HOLDS, FAILS, UNTOLD = "holds", "fails", "too few touches to tell"  #: of a bound
+FORMAT = 2  #: of `results.json`; 1 knew no states of lines and no intervals of errors
 WORST = 20
 QUANTILES = (0.5, 0.9, 0.99, 1.0)
 
@@ -42,23 +43,28 @@ BINS: dict[str, tuple[str, list[float]]] = {
 }
 
 
-def results_of(rows: Columns) -> dict[str, Any]:
+def results_of(rows: Columns, campaign: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Return the results of all touches.
 
     Parameters
     ----------
     rows
         Columns of `rows.COLUMNS`, in the order of the numbers.
+    campaign
+        As `results.json` has it; None: the usual one.
     """
+    asked = asdict(Campaign()) if campaign is None else campaign
     verdicts, kinds, levels = rows["verdict"], rows["kind"], rows["level"]
-    whole = _membership_mask(kinds, [kind for kind in ON_FACES if kind != "worn"])
+    registered = rows["object"] != ""
+    whole = registered & (kinds != "worn")
     fair = np.asarray(rows["enough"], bool)
     inside = kinds == "face"
     everything = np.ones(len(kinds), bool)
     return {
+        "format": FORMAT,
         "totals": line_of(rows, everything),
         "enough": line_of(rows, fair),
-        "worlds": _worlds(rows),
+        "worlds": worlds_of(rows, asked),
         "verdict": _verdict(rows, fair),
         "kinds": [
             {
@@ -66,17 +72,16 @@ def results_of(rows: Columns) -> dict[str, Any]:
                 "surface": surface,
                 **line_of(rows, (kinds == kind) & _surface_mask(rows, surface)),
             }
-            for kind, surface in _kinds(rows)
+            for kind, surface in _kinds(rows, asked["kinds"])
         ],
         "levels": [
             {"level": level, **line_of(rows, (levels == level) & fair)}
-            for level in LEVELS
-            if ((levels == level) & fair).any()
+            for level in names_in(levels[fair], asked["levels"])
         ],
-        "objects": _confusion(rows, _membership_mask(kinds, list(ON_FACES))),
+        "objects": _confusion(rows, registered),
         "reasons": dict(sorted(Counter(rows["reason"][verdicts == REJECTED].tolist()).items())),
         "drawn_anew": _drawn_anew(rows),
-        "pose": _pose(rows),
+        "pose": _pose(rows, asked["levels"]),
         "against": {
             name: {
                 "unit": unit,
@@ -97,35 +102,14 @@ def _surface_mask(rows: Columns, surface: str) -> Mask:
     return found
 
 
-def _membership_mask(values: Any, names: list[str]) -> Mask:
-    return np.array([value in names for value in values], bool)
-
-
-def _kinds(rows: Columns) -> list[tuple[str, str]]:
-    """Return every kind, foreign ones also by surface."""
+def _kinds(rows: Columns, order: Any) -> list[tuple[str, str]]:
+    """Return every kind, those of several surfaces also by surface."""
     found = []
-    for kind in dict.fromkeys((*ON_FACES, "blank", STRANGE)):
-        here = rows["kind"] == kind
-        if here.any():
-            found.append((kind, ""))
-        if kind == STRANGE:
-            found += [(kind, name) for name in sorted(set(rows["surface"][here]))]
+    for kind in names_in(rows["kind"], order):
+        found.append((kind, ""))
+        surfaces = sorted(set(rows["surface"][rows["kind"] == kind].tolist()))
+        found += [(kind, name) for name in surfaces if len(surfaces) > 1]
     return found
-
-
-def line_of(rows: Columns, where: Mask) -> dict[str, Any]:
-    """Return counts, shares and pose errors of some touches."""
-    verdicts = rows["verdict"][where]
-    right = where & (rows["verdict"] == RIGHT)
-    count = {name: int((verdicts == name).sum()) for name in (RIGHT, WRONG, REJECTED)}
-    return {
-        "touches": len(verdicts),
-        **count,
-        "answered": share_of(count[RIGHT] + count[WRONG], len(verdicts)),
-        "wrongly": share_of(count[WRONG], len(verdicts)),
-        "rms_mm": rms(rows["error_mm"][right]),
-        "rms_deg": rms(rows["error_deg"][right]),
-    }
 
 
 def _verdict(rows: Columns, fair: Mask) -> list[dict[str, Any]]:
@@ -135,37 +119,32 @@ def _verdict(rows: Columns, fair: Mask) -> list[dict[str, Any]]:
     strong = rows["level"] == LIMITS.hardest
     hard = line_of(rows, fair & strong) if (fair & strong).any() else expected
     under = "under strong mismatch" if (fair & strong).any() else "all levels"
-    answered = expected["answered"]
+    mm, degrees = (_size_found(hard, name) for name in ("mm", "deg"))
+    least, most = LIMITS.inside
     checks = [
-        ("wrong answers, all touches", everything["wrongly"], "=", 0.0, ""),
-        ("answered, of touches that show enough symbols", answered, ">=", LIMITS.answered, ""),
-        (f"pose, rms, {under}", hard["rms_mm"], "<=", LIMITS.rms_mm, "mm"),
-        (f"turn, rms, {under}", hard["rms_deg"], "<=", LIMITS.rms_deg, "degrees"),
+        ("wrong answers, all touches", everything["wrongly"], "=", 0.0, None, ""),
+        (_EXPECTED, expected["answered"], ">=", LIMITS.answered, None, ""),
+        (f"pose, rms, {under}", mm, "<=", LIMITS.rms_mm, None, "mm"),
+        (f"turn, rms, {under}", degrees, "<=", LIMITS.rms_deg, None, "degrees"),
+        (_INSIDE_95, everything["inside_95"], "within", least, most, ""),
     ]
     found = []
-    for name, value, sign, bound, unit in checks:
-        shown = value if isinstance(value, dict) else {"value": value}
-        state = state_of(shown, sign, bound)
-        line = {"name": name, "sign": sign, "bound": bound, "unit": unit,
+    for name, shown, sign, bound, upper, unit in checks:
+        state = state_of(shown, sign, bound, upper)
+        line = {"name": name, "sign": sign, "bound": bound, "upper": upper, "unit": unit,
                 "holds": state == HOLDS, "state": state}  # fmt: skip
         found.append(line | shown)
     return found
 
 
-def state_of(found: dict[str, Any], sign: str, bound: float) -> str:
-    """Return whether a bound holds, fails, or the touches are too few to tell.
+_EXPECTED = "answered, of touches that show enough symbols"
+_INSIDE_95 = "right answers inside their own 95 % ellipsoid"
 
-    A share that must be reached holds or fails when its whole 95 % interval does; a count that
-    must be zero fails by one touch.
-    """
-    if "share" not in found:
-        size = found["value"]
-        return UNTOLD if size is None else HOLDS if size <= bound else FAILS
-    if sign == "=":
-        return HOLDS if found["count"] == bound else FAILS
-    if found["low"] >= bound:
-        return HOLDS
-    return FAILS if found["high"] < bound else UNTOLD
+
+def _size_found(line: dict[str, Any], name: str) -> dict[str, Any]:
+    """Return a root mean square as a bound is judged by."""
+    low, high = line[f"rms_{name}_95"]
+    return {"value": line[f"rms_{name}"], "of": line["right"], "low": low, "high": high}
 
 
 def _confusion(rows: Columns, on_face: Mask) -> dict[str, Any]:
@@ -176,11 +155,11 @@ def _confusion(rows: Columns, on_face: Mask) -> dict[str, Any]:
     matrix = np.zeros((len(names), len(names) + 1), int)
     for i in np.flatnonzero(on_face).tolist():
         matrix[place[rows["object"][i]], place.get(answers[i], len(names))] += 1
-    faces: dict[tuple[str, str], Counter[str]] = {}
+    faces: dict[tuple[str, str], list[int]] = {}
     confused: Counter[tuple[str, str]] = Counter()
     for i in np.flatnonzero(on_face).tolist():
         key = (rows["object"][i], rows["face"][i])
-        faces.setdefault(key, Counter())[rows["verdict"][i]] += 1
+        faces.setdefault(key, []).append(i)
         if rows["verdict"][i] == WRONG:
             confused[f"{key[0]}/{key[1]}", rows["answer"][i]] += 1
     for i in np.flatnonzero(~on_face & (rows["verdict"] == WRONG)).tolist():
@@ -189,8 +168,8 @@ def _confusion(rows: Columns, on_face: Mask) -> dict[str, Any]:
         "names": names,
         "matrix": matrix.tolist(),
         "faces": [
-            {"object": a, "face": b, **{v: count[v] for v in (RIGHT, WRONG, REJECTED)}}
-            for (a, b), count in sorted(faces.items(), key=lambda one: [*map(_natural_key, one[0])])
+            {"object": a, "face": b, **_face(rows, faces[a, b])}
+            for a, b in sorted(faces, key=lambda one: [*map(_natural_key, one)])
         ],
         "confused": [
             {"touched": a, "answered": b, "count": n} for (a, b), n in sorted(confused.items())
@@ -204,12 +183,19 @@ def _drawn_anew(rows: Columns) -> dict[str, int]:
     return dict(sorted(found.items()))
 
 
+def _face(rows: Columns, numbers: list[int]) -> dict[str, Any]:
+    """Return what became of the touches of a face, and whether it must be looked at."""
+    here = {name: values[numbers] for name, values in rows.items()}
+    whole = line_of(here, here["kind"] != "worn")
+    return line_of(here, np.ones(len(numbers), bool)) | {"bad": face_is_bad(whole)}
+
+
 def _natural_key(name: str) -> tuple[str | int, ...]:
     """Return a name's key in an order in which Box-2 comes before Box-10."""
     return tuple(int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", name))
 
 
-def _pose(rows: Columns) -> dict[str, Any]:
+def _pose(rows: Columns, order: Any) -> dict[str, Any]:
     """Return the distribution of pose errors, and how honest the covariance is."""
     right = rows["verdict"] == RIGHT
     found: dict[str, Any] = {"right": int(right.sum()), "quantiles": list(QUANTILES)}
@@ -222,26 +208,12 @@ def _pose(rows: Columns) -> dict[str, Any]:
             "touches": int(here.sum()),
             "rms_mm": rms(rows["error_mm"][here]),
             "rms_deg": rms(rows["error_deg"][here]),
-            "inside_95": calibration(rows["chi2"][here])[2],
+            "inside_95": inside_of(rows["chi2"][here]),
         }
-        for level in LEVELS
+        for level in names_in(rows["level"][right], order)
         if (here := right & (rows["level"] == level)).any()
     ]
     return found
-
-
-def _worlds(rows: Columns) -> list[dict[str, Any]]:
-    """Return what became of the touches of registered faces, by the sensor that felt them."""
-    on_face = _membership_mask(rows["kind"], list(ON_FACES))
-    return [
-        {
-            "level": level,
-            **line_of(rows, here),
-            "inside_95": calibration(rows["chi2"][here & (rows["verdict"] == RIGHT)])[2],
-        }
-        for level in LEVELS
-        if (here := on_face & (rows["level"] == level)).any()
-    ]
 
 
 def _bins(rows: Columns, name: str, edges: list[float], where: Mask) -> list[dict[str, Any]]:

@@ -1,7 +1,7 @@
-"""What a scene did not need, and what leaving it out saved.
+"""What a touch did not need, and what leaving it out saved; what the engines leave out.
 
-Each line says what one touch looks at, out of how much, and the CPU time of both. Counts go
-to the results, times to the times.
+Each line says in plain words what one touch looks at, out of how much, and the CPU time of
+both. Counts go to the results, times to the times.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from generator.database.entries import object_names
 from generator.database.open import open_database
 from generator.database.read import read_object
 from generator.database.transaction import read_transaction
+from probe.contact.engines import ENGINES, engine_named, engine_table
 from probe.contact.press import LEVELS, level_for, table
 from probe.contact.tips import Tips, tip_points
 from recognizer.touch.reader import Reader
@@ -41,11 +42,12 @@ def find_savings(reader: Reader, plan: TouchPlan, readers: Study) -> Study:
     _objects(study, reader)
     _heights(study, plan, reader)
     _levels(study, reader)
+    _triangles(study, plan, reader)
     _cells(study, reader)
     if readers.counted:
-        _add(study, "effort of the reader: the likeliest candidates, more where that does not "
-             "answer", readers.counted[0]["settings"]["candidates"],
-             readers.counted[-1]["settings"]["candidates"], "candidates",
+        _add(study, "Ways to read the touch that are tried out: the likeliest ones; more only "
+             "where these give no answer", readers.counted[0]["settings"]["candidates"],
+             readers.counted[-1]["settings"]["candidates"], "ways",
              readers.spent[0], readers.spent[-1])  # fmt: skip
     return study
 
@@ -58,7 +60,7 @@ def _objects(study: Study, reader: Reader) -> None:
             _cpu_ms(partial(read_object, connection, name), 1) for name in names[: STUDIES.objects]
         ]
     one = float(np.median(spent))
-    _add(study, "objects read from the database: the one that is touched", 1, len(names),
+    _add(study, "Objects loaded from the database: only the one that is touched", 1, len(names),
          "objects", one, one * len(names))  # fmt: skip
 
 
@@ -76,7 +78,8 @@ def _heights(study: Study, plan: TouchPlan, reader: Reader) -> None:
     whole = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     surface = found.scene.surface
     surface.heights_mm(under)
-    _add(study, "heights asked of the surface: under the tips", len(under), len(whole), "points",
+    _add(study, "Places where the height of the surface is computed: only under the sensor's tips",
+         len(under), len(whole), "places",
          _cpu_ms(lambda: surface.heights_mm(under)),
          _cpu_ms(lambda: surface.heights_mm(whole)))  # fmt: skip
 
@@ -87,9 +90,30 @@ def _levels(study: Study, reader: Reader) -> None:
     chosen = level_for(reader.sensor)
     lines = {line.level: line for line in table()[kind]}
     finest = [level for level in LEVELS[kind] if level in lines][-1]
-    _add(study, f"fineness of the contact model: {chosen} holds the error, {finest} is the finest",
+    _add(study, f"Fineness of the simulated contact: {chosen}, the cheapest that is exact enough; "
+         f"the finest is {finest}",
          LEVELS[kind].index(chosen) + 1, len(lines), "levels", lines[chosen].ms,
          lines[finest].ms)  # fmt: skip
+
+
+def _triangles(study: Study, plan: TouchPlan, reader: Reader) -> None:
+    """Triangles of the part that the engine of the run gets, if it takes bodies."""
+    part = engine_named(plan.engine).part
+    found = draw_touch(plan, 0, reader) if part else None
+    if part is None or found is None or found.scene is None:
+        return
+    needed, of = part(found.surface, reader.sensor, found.touch)
+    _add(study, f"Triangles of the part that engine {plan.engine} gets: only those under the "
+         "sensor", needed, of, "triangles", None, None)  # fmt: skip
+
+
+def engine_lines() -> list[dict[str, Any]]:
+    """Return what each engine leaves out of a real touch, in plain words."""
+    measured = {line.engine: line.from_own for line in engine_table()}
+    return [
+        {"engine": name, "left_out": entry.left_out, "from_own": measured.get(name)}
+        for name, entry in ENGINES.items()
+    ]
 
 
 def _cells(study: Study, reader: Reader) -> None:
@@ -97,9 +121,10 @@ def _cells(study: Study, reader: Reader) -> None:
     for encoding in reader.lab.arrays:
         cells = encoding.array.rows * encoding.array.columns
         what = (
-            f"places weighed: registered cells of {encoding.array.rows} x {encoding.array.columns}"
+            f"Places that an answer may name: only those that were made, of all "
+            f"{encoding.array.rows} x {encoding.array.columns} of the array"
         )
-        _add(study, what, len(encoding.keys), cells, "cells", None, None)
+        _add(study, what, len(encoding.keys), cells, "places", None, None)
 
 
 def _add(

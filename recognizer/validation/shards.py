@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from recognizer.validation.campaign import Series, shards_of
+from recognizer.validation.errors import ValidationError
 from recognizer.validation.files import whole_file
 from recognizer.validation.rows import COLUMNS, CpuTime, Row
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 SHARDS, TIMES = "shards", "times"
+ADDED = ("drawn_anew",)  #: columns that runs of before may lack
 GROUP = 100_000  #: rows that a file holds together
 
 
@@ -70,12 +72,34 @@ def done_shards(folder: Path, series: Series) -> set[int]:
 
 
 def read_series(folder: Path, series: Series, what: str = SHARDS) -> pa.Table:
-    """Return all rows, or all times, of a series that is done."""
+    """Return all rows, or all times, of a series that is done.
+
+    Columns of `ADDED` that an earlier version did not write hold nothing.
+
+    Raises
+    ------
+    ValidationError
+        The files lack another column.
+    """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     files = [shard_file(folder, series.name, shard, what) for shard in range(shards_of(series))]
-    return pa.concat_tables([pq.read_table(file) for file in files]).combine_chunks()
+    table = pa.concat_tables([pq.read_table(file) for file in files]).combine_chunks()
+    if what == TIMES:
+        return table
+    schema = row_schema()
+    missing = [name for name in schema.names if name not in table.column_names]
+    if set(missing).difference(ADDED):
+        raise ValidationError(
+            f"touches of another version: they lack {', '.join(missing)}",
+            fix="touch the set again, in another folder",
+            place=str(folder),
+        )
+    for name in missing:
+        kind = schema.field(name).type
+        table = table.append_column(name, pa.nulls(len(table), kind))
+    return table.select(schema.names)
 
 
 def columns_of(table: pa.Table) -> dict[str, Any]:

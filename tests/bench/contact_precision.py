@@ -147,7 +147,7 @@ def timed(surface, sensor, touches, levels, repeat):
     return {level: 1e3 * statistics.median(map(min, each)) for level, each in times.items()}
 
 
-def drawn(known, path):
+def draw(known, path):
     """Draw error against run time, one panel for each overlay; the table's levels are named."""
     import matplotlib as mpl
 
@@ -172,6 +172,14 @@ def drawn(known, path):
         for p in worst:
             panel.annotate(p["level"], (p["ms"], p["error"]), fontsize=9, weight="bold",
                            xytext=(6, 5), textcoords="offset points")  # fmt: skip
+        engines = known["engines"] if kind == "tab" else []
+        for number, engine in enumerate(dict.fromkeys(p["engine"] for p in engines)):
+            here = [p for p in engines if p["engine"] == engine]
+            panel.loglog([p["ms"] for p in here], [p["error"] for p in here], "^--", ms=6,
+                         color=f"C{5 + number}", label=f"{engine}, worst and median")  # fmt: skip
+            for p in here:
+                panel.annotate(p["level"], (p["ms"], p["error"]), fontsize=9, ha="right",
+                               xytext=(-7, 5), textcoords="offset points")  # fmt: skip
         panel.set_title(f"{kind} overlay")
         panel.set_xlabel("CPU time of a touch with its surface [ms], one core")
         panel.set_ylim(1e-5, 1.5)
@@ -196,7 +204,7 @@ def main():
     parser.add_argument("--draw", action="store_true", help="draw precision.json as it is, no more")
     given = parser.parse_args()
     if given.draw:
-        drawn(json.loads(TABLE.read_text()), PICTURE)
+        draw(json.loads(TABLE.read_text()), PICTURE)
         return
     lines = []
     for kind in (given.overlay,) if given.overlay else ("tab", "pad"):
@@ -214,6 +222,11 @@ def main():
                 lines.append({"overlay": kind, "case": case, "level": level,
                               "error": float(f"{error:.3g}") if known else None,
                               "ms": float(f"{ms:.3g}") if known else None})  # fmt: skip
+    known = json.loads(TABLE.read_text())
+    anew = {(p["overlay"], p["case"]) for p in lines}
+    kept = [p for p in known["cases"] if (p["overlay"], p["case"]) not in anew]
+    order = [(p["overlay"], p["case"]) for p in known["cases"]]
+    lines = sorted(kept + lines, key=lambda p: order.index((p["overlay"], p["case"])))
     levels = {}
     for kind, names in LEVELS.items():
         levels[kind] = []
@@ -225,15 +238,23 @@ def main():
                 levels[kind].append({"level": level, "error": worst, "ms": ms})
                 print(f"{kind:4}{'worst':8}{level:12} error {worst:9.2e}   {ms:9.2f} ms")
     if given.write:
-        made = "OPENBLAS_NUM_THREADS=1 python tests/bench/contact_precision.py --write"
-        rows = ",\n".join(f"    {json.dumps(line)}" for line in lines)
-        heads = ",\n".join(
-            f'    "{kind}": [\n' + ",\n".join(f"      {json.dumps(p)}" for p in known) + "\n    ]"
-            for kind, known in levels.items()
-        )
-        head = f'  "made": "{made}",\n  "levels": {{\n{heads}\n  }}'
-        TABLE.write_text(f'{{\n{head},\n  "cases": [\n{rows}\n  ]\n}}\n')
-        drawn(json.loads(TABLE.read_text()), PICTURE)
+        write_table(known | {"cases": lines, "levels": levels})
+
+
+def write_table(known):
+    """Write `precision.json`, a line for each measurement, and its picture."""
+
+    def rows(lines, wide):
+        return ",\n".join(" " * wide + json.dumps(line) for line in lines)
+
+    made = "OPENBLAS_NUM_THREADS=1 python tests/bench/contact_precision.py --write"
+    heads = ",\n".join(f'    "{kind}": [\n{rows(lines, 6)}\n    ]'
+                       for kind, lines in known["levels"].items())  # fmt: skip
+    engines = f'  "engines": [\n{rows(known.get("engines", []), 4)}\n  ]'
+    cases = f'  "cases": [\n{rows(known["cases"], 4)}\n  ]'
+    head = f'  "made": "{made}",\n  "levels": {{\n{heads}\n  }}'
+    TABLE.write_text(f"{{\n{head},\n{engines},\n{cases}\n}}\n")
+    draw(json.loads(TABLE.read_text()), PICTURE)
 
 
 if __name__ == "__main__":

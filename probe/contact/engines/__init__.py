@@ -9,9 +9,11 @@ A third one is a file beside these with a value `ENGINE`, and a line in `ENGINES
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
+from functools import lru_cache
+from importlib import import_module, resources
 
 from probe.contact.contract import Contact, Touch
 from probe.contact.tips import Tips
@@ -20,10 +22,28 @@ from probe.sensor import SensorType
 from probe.surface.contract import HeightMap
 
 Press = Callable[[HeightMap, SensorType, Touch, Tips], Contact]
+Part = Callable[[HeightMap, SensorType, Touch], tuple[int, int]]
+
+
+@dataclass(frozen=True, slots=True)
+class EngineEntry:
+    """Where an engine is, and what can be said of it without loading it."""
+
+    module: str
+    left_out: str  #: of what happens between a tip and a surface, in plain words
+
 
 ENGINES = {
-    "own": "probe.contact.engines.own",
-    "mujoco": "probe.contact.engines.mujoco",
+    "own": EngineEntry(
+        "probe.contact.engines.own",
+        "every tab of the overlay is a column that is pressed straight down: it does not bulge, "
+        "does not slide, and does not touch the tabs beside it",
+    ),
+    "mujoco": EngineEntry(
+        "probe.contact.engines.mujoco",
+        "friction; and a tip that sinks deeper into a stroke than half the stroke's width is felt "
+        "as if it had slid off to the side",
+    ),
 }
 
 
@@ -34,7 +54,28 @@ class Engine:
     press: Press
     points: int  #: on each tip, enough for it
     bodies: bool  #: whether it touches closed bodies alone, not height maps
-    left_out: str  #: of what happens between a tip and a surface
+    part: Part | None = None  #: triangles of the body that a touch needs, and all; None: no body
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredEngine:
+    """What an engine errs by and costs; `tests/bench/contact_engines.py`."""
+
+    engine: str
+    level: str  #: the engine and its points on a tip
+    error: float  #: largest over the indenters, against the same engine with 217 points
+    from_own: float  #: how far its image is from our own engine's, largest over the indenters
+    ms: float  #: CPU time of a touch, median over the indenters
+
+
+@lru_cache(maxsize=1)
+def engine_table() -> tuple[MeasuredEngine, ...]:
+    """Return the measured errors and times of engines that are not ours."""
+    text = resources.files("probe.contact").joinpath("precision.json").read_text("utf-8")
+    return tuple(
+        MeasuredEngine(line["engine"], line["level"], line["error"], line["from_own"], line["ms"])
+        for line in json.loads(text)["engines"]
+    )
 
 
 def engine_named(name: str) -> Engine:
@@ -49,5 +90,5 @@ def engine_named(name: str) -> Engine:
     """
     if name not in ENGINES:
         raise ContactError(f"no contact engine '{name}'", fix=f"take {', '.join(ENGINES)}")
-    engine: Engine = import_module(ENGINES[name]).ENGINE
+    engine: Engine = import_module(ENGINES[name].module).ENGINE
     return engine

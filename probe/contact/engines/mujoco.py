@@ -279,9 +279,10 @@ def _quaternion(turn: float, tilt_x: float, tilt_y: float) -> list[float]:
     return [w1 * c - y1 * y, x1 * c - z1 * y, w1 * y + y1 * c, x1 * y + z1 * c]
 
 
-ENGINE = Engine(
-    press,
-    points=7,
-    bodies=True,
-    left_out="friction, and how deep a tip stands in a stroke beyond the stroke's half width",
-)
+def triangles_under(surface: HeightMap, sensor: SensorType, touch: Touch) -> tuple[int, int]:
+    """Return how many triangles of a body a touch needs, and how many the body has."""
+    solid = body_of(surface)
+    return len(cut_under(solid, sensor, touch)[1]), len(solid)
+
+
+ENGINE = Engine(press, points=7, bodies=True, part=triangles_under)

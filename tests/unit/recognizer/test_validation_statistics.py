@@ -21,20 +21,41 @@ from recognizer.validation.errors import ValidationError
 from recognizer.validation.statistics import (
     calibration,
     chi2_quantile,
+    clopper_pearson,
+    rms_interval,
     round_digits,
     share_of,
-    wilson,
 )
 
 
 @pytest.mark.parametrize(("hits", "of"), [(0, 10), (1, 10), (9, 10), (10, 10), (995, 1000), (3, 7)])
-def test_wilson_is_that_of_scipy(hits, of):
-    expected = binomtest(hits, of).proportion_ci(0.95, method="wilson")
-    assert wilson(hits, of) == pytest.approx((expected.low, expected.high), abs=1e-12)
+def test_interval_of_a_share_is_the_exact_one_of_scipy(hits, of):
+    expected = binomtest(hits, of).proportion_ci(0.95, method="exact")
+    assert clopper_pearson(hits, of) == pytest.approx((expected.low, expected.high), abs=1e-12)
+
+
+def test_interval_of_a_root_mean_square_by_hand():
+    # squares 1, 4, 9: mean 14/3, standard error sqrt(49/3)/sqrt(3) = 2.333, t(2 dof) = 4.3027
+    half = 4.302653 * math.sqrt(49 / 3) / math.sqrt(3) / (14 / 3) / 2
+    wanted = math.sqrt(14 / 3) * math.exp(-half), math.sqrt(14 / 3) * math.exp(half)
+    assert rms_interval(np.array([1.0, -2.0, 3.0])) == pytest.approx(wanted, rel=1e-5)
+    assert rms_interval(np.array([0.1])) == (0.0, math.inf)
+    assert rms_interval(np.zeros(4)) == (0.0, 0.0)
+
+
+def test_interval_of_a_root_mean_square_holds_the_true_one_as_often_as_it_says():
+    rng = np.random.default_rng(2)
+    held = [
+        low <= math.sqrt(2) <= high
+        for low, high in (
+            rms_interval(np.hypot(*rng.standard_normal((2, 100)))) for _ in range(600)
+        )
+    ]
+    assert 0.92 < np.mean(held) < 0.97
 
 
 def test_nothing_counted_says_nothing():
-    assert wilson(0, 0) == (0.0, 1.0)
+    assert clopper_pearson(0, 0) == (0.0, 1.0)
     assert share_of(0, 0)["share"] is None
 
 

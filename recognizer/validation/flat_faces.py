@@ -1,0 +1,164 @@
+"""Faces drawn flat, side by side, with every touch as a dot: right, refused or wrong.
+
+Faces + rows -> one SVG for each object. All faces of a run have the same scale; x of a face
+points to the right, y up. Dots are strokes of no length with round ends, so that a hundred
+thousand of them stay a small file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recognizer.touch.lab import EncodedFace, Lab
+from recognizer.validation.pictures import COLOURS, WORDS
+from recognizer.validation.trial import REJECTED, RIGHT, WRONG
+
+Array = NDArray[np.float64]
+FACE, BAD, SYMBOL, INK = "#f3f4f6", "#fdf0ee", "#c9ced6", "#1d2126"
+
+
+@dataclass(frozen=True, slots=True)
+class FlatSettings:
+    """Sizes on the page, px."""
+
+    wide: float = 1080.0  #: a row of faces
+    most: float = 230.0  #: the longer side of the largest face
+    gap: float = 18.0
+    title: float = 30.0  #: two lines of letters over a face
+    least: float = 96.0  #: width of a panel: its title must fit
+    dot: float = 5.0
+    right_dots: int = 150  #: of a face, at most; refused and wrong touches are all drawn
+
+
+FLAT = FlatSettings()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlatFace:
+    """A face and what became of its touches."""
+
+    name: str
+    loops_mm: tuple[Array, ...]  #: (k, 2) each, face frame
+    symbols_mm: Array  #: (n, 2) centres
+    touches_mm: Mapping[str, Array]  #: verdict -> (m, 2)
+    bad: bool
+
+    @property
+    def box_mm(self) -> tuple[Array, Array]:
+        """Lowest and highest corner."""
+        corners = np.concatenate(self.loops_mm)
+        return corners.min(axis=0), corners.max(axis=0)
+
+
+def flat_objects(lab: Lab, rows: Mapping[str, Any], faces: Sequence[Mapping[str, Any]]) -> Any:
+    """Return, for each object that was touched, its name, whether a face is bad, and its picture.
+
+    Parameters
+    ----------
+    lab
+        That holds the objects.
+    rows
+        Columns of `rows.COLUMNS`.
+    faces
+        Lines of the faces, `results.json`'s `objects.faces`.
+    """
+    held: dict[str, list[FlatFace]] = {}
+    shapes = {(face.object, face.face): face for face in _faces_of(lab)}
+    touched = {name: rows["object"] == name for name in {line["object"] for line in faces}}
+    for line in faces:
+        shape = shapes[line["object"], line["face"]]
+        here = np.flatnonzero(touched[line["object"]])
+        here = here[rows["face"][here] == line["face"]]
+        at = np.column_stack([rows["x_mm"][here], rows["y_mm"][here]])
+        by = {v: at[rows["verdict"][here] == v] for v in (RIGHT, REJECTED, WRONG)}
+        flat = FlatFace(line["face"], shape.polygon_mm, shape.centres_mm, by, line["bad"])
+        held.setdefault(line["object"], []).append(flat)
+    scale = _scale([flat for each in held.values() for flat in each])
+    return [
+        {"object": name, "bad": any(flat.bad for flat in each), "svg": draw_flat(each, scale)}
+        for name, each in held.items()
+    ]
+
+
+def draw_flat(faces: Sequence[FlatFace], scale: float, settings: FlatSettings = FLAT) -> str:
+    """Return the SVG of an object's faces, `scale` px a mm."""
+    parts, left, top, high, right = [], 0.0, 0.0, 0.0, 0.0
+    for face in faces:
+        low, far = face.box_mm
+        across, down = scale * (far - low)
+        panel = max(float(across), settings.least)
+        if left and left + panel > settings.wide:
+            left, top, high = 0.0, top + high + settings.gap, 0.0
+        parts.append(_panel(face, left, top + settings.title, scale, settings))
+        left += panel + settings.gap
+        right, high = max(right, left - settings.gap), max(high, settings.title + float(down))
+    wide, tall = f"{right + 6:.0f}", f"{top + high + settings.dot:.0f}"
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="-3 0 {wide} {tall}" width="{wide}" '
+        f'height="{tall}" font-family="DejaVu Sans, Arial, sans-serif" font-size="11">'
+        f"{''.join(parts)}</svg>"
+    )
+
+
+def _panel(face: FlatFace, left: float, top: float, scale: float, settings: FlatSettings) -> str:
+    """Return a face with its title over it."""
+    low, far = face.box_mm
+
+    def on_page(points: Array) -> Array:
+        at: Array = (points - (low[0], far[1])) * (scale, -scale) + (left, top)
+        return at
+
+    outline = "".join(f"M{_path(on_page(loop))}Z" for loop in face.loops_mm)
+    count = {verdict: len(at) for verdict, at in face.touches_mm.items()}
+    words = ", ".join(f"{n} {WORDS[v]}" for v, n in count.items() if n) or "not touched"
+    colour = COLOURS[WRONG] if face.bad else INK
+    svg = (
+        f'<text x="{left:.0f}" y="{top - 18:.0f}" fill="{colour}" font-weight="bold">'
+        f"{escape(face.name)}</text>"
+        f'<text x="{left:.0f}" y="{top - 5:.0f}" fill="{colour}" font-size="9">{words}</text>'
+        f'<path d="{outline}" fill="{BAD if face.bad else FACE}" fill-rule="evenodd" '
+        f'stroke="{colour if face.bad else "#9aa1ab"}"/>'
+    )
+    svg += _dots(on_page(face.symbols_mm), SYMBOL, max(1.0, settings.dot * 0.6))
+    for verdict in (RIGHT, REJECTED, WRONG):
+        at = face.touches_mm.get(verdict, np.zeros((0, 2)))
+        if verdict == RIGHT and len(at) > settings.right_dots:
+            at = at[np.linspace(0, len(at) - 1, settings.right_dots).astype(int)]
+        svg += _dots(on_page(at), DOTS[verdict], settings.dot)
+    return svg
+
+
+DOTS = COLOURS | {REJECTED: "#d98c00"}  #: grey would be taken for a symbol
+
+
+def _dots(at: Array, colour: str, size: float) -> str:
+    """Return dots; round by style, since matplotlib's pictures give the page a rule for ends."""
+    if len(at) == 0:
+        return ""
+    path = "".join(f"M{x:.1f} {y:.1f}h.01" for x, y in at)
+    return (
+        f'<path d="{path}" fill="none" stroke="{colour}" stroke-width="{size:.1f}" '
+        f'style="stroke-linecap:round"/>'
+    )
+
+
+def _path(points: Array) -> str:
+    return "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
+
+
+def _scale(faces: Sequence[FlatFace], settings: FlatSettings = FLAT) -> float:
+    """Return px a mm, so that the largest face is as large as it may be."""
+    sides = [float((far - low).max()) for low, far in (face.box_mm for face in faces)]
+    return settings.most / max(sides, default=1.0)
+
+
+def _faces_of(lab: Lab) -> Iterable[EncodedFace]:
+    for encoding in lab.arrays:
+        for number in range(len(encoding.faces)):
+            yield encoding.face(number)

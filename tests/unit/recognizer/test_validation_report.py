@@ -1,0 +1,229 @@
+"""Pictures whose names do not overlap, faces drawn flat, and worlds of several runs on a page."""
+
+import json
+import re
+from itertools import combinations
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from probe.contact.engines import ENGINES, engine_table
+from recognizer.validation.bounds import Interval, state_within
+from recognizer.validation.command import run
+from recognizer.validation.finished import FinishedRun
+from recognizer.validation.flat_faces import FlatFace, draw_flat
+from recognizer.validation.join import join_finished
+from recognizer.validation.labels import boxes_overlap, label_points
+from recognizer.validation.precision import contact_study
+from recognizer.validation.precision_pictures import draw_work_precision
+from recognizer.validation.report import environment
+from recognizer.validation.results import FORMAT
+from recognizer.validation.savings import engine_lines
+from recognizer.validation.settings import STUDIES
+from recognizer.validation.statistics import share_of
+from recognizer.validation.world_pictures import draw_answers, draw_errors
+from recognizer.validation.worlds import surface_name
+
+
+def figure_of(rows, columns, size):
+    figure = Figure(figsize=size, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure, list(figure.subplots(rows, columns, squeeze=False).flat)
+
+
+def assert_readable(figure, texts):
+    """No name over another, and every one within its axes."""
+    figure.draw_without_rendering()
+    boxes = [tuple(text.get_window_extent().extents) for text in texts]
+    for (one, a), (other, b) in combinations(zip(texts, boxes, strict=True), 2):
+        assert not boxes_overlap(a, b), (one.get_text(), other.get_text())
+    for text, (left, bottom, right, top) in zip(texts, boxes, strict=True):
+        frame = text.axes.get_window_extent()
+        within = (frame.x0 - 1 <= left, right <= frame.x1 + 1, frame.y0 - 1 <= bottom,
+                  top <= frame.y1 + 1)  # fmt: skip
+        assert all(within), text.get_text()
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_names_of_crowded_points_do_not_overlap(seed):
+    rng = np.random.default_rng(seed)
+    figure, (axes,) = figure_of(1, 1, (5.5, 4.0))
+    points = [
+        (float(x), float(y), f"more of {k}") for k, (x, y) in enumerate(rng.normal(0, 1, (14, 2)))
+    ]
+    points += [(0.0, 0.0, "one"), (0.0, 0.0, "its double"), (np.nan, 1.0, "no number")]
+    axes.plot(*zip(*[point[:2] for point in points], strict=True), "o")
+    axes.margins(0.3)
+    texts = label_points(axes, points)
+    assert {text.get_text() for text in texts} == {name for *_, name in points} - {"no number"}
+    assert_readable(figure, texts)
+
+
+def study_of_lookalikes():
+    """Readers and decoders that hardly differ, as they do on easy sets."""
+    names = ["as it is", "least", "one lattice", "more steps", "more candidates", "most"]
+    readers = [{"reader": name, "right": 199, "touches": 200, "rms_mm": 0.03} for name in names]
+    decoders = [
+        {"decoder": name, "right": right, "windows": 200}
+        for name, right in (("table", 63), ("serial", 63), ("milestones", 63), ("logarithm", 63),
+                            ("good tuple", 180), ("likelihood", 199),
+                            ("likelihood, registered cells", 199))
+    ]  # fmt: skip
+    contact = contact_study()
+    times = {"contact": contact.spent, "readers": [22.3, 18.6, 19.5, 26.3, 43.4, 83.0],
+             "decoders": [6e-4, 0.04, 1.7e-3, 3.9e-3, 0.07, 0.028, 0.023]}  # fmt: skip
+    return {"contact": contact.counted, "readers": readers, "decoders": decoders}, times
+
+
+def test_names_in_the_picture_of_error_against_run_time_do_not_overlap():
+    study, times = study_of_lookalikes()
+    figure, axes = figure_of(2, 2, (11.5, 8.0))
+    texts = draw_work_precision(axes, study, times, "tabs-19")
+    assert len(texts) == len(study["contact"]) + 2 * 6 + 7
+    assert_readable(figure, texts)
+
+
+def test_every_engine_is_in_the_picture_and_says_what_it_leaves_out():
+    series = {line["series"] for line in contact_study().counted}
+    assert series == {"tab, own engine", "pad, own engine", "tab, mujoco"}
+    assert {line.engine for line in engine_table()} == set(ENGINES) - {"own"}
+    errors = [line.error for line in engine_table()]
+    assert errors == sorted(errors, reverse=True)  # more points err less
+    lines = engine_lines()
+    assert [line["engine"] for line in lines] == list(ENGINES)
+    assert all(len(line["left_out"].split()) > 8 for line in lines)
+
+
+def square(name, bad=False, **touches):
+    by = {verdict: np.array(at, float).reshape(-1, 2) for verdict, at in touches.items()}
+    corners = np.array([[0, 0], [40, 0], [40, 40], [0, 40]], float)
+    return FlatFace(name, (corners,), np.array([[20.0, 20.0]]), by, bad)
+
+
+def test_a_face_drawn_flat_has_a_dot_for_each_touch_where_it_was():
+    face = square("F<1>", right=[(10, 30)], rejected=[(0, 0), (40, 40)])
+    svg = draw_flat([face], 2.0)
+    assert "F&lt;1&gt;" in svg
+    assert "1 right, 2 refused" in svg
+    dots = re.findall(r'd="((?:M[\d.]+ [\d.]+h.01)+)" fill="none" stroke="(#\w+)"', svg)
+    at = {colour: re.findall(r"M([\d.]+) ([\d.]+)", path) for path, colour in dots}
+    assert at["#c9ced6"] == [("40.0", "70.0")]  # 2 px a mm, 30 px of title, y up
+    assert at["#2a7f62"] == [("20.0", "50.0")]
+    assert at["#d98c00"] == [("0.0", "110.0"), ("80.0", "30.0")]
+
+
+def test_faces_stand_side_by_side_and_wrap():
+    svg = draw_flat([square(f"F{k}", bad=k == 1) for k in range(1, 9)], 5.0)
+    titles = re.findall(r'<text x="(\d+)" y="(\d+)" fill="(#\w+)" font-weight', svg)
+    assert len({(x, y) for x, y, _ in titles}) == 8
+    assert len({y for _, y, _ in titles}) == 2  # 200 px each, 1080 px a row
+    assert [colour for *_, colour in titles].count("#c0392b") == 1
+    wide = int(re.search(r'width="(\d+)"', svg)[1])
+    assert wide <= 1090
+
+
+def test_many_right_touches_are_thinned_and_no_refused_one():
+    many = np.random.default_rng(1).uniform(0, 40, (2000, 2))
+    svg = draw_flat([square("F1", right=many, rejected=many[:400])], 2.0)
+    assert "2000 right, 400 refused" in svg
+    assert svg.count("h.01") == 1 + 150 + 400
+
+
+def test_a_study_has_two_hundred_touches_or_none():
+    assert [STUDIES.touches_of(touches) for touches in (4, 199, 200, 100_000)] == [0, 0, 200, 200]
+
+
+@pytest.mark.parametrize(
+    ("found", "least", "most", "state"),
+    [
+        (Interval(0.91, 0.97), 0.90, 0.98, "holds"),
+        (Interval(0.89, 0.97), 0.90, 0.98, "too few touches to tell"),
+        (Interval(0.91, 0.99), 0.90, 0.98, "too few touches to tell"),
+        (Interval(0.981, 0.999), 0.90, 0.98, "fails"),
+        (Interval(0.60, 0.899), 0.90, 0.98, "fails"),
+        (Interval(0.0, None), None, 0.1, "too few touches to tell"),
+        (Interval(0.11, None), None, 0.1, "fails"),
+        (Interval(0.02, 0.1), None, 0.1, "holds"),
+    ],
+)
+def test_bounds_are_judged_by_the_whole_interval(found, least, most, state):
+    assert state_within(found, least, most) == state
+
+
+def world(sensor, right, wrong, registered=True, rms=0.05):
+    share = share_of(right, right)
+    return {
+        "engine": "own", "surface": "written files", "sensor": sensor, "registered": registered,
+        "touches": right + wrong + 3, "right": right, "wrong": wrong, "rejected": 3,
+        "answered": share_of(right + wrong, right + wrong + 3), "expected": share_of(0, 0),
+        "rms_mm": rms if right else None, "rms_mm_95": [0.04, 0.06 if right else None],
+        "rms_deg": 0.2 if right else None, "rms_deg_95": [0.1, 0.25 if right else None],
+        "inside_95": share, "inside_state": "", "state": "fails" if wrong else "",
+        "states": {"expected": "", "rms_mm": "holds", "rms_deg": "holds", "inside_95": "holds"},
+    }  # fmt: skip
+
+
+def finished(command, *worlds):
+    versions = {"source, sha256": "0" * 64}
+    provenance = {"command": command, "versions": versions, "set": "1" * 64}
+    totals = {"touches": sum(line["touches"] for line in worlds)}
+    results = {"format": FORMAT, "worlds": list(worlds), "totals": totals, "provenance": provenance}
+    spent = [{"drawing": 4.0 + k, "reading": 20.0 + k} for k in range(len(worlds))]
+    return FinishedRun(results, {"worlds": spent})
+
+
+def test_worlds_of_several_runs_keep_their_order_commands_and_times():
+    runs = [
+        finished("validate-set a.yaml", world("low", 90, 0), world("half dead", 0, 0)),
+        finished("validate-set a.yaml --engine mujoco", world("low", 80, 2)),
+    ]
+    found = join_finished(runs)
+    assert [(line["run"], line["sensor"], line["right"]) for line in found["worlds"]] == [
+        ("A", "low", 90), ("A", "half dead", 0), ("B", "low", 80),
+    ]  # fmt: skip
+    assert [line["drawing_ms"] for line in found["worlds"]] == [4.0, 5.0, 4.0]
+    assert [line["command"] for line in found["runs"]] == [each.command for each in runs]
+    json.dumps(found, allow_nan=False)
+    drawn = draw_answers(found["worlds"]), draw_errors(found["worlds"])
+    assert "2 wrong" in drawn[0]
+    page = environment().get_template("worlds.html.j2").render(**found, pictures=drawn)
+    assert page.count("half dead") == 2  # in the table, and in the picture of answers alone
+    assert "--engine mujoco" in page
+    assert draw_errors([found["worlds"][1]]) == ""
+
+
+def test_worlds_reads_folders_and_writes_a_page_with_json_beside_it(tmp_path, capsys):
+    folders = []
+    for name in ("one", "two"):
+        folder = tmp_path / name
+        folder.mkdir()
+        made = finished(f"validate-set {name}.yaml", world("low", 9, 0))
+        (folder / "results.json").write_text(json.dumps(made.results))
+        (folder / "times.json").write_text(json.dumps(made.times))
+        folders.append(str(folder))
+    page = tmp_path / "worlds.html"
+    assert run(["worlds", *folders, "-o", str(page), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert [line["run"] for line in said["worlds"]] == ["A", "B"]
+    assert json.loads(page.with_suffix(".json").read_text()) == said
+    assert str(tmp_path) not in page.read_text() + page.with_suffix(".json").read_text()
+    assert not re.search(r"""(src|href)\s*=\s*["'](?!#|data:)""", page.read_text())
+    assert run(["worlds", *folders]) == 0
+    assert "A: own, written files, low" in capsys.readouterr().out
+    assert run(["worlds", folders[0], folders[0]]) == 2
+    assert "stands twice" in capsys.readouterr().err
+    old = json.loads((tmp_path / "one" / "results.json").read_text())
+    del old["format"]
+    (tmp_path / "one" / "results.json").write_text(json.dumps(old))
+    for command in (["worlds", *folders], ["compare", *folders]):
+        assert run(command) == 2
+        assert "validate-set report" in capsys.readouterr().err
+
+
+def test_a_surface_is_named_as_it_was_made():
+    assert surface_name({"files": True}) == "written files"
+    assert surface_name({"files": False}) == "registered faces"
+    printed = {"surfaces": "printed", "faults": "usual", "print_profile": "mk4-0.4"}
+    assert surface_name(printed) == "printed, faults usual, by mk4-0.4"
