@@ -6,8 +6,11 @@
     draw      number -> touch and counts (surfaces, written)
     trial     touch -> answer -> verdict;  rows  a touch as a row
     run       who does which touches (work, workers, cluster), and where they go (shards)
-    results   rows -> shares and errors (statistics, precision, extremes, savings)
-    report    results -> page (pictures);  compare  two runs;  repeat  one touch again
+    results   rows -> shares and errors (lines, worlds, bounds, statistics, precision, extremes,
+              savings)
+    report    results -> page (pictures, precision_pictures, labels, flat_faces)
+    compare   two runs;  join  runs of different worlds (world_pictures);  finished  reads them
+    repeat    one touch again
     pipeline  all of it in order: `validate`;  result  what it returns;  command  validate-set
 """
 
