@@ -1,6 +1,6 @@
 """What a face promises: the share of its touches that a sensor's reader would answer.
 
-Outline + symbols of a face (mm, cells) + sensor -> symbols seen whole, loaded share and rank at
+Outline + symbols of a face (mm, cells) + sensor -> symbols seen whole, loaded share and rivals at
 many poses; with a table of measured answers -> the share of touches that are answered.
 
 A pose is a place of the sensor's centre on the face, and a turn. They are spread evenly, the
@@ -18,9 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from generator.array.contract import SymbolArray
 from generator.layout.footprint import Points
 from generator.layout.placement import FaceLayout
-from generator.layout.places import Cells, Identifies, windows_in
+from generator.layout.places import Cells, windows_in
 
 _STEPS = 1.2207440846057596 ** -np.arange(1.0, 4.0)  # of x, y and turn: 1.22^4 = 1.22 + 1
 
@@ -45,6 +46,23 @@ class SensorView:
     symbol_half_mm: float  #: from a symbol's centre to the end of its strokes
 
 
+class SeenRanks:
+    """Ranks of sets of cells of one array, each found once, for all faces that stand on it."""
+
+    def __init__(self, array: SymbolArray) -> None:
+        self.array = array
+        self._known: dict[bytes, int] = {}
+
+    def rank(self, rows: Cells, columns: Cells) -> int:
+        """Return the rank of cells (n,); only their differences matter."""
+        if not len(rows):
+            return 0
+        key = np.stack([rows - rows.min(), columns - columns.min()]).tobytes()
+        if key not in self._known:
+            self._known[key] = self.array.rank(rows, columns)
+        return self._known[key]
+
+
 @dataclass(frozen=True, slots=True)
 class FaceViews:
     """A face as a sensor meets it, pose by pose; the sensor's centre is on the face."""
@@ -53,7 +71,7 @@ class FaceViews:
     turn_rad: Points  #: (P,) of the sensor against the face
     seen: NDArray[np.int64]  #: (P,) symbols seen whole
     loaded: Points  #: (P,) share of the sensor's rectangle that lies on the face
-    named: NDArray[np.bool_]  #: (P,) the cells seen whole have full rank: no rival anywhere
+    rivals: Points  #: (P,) places of a full array that show the same in these cells; 0: none
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,12 +95,21 @@ class AnswerTable:
         return np.asarray(rows[low, pose] + (place - low) * (rows[high, pose] - rows[low, pose]))
 
 
-def promised_share(views: FaceViews, table: AnswerTable) -> float:
+def promised_share(views: FaceViews, table: AnswerTable, used: float) -> float:
     """Return the share of touches of a face that will be answered at once.
 
-    Cells without full rank have a rival on a full array: they count as not answered.
+    Parameters
+    ----------
+    views
+        Of the face.
+    table
+        Measured where no rival is registered.
+    used
+        Share of the array's cells that carry symbols, as if strewn at random: a pose with r
+        rivals has none of them registered with probability exp(-r used).
     """
-    return float((table.at(views.seen, views.loaded) * views.named).mean())
+    alone = np.exp(-views.rivals * used)
+    return float((table.at(views.seen, views.loaded) * alone).mean())
 
 
 def face_views(
@@ -90,8 +117,7 @@ def face_views(
     face: FaceLayout,
     pitch_mm: float,
     view: SensorView,
-    window: tuple[int, int],
-    identifies: Identifies,
+    ranks: SeenRanks,
     settings: PromiseSettings = PROMISE,
 ) -> FaceViews:
     """Return what a sensor meets on one face.
@@ -104,27 +130,55 @@ def face_views(
         Its symbols.
     view
         The sensor.
-    window, identifies
-        Of the array: its unique window, and `generator.layout.places.rank_test`.
+    ranks
+        Of the array on which it stands.
     settings
         How many poses.
     """
-    start = np.concatenate(list(loops))
-    end = np.concatenate([np.roll(loop, -1, axis=0) for loop in loops])
+    start, end = _edges(loops)
     centre, turn = _poses_on(start, end, settings.poses)
-    c, s = np.cos(turn)[:, None], np.sin(turn)[:, None]
-    across, up = _in_sensor(face.centres_mm, centre, c, s)
+    return views_at(loops, face, pitch_mm, view, ranks, centre, turn)
+
+
+def views_at(
+    loops: Sequence[Points],
+    face: FaceLayout,
+    pitch_mm: float,
+    view: SensorView,
+    ranks: SeenRanks,
+    centre_mm: Points,
+    turn_rad: Points,
+) -> FaceViews:
+    """Return what a sensor meets at given poses of one face.
+
+    Parameters
+    ----------
+    loops, face, pitch_mm, view, ranks
+        As for `face_views`.
+    centre_mm, turn_rad
+        (P, 2) and (P,) of the sensor, face frame.
+    """
+    start, end = _edges(loops)
+    c, s = np.cos(turn_rad)[:, None], np.sin(turn_rad)[:, None]
+    across, up = _in_sensor(face.centres_mm, centre_mm, c, s)
     whole = (np.abs(across) <= view.half_mm[0] - view.symbol_half_mm) & (
         np.abs(up) <= view.half_mm[1] - view.symbol_half_mm
     )
-    ax, ay = _in_sensor(start, centre, c, s)
-    bx, by = _in_sensor(end, centre, c, s)
+    ax, ay = _in_sensor(start, centre_mm, c, s)
+    bx, by = _in_sensor(end, centre_mm, c, s)
     area = _area_within(ax, ay, bx, by, *view.half_mm)
     loaded = area / (4 * view.half_mm[0] * view.half_mm[1])
     rows, columns = _cells_unwrapped(face, pitch_mm)
-    named = _shows_window(whole, rows, columns, window)
-    named |= _passes(whole & ~named[:, None], rows, columns, identifies)
-    return FaceViews(centre, turn, whole.sum(axis=1), loaded, named)
+    array = ranks.array
+    unknown = 1 - _rank_seen(whole, rows, columns, ranks) / array.full_rank
+    rivals = (float(array.rows) * float(array.columns) + 1) ** unknown - 1
+    return FaceViews(centre_mm, turn_rad, whole.sum(axis=1), loaded, rivals)
+
+
+def _edges(loops: Sequence[Points]) -> tuple[Points, Points]:
+    return np.concatenate(list(loops)), np.concatenate(
+        [np.roll(loop, -1, axis=0) for loop in loops]
+    )
 
 
 def _poses_on(start: Points, end: Points, number: int) -> tuple[Points, Points]:
@@ -204,15 +258,11 @@ def _shows_window(
     return np.asarray(windows_in(grid, *window).any(axis=(0, 2, 3)))
 
 
-def _passes(
-    whole: NDArray[np.bool_], rows: Cells, columns: Cells, identifies: Identifies
-) -> NDArray[np.bool_]:
-    """Return at which poses (P,) the cells seen whole pass the rank test, each set tested once."""
-    known: dict[bytes, bool] = {}
-    found = np.zeros(len(whole), dtype=bool)
-    for pose, key in enumerate(map(bytes, np.packbits(whole, axis=1))):
-        if key not in known:
-            some = whole[pose]
-            known[key] = bool(some.any()) and identifies(rows[some], columns[some])
-        found[pose] = known[key]
+def _rank_seen(
+    whole: NDArray[np.bool_], rows: Cells, columns: Cells, ranks: SeenRanks
+) -> NDArray[np.int64]:
+    """Return the rank of the cells seen whole at each pose, (P,)."""
+    found = np.full(len(whole), ranks.array.full_rank)
+    for pose in np.flatnonzero(~_shows_window(whole, rows, columns, ranks.array.window)):
+        found[pose] = ranks.rank(rows[whole[pose]], columns[whole[pose]])
     return found

@@ -6,10 +6,10 @@ import pytest
 from generator.array import profile
 from generator.layout.layout import lay_out
 from generator.layout.placement import FaceLayout, Placement
-from generator.layout.places import rank_test
 from generator.layout.promise import (
     AnswerTable,
     PromiseSettings,
+    SeenRanks,
     SensorView,
     face_views,
     promised_share,
@@ -62,7 +62,7 @@ def area(polygon):
 def test_views_are_those_of_each_pose_by_itself(loops):
     array = profile().array()
     face = lattice(loops[0])
-    views = face_views(loops, face, 7.0, VIEW, array.window, rank_test(array), PromiseSettings(150))
+    views = face_views(loops, face, 7.0, VIEW, SeenRanks(array), PromiseSettings(150))
     assert len(views.seen) == 150
     for k in range(150):
         c, s = np.cos(views.turn_rad[k]), np.sin(views.turn_rad[k])
@@ -71,7 +71,8 @@ def test_views_are_those_of_each_pose_by_itself(loops):
         whole = (abs(there[:, 0]) <= 12.7 - 2.52) & (abs(there[:, 1]) <= 9.0 - 2.52)
         assert views.seen[k] == whole.sum()
         rows, columns = face.rows[whole], face.columns[whole]
-        assert views.named[k] == (bool(whole.any()) and array.identifies(rows, columns))
+        rank = array.rank(rows, columns) if whole.any() else 0
+        assert views.rivals[k] == pytest.approx(4.0 ** (6 - rank) - 1)
         on_face = 0.0
         for loop in loops:
             part = loop - views.centre_mm[k]
@@ -85,7 +86,7 @@ def test_centres_lie_on_the_face_evenly():
     array = profile().array()
     face = lattice(ELL)
     poses = PromiseSettings(2000)
-    views = face_views((ELL,), face, 7.0, VIEW, array.window, rank_test(array), poses)
+    views = face_views((ELL,), face, 7.0, VIEW, SeenRanks(array), poses)
     x, y = views.centre_mm.T
     assert (((y < 12) & (x < 50)) | ((x < 14) & (y < 60))).all()
     assert (x.min(), y.min()) >= (0, 0)
@@ -94,7 +95,7 @@ def test_centres_lie_on_the_face_evenly():
     for quarter in range(4):
         share = (views.turn_rad // (np.pi / 2) == quarter).mean()
         assert share == pytest.approx(0.25, abs=0.01)
-    again = face_views((ELL,), face, 7.0, VIEW, array.window, rank_test(array), poses)
+    again = face_views((ELL,), face, 7.0, VIEW, SeenRanks(array), poses)
     assert np.array_equal(views.centre_mm, again.centre_mm)
 
 
@@ -108,7 +109,7 @@ def test_a_60_mm_face_shows_what_was_measured(pitch_mm, half_mm, mean):
     (face, *_) = lay_out(solid, array, pitch_mm, half_mm, clearances, NONE).faces
     views = face_views(
         face_polygon(solid, 0), face, pitch_mm, SensorView((12.7, 12.7), 0.36 * pitch_mm),
-        array.window, rank_test(array), PromiseSettings(4000),
+        SeenRanks(array), PromiseSettings(4000),
     )  # fmt: skip
     near = (np.minimum(views.centre_mm, 60 - views.centre_mm) < 9).sum(axis=1)
     for sides, symbols in enumerate(mean):
@@ -118,9 +119,9 @@ def test_a_60_mm_face_shows_what_was_measured(pitch_mm, half_mm, mean):
 def test_a_blank_face_shows_nothing():
     array = profile().array()
     blank = FaceLayout(0, Placement(0, 0, 0.0, 0.0, 0.0), *NONE, NONE[0], np.empty((0, 2)), 0)
-    views = face_views((SQUARE,), blank, 7.0, VIEW, array.window, rank_test(array))
+    views = face_views((SQUARE,), blank, 7.0, VIEW, SeenRanks(array))
     assert not views.seen.any()
-    assert not views.named.any()
+    assert (views.rivals == 4095).all()
     assert (views.loaded > 0.2).all()
 
 
@@ -132,7 +133,10 @@ def test_a_promise_weighs_measured_answers():
     flat = AnswerTable((1,), (1.0,), np.array([[0.7]]))
     assert flat.at(seen, loaded) == pytest.approx(0.7)
     array = profile().array()
-    views = face_views((SQUARE,), lattice(SQUARE), 7.0, VIEW, array.window, rank_test(array))
-    assert promised_share(views, flat) == pytest.approx(0.7 * views.named.mean())
-    answered = table.at(views.seen, views.loaded)[views.named].sum() / 1000
-    assert promised_share(views, table) == pytest.approx(answered)
+    views = face_views((SQUARE,), lattice(SQUARE), 7.0, VIEW, SeenRanks(array))
+    assert promised_share(views, flat, 0.0) == pytest.approx(0.7)
+    alone = np.exp(-0.25 * views.rivals)
+    assert promised_share(views, flat, 0.25) == pytest.approx(0.7 * alone.mean())
+    answered = (table.at(views.seen, views.loaded) * alone).mean()
+    assert promised_share(views, table, 0.25) == pytest.approx(answered)
+    assert promised_share(views, flat, 1.0) < 0.7 * (views.rivals == 0).mean() + 0.06
