@@ -3,6 +3,7 @@
 ::
 
     campaign  how many touches, of which kinds and levels;  encoded_set  what is touched
+    made_kinds  what kinds need beside the set: copies, small objects, other labs
     draw      number -> touch and counts (surfaces, written)
     trial     touch -> answer -> verdict;  rows  a touch as a row
     run       who does which touches (work, workers, cluster), and where they go (shards)

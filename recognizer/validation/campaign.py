@@ -19,12 +19,14 @@ from recognizer.touch.reader import Reader
 from recognizer.touch.settings import DEFAULTS
 from recognizer.validation.draw import TouchPlan
 from recognizer.validation.errors import ValidationError
+from recognizer.validation.made_kinds import COPY, NEAR, SAME_PROFILE, SIDE, SMALL
 from recognizer.validation.settings import SHARING
 from recognizer.validation.surfaces import FOREIGN
 
 TOUCHES = "touches"  #: name of the series that is counted
 BLANK, STRANGE = "blank", "foreign"
-ON_FACES = ("face", "edge", "corner", "worn")
+ON_FACES = ("face", "edge", "corner", "worn", COPY, NEAR, SMALL, SIDE)
+ON_PARTS = (*ON_FACES, SAME_PROFILE)  #: all that touch written parts
 
 Shares = tuple[tuple[str, float], ...]
 
@@ -37,6 +39,7 @@ KINDS: Shares = (
     (BLANK, 0.05),
     (STRANGE, 0.15),
 )
+KIND_NAMES = (*ON_FACES, BLANK, STRANGE, SAME_PROFILE)  #: all that `--kinds` names
 LEVEL_SHARES: Shares = (("low", 0.1), ("typical", 0.4), ("hard", 0.2), ("mismatch", 0.3))
 
 #: Readers of the picture of error against run time: candidates, steps, finalists, final steps.
@@ -81,11 +84,11 @@ def bodies_alone(campaign: Campaign, named: bool) -> Campaign:
     ValidationError
         It asks for what such an engine cannot touch.
     """
-    other = [kind for kind, _ in campaign.kinds if kind not in ON_FACES]
+    other = [kind for kind, _ in campaign.kinds if kind not in ON_PARTS]
     if named and other:
         raise ValidationError(
             f"engine {campaign.engine} touches written parts, not {', '.join(other)}",
-            fix=f"name kinds among {', '.join(ON_FACES)}, or take --engine own",
+            fix=f"name kinds among {', '.join(ON_PARTS)}, or take --engine own",
             place="--kinds",
         )
     if not campaign.files or campaign.overlay != "tab":
@@ -95,7 +98,7 @@ def bodies_alone(campaign: Campaign, named: bool) -> Campaign:
             fix="take --surfaces files and --overlay tab, or --engine own",
             place="--engine",
         )
-    kept = [(kind, share) for kind, share in campaign.kinds if kind in ON_FACES]
+    kept = [(kind, share) for kind, share in campaign.kinds if kind in ON_PARTS]
     total = sum(share for _, share in kept)
     return replace(campaign, kinds=tuple((kind, share / total) for kind, share in kept))
 
@@ -147,7 +150,11 @@ def batches_of(series: Series, shard: int) -> Iterator[Batch]:
 
 
 def plan_of(
-    campaign: Campaign, series: Series, database: str, number: int
+    campaign: Campaign,
+    series: Series,
+    database: str,
+    number: int,
+    labs: tuple[str, ...] = (),
 ) -> tuple[str, TouchPlan]:
     """Return the kind of a touch as `kinds` names it, and the plan that draws it."""
     rng = np.random.default_rng([campaign.seed, number, 1])
@@ -157,7 +164,7 @@ def plan_of(
         strange = [name for name in FOREIGN if name != BLANK]
         surface = strange[int(rng.integers(len(strange)))]
     plan = TouchPlan(database, campaign.seed, level, surface, files=campaign.files,
-                     engine=campaign.engine, sensor_per=campaign.sensor_per)  # fmt: skip
+                     engine=campaign.engine, sensor_per=campaign.sensor_per, labs=labs)  # fmt: skip
     return kind, plan
 
 
@@ -219,7 +226,7 @@ def shares_of(text: str, allowed: Mapping[str, object] | tuple[str, ...], option
 
 def kinds_of(text: str) -> Shares:
     """Read the shares of `--kinds`."""
-    return shares_of(text, tuple(name for name, _ in KINDS), "--kinds")
+    return shares_of(text, KIND_NAMES, "--kinds")
 
 
 def levels_of(text: str) -> Shares:

@@ -92,7 +92,8 @@ def touch_set(
     kinds: Annotated[
         str, typer.Option(metavar="LIST", show_default=False,
                           help="Kinds of touches and their shares: face, edge, corner, worn, "
-                               "blank, foreign; as face=3,edge."),
+                               "blank, foreign, copy, near, small, side, same_profile; "
+                               "as face=3,edge."),
     ] = "",
     levels: Annotated[
         str, typer.Option("--levels", "--noise", metavar="LIST", show_default=False,

@@ -16,17 +16,19 @@ from numpy.typing import NDArray
 from probe.contact.contract import Touch
 from probe.errors import ContactError
 from probe.sensor import Overlay, SensorType
-from probe.simulate.registered import registered_surface
+from probe.simulate.registered import registered_object, registered_objects, registered_surface
 from probe.simulate.scene import Scene
 from probe.simulate.touch import TouchRanges, random_touches
 from probe.simulate.world.levels import LEVELS, Level
 from probe.simulate.world.reading import read_sensor
 from probe.simulate.world.sensor_copy import SensorCopy, draw_copy
+from probe.simulate.world.side_by_side import SideBySide, lay_beside
 from probe.simulate.world.worn import wear_face, wear_part
 from probe.surface.contract import HeightMap
 from probe.surface.face import FaceSurface
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.reader import Reader
+from recognizer.validation.made_kinds import SAME_PROFILE, SIDE, is_extra
 from recognizer.validation.settings import DRAWING
 from recognizer.validation.surfaces import FOREIGN
 from recognizer.validation.written import written_surface
@@ -40,7 +42,9 @@ class TouchPlan:
 
     `kind` is `face` (the sensor's centre at least `inside_mm` from the edges), `edge` (nearer
     than that), `corner` (within `inside_mm` of a corner), `worn` (a face with a share of its
-    symbols gone), or one of the surfaces of `surfaces.FOREIGN`.
+    symbols gone), `copy`, `near` or `small` (inside faces of these members, `made_kinds`), `side`
+    (near an edge beside which another object lies), `same_profile` (a part of another lab), or
+    one of the surfaces of `surfaces.FOREIGN`.
     """
 
     database: str
@@ -53,6 +57,7 @@ class TouchPlan:
     files: bool = False  #: touch the written STL files, not what the database says of them
     engine: str = "own"  #: of contact, `probe.contact.engines`
     sensor_per: str = "touch"  #: or `run`: the errors of the sensor stay the same
+    labs: tuple[str, ...] = ()  #: databases of other labs, of `same_profile`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,10 +65,19 @@ class DrawnTouch:
     """What is touched, and what the sensor reads."""
 
     surface: HeightMap
-    scene: Scene | None  #: None for a foreign surface
+    scene: Scene | None  #: None for a foreign surface, and for parts of another lab
     touch: Touch
     counts: NDArray[np.uint16]
     drawn_anew: tuple[str, ...] = ()  #: why, for each time that the plate did not come to rest
+    beside: tuple[Scene, Touch] | None = None  #: another face under the sensor, its touch there
+
+    def truth_of(self, object_name: str | None, face: str | None) -> tuple[Scene | None, Touch]:
+        """Return the truth that an answer is compared with: of the face named, if it is there."""
+        if self.beside is not None:
+            scene, _ = self.beside
+            if (scene.object_name, scene.face) == (object_name, face):
+                return self.beside
+        return self.scene, self.touch
 
 
 def draw_touch(plan: TouchPlan, number: int, reader: Reader) -> DrawnTouch:
@@ -72,35 +86,88 @@ def draw_touch(plan: TouchPlan, number: int, reader: Reader) -> DrawnTouch:
     level = LEVELS[plan.level]
     ranges = _ranges(plan, level)
     copy = _copy_of_run(plan.seed, reader.sensor) if plan.sensor_per == "run" else None
-    encoding = reader.lab.arrays[int(rng.integers(len(reader.lab.arrays)))]
     anew: list[str] = []
+    arrays = [one for one in reader.lab.arrays if plan.kind in FOREIGN or _by_name(one, plan.kind)]
+    encoding = arrays[int(rng.integers(len(arrays)))]
     while True:
-        scene: Scene | None = None
-        surface: HeightMap
-        if plan.kind in FOREIGN:
-            surface = FOREIGN[plan.kind](encoding, rng)
-            touch = _draw_anywhere(rng, ranges)
-        else:
-            face = encoding.face(_by_name(encoding)[int(rng.integers(len(encoding.faces)))])
-            scene = scene_of(plan.database, face.object, face.face, plan.files)
-            most = _inradius_mm(plan.database, face.object, face.face, plan.files)
-            touch = _draw_on_face(scene, plan.kind, most, rng, ranges)
-            surface = scene.under(touch).surface
-            if plan.kind == "worn" and isinstance(surface, FaceSurface):
-                surface = wear_face(surface, plan.worn, rng)
-            elif plan.kind == "worn":
-                pitch = encoding.style.pitch_mm
-                at, turn = face.centres_mm, face.rotation_rad
-                surface = wear_part(surface, at, turn, pitch, plan.worn, rng)
+        met = _meet(plan, encoding, ranges, rng)
         try:
             counts, _ = read_sensor(
-                surface, reader.sensor, touch, level, rng, plan.engine,
-                datum_mm=_datum(scene), copy=copy,
+                met.surface, reader.sensor, met.touch, level, rng, plan.engine,
+                datum_mm=_datum(met.face), copy=copy,
             )  # fmt: skip
         except ContactError as error:
             anew.append(DRAWING.why_anew(error.cause))
             continue
-        return DrawnTouch(surface, scene, touch, counts, tuple(anew))
+        scene = None if plan.kind == SAME_PROFILE else met.face
+        return DrawnTouch(met.surface, scene, met.touch, counts, tuple(anew), met.beside)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MetSurface:
+    """What the sensor comes down on, and where."""
+
+    surface: HeightMap
+    touch: Touch
+    face: Scene | None  #: None for a surface of no part
+    beside: tuple[Scene, Touch] | None = None
+
+
+def _meet(
+    plan: TouchPlan, encoding: EmbossedArray, ranges: TouchRanges, rng: np.random.Generator
+) -> MetSurface:
+    """Draw what is touched and where."""
+    if plan.kind in FOREIGN:
+        return MetSurface(FOREIGN[plan.kind](encoding, rng), _draw_anywhere(rng, ranges), None)
+    if plan.kind == SAME_PROFILE:
+        lab = plan.labs[int(rng.integers(len(plan.labs)))]
+        faces = _faces_of_lab(lab)
+        name, shown = faces[int(rng.integers(len(faces)))]
+        scene = scene_of(lab, name, shown, plan.files)
+        touch = _draw_on_face(
+            scene, plan.kind, _inradius_mm(lab, name, shown, plan.files), rng, ranges
+        )
+        return MetSurface(scene.under(touch).surface, touch, scene)
+    known = _by_name(encoding, plan.kind)
+    face = encoding.face(known[int(rng.integers(len(known)))])
+    scene = scene_of(plan.database, face.object, face.face, plan.files)
+    if plan.kind == SIDE:
+        return _lay_beside(plan, encoding, scene, ranges, rng)
+    most = _inradius_mm(plan.database, face.object, face.face, plan.files)
+    touch = _draw_on_face(scene, plan.kind, most, rng, ranges)
+    surface = scene.under(touch).surface
+    if plan.kind == "worn" and isinstance(surface, FaceSurface):
+        surface = wear_face(surface, plan.worn, rng)
+    elif plan.kind == "worn":
+        at, turn, pitch = face.centres_mm, face.rotation_rad, encoding.style.pitch_mm
+        surface = wear_part(surface, at, turn, pitch, plan.worn, rng)
+    return MetSurface(surface, touch, scene)
+
+
+def _lay_beside(
+    plan: TouchPlan, encoding: EmbossedArray, scene: Scene, ranges: TouchRanges,
+    rng: np.random.Generator,
+) -> MetSurface:  # fmt: skip
+    """Lay a face of another object beside one, and touch near where they meet."""
+    faces = [encoding.face(n) for n in _by_name(encoding, SIDE)]
+    others = [face for face in faces if face.object != scene.object_name]
+    other = others[int(rng.integers(len(others)))]
+    second = scene_of(plan.database, other.object, other.face, plan.files)
+    place, at = lay_beside(scene.region, second.region, rng)
+    touch = replace(_draw_anywhere(rng, ranges), x_mm=float(at[0]), y_mm=float(at[1]))
+    surface = SideBySide(scene.surface, second.surface, place)
+    return MetSurface(surface, touch, scene, (second, place.touch_inside(touch)))
+
+
+@lru_cache(maxsize=8)
+def _faces_of_lab(database: str) -> list[tuple[str, str]]:
+    """Return the objects and faces of another lab that bear symbols, in order."""
+    return [
+        (name, face.name)
+        for name in registered_objects(database)
+        for face in registered_object(database, name).faces
+        if face.placement is not None
+    ]
 
 
 def _ranges(plan: TouchPlan, level: Level) -> TouchRanges:
@@ -123,14 +190,18 @@ def _copy_of_run(seed: int, sensor: SensorType) -> SensorCopy:
     return draw_copy(sensor, np.random.default_rng([seed, 0, 4]))
 
 
-@lru_cache(maxsize=8)
-def _by_name(encoding: EmbossedArray) -> list[int]:
-    """Return the faces in the order of their objects' names.
+@lru_cache(maxsize=32)
+def _by_name(encoding: EmbossedArray, kind: str) -> list[int]:
+    """Return the faces that a kind touches, in the order of their objects' names.
 
     Their numbers follow the order of registration, which a set made in parallel leaves to chance.
     """
     faces, names = encoding.faces.tolist(), encoding.names
-    return sorted(range(len(faces)), key=lambda n: (names[faces[n][0]], faces[n][1]))
+    found = sorted(range(len(faces)), key=lambda n: (names[faces[n][0]], faces[n][1]))
+    found = [n for n in found if is_extra(names[faces[n][0]], kind)]
+    if kind == SIDE:  # round faces roll away from each other
+        found = [n for n in found if encoding.face(n).round is None]
+    return found
 
 
 @lru_cache(maxsize=512)

@@ -15,6 +15,7 @@ from generator.database.url import normal_url
 from recognizer.validation.campaign import Campaign
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.files import write_json
+from recognizer.validation.made_kinds import labs_of
 from recognizer.validation.work import Work, code_digest
 
 RECORD = "asked.json"
@@ -34,7 +35,8 @@ class RunRecord:
     def work(self, folder: Path) -> Work:
         """Return what the workers get."""
         url = absolute_database(self.database, folder)
-        return Work(self.campaign, url, self.set_digest, self.code_digest)
+        labs = labs_of(folder, [kind for kind, _ in self.campaign.kinds])
+        return Work(self.campaign, url, self.set_digest, self.code_digest, labs)
 
     def work_now(self, folder: Path) -> Work:
         """Return the same for this version, which may be another than that of the touches."""

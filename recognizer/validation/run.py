@@ -24,6 +24,7 @@ from pathlib import Path
 from recognizer.validation.campaign import Campaign, batches_of, series_of, shards_of
 from recognizer.validation.encoded_set import LAB, PARTS, make_parts, set_digest
 from recognizer.validation.errors import ValidationError
+from recognizer.validation.made_kinds import make_for_kinds, refuse_without_specs
 from recognizer.validation.progress import TouchProgress
 from recognizer.validation.record import (
     RECORD,
@@ -75,10 +76,14 @@ def prepare_run(
         name = relative_database(database, folder) if database else before.database
     else:
         name = relative_database(database or str(folder / LAB), folder)
+        kinds = [kind for kind, _ in campaign.kinds]
         if specs:
             make_parts(specs, folder / PARTS, absolute_database(name, folder))
-        elif not database:
+        elif database:
+            refuse_without_specs(kinds)
+        else:
             raise ValidationError("no set is named", fix="give SPEC.yaml files, or --database URL")
+        make_for_kinds(folder, absolute_database(name, folder), kinds, campaign.seed)
     digest = set_digest(absolute_database(name, folder))
     names = tuple(map(str, specs)) if specs or before is None else before.specs
     record = RunRecord(campaign, name, digest, code_digest(), names)

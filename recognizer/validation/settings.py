@@ -35,6 +35,21 @@ class DrawSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class MakeSettings:
+    """What is made for kinds of touches that need objects of their own."""
+
+    block_mm: tuple[float, float, float] = (45.0, 35.0, 28.0)  #: of copies and near ones
+    copies: int = 12  #: of one block; as many near ones
+    near_mm: float = 0.5  #: from one near block to the next
+    small_pitches: tuple[float, ...] = (3.15, 3.3, 3.45, 3.6)
+    """Sides of small cubes: 22 ... 25.2 mm at 7 mm, less than the sensor's 25.4 mm, with room for
+    nine symbols; smaller ones have no place that could be told, and are refused when made."""
+    labs: int = 2  #: that have made parts with the same profile
+    lab_objects: int = 8  #: of each
+    lab_mm: tuple[float, float] = (35.0, 75.0)  #: their sizes
+
+
+@dataclass(frozen=True, slots=True)
 class JudgeSettings:
     """When an answer is right, and when one is expected."""
 
@@ -91,4 +106,4 @@ class SharingSettings:
 
 
 DRAWING, JUDGING, LIMITS = DrawSettings(), JudgeSettings(), AcceptanceLimits()
-STUDIES, SHARING = StudySettings(), SharingSettings()
+STUDIES, SHARING, MAKING = StudySettings(), SharingSettings(), MakeSettings()

@@ -60,7 +60,7 @@ def judge(
     plan: TouchPlan, number: int, found: DrawnTouch, answer: Recognition, seconds: float
 ) -> Trial:
     """Compare an answer with the truth."""
-    touch, scene = found.touch, found.scene
+    scene, touch = found.truth_of(answer.object, answer.face)
     error, degrees, chi2, verdict = math.nan, math.nan, math.nan, REJECTED
     if answer:
         verdict = WRONG

@@ -33,6 +33,7 @@ class Work:
     database: str  #: as the workers find it
     set_digest: str
     code_digest: str
+    labs: tuple[str, ...] = ()  #: databases of other labs, as the workers find them
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +62,7 @@ def touch(work: Work, batch: Batch) -> BatchResult:
     reading = reader_with(reader, series.reader)
     rows, times = [], []
     for number in range(batch.first, batch.last):
-        kind, plan = plan_of(work.campaign, series, work.database, number)
+        kind, plan = plan_of(work.campaign, series, work.database, number, work.labs)
         start = time.process_time()
         found = trial(plan, number, reading)
         spent = time.process_time() - start

@@ -1,0 +1,34 @@
+"""A small campaign over kinds that need objects of their own, by faulty sensors."""
+
+from recognizer.validation import validate
+from recognizer.validation.campaign import Campaign, series_of
+from recognizer.validation.made_kinds import is_extra
+from recognizer.validation.shards import columns_of, read_series
+
+KINDS = ("copy", "near", "small", "side", "same_profile")
+SET = """objects:
+  - {name: Block, shape: {box: [60 mm, 50 mm, 40 mm]}, profile: one-touch}
+  - {name: Prism, shape: {triangular_prism: {side: 50 mm, height: 40 mm}}, profile: one-touch}
+"""
+
+
+def test_a_campaign_over_worlds(tmp_path):
+    (tmp_path / "set.yaml").write_text(SET)
+    folder = tmp_path / "run"
+    result = validate(
+        tmp_path / "set.yaml", folder=folder, touches=15, seed=3, kinds=",".join(KINDS),
+        levels="typical,dead-10,slide-2", sensor_per="run", study=0,
+    )  # fmt: skip
+    assert result.touches == 15
+    rows = columns_of(read_series(folder, series_of(Campaign(15))[0]))
+    assert set(rows["kind"]) <= set(KINDS)
+    for kind, name in zip(rows["kind"], rows["object"], strict=True):
+        if kind == "same_profile":
+            assert name == ""  # nobody's, to this lab: every answer is wrong
+        elif kind == "side":
+            assert name in ("Block", "Prism")
+        else:
+            assert is_extra(name, kind)
+    kept = rows["kind"] != "same_profile"
+    assert not (rows["verdict"][kept] == "wrong").any()
+    assert (rows["verdict"][kept] == "right").any()
