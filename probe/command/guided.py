@@ -17,12 +17,12 @@ import numpy as np
 
 from encoded_objects.console.files import refuse_taken
 from encoded_objects.console.output import message
+from probe.calibration.load_words import describe_load
 from probe.circuit import Electronics
 from probe.client.stream import Stream, name_of
 from probe.command.calibrated import calibrate_loads
 from probe.command.listen import Counts
 from probe.command.loads import LoadRecording, write_list
-from probe.command.settings import COMMAND
 from probe.errors import CalibrationError, PortError
 from probe.frame import Frame
 from probe.recording.record import Recorder
@@ -98,7 +98,7 @@ def _step(
     while True:
         _ask(f"{done + 1}/{steps}  {what}, then press Enter: ")
         counts = _record_load(bench, path)
-        message(f"     {_describe_load(counts, rest)}")
+        message(f"     {describe_load(counts, rest)}")
         if _ask("     Enter goes on, r reads it again: ") != "r":
             return LoadRecording(path, force), counts
 
@@ -119,24 +119,6 @@ def _record_load(bench: CalibrationBench, path: Path) -> Counts:
         for frame in frames:
             recorder.append(frame)
     return np.stack([frame.counts for frame in frames])
-
-
-def _describe_load(counts: Counts, rest: Counts | None) -> str:
-    """Return in words what a load did."""
-    mean = counts.mean(axis=0)
-    if rest is None:
-        return f"{len(counts)} frames, median {np.median(mean):.1f} counts"
-    rise = mean - rest.mean(axis=0)
-    half = len(counts) // 2
-    change = float(np.median(counts[half:].mean(axis=0) - counts[:half].mean(axis=0)))
-    felt = int((rise > COMMAND.felt_counts).sum())
-    words = (
-        f"{len(counts)} frames, felt by {felt} of {rise.size} tactels, "
-        f"median {np.median(rise):.1f} counts above rest"
-    )
-    if abs(change) > max(1.0, COMMAND.steady * float(np.median(rise))):
-        words += f"; not steady, it changed by {change:+.1f} counts"
-    return words
 
 
 def _ask(prompt: str) -> str:

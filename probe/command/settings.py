@@ -12,8 +12,6 @@ class ProbeCommandSettings:
     answer_s: float = 0.5  #: a probe that was asked for its statistics answers within that
     slice_s: float = 0.1  #: longest wait for frames between two looks at the keyboard
     silent_s: float = 5.0  #: without a frame for so long, the host's clock ends a recording too
-    felt_counts: float = 5.0  #: above rest: a load lies on the sensor
-    steady: float = 0.05  #: share by which a load may change while it is read
     pictures_hz: int = 15  #: of the live view
     hold: float = 0.98  #: of the scale of the live view is left after each frame shown
 

@@ -21,8 +21,9 @@ from numpy.typing import ArrayLike
 from probe.contact.contract import Contact, Touch
 from probe.contact.elements_line import Array
 from probe.contact.elements_pad import CondensedPad, PadLines, condense
-from probe.contact.elements_seen import heights_at, refuse_unseen
+from probe.contact.elements_seen import refuse_unseen
 from probe.contact.elements_unilateral import rest, tips
+from probe.contact.heights import heights_at
 from probe.contact.settings import CONTACT, ELEMENTS
 from probe.errors import ContactError
 from probe.sensor import SensorType

@@ -14,28 +14,12 @@ from numpy.typing import NDArray
 
 from probe.contact.contract import Touch
 from probe.contact.elements_line import Array
+from probe.contact.heights import heights_at
 from probe.contact.settings import ELEMENT_SIGHT
 from probe.errors import ContactError
 from probe.surface.contract import HeightMap
 
 Value = TypeVar("Value", np.float64, np.bool_)
-
-
-def heights_at(surface: HeightMap, touch: Touch, points: Array) -> Array:
-    """Return heights (n,) at points (n, 2) of the sensor frame.
-
-    Raises
-    ------
-    ContactError
-        For heights that are no numbers, or +inf.
-    """
-    heights = np.asarray(surface.heights_mm(touch.on_surface(points)), dtype=np.float64)
-    if heights.shape != (len(points),) or not (heights < np.inf).all():
-        raise ContactError(
-            "the surface gives heights that are no numbers",
-            fix="give a finite height at each point, or -inf where there is no matter",
-        )
-    return heights
 
 
 def refuse_unseen(
@@ -75,7 +59,7 @@ def refuse_unseen(
         fine = _places(along)
         points = np.stack(np.meshgrid(fine, across[rows]), axis=-1)
         asked = points[..., ::-1] if swapped else points
-        found = heights_at(surface, touch, asked.reshape(-1, 2)).reshape(points.shape[:2])
+        found = heights_at(surface, touch, asked)
         after = np.searchsorted(along, fine)
         # What a node beside it bears is no more than an edge that is not on a line of the mesh.
         around = _neighbour_maximum(top)

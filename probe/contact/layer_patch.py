@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.contact.contract import Touch
+from probe.contact.heights import heights_at
 from probe.contact.settings import LAYER_PATCH
 from probe.errors import ContactError
 from probe.sensor import SensorType
@@ -66,7 +67,7 @@ class LayerPatch:
         fine = np.repeat(self.coarse_mm[None, new], len(self.offsets_mm), axis=0)
         rough = np.flatnonzero(~self.level[new])
         points = self.centres_mm[new[rough]] + self.offsets_mm[:, None, :]
-        fine[:, rough] = _heights(self.surface, self.touch, points)
+        fine[:, rough] = heights_at(self.surface, self.touch, points)
         if not len(self.cells):
             return replace(self, cells=new, heights_mm=fine)
         both = np.concatenate([self.cells, new])
@@ -113,7 +114,7 @@ def patch_under(
         )
     shape = sensor.rows * cells_per_tactel, sensor.columns * cells_per_tactel
     dx = sensor.pitch_mm / cells_per_tactel
-    coarse = _heights(surface, touch, _coarse_points(*shape, dx, samples))
+    coarse = heights_at(surface, touch, _coarse_points(*shape, dx, samples))
     highest = coarse.max(axis=0)
     high = _join_neighbours(highest.reshape(shape), np.maximum)
     low = _join_neighbours(coarse.min(axis=0).reshape(shape), np.minimum)
@@ -156,18 +157,6 @@ def lattice(samples: int) -> Array:
     return (np.stack([i, best], axis=-1) + 0.5) / samples - 0.5
 
 
-def _heights(surface: HeightMap, touch: Touch, points: Array) -> Array:
-    """Return heights (...) at points (..., 2) of the sensor frame."""
-    asked = touch.on_surface(points.reshape(-1, 2))
-    heights = np.asarray(surface.heights_mm(asked), np.float64)
-    if heights.shape != (len(asked),) or not (heights < np.inf).all():
-        raise ContactError(
-            "the surface gives heights that are no numbers",
-            fix="give a finite height at each point, or -inf where there is no matter",
-        )
-    return heights.reshape(points.shape[:-1])
-
-
 def _refuse_hidden(
     surface: HeightMap, sensor: SensorType, touch: Touch, high: Array, low: Array, finest_mm: float
 ) -> None:
@@ -181,7 +170,7 @@ def _refuse_hidden(
     if top <= seen + LAYER_PATCH.level_mm:
         return
     points = _search_lines(*sensor.half_mm)
-    heights = _heights(surface, touch, points)
+    heights = heights_at(surface, touch, points)
     highest = int(heights.argmax())
     found, at = float(heights[highest]), points[highest]
     rows, columns = high.shape

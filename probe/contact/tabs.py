@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.contact.contract import Contact, Touch
+from probe.contact.heights import heights_at, nothing_under
 from probe.contact.neo_hooke import Linear
 from probe.contact.plate import PlateLoad, PlatePose, PlateRest, checked_load, load_of, rest
 from probe.contact.plate_newton import Columns
@@ -131,20 +132,10 @@ def heights_under(surface: HeightMap, touch: Touch, points_mm: Array) -> Array:
 
     Refused where they are no numbers, or nothing at all lies under the points.
     """
-    at = touch.on_surface(points_mm.reshape(-1, 2))
-    heights = np.asarray(surface.heights_mm(at), dtype=np.float64)
-    highest = heights.max(initial=-math.inf) if heights.shape == (len(at),) else math.nan
-    if not highest < math.inf:  # NaN, too
-        raise ContactError(
-            "the surface gives heights that are no numbers",
-            fix="give a finite height at each point, or -inf where there is no matter",
-        )
-    if highest == -math.inf:
-        raise ContactError(
-            f"there is nothing under the sensor to bear {touch.force_n:g} N",
-            fix="move the sensor over the object",
-        )
-    return heights.reshape(points_mm.shape[:-1])
+    heights = heights_at(surface, touch, points_mm)
+    if heights.max(initial=-math.inf) == -math.inf:
+        raise nothing_under(touch)
+    return heights
 
 
 def tabs_at_rest(

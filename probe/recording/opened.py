@@ -39,12 +39,7 @@ def open_recording(path: Path, *, live: bool = False) -> Iterator[h5py.File]:
     RecordingError
         No such file, no HDF5 file, truncated, not closed, damaged.
     """
-    with explain_errors(path, "read"):
-        head = superblock_of(path)
-    if is_part(path) and _blank(head):
-        raise _nothing_yet(path)
-    if head is None:
-        raise _no_hdf5(path)
+    head = _head_of(path)
     if head.truncated and not (live and head.writing):
         raise RecordingError(
             f"it is truncated: {head.size} of {head.end} bytes",
@@ -71,15 +66,22 @@ def open_anyhow(path: Path) -> Iterator[tuple[h5py.File, Superblock]]:
     with ExitStack() as stack:
         with explain_errors(path, "read"):
             stream = stack.enter_context(open(path, "rb"))
-            head = superblock_of(path)
-        if is_part(path) and _blank(head):
-            raise _nothing_yet(path)
-        if head is None:
-            raise _no_hdf5(path)
+        head = _head_of(path)
         with explain_errors(path, "open"):
             source = path if head.whole else PaddedFile(stream, head)
             file = stack.enter_context(h5py.File(source, "r"))
         yield file, head
+
+
+def _head_of(path: Path) -> Superblock:
+    """Return the beginning of a file that is HDF5."""
+    with explain_errors(path, "read"):
+        head = superblock_of(path)
+    if is_part(path) and _blank(head):
+        raise _nothing_yet(path)
+    if head is None:
+        raise _no_hdf5(path)
+    return head
 
 
 @contextmanager

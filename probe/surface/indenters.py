@@ -20,6 +20,17 @@ from probe.errors import SurfaceError
 Array = NDArray[np.float64]
 
 
+class _TopAtZero:
+    """A surface whose highest point lies at 0."""
+
+    __slots__ = ()
+
+    @property
+    def top_mm(self) -> float:
+        """0."""
+        return 0.0
+
+
 @dataclass(frozen=True, slots=True)
 class FlatPlate:
     """An endless flat plate."""
@@ -56,17 +67,12 @@ class TiltedPlane:
 
 
 @dataclass(frozen=True, slots=True)
-class RaisedStrip:
+class RaisedStrip(_TopAtZero):
     """A straight bar along y, with a flat top."""
 
     width_mm: float = 2.0
     length_mm: float = math.inf
     floor_mm: float = -math.inf
-
-    @property
-    def top_mm(self) -> float:
-        """0."""
-        return 0.0
 
     def heights_mm(self, points_mm: Array) -> Array:
         """Return 0 on the bar and the floor beside it."""
@@ -75,17 +81,12 @@ class RaisedStrip:
 
 
 @dataclass(frozen=True, slots=True)
-class Cross:
+class Cross(_TopAtZero):
     """Two bars of equal width, along x and along y, with a flat top."""
 
     width_mm: float = 2.0
     length_mm: float = 20.0
     floor_mm: float = -math.inf
-
-    @property
-    def top_mm(self) -> float:
-        """0."""
-        return 0.0
 
     def heights_mm(self, points_mm: Array) -> Array:
         """Return 0 on the bars and the floor beside them."""
@@ -96,17 +97,12 @@ class Cross:
 
 
 @dataclass(frozen=True, slots=True)
-class Washer:
+class Washer(_TopAtZero):
     """A flat ring; a disc when the inner diameter is 0. Thesis figures 4.9 and 4.10."""
 
     outer_mm: float = 15.0  #: diameter
     inner_mm: float = 7.0  #: diameter
     floor_mm: float = -math.inf
-
-    @property
-    def top_mm(self) -> float:
-        """0."""
-        return 0.0
 
     def heights_mm(self, points_mm: Array) -> Array:
         """Return 0 on the ring and the floor beside it."""
@@ -116,16 +112,11 @@ class Washer:
 
 
 @dataclass(frozen=True, slots=True)
-class Sphere:
+class Sphere(_TopAtZero):
     """The upper half of a ball whose highest point is the origin."""
 
     radius_mm: float = 20.0
     floor_mm: float = -math.inf
-
-    @property
-    def top_mm(self) -> float:
-        """0."""
-        return 0.0
 
     def heights_mm(self, points_mm: Array) -> Array:
         """Return the ball's height; sqrt(R^2 - r^2) - R without its cancellation."""
@@ -136,15 +127,10 @@ class Sphere:
 
 
 @dataclass(frozen=True, slots=True)
-class Paraboloid:
+class Paraboloid(_TopAtZero):
     """z = -r^2 / 2R: the body of the closed formulas of contact."""
 
     radius_mm: float = 20.0  #: R, of curvature at the top
-
-    @property
-    def top_mm(self) -> float:
-        """0."""
-        return 0.0
 
     def heights_mm(self, points_mm: Array) -> Array:
         """Return the paraboloid's height."""
@@ -153,15 +139,10 @@ class Paraboloid:
 
 
 @dataclass(frozen=True, slots=True)
-class HalfPlane:
+class HalfPlane(_TopAtZero):
     """A flat face that ends at a straight edge: matter where x <= 0."""
 
     floor_mm: float = -math.inf
-
-    @property
-    def top_mm(self) -> float:
-        """0."""
-        return 0.0
 
     def heights_mm(self, points_mm: Array) -> Array:
         """Return 0 up to the edge and the floor beyond it."""

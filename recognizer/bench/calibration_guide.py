@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.calibration import Calibration, Condition, calibration_from, even_load
+from probe.calibration.load_words import describe_load
 from probe.circuit import Electronics
 from probe.frame import Frame
 from recognizer.bench.errors import BenchError, BusyError
@@ -78,7 +79,7 @@ class CalibrationGuide:
         if not 0 <= passed_s < self.seconds or len(self._frames) >= GUIDE.most_frames:
             counts, self._frames = np.stack(self._frames), None
             self.taken.append(counts)
-            self.felt.append(_describe_load(counts, self.taken[0] if self.step else None))
+            self.felt.append(describe_load(counts, self.taken[0] if self.step else None))
             self.step += 1
 
     def calibration(self) -> Calibration:
@@ -143,20 +144,3 @@ def condition_json(calibration: Calibration) -> dict[str, Any]:
         "loads": list(calibration.loads),
         "condition": marks,
     }
-
-
-def _describe_load(counts: Counts, rest: Counts | None) -> str:
-    """Return in words what a load did."""
-    mean = counts.mean(axis=0)
-    if rest is None:
-        return f"{len(counts)} frames at rest, median {np.median(mean):.1f} counts"
-    rise = mean - rest.mean(axis=0)
-    felt, half = int((rise > GUIDE.felt_counts).sum()), len(counts) // 2
-    change = float(np.median(counts[half:].mean(axis=0) - counts[: max(half, 1)].mean(axis=0)))
-    words = (
-        f"{len(counts)} frames, felt by {felt} of {rise.size} tactels, "
-        f"median {np.median(rise):.1f} counts above rest"
-    )
-    if abs(change) > max(1.0, GUIDE.steady * float(np.median(rise))):
-        words += f"; not steady, it changed by {change:+.1f} counts"
-    return words

@@ -44,8 +44,6 @@ class SessionSettings:
 class GuideSettings:
     """How loads of a calibration are judged while they are taken."""
 
-    felt_counts: float = 5.0  #: above rest, for a tactel that feels the load
-    steady: float = 0.05  #: share by which a load may change while it is read
     most_loads: int = 12
     most_frames: int = 20_000  #: of a load
 

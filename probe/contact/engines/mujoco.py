@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from encoded_objects.errors import require
 from probe.contact.contract import Contact, Touch
 from probe.contact.engines import Engine
+from probe.contact.heights import nothing_under
 from probe.contact.neo_hooke import NeoHooke
 from probe.contact.plate import checked_load, load_of
 from probe.contact.tips import Tips, tip_points
@@ -246,10 +247,7 @@ def cut_under(
     box = box.rotate((0, 0, math.degrees(touch.theta_rad))).translate((touch.x_mm, touch.y_mm, top))
     corners, triangles = indexed_triangles(manifold_of(solid_mm) ^ box)
     if len(triangles) == 0:
-        raise ContactError(
-            f"there is nothing under the sensor to bear {touch.force_n:g} N",
-            fix="move the sensor over the object",
-        )
+        raise nothing_under(touch)
     return corners, triangles
 
 
