@@ -131,6 +131,18 @@ class RefineSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class StretchSettings:
+    """How the stretch of one touch is fitted, where it is asked for: scale both ways and skew."""
+
+    steps: int = 8  #: of damped least squares, at most
+    settled: float = 0.01  #: nats by which a step may change what is taken as found
+    largest: float = 0.15  #: of scale - 1 and of both unknowns of the shear
+    widest: float = 2.5  #: tenths of a mm, of the stroke's excess
+    step: tuple[float, float] = (0.01, 0.01)  #: largest change in one step
+    least: tuple[float, float] = (10.0, 10.0)  #: added to the diagonal of the normal matrix
+
+
+@dataclass(frozen=True, slots=True)
 class CovarianceSettings:
     """By how much the fit's own covariance is too small.
 
@@ -239,6 +251,13 @@ class RoundSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class PrintedSettings:
+    """How a pose is corrected where it is known how the part was printed."""
+
+    step: float = 1e-6  #: of scales and skew, of the differences that stand for derivatives
+
+
+@dataclass(frozen=True, slots=True)
 class ReaderSettings:
     """All numbers that decide in `recognizer.touch`.
 
@@ -258,6 +277,7 @@ class ReaderSettings:
     noise: NoiseSettings = field(default_factory=NoiseSettings)
     search: SearchSettings = field(default_factory=SearchSettings)
     refine: RefineSettings = field(default_factory=RefineSettings)
+    stretch: StretchSettings = field(default_factory=StretchSettings)
     covariance: CovarianceSettings = field(default_factory=CovarianceSettings)
     first: FitSettings = field(default_factory=FitSettings)  #: the first try
     #: the second, of touches that the first does not answer or that few cells speak for: seven
@@ -267,6 +287,7 @@ class ReaderSettings:
     belief: BeliefSettings = field(default_factory=BeliefSettings)
     bends: BendSettings = field(default_factory=BendSettings)
     round: RoundSettings = field(default_factory=RoundSettings)
+    printed: PrintedSettings = field(default_factory=PrintedSettings)
 
 
 #: As the reader is, if nothing else is asked for.

@@ -54,6 +54,16 @@ class Fit:
         """Return (7,) of `refine.Lattices`."""
         return np.array([self.x_mm, self.y_mm, self.theta_rad, *self.nuisance])
 
+    @property
+    def scale(self) -> float:
+        """Return the size of the print as it is felt, 1 as designed."""
+        return 1.0 / (1.0 + float(self.nuisance[3]))
+
+    @property
+    def wider(self) -> float:
+        """Return by how much strokes are felt wider than designed, `TemplateSettings.wider_mm`."""
+        return float(self.nuisance[0])
+
 
 def fit_lattices(
     image: Image,

@@ -82,10 +82,41 @@ def refine_lattices(
     return ascend(start, moved, steps, settings, settings.settled)
 
 
+@dataclass(frozen=True, slots=True)
+class LinearizedImage:
+    """An image about b poses and gains, each tactel weighed by what it is worth."""
+
+    value: Array  #: (b,) log-likelihood of the image, nats, up to a constant of the image
+    jacobian: Array  #: (b, n, 11) forces by pose and gain
+    left: Array  #: (b, n) forces that are left over
+    sure: Array  #: (b, n) one over their variances; 0 where a tactel does not pull
+    known: Array  #: (b, 11) how far each unknown lies from what is known of it beforehand
+    precision: Array  #: (11,) of that
+
+
 def _evaluate_lattices(
     image: Image, template: ResponseTemplate, pose: Array, gain: Array, shown: Shown | None
 ) -> Lattices:
     """Return how well lattices explain the image, and what a small change would do."""
+    at = linearize_image(image, template, pose, gain, shown)
+    weighted = (at.jacobian * at.sure[..., None]).swapaxes(1, 2)
+    normal = weighted @ at.jacobian + np.diag(at.precision)
+    right = (weighted @ at.left[..., None])[..., 0] - at.known * at.precision
+    return Lattices(pose, gain, at.value, normal, right)
+
+
+def linearize_image(
+    image: Image, template: ResponseTemplate, pose: Array, gain: Array, shown: Shown | None
+) -> LinearizedImage:
+    """Return how well lattices explain the image, and what changes with pose and gain.
+
+    Parameters
+    ----------
+    pose, gain
+        (b, 7) and (b, 4) of `Lattices`.
+    shown
+        As for `refine_lattices`.
+    """
     noise = image.settings.noise
     under = project_template(image, template, pose, gain)
     felt, cells = under.felt, under.cells
@@ -100,10 +131,7 @@ def _evaluate_lattices(
     width = _width(values, felt, noise.first)
     left = image.forces - force
     sure = np.where(np.abs(left / width) < noise.far, felt.trust, 0.0) / width**2
-    weighted = (jacobian * sure[..., None]).swapaxes(1, 2)
-    normal = weighted @ jacobian + np.diag(precision)
-    right = (weighted @ left[..., None])[..., 0] - known * precision
-    return Lattices(pose, gain, value, normal, right)
+    return LinearizedImage(value, jacobian, left, sure, known, precision)
 
 
 def _from_prior(image: Image, pose: Array, gain: Array) -> Array:
