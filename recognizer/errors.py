@@ -5,7 +5,8 @@
     EncodedObjectsError       exit code 2
     └── RecognizerError
         ├── LabError          the database holds nothing that can be read by touch
-        └── TouchError        an image that is none of the sensor's
+        ├── TouchError        an image that is none of the sensor's
+        └── AsBuiltError      touches that do not tell how a part was printed
 
 A touch that is not recognised is no error but a value with a reason (`recognition`).
 """
@@ -25,3 +26,7 @@ class LabError(RecognizerError):
 
 class TouchError(RecognizerError):
     """An image of another shape than the sensor, or of values that are no numbers."""
+
+
+class AsBuiltError(RecognizerError):
+    """Touches that do not tell how a part was printed."""

@@ -36,7 +36,10 @@ class AsBuilt:
 
 
 def write_as_built(connection: Connection, measured: AsBuilt) -> None:
-    """Keep a measurement; an earlier one of the same object, part, printer, material goes.
+    """Keep a measurement in the place of an earlier one.
+
+    That is the one of the same object and part, whatever it was said to be printed of, or, of
+    printers, the one of the same printer and material.
 
     Parameters
     ----------
@@ -55,7 +58,8 @@ def write_as_built(connection: Connection, measured: AsBuilt) -> None:
         raise ValueError("the covariance of an as-built print is a finite 4x4 matrix")
     named = ("object_id", "part", "printer", "material")
     row = {name: getattr(measured, name) for name in (*named, *PARAMETERS, "touches")}
-    same = [as_built.c[name].is_not_distinct_from(row[name]) for name in named]
+    alike = named if measured.object_id is None else ("object_id", "part")
+    same = [as_built.c[name].is_not_distinct_from(row[name]) for name in alike]
     connection.execute(delete(as_built).where(*same))
     row["covariance"] = json.dumps(covariance.tolist())
     connection.execute(insert(as_built).values(row))

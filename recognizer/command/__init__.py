@@ -1,5 +1,7 @@
 """`recognize-object RECORDING|--port URL`: which object, which face, where, and how sure.
 
+`recognize-object as-built RECORDING`: how a part came out of the printer.
+
 ::
 
     app           options
@@ -7,6 +9,7 @@
     answers       touches -> answers, printed as they come
     in_base       the object in the robot's base
     report        answers as text and as JSON
+    as_built      recognize-object as-built
 
 Results go to stdout, progress and messages to stderr. Exit codes: 0 recognised, 1 nothing
 recognised, or ran but failed, 2 bad input, 3 device, 4 database, 130 interrupted. Nothing heavy is
@@ -24,6 +27,7 @@ if TYPE_CHECKING:
     from typer import Typer
 
 NAME = "recognize-object"
+AS_BUILT = "as-built"
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
@@ -37,8 +41,12 @@ def run(arguments: list[str]) -> int:
     return console.run(NAME, application, arguments)
 
 
-def application(_arguments: list[str]) -> Typer:
-    """Return the application that reads the arguments."""
+def application(arguments: list[str]) -> Typer:
+    """Return the application that reads the arguments; a recording needs no command's name."""
+    if arguments[:1] == [AS_BUILT]:
+        from recognizer.command.as_built import app
+
+        return app
     from recognizer.command.app import app
 
     return app

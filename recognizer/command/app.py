@@ -12,7 +12,8 @@ HELP = """Say which object was touched, which face, where, and how sure.
 
 RECORDING is any HDF5 file with /frames (N, 16, 16). Try it without a probe: \
 [bold]probe-sensor simulate lab.db#Cube/F1 -o touch.h5[/], then \
-[bold]recognize-object touch.h5[/].
+[bold]recognize-object touch.h5[/]. How a part came out of the printer: \
+[bold]recognize-object as-built --help[/].
 """
 EPILOG = """Exit codes: 0 recognised, 1 nothing recognised, 2 bad input, 3 device, 4 database, \
 130 interrupted.

@@ -176,7 +176,7 @@ def answer_scan(
     if by_hand:
         margin = min(margin, _shift_margin(best, limits, reader.settings.hypotheses))
     return answer_at(
-        best.encoding, best.fit, best.place, reader.settings.belief, seq,
+        best.encoding, best.fit, best.place, reader.settings, seq,
         reason=_doubt(reader, best, margin, limits, by_hand=by_hand),
         margin=margin, runner_up=runner_up,
     )  # fmt: skip

@@ -199,6 +199,9 @@ def _answer_of(
         return refusal(seq, OUTSIDE, margin=decoded.margin, runner_up=runner_up)
     lever = np.eye(3)  # the image's turn moves a probe that is away from its origin
     lever[:2, 2] = fit.y_mm - at_mm[1], at_mm[0] - fit.x_mm
+    covariance = face_covariance(face, lever @ fit.covariance @ lever.T)
+    if face.printed is not None:
+        pose, covariance = face.printed.pose(pose, covariance)
     return Recognition(
         seq=seq,
         object=face.object,
@@ -206,7 +209,7 @@ def _answer_of(
         index=index(place),
         T_face_probe=pose,
         T_object_probe=pose_on_object(face, pose),
-        covariance=face_covariance(face, lever @ fit.covariance @ lever.T),
+        covariance=covariance,
         margin=decoded.margin,
         runner_up=runner_up,
         reason="",

@@ -101,7 +101,7 @@ class VerifiedHypothesis:
             inliers=int(cells.agree.sum()),
             clear=int((cells.seen & (cells.against > limits.clearly)).sum()),
             plain=int((cells.seen & (cells.against > limits.plainly)).sum()),
-            wider=float(fit.nuisance[0]),
+            wider=fit.wider,
         )
 
 

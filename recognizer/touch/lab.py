@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -20,12 +20,20 @@ from sqlalchemy import Connection, Engine
 from encoded_objects.console.output import count_of
 from generator.alphabet import Alphabet, SymbolStyle, alphabet_from
 from generator.array import FoldedArray, ProductArray, array_from
+from generator.database.as_built import AsBuilt, read_as_built
 from generator.database.cells import held_cells
 from generator.database.open import open_database
 from generator.database.read import read_array, read_object, read_styles, read_surfaces
-from generator.database.registered import Developable, RegisteredObject, RegisteredStyle, RoundFace
+from generator.database.registered import (
+    Developable,
+    RegisteredObject,
+    RegisteredPart,
+    RegisteredStyle,
+    RoundFace,
+)
 from generator.database.transaction import read_transaction
 from recognizer.errors import LabError
+from recognizer.touch.as_built import PrintedFace, print_of
 from recognizer.touch.settings import DEFAULTS, LabSettings
 from recognizer.touch.windows import Windows, index_windows
 
@@ -46,6 +54,9 @@ class EncodedFace:
     labels: Ints  #: (n,)
     centres_mm: NDArray[np.float64]  #: (n, 2) face frame
     round: RoundFace | None = None  #: of a round face; its frame is that of the unrolled plane
+    part: str = ""  #: name of the printed part that bears it; empty where no part is registered
+    T_part_face: NDArray[np.float64] | None = None  #: (4, 4) to the frame of the part's file
+    printed: PrintedFace | None = None  #: None where nothing is known of the print, or it is round
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +106,8 @@ class EmbossedArray:
             numbers = np.flatnonzero(self.faces[:, 0] == object_id)
             with read_transaction(self.engine) as connection:
                 found = read_object(connection, self.names[object_id])
-            encoded = dict(_encoded_faces(found))
+                prints = (*read_as_built(connection, object_id), *read_as_built(connection))
+            encoded = dict(_encoded_faces(found, prints))
             for near in numbers.tolist():
                 self.known[near] = encoded[int(self.faces[near, 1])]
         return self.known[number]
@@ -219,9 +231,17 @@ def radii_of(
     return tuple(least * finer**step for step in sorted(steps))
 
 
-def _encoded_faces(found: RegisteredObject) -> Iterable[tuple[int, EncodedFace]]:
+def _encoded_faces(
+    found: RegisteredObject, prints: Sequence[AsBuilt]
+) -> Iterable[tuple[int, EncodedFace]]:
     for layout in found.layout.faces:
         face = found.faces[layout.face]
+        part = part_with(found, face.name)
+        T_part_face, printed = None, None
+        if part is not None and face.round is None:
+            T_part_face = np.linalg.inv(part.T_object_part) @ face.T_object_face
+            known = print_of(prints, part.name, printer_of(found))
+            printed = None if known is None else PrintedFace(known, T_part_face)
         yield (
             layout.face,
             EncodedFace(
@@ -235,5 +255,23 @@ def _encoded_faces(found: RegisteredObject) -> Iterable[tuple[int, EncodedFace]]
                 labels=layout.labels,
                 centres_mm=layout.centres_mm,
                 round=face.round,
+                part="" if part is None else part.name,
+                T_part_face=T_part_face,
+                printed=printed,
             ),
         )
+
+
+def part_with(found: RegisteredObject, face: str) -> RegisteredPart | None:
+    """Return the printed part that bears a face: its panel, or the whole body; None if neither."""
+    names = {part.name for part in found.parts}
+    for part in found.parts:
+        if part.name.endswith(f"-{face}") or len(names) == 1:
+            return part
+    return None
+
+
+def printer_of(found: RegisteredObject) -> str:
+    """Return the printer that an object was made for; empty where its spec names none."""
+    spec = found.spec
+    return str(spec.get("printer", "")) if isinstance(spec, dict) else ""

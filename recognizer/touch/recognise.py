@@ -30,7 +30,7 @@ from recognizer.touch.recognition import (
     RunnerUp,
     refusal,
 )
-from recognizer.touch.settings import BeliefSettings
+from recognizer.touch.settings import BeliefSettings, ReaderSettings
 from recognizer.touch.signal import Signal
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.verify import verify_hypotheses
@@ -47,14 +47,14 @@ def recognise_with_hypothesis(
     """Return what one touch says, and the hypothesis that was judged; None where there is none."""
     if not signal.contact:
         return refusal(seq, NO_CONTACT), None
-    limits = reader.settings.belief
-    first = verify_hypotheses(reader, signal, reader.settings.first)
-    answer, inliers = _answer(first, limits, seq)
+    settings, limits = reader.settings, reader.settings.belief
+    first = verify_hypotheses(reader, signal, settings.first)
+    answer, inliers = _answer(first, settings, seq)
     if answer and inliers >= limits.many_inliers:
         return answer, first[0]
     # Spend more where it is needed: no answer yet, or one that few cells speak for.
-    second = verify_hypotheses(reader, signal, reader.settings.thorough)
-    final, inliers = _answer(second, limits, seq)
+    second = verify_hypotheses(reader, signal, settings.thorough)
+    final, inliers = _answer(second, settings, seq)
     if answer and final and not first[0].coincides(second[0]):
         return refusal(seq, AMBIGUOUS, margin=0.0, runner_up=answer.runner_up), second[0]
     if final and inliers < limits.many_inliers:
@@ -63,7 +63,7 @@ def recognise_with_hypothesis(
 
 
 def _answer(
-    found: list[VerifiedHypothesis], limits: BeliefSettings, seq: int
+    found: list[VerifiedHypothesis], settings: ReaderSettings, seq: int
 ) -> tuple[Recognition, int]:
     """Return what hypotheses, best first, say together, and how many cells speak for it.
 
@@ -73,7 +73,7 @@ def _answer(
     """
     if not found:
         return refusal(seq, TOO_FEW), 0
-    best = found[0]
+    best, limits = found[0], settings.belief
     other = next((one for one in found[1:] if not best.same_place(one)), None)
     margin = math.inf if other is None else best.score - other.score
     runner_up = None
@@ -93,7 +93,7 @@ def _answer(
         if margin < limits.margin:
             reason = AMBIGUOUS
     answer = answer_at(
-        best.embossed, best.fit, best.hypothesis, limits, seq,
+        best.embossed, best.fit, best.hypothesis, settings, seq,
         reason=reason, margin=margin, runner_up=runner_up,
     )  # fmt: skip
     return answer, support.inliers
@@ -117,20 +117,26 @@ def answer_at(
     embossed: EmbossedArray,
     fit: Fit,
     hypothesis: Hypothesis,
-    limits: BeliefSettings,
+    settings: ReaderSettings,
     seq: int,
     *,
     reason: str,
     margin: float,
     runner_up: RunnerUp | None,
 ) -> Recognition:
-    """Return the answer at a place, or the refusal where there is a reason or no face."""
+    """Return the answer at a place, or the refusal where there is a reason or no face.
+
+    Where it is known how the part was printed, the pose is that on the printed part.
+    """
     if reason:
         return refusal(seq, reason, margin=margin, runner_up=runner_up)
     face = embossed.face(hypothesis.face)
     pose = face_pose(embossed, face, hypothesis, fit)
-    if inside_mm(face, float(pose[0, 3]), float(pose[1, 3])) < -limits.rim_mm:
+    if inside_mm(face, float(pose[0, 3]), float(pose[1, 3])) < -settings.belief.rim_mm:
         return refusal(seq, OUTSIDE, margin=margin, runner_up=runner_up)
+    covariance = face_covariance(face, fit.covariance)
+    if face.printed is not None:
+        pose, covariance = face.printed.pose(pose, covariance)
     return Recognition(
         seq=seq,
         object=face.object,
@@ -138,9 +144,11 @@ def answer_at(
         index=under_centre(embossed, fit, hypothesis),
         T_face_probe=pose,
         T_object_probe=pose_on_object(face, pose),
-        covariance=face_covariance(face, fit.covariance),
+        covariance=covariance,
         margin=margin,
         runner_up=runner_up,
         reason="",
         noise=fit.noise,
+        scale=fit.scale,
+        stroke_mm=embossed.style.stroke_mm + fit.wider * settings.template.wider_mm,
     )

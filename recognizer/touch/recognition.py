@@ -2,6 +2,8 @@
 
 Frames: `T_face_probe` takes the sensor frame to the face frame (origin at the face's first
 vertex, x along its first edge, z outward), `T_object_probe` to the object frame; mm.
+Both frames are those of the design. Where it is known how the part was printed (`touch.as_built`)
+they say where the probe stands beside the printed part, whose place is that of its file's middle.
 """
 
 from __future__ import annotations
@@ -60,6 +62,8 @@ class Recognition:
     runner_up: RunnerUp | None
     reason: str  #: "" where it answers
     noise: float | None = None  #: standard deviation of psi that the symbols leave unexplained
+    scale: float | None = None  #: of the print as this touch felt it: 1 is as designed
+    stroke_mm: float | None = None  #: width of the strokes, likewise
 
     def __bool__(self) -> bool:
         return self.object is not None
@@ -128,6 +132,8 @@ class Recognition:
                 "index": list(runner_up.index),
             },
             "reason": self.reason,
+            "scale": self.scale,
+            "stroke_mm": self.stroke_mm,
         }
 
 

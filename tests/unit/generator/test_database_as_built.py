@@ -73,16 +73,18 @@ def test_what_is_written_is_read_bit_for_bit(engine):
 def test_a_later_measurement_takes_the_place_of_the_same_one_only(engine):
     with write_transaction(engine) as connection:
         write_as_built(connection, measured())
-        for changes in ({"part": "F2"}, {"printer": "x1"}, {"material": "PETG"}):
-            write_as_built(connection, measured(**changes))
-        write_as_built(connection, measured(touches=50))
+        write_as_built(connection, measured(part="F2"))
+        write_as_built(connection, measured(material="PETG", touches=50))
+        for changes in ({"printer": "x1"}, {"material": "PETG"}, {}, {"touches": 75}):
+            write_as_built(connection, measured(object_id=None, **changes))
     with read_transaction(engine) as connection:
-        found = read_as_built(connection, 1)
+        found = (*read_as_built(connection, 1), *read_as_built(connection))
     assert [(one.part, one.printer, one.material, one.touches) for one in found] == [
-        (None, "mk4", "PETG", 25),
-        (None, "mk4", "PLA", 50),
-        (None, "x1", "PLA", 25),
+        (None, "mk4", "PETG", 50),  # a part is printed of one material
         ("F2", "mk4", "PLA", 25),
+        (None, "mk4", "PETG", 25),
+        (None, "mk4", "PLA", 75),
+        (None, "x1", "PLA", 25),
     ]
 
 

@@ -29,7 +29,7 @@ class SmallLab:
         self.embossed = EmbossedArray(
             array=SimpleNamespace(rows=rows, columns=columns, order=order),
             alphabet=None,
-            style=SimpleNamespace(pitch_mm=PITCH, height_mm=1.2),
+            style=SimpleNamespace(pitch_mm=PITCH, height_mm=1.2, stroke_mm=1.4),
             keys=keys,
             owners=np.array([*owners, -1], np.int32),
             labels=np.array([*(held[cell][1] for cell in cells), -1], np.int8),

@@ -62,7 +62,7 @@ def lab(small):
             object="Thing", face=name, round=None, T_object_face=T_OBJECT_FACE,
             polygon_mm=(np.array([(0, 0), (42, 0), (42, 42), (0, 42)], float),),
             rows=np.array([6]), columns=np.array([2]), rotation_rad=0.0,
-            centres_mm=np.array([[3.5, 3.5]]),
+            centres_mm=np.array([[3.5, 3.5]]), printed=None,
         )  # fmt: skip
     return made
 
@@ -94,7 +94,7 @@ def reads(small, lab, monkeypatch):
         return answer, judged, count
 
     def one(place="here", score=0.0, inliers=16, embossed=lab, face=0, index=(3, 4), **changed):
-        fit = {name: changed.pop(name) for name in ("x_mm", "y_mm") if name in changed}
+        fit = {name: changed.pop(name) for name in ("x_mm", "y_mm", "nuisance") if name in changed}
         speaks = replace(SURE, inliers=inliers, **changed)
         return Found(embossed, place, score, replace(centre, **fit), speaks, face, index)
 
@@ -275,3 +275,32 @@ def test_the_centre_lies_at_most_two_mm_beyond_the_face(reads, x, y, reason):
     assert answer.reason == reason
     assert answer.margin == 40.0
     assert answer.runner_up.face == "F1"
+
+
+def test_an_answer_says_how_the_print_was_felt(reads):
+    found = [reads.one(nuisance=np.array([-0.5, 0.2, 0.1, 0.01])), reads.one("rival", -40.0)]
+    answer, _, _ = reads.read(found, found)
+    assert answer.scale == pytest.approx(1 / 1.01)  # a lattice that looks large is a small print
+    assert answer.stroke_mm == pytest.approx(1.4 - 0.05)
+    assert (refused(reads).scale, refused(reads).stroke_mm) == (None, None)
+
+
+def refused(reads):
+    found = [reads.one(inliers=2)]
+    return reads.read(found, found)[0]
+
+
+def test_where_the_print_is_known_the_pose_is_that_on_the_print(reads):
+    def pose(read, covariance):
+        moved = read.copy()
+        moved[0, 3] += 1.5
+        return moved, 2 * covariance
+
+    plain, _, _ = reads.read([reads.one()])
+    reads.lab.known[0].printed = SimpleNamespace(pose=pose)
+    answer, _, _ = reads.read([reads.one()])
+    assert answer.x_mm == plain.x_mm + 1.5
+    np.testing.assert_array_equal(answer.covariance, 2 * plain.covariance)
+    np.testing.assert_allclose(answer.T_object_probe, T_OBJECT_FACE @ answer.T_face_probe)
+    outside = reads.read([reads.one(x_mm=44.01)], [reads.one(x_mm=44.01)])[0]
+    assert outside.reason == OUTSIDE  # of the face as designed

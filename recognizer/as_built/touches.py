@@ -1,0 +1,110 @@
+"""Touches of a recording -> how the print under each of them is stretched."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.calibration import Calibration
+from recognizer.as_built.estimate import FeltPrint
+from recognizer.errors import AsBuiltError
+from recognizer.touch.belief import VerifiedHypothesis, unworn_labels_at, weigh_cells
+from recognizer.touch.contacts import TouchImage
+from recognizer.touch.lab import EncodedFace
+from recognizer.touch.reader import Reader
+from recognizer.touch.recognise import recognise_with_hypothesis
+from recognizer.touch.symbols.stretch import fit_stretch
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def feel_prints(
+    reader: Reader,
+    touches: Iterable[TouchImage],
+    *,
+    calibration: Calibration | None = None,
+    place: str = "",
+) -> tuple[FeltPrint, ...]:
+    """Return how every touch that is recognised felt the print.
+
+    Parameters
+    ----------
+    reader
+        With settings of `settings_for_prints`, so that a print far off is read too.
+    place
+        Of the touches, for messages.
+
+    Raises
+    ------
+    AsBuiltError
+        Nothing is recognised, or several objects are; or only round faces, whose stretch a touch
+        does not tell from their bend.
+    """
+    found: list[FeltPrint] = []
+    reasons: Counter[str] = Counter()
+    for touch in touches:
+        signal = reader.signal(touch.counts, calibration=calibration)
+        answer, verified = recognise_with_hypothesis(reader, signal, touch.seq)
+        if not answer or verified is None:
+            reasons[answer.reason] += 1
+            continue
+        face = verified.embossed.face(verified.hypothesis.face)
+        if face.round is not None:
+            reasons["on a round face"] += 1
+        elif face.T_part_face is None:
+            reasons["of an object without a registered part"] += 1
+        else:
+            found.append(_felt(verified, face, face.T_part_face, touch.seq))
+    if not found:
+        number = sum(reasons.values())
+        why = ", ".join(f"{count} {reason}" for reason, count in reasons.most_common())
+        raise AsBuiltError(
+            f"none of {number} touches tells of a print: {why}" if number else "no touch",
+            fix="record 25-50 touches of flat faces of one part that is in this database; what is "
+            "more than 10 % off cannot be read",
+            place=place,
+        )
+    objects = Counter(one.object for one in found)
+    if len(objects) > 1:
+        names = ", ".join(f"{name} ({count})" for name, count in objects.most_common())
+        raise AsBuiltError(
+            f"touches of {len(objects)} objects: {names}",
+            fix="give a recording of one object at a time",
+            place=place,
+        )
+    return tuple(found)
+
+
+def _felt(
+    verified: VerifiedHypothesis, face: EncodedFace, T_part_face: Array, seq: int
+) -> FeltPrint:
+    fit, embossed, place = verified.fit, verified.embossed, verified.hypothesis
+    worn = fit.cells[weigh_cells(embossed, fit, place, verified.image.settings.belief).worn]
+
+    def shown(cells: Ints) -> Ints:
+        return unworn_labels_at(embossed, place, worn, cells)
+
+    lattice = fit_stretch(verified.image, verified.template, fit.pose, fit.gain, shown)
+    c, s = math.cos(face.rotation_rad), math.sin(face.rotation_rad)
+    # the lattice's axes are the face's, turned by `rotation_rad`
+    by = np.eye(4)
+    by[:3, :3] = [
+        [c * c, s * s, 2 * c * s],
+        [s * s, c * c, -2 * c * s],
+        [-c * s, c * s, c * c - s * s],
+    ]
+    return FeltPrint(
+        seq=seq,
+        object=face.object,
+        face=face.face,
+        part=face.part,
+        axes=T_part_face[:2, :2],
+        strain=by[:3, :3] @ lattice.strain,
+        stroke_mm=embossed.style.stroke_mm + lattice.wider_mm,
+        covariance=by @ lattice.covariance @ by.T,
+    )

@@ -1,0 +1,194 @@
+"""`recognize-object as-built RECORDING`: how a part came out of the printer, from touches of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from encoded_objects import console
+from encoded_objects.console import Action
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from encoded_objects.console.progress import ProgressBar
+    from generator.database.as_built import AsBuilt
+    from recognizer.as_built.estimate import FeltPrint
+    from recognizer.as_built.verdict import PrintVerdict
+    from recognizer.touch.contacts import TouchImage
+
+HELP = """Say how a part came out of the printer: its scale both ways, skew, and stroke width.
+
+RECORDING holds 25-50 touches all over one part; x and y are the printer's axes, those of the \
+part's file. With [bold]--store[/] the database keeps it, and every later pose on the part, and \
+on parts of the same printer that nobody has touched so, is corrected by it.
+"""
+
+app = console.application()
+
+
+@app.callback()
+def _commands() -> None:
+    """Say what a print is like."""
+
+
+@app.command(name="as-built", help=HELP)
+def as_built(
+    recording: Annotated[
+        Path, typer.Argument(metavar="RECORDING", show_default=False, help="Touches of one part."),
+    ],
+    database: Annotated[
+        str, typer.Option(metavar="URL", help="The lab's database."),
+    ] = "lab.db",
+    store: Annotated[
+        bool, typer.Option("--store", help="Keep it in the database, for every later pose."),
+    ] = False,
+    material: Annotated[
+        str, typer.Option(metavar="NAME", help="What the part is printed of, as PLA."),
+    ] = "",
+    overlay: Annotated[
+        str, typer.Option(metavar="tab|pad", show_default=False,
+                          help="Elastic overlay; as the recording tells, tab by default."),
+    ] = "",
+    calibration: Annotated[
+        Path | None, typer.Option(metavar="FILE", show_default=False,
+                                  help="The sensor's calibration; the one that the recording "
+                                       "names is found beside it."),
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="One JSON object on stdout, also for errors."),
+    ] = False,
+) -> Action:  # fmt: skip
+    """Estimate a print; `HELP` is what people see."""
+    if overlay not in ("", "tab", "pad"):
+        raise typer.BadParameter(f"--overlay {overlay}: give tab or pad")
+
+    def action() -> int:
+        from encoded_objects.console.output import message, write, write_json
+
+        felt = _feel(recording, database, overlay, calibration)
+        prints, too_few = _estimate(felt, database, material)
+        for words in too_few:
+            message(words)
+        printer = None
+        if store:
+            from recognizer.as_built.keep import keep_prints
+
+            printer = keep_prints(database, [found for found, _ in prints])
+        if as_json:
+            parts = [_entry(found, verdict) for found, verdict in prints]
+            told = None if printer is None else _numbers(printer)
+            write_json({"object": felt[0].object, "parts": parts, "stored": store, "printer": told})
+            return 0
+        for found, verdict in prints:
+            write(_sentences(found, verdict))
+        if printer is not None:
+            name = " ".join(filter(None, (printer.printer or "its printer", printer.material)))
+            message(f"kept in {database}; parts of {name} that are not known by touches of their "
+                    f"own: {_sizes(printer)}")  # fmt: skip
+        return 0
+
+    return action
+
+
+def _feel(
+    recording: Path, database: str, overlay: str, calibration: Path | None
+) -> tuple[FeltPrint, ...]:
+    """Return how the touches of a recording felt the print."""
+    from encoded_objects.console.output import warning
+    from encoded_objects.console.progress import progress_bar
+    from probe.recording.read import Recording
+    from probe.sensor import SensorType
+    from recognizer.as_built.settings import settings_for_prints
+    from recognizer.as_built.touches import feel_prints
+    from recognizer.touch.lab import open_lab
+    from recognizer.touch.reader import Reader
+    from recognizer.touch.source import source_of
+
+    lab = open_lab(database)
+    opened = Recording(recording)
+    source = source_of(opened, SensorType(), overlay=overlay, calibration=calibration)
+    if source.notice:
+        warning(source.notice)
+    reader = Reader(lab, source.sensor, settings_for_prints())
+    with progress_bar("reading", source.frames) as bar:
+        touches = _show_count(source.touches(opened.frames(), reader.settings), bar)
+        return feel_prints(reader, touches, calibration=source.calibration, place=str(recording))
+
+
+def _show_count(touches: Iterator[TouchImage], bar: ProgressBar) -> Iterator[TouchImage]:
+    for number, touch in enumerate(touches, start=1):
+        yield touch
+        bar.show(touch.seq + touch.frames, f"{number:,} touches")
+
+
+def _estimate(
+    felt: tuple[FeltPrint, ...], database: str, material: str
+) -> tuple[list[tuple[AsBuilt, PrintVerdict]], list[str]]:
+    """Return every part that was touched often enough, and words on those that were not."""
+    from generator.database.open import open_database
+    from generator.database.read import read_object
+    from generator.database.transaction import read_transaction
+    from recognizer.as_built.estimate import estimate_print
+    from recognizer.as_built.settings import ESTIMATE
+    from recognizer.as_built.verdict import judge_print
+    from recognizer.touch.lab import printer_of
+
+    with read_transaction(open_database(database, writable=False)) as connection:
+        held = read_object(connection, felt[0].object)
+    parts: dict[str, list[FeltPrint]] = {}
+    for one in felt:
+        parts.setdefault(one.part, []).append(one)
+    told, few = [], []
+    most = max(parts.values(), key=len)
+    for name, touches in parts.items():
+        if len(touches) < ESTIMATE.least and touches is not most:
+            few.append(f"{name}: {len(touches)} touches are too few")
+            continue
+        found = estimate_print(
+            touches, object_id=held.entry.object_id, printer=printer_of(held), material=material
+        )
+        told.append((found, judge_print(found, held.style.stroke_mm)))
+    return told, few
+
+
+def _numbers(found: AsBuilt) -> dict[str, Any]:
+    """Return the numbers of a print as JSON has them."""
+    from math import degrees, sqrt
+
+    spread = [sqrt(float(found.covariance[k, k])) for k in range(4)]
+    return {
+        "printer": found.printer,
+        "material": found.material,
+        "touches": found.touches,
+        "scale_x": found.scale_x,
+        "scale_y": found.scale_y,
+        "skew_deg": degrees(found.skew_rad),
+        "stroke_mm": found.stroke_mm,
+        "deviation": {
+            "scale_x": spread[0], "scale_y": spread[1], "skew_deg": degrees(spread[2]),
+            "stroke_mm": spread[3],
+        },
+        "covariance": found.covariance,
+    }  # fmt: skip
+
+
+def _entry(found: AsBuilt, verdict: PrintVerdict) -> dict[str, Any]:
+    return {"part": found.part, "verdict": verdict.kind, "words": verdict.words} | _numbers(found)
+
+
+def _sentences(found: AsBuilt, verdict: PrintVerdict) -> str:
+    return f"{found.part}: {verdict.words}\n  {_sizes(found)}; {found.touches} touches"
+
+
+def _sizes(found: AsBuilt) -> str:
+    told = _numbers(found)
+    by = told["deviation"]
+    return (
+        f"scale X {found.scale_x:.4f} +- {by['scale_x']:.4f}, "
+        f"Y {found.scale_y:.4f} +- {by['scale_y']:.4f}, "
+        f"skew {told['skew_deg']:.2f} +- {by['skew_deg']:.2f} degrees, "
+        f"strokes {found.stroke_mm:.2f} +- {by['stroke_mm']:.2f} mm"
+    )

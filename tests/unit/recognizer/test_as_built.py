@@ -1,0 +1,192 @@
+"""How a part came out of the printer: from strains that are known, and what poses make of it."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from generator.database.as_built import AsBuilt
+from recognizer.as_built.estimate import FeltPrint, estimate_print, estimate_printer
+from recognizer.as_built.settings import EstimateSettings
+from recognizer.as_built.verdict import AS_DESIGNED, CORRECTED, PRINT_AGAIN, judge_print
+from recognizer.errors import AsBuiltError
+from recognizer.touch.as_built import PrintedFace, print_matrix, print_of
+
+EXACT = EstimateSettings(always=(0.0, 0.0, 0.0, 0.0))
+NEAR = st.floats(0.94, 1.06)
+TOP = np.eye(3)
+WALL_X = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # face x along x, face y along z
+WALL_Y = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # face x along y
+SLOPE = np.array([[0.6, 0, 0.8], [0, 1, 0], [-0.8, 0, 0.6]])
+
+
+def print_with(scale_x=1.0, scale_y=1.0, skew_rad=0.0, stroke_mm=1.4, covariance=None, **named):
+    known = {"object_id": 1, "part": "Cube-F1", "printer": "mk4", "material": "PLA", "touches": 30}
+    covariance = np.zeros((4, 4)) if covariance is None else covariance
+    return AsBuilt(scale_x=scale_x, scale_y=scale_y, skew_rad=skew_rad, stroke_mm=stroke_mm,
+                   covariance=covariance, **(known | named))  # fmt: skip
+
+
+def turned(angle):
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def felt_on(as_built, R_part_face, error=(0, 0, 0, 0), covariance=None):
+    """What an exact touch of a face tells: the metric of its plane as it is printed."""
+    S, B = print_matrix(as_built), R_part_face[:, :2]
+    E = (B.T @ S.T @ S @ B - np.eye(2)) / 2
+    return FeltPrint(
+        0, "Cube", "F1", "Cube-F1", R_part_face[:2, :2],
+        np.array([E[0, 0], E[1, 1], E[0, 1]]) + error[:3], as_built.stroke_mm + error[3],
+        np.eye(4) * 1e-6 if covariance is None else covariance,
+    )  # fmt: skip
+
+
+@given(NEAR, NEAR, st.floats(-0.03, 0.03), st.floats(-math.pi, math.pi))
+def test_exact_touches_of_turned_faces_give_the_print_back(scale_x, scale_y, skew, angle):
+    truth = print_with(scale_x, scale_y, skew, 1.55)
+    faces = [turned(angle), turned(angle + 2) @ WALL_X, turned(angle) @ WALL_Y, SLOPE]
+    felt = [felt_on(truth, faces[k % 4]) for k in range(12)]
+    found = estimate_print(felt, settings=EXACT)
+    for name in ("scale_x", "scale_y", "skew_rad", "stroke_mm"):
+        assert getattr(found, name) == pytest.approx(getattr(truth, name), abs=1e-9)
+    assert found.touches == 12
+
+
+def test_one_bad_touch_in_twenty_five_moves_little():
+    truth, rng = print_with(0.98, 0.99, 0.004), np.random.default_rng(3)
+    felt = [felt_on(truth, TOP, rng.normal(0, 1e-3, 4)) for _ in range(24)]
+    bad = felt_on(truth, TOP, (0.06, -0.05, 0.03, 0.3))
+    without, found = estimate_print(felt, settings=EXACT), estimate_print([*felt, bad])
+    assert abs(found.scale_x - without.scale_x) < 2e-4
+    assert abs(found.skew_rad - without.skew_rad) < 2e-4
+
+
+@pytest.mark.parametrize("said", [1e-7, 1e-6, 1e-5])
+def test_how_sure_it_is_comes_from_the_spread_of_the_touches(said):
+    truth, rng = print_with(0.98, 0.99, 0.004), np.random.default_rng(4)
+    chi2 = []
+    for _ in range(60):
+        felt = [felt_on(truth, TOP, rng.normal(0, 2e-3, 4), np.eye(4) * said) for _ in range(30)]
+        found = estimate_print(felt, settings=EXACT)
+        away = np.array([found.scale_x - 0.98, found.scale_y - 0.99, found.skew_rad - 0.004])
+        chi2.append(away @ np.linalg.solve(found.covariance[:3, :3], away))
+    assert 2.4 < np.mean(chi2) < 4.2  # three degrees of freedom
+
+
+def test_a_wall_alone_does_not_tell_the_print():
+    felt = [felt_on(print_with(0.98), WALL_X)] * 30
+    with pytest.raises(AsBuiltError, match="do not tell y and skew"):
+        estimate_print(felt)
+    felt[0] = felt_on(print_with(0.98), WALL_Y)
+    with pytest.raises(AsBuiltError, match="do not tell skew"):
+        estimate_print(felt)
+
+
+def test_few_touches_are_refused_with_what_is_needed():
+    felt = [felt_on(print_with(0.98), TOP)] * 9
+    with pytest.raises(AsBuiltError, match=r"9 touches of it were read, 10 are the least") as error:
+        estimate_print(felt)
+    assert error.value.place == "Cube-F1"
+    assert "25-50 touches" in error.value.fix
+
+
+def test_a_printer_is_what_its_parts_are_and_how_far_they_differ():
+    spread = np.diag([1e-8, 1e-8, 1e-8, 1e-4])
+    one = estimate_printer([print_with(0.99, 0.995, 0.001, covariance=spread)])
+    assert (one.object_id, one.part, one.printer, one.material) == (None, None, "mk4", "PLA")
+    between = np.square(EstimateSettings().between)
+    np.testing.assert_allclose(np.diag(one.covariance), np.diag(spread) + 2 * between)
+    apart = [print_with(0.98, covariance=spread), print_with(1.0, covariance=spread)]
+    both = estimate_printer(apart)
+    assert (both.scale_x, both.touches) == (0.99, 60)
+    assert both.covariance[0, 0] == pytest.approx(0.5e-8 + 2e-4 * 1.5)
+    assert both.covariance[1, 1] == pytest.approx(0.5e-8 + between[1] * 1.5)
+
+
+def test_what_is_known_of_a_part_comes_before_its_printer():
+    own, other = print_with(0.98), print_with(0.97, part="Cube-F2")
+    made = print_with(0.99, object_id=None, part=None)
+    assert print_of([other, own, made], "Cube-F1", "mk4") is own
+    assert print_of([other, made], "Cube-F1", "mk4") is made
+    assert print_of([other, made], "Cube-F1", "another") is None
+    petg = print_with(0.995, object_id=None, part=None, material="PETG")
+    assert print_of([other, made, petg], "Cube-F1", "mk4") is None
+
+
+def read_pose(S, T_part_face, T_part_probe):
+    """What a reader that fits a turned and scaled lattice says of a pose on a printed face."""
+    R, at = T_part_face[:3, :3], T_part_face[:3, 3]
+    middle = R.T @ (np.linalg.solve(S, T_part_probe[:3, 3]) - at)
+    steps = np.array([(x, y) for x in (-8, 0, 8) for y in (-8, 0, 8)], float)
+    design = middle + np.c_[steps, np.zeros(9)]  # symbols about the probe, face frame
+    seen = (S @ (design @ R.T + at).T - T_part_probe[:3, 3:]).T @ T_part_probe[:3, :3]
+    z = (seen[:, 0] + 1j * seen[:, 1]).conj() @ (steps[:, 0] + 1j * steps[:, 1])
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = turned(float(np.angle(z))), middle
+    return pose
+
+
+@given(NEAR, NEAR, st.floats(-0.03, 0.03), st.floats(-3, 3), st.sampled_from((TOP, WALL_X, SLOPE)))
+def test_a_pose_that_is_read_becomes_the_pose_on_the_print(scale_x, scale_y, skew, turn, R):
+    T_part_face = np.eye(4)
+    T_part_face[:3, :3], T_part_face[:3, 3] = R, (-30, -20, 12)
+    as_built = print_with(scale_x, scale_y, skew)
+    S = print_matrix(as_built)
+    Q, _ = np.linalg.qr(S @ R[:, :2])  # a frame of the printed face, the same way round
+    Q *= np.sign((Q * R[:, :2]).sum(axis=0))
+    T_part_probe = np.eye(4)
+    T_part_probe[:3, :3] = np.column_stack([Q, np.cross(*Q.T)]) @ turned(turn)
+    T_part_probe[:3, 3] = S @ (R @ (41.0, 33.0, 1.0) + T_part_face[:3, 3])
+    read = read_pose(S, T_part_face, T_part_probe)
+    found, _ = PrintedFace(as_built, T_part_face).pose(read, np.eye(3))
+    np.testing.assert_allclose(T_part_face @ found, T_part_probe, atol=1e-9)
+
+
+def test_a_pose_is_as_unsure_as_the_print_where_it_is_far_from_the_middle():
+    T_part_face = np.eye(4)
+    T_part_face[:3, 3] = -30, -30, 3
+    spread = np.diag([1e-3**2, 2e-3**2, 3e-3**2, 0.1**2])
+    face = PrintedFace(print_with(covariance=spread), T_part_face)
+    pose = np.eye(4)
+    pose[:2, 3] = 30, 30  # the middle
+    own = np.diag([1e-4, 1e-4, 1e-6])
+    same, covariance = face.pose(pose, own)
+    np.testing.assert_allclose(same, pose, atol=1e-12)
+    np.testing.assert_allclose(covariance, own + np.diag([0, 0, 1.5e-3**2]), atol=1e-12)
+    pose[:2, 3] = 50, 20
+    _, covariance = face.pose(pose, own)  # 20 mm along x, -10 mm along y
+    assert covariance[0, 0] == pytest.approx(1e-4 + 0.02**2 + 0.03**2, rel=1e-4)
+    assert covariance[1, 1] == pytest.approx(1e-4 + 0.02**2, rel=1e-4)
+    assert covariance[0, 2] == pytest.approx(0.03 * 1.5e-3, rel=1e-4)  # both of the skew
+
+
+@pytest.mark.parametrize(
+    ("print_", "kind", "words"),
+    [
+        ((1.0003, 0.9996, 0.0004), AS_DESIGNED, "as designed"),
+        ((0.992, 0.9925, 0.0), CORRECTED, "0.8 % small, within what the reader corrects"),
+        ((1.01, 1.01, 0.0), CORRECTED, "1.0 % large, within what the reader corrects"),
+        ((0.99, 1.0, 0.0), CORRECTED, "X is 1.0 % short, within what the reader corrects"),
+        ((0.97, 1.0, 0.0), PRINT_AGAIN, "print again, X is 3.0 % short: belts?"),
+        ((1.0, 1.03, 0.01), PRINT_AGAIN,
+         "print again, Y is 3.0 % long, 0.6 degrees askew: belts? a frame out of square?"),
+        ((1.0, 1.0, -0.03), PRINT_AGAIN,
+         "print again, 1.7 degrees askew: a frame out of square?"),
+        ((0.96, 0.96, 0.0), PRINT_AGAIN,
+         "print again, 4.0 % small: scale in the slicer, shrinkage?"),
+    ],
+)  # fmt: skip
+def test_what_is_said_of_a_print(print_, kind, words):
+    verdict = judge_print(print_with(*print_), 1.4)
+    assert (verdict.kind, verdict.words) == (kind, words)
+
+
+def test_what_nobody_can_be_sure_of_is_not_said():
+    unsure = np.diag([0.004**2, 0.004**2, 0.004**2, 0.2**2])
+    assert judge_print(print_with(0.996, 1.0, 0.003, 1.6, unsure), 1.4).words == "as designed"
+    strokes = judge_print(print_with(stroke_mm=1.2), 1.4)
+    assert strokes.words == "as designed; strokes 0.2 mm too narrow: flow, first layer?"
