@@ -411,7 +411,9 @@ def test_a_window_of_a_product_array_is_searched_as_it_is_weighed(
 ):
     rng = np.random.default_rng(10)
     scores = rng.normal(size=(8, *shape, array.order))
-    scores *= np.arange(1, 9)[:, None, None, None]  # from faint to sharp
+    scores *= np.array([1, 2, 3, 4, 6, 8, 20, 60])[:, None, None, None]  # from faint to sharp
+    rows_alone = 40 * rng.normal(size=(shape[0], 1, array.law.shape[0], 1))
+    scores[7][..., array.law] = rows_alone  # all places of a row are alike
     scores -= scores.max(axis=-1, keepdims=True)
     flat = scores.reshape(8, shape[0] * shape[1], -1).astype(np.float32)
     monkeypatch.setattr(decoder.joint, "_PAIRS", pairs)
