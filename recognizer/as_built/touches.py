@@ -59,7 +59,7 @@ def feel_prints(
         elif face.T_part_face is None:
             reasons["of an object without a registered part"] += 1
         else:
-            found.append(_felt(verified, face, face.T_part_face, touch.seq))
+            found.append(_fit_print(verified, face, face.T_part_face, touch.seq))
     if not found:
         number = sum(reasons.values())
         why = ", ".join(f"{count} {reason}" for reason, count in reasons.most_common())
@@ -80,7 +80,7 @@ def feel_prints(
     return tuple(found)
 
 
-def _felt(
+def _fit_print(
     verified: VerifiedHypothesis, face: EncodedFace, T_part_face: Array, seq: int
 ) -> FeltPrint:
     fit, embossed, place = verified.fit, verified.embossed, verified.hypothesis

@@ -91,7 +91,7 @@ def read_sensor(
         _, state = conductances(film, _heard(before, level))
     conductance, _ = conductances(film, _heard(forces, level), state)
     share = loaded_columns(conductance, sensor_copy.floating_rows(level), level.load_ohm)
-    offered = READOUT.full * _amplification(level.load_ohm) * _bled(share, level.bleed)
+    offered = READOUT.full * _amplification(level.load_ohm) * _bleed_rows(share, level.bleed)
     noise = READOUT.counts_per_n * level.noise_n * rng.standard_normal(forces.shape)
     counts = np.clip(np.rint(READOUT.bias + offered + noise), 0, READOUT.full)
     return mount(counts.astype(np.uint16), level.mounting), contact
@@ -125,7 +125,7 @@ def _heard(forces_n: Array, level: Level) -> Array:
     return np.asarray(gaussian_filter(forces_n, level.cross_talk, mode="nearest"))
 
 
-def _bled(share: Array, bleed: float) -> Array:
+def _bleed_rows(share: Array, bleed: float) -> Array:
     """Return readings in which each row holds a share of the row above and of the one below."""
     around = np.pad(share, ((1, 1), (0, 0)))
     mixed: Array = (1 - 2 * bleed) * share + bleed * (around[:-2] + around[2:])

@@ -77,7 +77,7 @@ def fit_stretch(
 
     start = _evaluate(free, template, pose[None], gain[None], np.zeros((1, 2)), shown)
     found = ascend(start, moved, settings.steps, refine, settings.settled)
-    return _told(found, image.settings.template.wider_mm)
+    return _stretch_of(found, image.settings.template.wider_mm)
 
 
 def _evaluate(
@@ -107,7 +107,7 @@ def _evaluate(
     )
 
 
-def _told(found: _StretchedLattice, unit_mm: float) -> Stretch:
+def _stretch_of(found: _StretchedLattice, unit_mm: float) -> Stretch:
     """Return strain and width of a lattice; the strain turns with the lattice, not the sensor."""
     (a, c), turn = found.stretch[0], float(found.pose[0, 2])
     cos, sin = math.cos(turn), math.sin(turn)
