@@ -23,7 +23,7 @@ COPY, NEAR, SMALL, SIDE = "copy", "near", "small", "side"
 SAME_PROFILE = "same_profile"
 EXTRA = {COPY: "Extra copy", NEAR: "Extra near", SMALL: "Extra small"}
 """Kinds that are touches of members of their own, and how the names of these begin."""
-LABS, EXTRA_SPEC = "labs", "extra.yaml"
+LABS = "labs"
 
 
 def make_for_kinds(folder: Path, database: str, kinds: Collection[str], seed: int) -> None:
@@ -55,9 +55,10 @@ def make_for_kinds(folder: Path, database: str, kinds: Collection[str], seed: in
             place="--kinds",
         )
     first = members[0]
-    extra = [s for kind in EXTRA if kind in kinds for s in _extra_specs(kind, first.pitch_mm)]
-    if extra:
-        _make(extra, first, folder / EXTRA_SPEC, folder / PARTS, database)
+    for kind in EXTRA:  # one after the other: they may be on different arrays
+        if kind in kinds:
+            specs = list(_extra_specs(kind, first.pitch_mm))
+            _make(specs, first, folder / f"extra-{kind}.yaml", folder / PARTS, database)
     if SAME_PROFILE in kinds:
         for number in range(MAKING.labs):
             lab = folder / LABS / f"lab-{number + 1}"
