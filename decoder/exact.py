@@ -54,7 +54,8 @@ def decode_exact(
         return _of_product(array, labels, method)
     number, a, b = labels.shape
     offsets = _offsets(array, a, b)
-    terms = convert_terms(array.sequence, offsets, labels.reshape(number, a * b), method)
+    seen = array.terms_of(labels).reshape(number, a * b)
+    terms = convert_terms(array.sequence, offsets, seen, method)
     rows, columns = np.uint64(array.rows), np.uint64(array.columns)
     listed = {
         i: tuple(Candidate(*array.cell(t)) for t in places)

@@ -49,7 +49,7 @@ def decode_good_tuple(array: FoldedArray | ProductArray, windows: ArrayLike) -> 
         raise MethodError(
             "good tuples are looked for in folded arrays", fix="take method likelihood"
         )
-    labels = checked_labels(windows, array.order)
+    labels = array.terms_of(checked_labels(windows, array.order))
     number, a, b = labels.shape
     height, width = array.window
     if a < height or b < width:

@@ -56,6 +56,7 @@ class AllPlaces:
     def rank(self, scores: Scores, number: int) -> Ranked:
         """Return the best places of scores (N, k, q)."""
         method = self._method
+        scores = np.take(scores, self._array.permutation, axis=2)  # of terms, no more of symbols
         if isinstance(method, Transform):
             places, values, rest = best_of(method.values(scores), number)
             t = method.index_of_key[places].astype(np.uint64)

@@ -7,6 +7,7 @@
         ├── SpecError         the YAML file: one or more problems, each with its place
         ├── ShapeError        a polyhedron or a file that holds one
         ├── ArrayError        an encoding that cannot be built or does not identify
+        ├── LabKeyError       a lab key that is misspelt, or another than the database's
         ├── AlphabetError     a symbol that cannot be embossed as asked
         ├── LayoutError       a face that shows no place, or an array that is full
         ├── SolidError        a part that cannot be made or did not pass its proof
@@ -31,6 +32,10 @@ class ShapeError(GeneratorError):
 
 class ArrayError(GeneratorError):
     """An encoding that cannot be built, decoded, or does not identify its windows."""
+
+
+class LabKeyError(GeneratorError):
+    """A lab key that is misspelt, or that is not the one of the database."""
 
 
 class AlphabetError(GeneratorError):

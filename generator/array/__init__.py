@@ -12,6 +12,7 @@ takes an explicit encoding; both give a `SymbolArray` (`contract`).
     window                        minimum distance, unique windows
     touches                       how many of a sensor's touches name a place
     visible, rivals               cells that a sensor sees whole, places that look like them
+    labelling, keyed, lab_key     arrays of a lab's own
     definition, profiles          arrays by plain values and by name
 """
 

@@ -38,6 +38,11 @@ class SymbolArray(Protocol):
         """Rows and columns of the window that is known to be unique."""
         ...
 
+    @property
+    def first(self) -> tuple[int, int]:
+        """Row and column at which the placing of objects begins."""
+        ...
+
     def symbols(self, rows: ArrayLike, columns: ArrayLike) -> Labels:
         """Return the labels at cells (rows, columns), broadcast together, taken on the torus.
 

@@ -7,8 +7,8 @@
 
 Left out: `polynomial`, the default one on file; `initial`, 0 ... 0 1; `rows` and `columns`,
 the most square fold; `window`, the smallest unique one; `law`, figure 5.11's; `field`, the
-usual minimal polynomial of A. Polynomials are labels from x^0 upwards, or texts as
-"x^6+x^2+x+A", or 0x1099 over GF(2).
+usual minimal polynomial of A; `permutation`, none; `first`, cell (0, 0). Polynomials are
+labels from x^0 upwards, or texts as "x^6+x^2+x+A", or 0x1099 over GF(2).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from generator.errors import ArrayError
 
 FAMILIES = ("prbs", "prba", "prpa", "prmvs", "prmva", "prmvpa")
 _SEQUENCE_KEYS = ("order", "degree", "field", "polynomial", "initial")
-_FOLD_KEYS = ("family", *_SEQUENCE_KEYS, "rows", "columns", "window")
+_FOLD_KEYS = ("family", *_SEQUENCE_KEYS, "rows", "columns", "window", "permutation", "first")
 _PRODUCT_KEYS = ("family", "factors", "law", "rows", "columns", "window")
 
 
@@ -81,7 +81,15 @@ def array_from(definition: Mapping[str, Any]) -> FoldedArray | ProductArray:
         rows = sequence.period // columns
     elif columns is None and rows:
         columns = sequence.period // rows
-    return FoldedArray(sequence, rows or 0, columns or 0, window)
+    first = _integers(definition, "first", 2)
+    return FoldedArray(
+        sequence,
+        rows or 0,
+        columns or 0,
+        window,
+        permutation=_integers(definition, "permutation", order),
+        first=(first[0], first[1]) if first else (0, 0),
+    )
 
 
 def _product(
@@ -214,6 +222,15 @@ def _window(given: Mapping[str, Any]) -> tuple[int, int] | None:
     if _are_integers(window) and len(window) == 2:
         return int(window[0]), int(window[1])
     raise ArrayError(f"window: {window!r} is no size", fix="give [rows, columns], as [3, 2]")
+
+
+def _integers(given: Mapping[str, Any], key: str, number: int) -> tuple[int, ...] | None:
+    values = given.get(key)
+    if values is None:
+        return None
+    if _are_integers(values) and len(values) == number:
+        return tuple(values)
+    raise ArrayError(f"{key}: {values!r} is no list of {number}", fix=f"give {number} integers")
 
 
 def _are_integers(values: Any) -> bool:

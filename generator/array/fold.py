@@ -4,11 +4,13 @@ Any coprime n1 n2 = q^n - 1 serves (the thesis takes n1 = q^k1 - 1, n = k1 k2, f
 With e1 = 1 (mod n1), 0 (mod n2) and e2 the other way round, cell (r, c) has the index
 t = r e1 + c e2 and the field element beta^r gamma^c, beta = x^e1, gamma = x^e2: rows and
 columns are prepared apart, and a symbol is one inner product. Nothing is materialised.
+Which symbol shows which term may be permuted (`keyed`); ranks are those of the terms.
 A set of visible cells names its place if the functionals of its cells have rank n.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import gcd
 from typing import Any
 
@@ -16,9 +18,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from generator.array.contract import Labels
+from generator.array.labelling import checked_cell, checked_permutation
 from generator.array.notation import format_polynomial
 from generator.array.residue import Digits, Powers, pack_words
-from generator.array.sequence import Sequence
+from generator.array.sequence import Sequence, sequence_definition
 from generator.array.size import no_fold
 from generator.array.torus import on_torus
 from generator.array.window import minimum_distance
@@ -38,11 +41,16 @@ class FoldedArray:
         Coprime, rows * columns = N.
     window
         Rows and columns of a window that must be unique; the smallest one by default.
+    permutation
+        (q,) the symbol that shows each label of the sequence; by default the label itself.
+    first
+        Cell at which the placing of objects begins; it changes no symbol.
 
     Raises
     ------
     ArrayError
-        If the fold is not one, or the window is not unique; the error names one that is.
+        If the fold is not one, or the window is not unique; the error names one that is. If
+        the permutation is none, or `first` is no cell.
     """
 
     def __init__(
@@ -51,6 +59,9 @@ class FoldedArray:
         rows: int,
         columns: int,
         window: tuple[int, int] | None = None,
+        *,
+        permutation: Iterable[int] | None = None,
+        first: tuple[int, int] = (0, 0),
     ) -> None:
         if rows < 1 or rows * columns != sequence.period or gcd(rows, columns) != 1:
             raise no_fold(sequence.field.order, sequence.degree, rows, columns)
@@ -63,6 +74,9 @@ class FoldedArray:
         self._beta = Powers(ring, ring.power_of_x(self.row_step), rows)
         self._gamma = Powers(ring, ring.power_of_x(self.column_step), columns)
         self._window = self._smallest_window() if window is None else self._checked(window)
+        self.permutation = checked_permutation(permutation, self.order)  #: (q,)
+        self._label_of_symbol = np.append(np.argsort(self.permutation), -1)
+        self._first = checked_cell(first, rows, columns)
 
     def __repr__(self) -> str:
         return f"FoldedArray({self.sequence!r}, {self.rows}x{self.columns})"
@@ -88,6 +102,11 @@ class FoldedArray:
         return self._window
 
     @property
+    def first(self) -> tuple[int, int]:
+        """Row and column at which the placing of objects begins."""
+        return self._first
+
+    @property
     def full_rank(self) -> int:
         """Rank at which cells name their place, n."""
         return self.sequence.degree
@@ -100,7 +119,14 @@ class FoldedArray:
     # --- cells -----------------------------------------------------------------------------
 
     def symbols(self, rows: ArrayLike, columns: ArrayLike) -> Labels:
-        """Return the labels at cells (rows, columns), broadcast together, on the torus."""
+        """Return the symbols at cells (rows, columns), broadcast together, on the torus."""
+        return np.asarray(self.permutation[self._terms(rows, columns)])
+
+    def terms_of(self, symbols: ArrayLike) -> Labels:
+        """Return the sequence's labels that symbols (...) show; -1, not seen, stays."""
+        return np.asarray(self._label_of_symbol[np.asarray(symbols)])
+
+    def _terms(self, rows: ArrayLike, columns: ArrayLike) -> Labels:
         field = self.sequence.field
         r, in_row = _distinct_indices(rows, self.rows)
         c, in_column = _distinct_indices(columns, self.columns)
@@ -148,11 +174,11 @@ class FoldedArray:
         ]
 
     def coefficients(self, rows: ArrayLike, columns: ArrayLike) -> Labels:
-        """Return (k, n) labels c with A[place + cell] = sum_j c_j s[t + j], t the place's index."""
+        """Return (k, n) labels c with s at (place + cell) = sum_j c_j s[t + j], t place's index."""
         return self.sequence.coefficients(self.offsets(rows, columns))
 
     def functionals(self, rows: ArrayLike, columns: ArrayLike) -> Digits:
-        """Return (k, m, D) digits F with digits(A[place + cell]) = F @ element(place)."""
+        """Return (k, m, D) digits F: those of the term at place + cell are F @ element(place)."""
         return self.sequence.functionals(self.sequence.element(self.offsets(rows, columns)))
 
     def rank(self, rows: ArrayLike, columns: ArrayLike) -> int:
@@ -212,19 +238,12 @@ class FoldedArray:
     def definition(self) -> dict[str, Any]:
         """Return the plain values (JSON) from which `array_from` makes this array again."""
         found: dict[str, Any] = {"family": self.family, **sequence_definition(self.sequence)}
-        return found | {"rows": self.rows, "columns": self.columns, "window": list(self.window)}
-
-
-def sequence_definition(sequence: Sequence) -> dict[str, Any]:
-    """Return the plain values that make the sequence again."""
-    field = sequence.field
-    found: dict[str, Any] = {"order": field.order, "degree": sequence.degree}
-    if field.degree > 1:
-        found["field"] = list(field.minimal)
-    return found | {
-        "polynomial": list(sequence.polynomial),
-        "initial": list(sequence.initial),
-    }
+        found |= {"rows": self.rows, "columns": self.columns, "window": list(self.window)}
+        if (np.diff(self.permutation) != 1).any():
+            found["permutation"] = self.permutation.tolist()
+        if self.first != (0, 0):
+            found["first"] = list(self.first)
+        return found
 
 
 def _distinct_indices(

@@ -20,8 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from generator.array.contract import Labels
-from generator.array.fold import sequence_definition
-from generator.array.sequence import Sequence
+from generator.array.sequence import Sequence, sequence_definition
 from generator.array.torus import on_torus
 from generator.array.window import minimum_distance
 from generator.errors import ArrayError
@@ -87,6 +86,11 @@ class ProductArray:
     def window(self) -> tuple[int, int]:
         """Rows and columns of the window that is known to be unique."""
         return self._window
+
+    @property
+    def first(self) -> tuple[int, int]:
+        """Row and column at which the placing of objects begins."""
+        return 0, 0
 
     @property
     def full_rank(self) -> int:

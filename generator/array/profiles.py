@@ -15,6 +15,7 @@ from typing import Any
 
 from generator.array.definition import array_from
 from generator.array.fold import FoldedArray
+from generator.array.keyed import keyed_array
 from generator.array.product import ProductArray
 from generator.array.size import nearest_sizes
 from generator.errors import ArrayError
@@ -32,10 +33,18 @@ class Profile:
     alphabet: str  #: name of the alphabet
     pitch_mm: float  #: distance of neighbouring symbols
     purpose: str
+    keyed: bool = False  #: whether every lab has an array of its own; the others are published
 
     def array(self) -> FoldedArray | ProductArray:
-        """Return the array of this profile."""
+        """Return the array of this profile, without a key."""
         return array_from(self.encoding)
+
+    def array_of_lab(self, lab_key: str) -> FoldedArray | ProductArray:
+        """Return a lab's own array; of a profile that has no keys, the published one."""
+        published = self.array()
+        if not (lab_key and self.keyed) or isinstance(published, ProductArray):
+            return published
+        return keyed_array(published, lab_key)
 
 
 def _profile(
@@ -45,9 +54,11 @@ def _profile(
     alphabet: str,
     pitch_mm: float,
     purpose: str,
+    *,
+    keyed: bool = False,
 ) -> Profile:
     whole = MappingProxyType(encoding | {"window": list(window)})
-    return Profile(name, whole, window, alphabet, pitch_mm, purpose)
+    return Profile(name, whole, window, alphabet, pitch_mm, purpose, keyed)
 
 
 def _gf4(degree: int, polynomial: str, rows: int, columns: int) -> dict[str, Any]:
@@ -76,6 +87,7 @@ PROFILES: Mapping[str, Profile] = MappingProxyType(
                 "dense-4",
                 7.0,
                 "one 25 mm touch is enough",
+                keyed=True,
             ),
             _profile(
                 "thesis",
@@ -106,6 +118,7 @@ PROFILES: Mapping[str, Profile] = MappingProxyType(
                 "dense-4",
                 7.0,
                 "hundreds of objects",
+                keyed=True,
             ),
             _profile(
                 "fine",
@@ -114,6 +127,7 @@ PROFILES: Mapping[str, Profile] = MappingProxyType(
                 "dense-4",
                 4.5,
                 "resin printing, small faces",
+                keyed=True,
             ),
         )
     }

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from functools import cached_property
 from itertools import islice
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -222,3 +223,15 @@ class Sequence:
             maps = pack_words(self.functionals(self.element(missing))).tolist()
             known.update(zip(missing, maps, strict=True))
         return [word for offset in offsets for word in known[offset]]
+
+
+def sequence_definition(sequence: Sequence) -> dict[str, Any]:
+    """Return the plain values that make the sequence again."""
+    field = sequence.field
+    found: dict[str, Any] = {"order": field.order, "degree": sequence.degree}
+    if field.degree > 1:
+        found["field"] = list(field.minimal)
+    return found | {
+        "polynomial": list(sequence.polynomial),
+        "initial": list(sequence.initial),
+    }

@@ -18,9 +18,10 @@ from generator.layout.settings import LAYOUT
 class Board:
     """The part of the torus that is looked at, as bits, with a margin around it.
 
-    Bit (y + 1) stride + x + 1 is cell (y, x). Where the extent is the whole side of the array
-    the margin repeats the other side; elsewhere it counts as taken. Of a large array the opened
-    corner is looked at (`board_size`), which grows when nothing fits any more.
+    Bit (y + 1) stride + x + 1 is cell (y, x), counted from the first one of the occupancy. Where
+    the extent is the whole side of the array the margin repeats the other side; elsewhere it
+    counts as taken. Of a large array the opened corner is looked at (`board_size`), which grows
+    when nothing fits any more.
     """
 
     def __init__(self, occupancy: Occupancy, margin: int) -> None:
@@ -55,7 +56,8 @@ class Board:
         r, c = np.nonzero(form)
         rows, columns = self._extent
         cells = (r + row) % rows, (c + column) % columns
-        self._occupancy = self._occupancy.with_cells(*cells)
+        first = self._occupancy.first
+        self._occupancy = self._occupancy.with_cells(cells[0] + first[0], cells[1] + first[1])
         self._sheet[cells[0] + 1, cells[1] + 1] = True
         self._draw()
 
@@ -139,7 +141,10 @@ def board_size(occupancy: Occupancy) -> tuple[int, int]:
     if size[0] * size[1] <= LAYOUT.whole_cells:
         return size
     extent = min(size[0], LAYOUT.corner), min(size[1], LAYOUT.corner)
-    low = np.array([(y * TILE, x * TILE) for y, x in occupancy.tiles]).reshape(-1, 2)
+    corners = np.array(list(occupancy.tiles)).reshape(-1, 2) * TILE
+    before = np.array(occupancy.first) - corners
+    reaches = (before > 0) & (before < TILE)  # from before the first cell beyond it
+    low = np.where(reaches, 0, -before % np.array(size, dtype=object))
     while extent != (following := _next_extent(extent, size)):
         inside = (low < _next_extent(following, size)).all(axis=1)  # a step for each side
         if not (inside & (low >= extent).any(axis=1)).any():

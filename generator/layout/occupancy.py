@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,11 +32,13 @@ class Occupancy:
     columns: int
     tiles: Mapping[tuple[int, int], NDArray[np.uint8]]
     used: int  #: number of taken cells
+    first: tuple[int, int] = (0, 0)  #: cell at which placing begins
 
     @classmethod
     def from_cells(cls, rows: ArrayLike, columns: ArrayLike, array: SymbolArray) -> Occupancy:
         """Return the occupancy of an array by cells (n,), taken on the torus."""
-        return cls(array.rows, array.columns, {}, 0).with_cells(rows, columns)
+        none = cls(array.rows, array.columns, {}, 0, array.first)
+        return none.with_cells(rows, columns)
 
     @classmethod
     def from_tiles(
@@ -45,7 +47,7 @@ class Occupancy:
         """Return the occupancy of an array by tiles, as a database has them."""
         counts = {at: int(np.bitwise_count(bits).sum()) for at, bits in tiles.items()}
         held = {at: tiles[at] for at in tiles if counts[at]}
-        return cls(array.rows, array.columns, held, sum(counts.values()))
+        return cls(array.rows, array.columns, held, sum(counts.values()), array.first)
 
     def with_cells(self, rows: ArrayLike, columns: ArrayLike) -> Occupancy:
         """Return the occupancy with more cells (n,) taken."""
@@ -70,15 +72,24 @@ class Occupancy:
         return cells_of_tiles(self.tiles)
 
     def corner(self, rows: int, columns: int) -> Mask:
-        """Return which of the first rows and columns are taken, bool (rows, columns)."""
-        down, right = -(-rows // TILE), -(-columns // TILE)
-        seen = [at for at in self.tiles if at[0] < down and at[1] < right]
+        """Return which cells are taken from the first one on, bool (rows, columns)."""
+        down = _stretches(self.first[0], rows, self.rows)
+        right = _stretches(self.first[1], columns, self.columns)
+        return np.block([[self._block(*y, *x) for x in right] for y in down])
+
+    def _block(self, top: int, rows: int, left: int, columns: int) -> Mask:
+        """Return which cells of a block are taken; it does not go round the torus."""
+        y0, x0 = top // TILE, left // TILE
+        down, right = -(-(top + rows) // TILE) - y0, -(-(left + columns) // TILE) - x0
+        seen = [at for at in self.tiles if 0 <= at[0] - y0 < down and 0 <= at[1] - x0 < right]
         sheet = np.zeros((down, TILE, right, TILE), dtype=bool)
         if seen:
             bits = np.unpackbits(np.stack([self.tiles[at] for at in seen]), bitorder="little")
             y, x = np.array(seen).T
-            sheet[y, :, x] = bits.reshape(-1, TILE, TILE)
-        return sheet.reshape(down * TILE, right * TILE)[:rows, :columns]
+            sheet[y - y0, :, x - x0] = bits.reshape(-1, TILE, TILE)
+        whole = sheet.reshape(down * TILE, right * TILE)
+        within = top - y0 * TILE, left - x0 * TILE
+        return whole[within[0] : within[0] + rows, within[1] : within[1] + columns]
 
     def _changed(self, rows: ArrayLike, columns: ArrayLike, *, taken: bool) -> Occupancy:
         tiles, used = dict(self.tiles), self.used
@@ -91,7 +102,13 @@ class Occupancy:
             tiles[at] = after
             if not after.any():
                 del tiles[at]
-        return Occupancy(self.rows, self.columns, tiles, used)
+        return replace(self, tiles=tiles, used=used)
+
+
+def _stretches(first: int, length: int, cycle: int) -> list[tuple[int, int]]:
+    """Return the one or two stretches (start, length) of a cycle from `first` on."""
+    before = min(length, cycle - first)
+    return [(first, before)] + ([(0, length - before)] if length > before else [])
 
 
 def tiles_of(rows: NDArray[np.int64], columns: NDArray[np.int64]) -> Tiles:

@@ -2,8 +2,8 @@
 
 Occupancy + masks (each with its allowed quarter turns) -> corner of each piece. Greedy, big
 pieces first: of all free positions the one with the most contact (taken cells next to the
-piece) is taken, the first in reading order among equals. Of a large array only a corner is
-looked at, which grows when nothing fits any more.
+piece) is taken, the first in reading order among equals, as read from the array's first cell on.
+Of a large array only a corner there is looked at, which grows when nothing fits any more.
 """
 
 from __future__ import annotations
@@ -69,7 +69,9 @@ def place_pieces(
             continue
         row, column, quarter = found
         board.take(forms[quarter], row, column)
-        spots[k] = Spot(row, column, quarter)
+        first = occupancy.first
+        at = (row + first[0]) % occupancy.rows, (column + first[1]) % occupancy.columns
+        spots[k] = Spot(*at, quarter)
     return spots
 
 

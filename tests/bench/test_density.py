@@ -43,7 +43,9 @@ def mixed_faces(cells, seed=5):
 
 def loaded(rows, columns, turns, seed=5):
     masks = mixed_faces(rows * columns, seed)
-    occupancy = Occupancy.from_cells(*NONE, SimpleNamespace(rows=rows, columns=columns))
+    occupancy = Occupancy.from_cells(
+        *NONE, SimpleNamespace(rows=rows, columns=columns, first=(0, 0))
+    )
     spots = place_pieces(occupancy, [(mask, turns) for mask in masks])
     cells = [
         cells_at(mask, spot, rows, columns)
@@ -68,7 +70,7 @@ def test_density(benchmark, rows, columns, least, turns):
 
 
 def test_cube_in_an_empty_63x65(benchmark):
-    occupancy = Occupancy.from_cells(*NONE, SimpleNamespace(rows=63, columns=65))
+    occupancy = Occupancy.from_cells(*NONE, SimpleNamespace(rows=63, columns=65, first=(0, 0)))
     pieces = [(np.ones((8, 8), dtype=bool), (0, 1, 2, 3))] * 6
     assert None not in benchmark(place_pieces, occupancy, pieces)
 

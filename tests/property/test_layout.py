@@ -214,7 +214,7 @@ def test_placing_uses_free_cells_once_and_only_refuses_what_fits_nowhere(
 ):
     random = np.random.default_rng(rows * 31 + columns)
     before = random.random((rows, columns)) < load
-    size = SimpleNamespace(rows=rows, columns=columns)
+    size = SimpleNamespace(rows=rows, columns=columns, first=(0, 0))
     occupancy = Occupancy.from_cells(*np.nonzero(before), size)
     masks = [np.random.default_rng(seed).random((h, w)) < 0.8 for h, w, seed in sizes]
     spots = place_pieces(occupancy, [(mask, turns) for mask in masks])

@@ -24,7 +24,7 @@ def test_mixed_faces_fill_the_array(seed):
     while sum(int(mask.sum()) for mask in masks) < rows * columns:
         kind = list(KINDS)[random.integers(4)]
         masks.append(KINDS[kind](*random.integers(3, 8, 2)))
-    size = SimpleNamespace(rows=rows, columns=columns)
+    size = SimpleNamespace(rows=rows, columns=columns, first=(0, 0))
     occupancy = Occupancy.from_cells([], [], size)
     spots = place_pieces(occupancy, [(mask, (0, 1, 2, 3)) for mask in masks])
     for mask, spot in zip(masks, spots, strict=True):

@@ -19,7 +19,7 @@ PLACES = {
 
 
 def of(rows, columns, cells=((), ())):
-    return Occupancy.from_cells(*cells, SimpleNamespace(rows=rows, columns=columns))
+    return Occupancy.from_cells(*cells, SimpleNamespace(rows=rows, columns=columns, first=(0, 0)))
 
 
 def block(row, column, height, width):
@@ -51,7 +51,7 @@ def test_cells_are_taken_and_freed_one_by_one():
     whole[rows, columns] = True
     for size in ((130, 150), (64, 128), (1, 149), (100, 7)):
         assert np.array_equal(occupancy.corner(*size), whole[: size[0], : size[1]])
-    array = SimpleNamespace(rows=130, columns=150)
+    array = SimpleNamespace(rows=130, columns=150, first=(0, 0))
     assert Occupancy.from_tiles(occupancy.tiles, array).used == len(held)
     assert occupancy.without_cells(rows, columns).tiles == {}
 
@@ -74,3 +74,28 @@ def test_what_is_opened_of_a_large_array_follows_its_objects():
     assert board_size(of(1023, 1025, block(0, 0, 1023, 1025))) == (1023, 1025)
     assert board_size(of(255, 257)) == (255, 257)
     assert min(board_size(of(2**32 - 1, 2**32 + 1, block(0, 0, 10, 30 * TILE)))) >= 30 * TILE
+
+
+@pytest.mark.parametrize("first", [(0, 0), (1, 1), (64, 128), (129, 149), (100, 60)])
+def test_the_corner_begins_at_the_first_cell_and_goes_round(first):
+    chance = np.random.default_rng(7)
+    taken = chance.random((130, 150)) < 0.3
+    array = SimpleNamespace(rows=130, columns=150, first=first)
+    occupancy = Occupancy.from_cells(*np.nonzero(taken), array)
+    assert occupancy.first == first
+    assert occupancy.with_cells([1], [1]).first == first
+    seen = np.roll(taken, (-first[0], -first[1]), axis=(0, 1))
+    for size in ((130, 150), (64, 128), (1, 149), (100, 7)):
+        assert np.array_equal(occupancy.corner(*size), seen[: size[0], : size[1]])
+    assert Occupancy.from_tiles(occupancy.tiles, array).first == first
+
+
+@pytest.mark.parametrize("first", [(0, 0), (5, 3), (4000, 4090), (2048, 64)])
+def test_what_is_opened_begins_at_the_first_cell(first):
+    array = SimpleNamespace(rows=4095, columns=4097, first=first)
+    rows, columns = block(*first, 700, 700)
+    near = Occupancy.from_cells(rows % 4095, columns % 4097, array)
+    assert all(640 <= side <= 704 for side in board_size(near))
+    rows, columns = block(first[0] + 1500, first[1] + 1500, 8, 8)
+    far = Occupancy.from_cells(rows % 4095, columns % 4097, array)
+    assert board_size(far) == (LAYOUT.corner, LAYOUT.corner)

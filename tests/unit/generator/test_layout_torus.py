@@ -12,7 +12,7 @@ TURNS = (0, 1, 2, 3)
 
 
 def torus(rows, columns, cells=NONE):
-    return Occupancy.from_cells(*cells, SimpleNamespace(rows=rows, columns=columns))
+    return Occupancy.from_cells(*cells, SimpleNamespace(rows=rows, columns=columns, first=(0, 0)))
 
 
 def block(rows, columns):
@@ -108,3 +108,16 @@ def test_a_narrow_large_array_wraps_along_its_short_side_alone():
     taken[[2, 0], 100:104] = False
     (spot,) = place_pieces(torus(3, 1 << 17, np.nonzero(taken)), [(block(2, 4), (0,))])
     assert spot == Spot(2, 100, 0)
+
+
+@pytest.mark.parametrize("size", [(63, 65), (1023, 1025)])
+def test_placing_from_another_first_cell_is_a_shift_of_the_same(size):
+    rows, columns = size
+    pieces = [(block(5, 7), (0, 1)), (block(4, 4), (0,))] * 3
+    first = (rows - 3, columns // 2)
+    array = SimpleNamespace(rows=rows, columns=columns, first=first)
+    elsewhere = place_pieces(Occupancy.from_cells(*NONE, array), pieces)
+    for one, other in zip(place_pieces(torus(rows, columns), pieces), elsewhere, strict=True):
+        assert other == Spot(
+            (one.row + first[0]) % rows, (one.column + first[1]) % columns, one.quarter
+        )

@@ -1,0 +1,170 @@
+"""Arrays of a lab's own: as good as the published one, another one for every key."""
+
+from math import gcd
+
+import numpy as np
+import pytest
+
+from generator.array import FoldedArray, Sequence, array_from, profile
+from generator.array.field import field_of_order
+from generator.array.keyed import decimated_polynomial, keyed_array
+from generator.array.lab_key import lab_key_of
+from generator.array.labelling import translation
+from generator.array.polynomial import is_primitive
+from generator.array.primitive import primitive_polynomial
+from generator.array.profiles import PROFILES, next_larger
+from generator.array.rivals import rival_shares
+from generator.array.visible import PoseGrid, visible_sets
+from generator.array.window import windows_are_unique
+from generator.database.cells import array_key
+from generator.errors import ArrayError
+
+KEY = "0123-4567-89AB-CDER"
+KEYS = [lab_key_of(np.random.default_rng(seed).bytes(16)) for seed in range(20)]
+
+
+def test_the_array_of_a_key_stays_what_it_is():
+    """Golden: another array would be another lab's, and databases could not go on."""
+    assert keyed_array(profile("one-touch").array(), KEY).definition() == {
+        "family": "prmva", "order": 4, "degree": 6, "field": [1, 1, 1],
+        "polynomial": [3, 2, 2, 2, 0, 2, 1], "initial": [0, 0, 0, 0, 0, 1],
+        "rows": 63, "columns": 65, "window": [3, 2],
+        "permutation": [2, 3, 0, 1], "first": [4, 17],
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["one-touch", "large"])
+def test_an_array_is_made_again_from_its_definition(name):
+    array = keyed_array(profile(name).array(), KEY)
+    again = array_from(array.definition())
+    assert again.definition() == array.definition()
+    rows, columns = np.indices((51, 63))
+    np.testing.assert_array_equal(again.symbols(rows, columns), array.symbols(rows, columns))
+
+
+def test_keys_give_arrays_of_their_own():
+    published = profile("large").array()
+    arrays = [keyed_array(published, key) for key in KEYS]
+    assert len({array_key(array) for array in (published, *arrays)}) == len(KEYS) + 1
+    assert len({array.first for array in arrays}) == len(KEYS)
+    assert {tuple(array.permutation.tolist()) for array in arrays} == {
+        translation(field_of_order(4), label) for label in range(4)
+    }
+    assert {array.window for array in arrays} == {published.window}
+
+
+@pytest.mark.parametrize("name", ["one-touch", "large"])
+def test_windows_are_unique_on_every_one(name):
+    for key in KEYS[:4]:
+        array = keyed_array(profile(name).array(), key)
+        assert windows_are_unique(array, array.window)
+
+
+def test_a_touch_has_as_few_rivals_as_on_the_published_array():
+    sets = visible_sets(6.0, (12.7, 12.7), 2.16, PoseGrid(places=6, turns=15))
+    published = profile("large").array()
+    worst = max(rival_shares(keyed_array(published, key), sets).poses[0] for key in KEYS[:6])
+    assert worst <= rival_shares(published, sets).poses[0] + 0.06
+
+
+def test_larger_sizes_have_keys_too():
+    size = profile("large")
+    for _ in range(3):
+        size = next_larger(size)
+        array = size.array_of_lab(KEYS[0])
+        assert (array.rows, array.columns) == (size.encoding["rows"], size.encoding["columns"])
+        assert array.window == size.window
+        assert array.definition() != size.array().definition()
+
+
+def test_published_profiles_have_none():
+    assert {name for name, one in PROFILES.items() if one.keyed} == {"one-touch", "large", "fine"}
+    for name in PROFILES:
+        assert profile(name).array_of_lab("").definition() == profile(name).array().definition()
+    for name in ("thesis", "product"):
+        assert profile(name).array_of_lab(KEY).definition() == profile(name).array().definition()
+
+
+@pytest.mark.parametrize(
+    ("order", "degree", "number"), [(2, 6, 6), (3, 3, 4), (4, 3, 12), (5, 2, 4)]
+)
+def test_decimation_gives_every_primitive_polynomial(order, degree, number):
+    """phi(N) / n of them (MacWilliams and Sloane, chapter 4)."""
+    field = field_of_order(order)
+    sequence = Sequence(field, primitive_polynomial(order, degree))
+    steps = [step for step in range(1, sequence.period) if gcd(step, sequence.period) == 1]
+    found = {decimated_polynomial(sequence, step) for step in steps}
+    assert len(found) == len(steps) / degree == number
+    assert all(is_primitive(field, h) for h in found)
+    step = steps[len(steps) // 2]
+    terms = sequence.symbols(step * np.arange(3 * degree) % sequence.period).tolist()
+    going_on = Sequence(field, decimated_polynomial(sequence, step)).forward(terms[:degree])
+    assert [next(going_on) for _ in terms] == terms
+
+
+def test_translations_are_what_shifts_and_other_polynomials_do_not_give():
+    """All 24 permutations of 4 symbols are 4 translations times 6 that give known arrays."""
+    field = field_of_order(4)
+    scaled = [[int(field.multiplication[a, x]) for x in range(4)] for a in (1, 2, 3)]
+    conjugated = [[row[x] for x in (0, 1, 3, 2)] for row in scaled]
+    every = {
+        tuple(translation(field, k)[x] for x in row)
+        for k in range(4)
+        for row in (*scaled, *conjugated)
+    }
+    assert len(every) == 24
+    sequence = profile("one-touch").array().sequence
+    terms = sequence.symbols(np.arange(200))
+    states = {sequence.state(t) for t in range(sequence.period)}
+    for row in scaled[1:]:
+        assert tuple(np.array(row)[terms][:6].tolist()) in states  # a shift of the same one
+    conjugate = Sequence(field, tuple((0, 1, 3, 2)[c] for c in sequence.polynomial))
+    going_on = conjugate.forward(np.array([0, 1, 3, 2])[terms[:6]])
+    assert [next(going_on) for _ in terms] == np.array([0, 1, 3, 2])[terms].tolist()
+
+
+def small(**options):
+    return FoldedArray(Sequence(field_of_order(4), (2, 1, 1)), 3, 5, **options)
+
+
+def test_a_permutation_changes_symbols_and_no_rank():
+    plain, changed = small(), small(permutation=(2, 3, 0, 1), first=(1, 4))
+    rows, columns = np.indices((3, 5))
+    np.testing.assert_array_equal(
+        changed.symbols(rows, columns), np.array([2, 3, 0, 1])[plain.symbols(rows, columns)]
+    )
+    np.testing.assert_array_equal(
+        changed.terms_of(changed.symbols(rows, columns)), plain.symbols(rows, columns)
+    )
+    assert changed.terms_of([-1, 2]).tolist() == [-1, 0]
+    assert changed.rank([0, 0], [0, 1]) == plain.rank([0, 0], [0, 1])
+    assert (plain.first, changed.first) == ((0, 0), (1, 4))
+    assert "permutation" not in plain.definition()
+    assert "first" not in plain.definition()
+    assert array_key(changed) == array_key(small(permutation=(2, 3, 0, 1)))  # not by `first`
+    assert array_key(changed) != array_key(plain)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"permutation": (0, 1, 2)}, "each of the 4 labels"),
+        ({"permutation": (0, 1, 2, 2)}, "each of the 4 labels"),
+        ({"permutation": (1, 2, 3, 4)}, "each of the 4 labels"),
+        ({"first": (3, 0)}, "no cell"),
+        ({"first": (0, 5)}, "no cell"),
+        ({"first": (-1, 0)}, "no cell"),
+    ],
+)
+def test_what_is_no_permutation_or_cell_is_refused(options, said):
+    with pytest.raises(ArrayError, match=said):
+        small(**options)
+
+
+@pytest.mark.parametrize("wrong", [[0, 1], "0123", [0, 1, 2, True], 4])
+def test_definitions_are_read_with_care(wrong):
+    given = small(permutation=(2, 3, 0, 1)).definition()
+    with pytest.raises(ArrayError, match="no list of 4"):
+        array_from(given | {"permutation": wrong})
+    with pytest.raises(ArrayError, match="no list of 2"):
+        array_from(given | {"first": [1]})
