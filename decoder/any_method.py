@@ -20,6 +20,7 @@ from decoder.settings import LIKELIHOOD
 from decoder.window import parse_window
 from generator.array import DEFAULT_PROFILE, FoldedArray, ProductArray, array_from
 from generator.array import profile as profile_named
+from generator.array.lab_key import read_lab_key
 
 if TYPE_CHECKING:
     from decoder.registered import Registered
@@ -33,6 +34,7 @@ def decode(
     profile: str = "",
     array: FoldedArray | ProductArray | Mapping[str, Any] | None = None,
     database: str = "",
+    lab_key: str = "",
     method: str = "logarithm",
     error: float = LIKELIHOOD.symbol_error,
     doubt: float = LIKELIHOOD.doubt,
@@ -54,6 +56,9 @@ def decode(
     database
         In place of both, a lab's: its array, the registered cells as prior, and the object
         and face of the answer; `profile` says which array where it holds several.
+    lab_key
+        Whose array of the profile, or of the arrays in the database; without a key the published
+        one, and the database's own.
     method
         table, serial, milestones, logarithm, or likelihood.
     error, doubt, blank, rotations, top
@@ -80,13 +85,13 @@ def decode(
 
         if array is not None:
             raise DecoderError("both an array and a database were given", fix="give one of them")
-        held = read_registered(database, profile)
+        held = read_registered(database, profile, lab_key)
     if array is not None and profile:
         raise DecoderError("both an array and a profile were given", fix="give one of them")
     if held:
         on = held.array
     elif array is None:
-        on = profile_named(profile or DEFAULT_PROFILE).array()
+        on = array_of_profile(profile, lab_key)
     else:
         on = array_from(array) if isinstance(array, Mapping) else array
     labels = parse_window(window, on.order) if isinstance(window, str) else np.asarray(window)
@@ -94,6 +99,23 @@ def decode(
         on, labels, method, held,
         error=error, doubt=doubt, blank=blank, rotations=rotations, top=top,
     )  # fmt: skip
+
+
+def array_of_profile(profile: str = "", lab_key: str = "") -> FoldedArray | ProductArray:
+    """Return a lab's array of a profile; without a key the published one.
+
+    Raises
+    ------
+    ArrayError, LabKeyError
+        No such profile, no such key.
+    DecoderError
+        A key, and a profile that is the same in every lab.
+    """
+    named = profile_named(profile or DEFAULT_PROFILE)
+    if lab_key and not named.keyed:
+        cause = f"profile {named.name} is the same array in every lab"
+        raise DecoderError(cause, fix="leave the lab key out")
+    return named.array_of_lab(read_lab_key(lab_key) if lab_key else "")
 
 
 def decode_on(

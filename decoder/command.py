@@ -60,6 +60,10 @@ def decode(
         str, typer.Option(metavar="URL", show_default=False,
                           help="A lab's database: its array, the registered cells as prior, and "
                                "the object and face of the answer.")] = "",
+    lab_key: Annotated[
+        str, typer.Option(metavar="KEY", show_default=False,
+                          help="Whose array of the profile; without it the published one, or the "
+                               "database's own.")] = "",
     method: Annotated[
         str, typer.Option(help="table, serial, milestones, logarithm, likelihood.")] = "logarithm",
     error: Annotated[
@@ -89,8 +93,8 @@ def decode(
 
         if array:
             raise typer.BadParameter("both --array and --database were given; give one of them")
-        held = read_registered(database, profile)
-    chosen = held.array if held else _array(profile, array)
+        held = read_registered(database, profile, lab_key)
+    chosen = held.array if held else _array(profile, array, lab_key)
     window = parse_window(" ".join(rows), chosen.order)
     found = decode_on(
         chosen, window, method, held,
@@ -108,13 +112,15 @@ def decode(
     return console.DONE if found else console.FAILED
 
 
-def _array(profile_name: str, definition: str) -> FoldedArray | ProductArray:
-    from generator.array import DEFAULT_PROFILE, array_from, profile
+def _array(profile_name: str, definition: str, lab_key: str) -> FoldedArray | ProductArray:
+    from decoder.any_method import array_of_profile
+    from generator.array import array_from
 
     if not definition:
-        return profile(profile_name or DEFAULT_PROFILE).array()
-    if profile_name:
-        raise typer.BadParameter("both --profile and --array were given; give one of them")
+        return array_of_profile(profile_name, lab_key)
+    if profile_name or lab_key:
+        given = "--profile" if profile_name else "--lab-key"
+        raise typer.BadParameter(f"both {given} and --array were given; give one of them")
     try:
         text = definition if definition.lstrip().startswith("{") else Path(definition).read_text()
         values = json.loads(text)

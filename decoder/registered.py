@@ -7,6 +7,7 @@ that reads the database; only `decode-window --database` loads it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,10 +16,13 @@ from numpy.typing import NDArray
 from decoder.errors import DecoderError
 from generator.array import FoldedArray, ProductArray, array_from
 from generator.array.contract import Labels
+from generator.array.lab_key import read_lab_key
 from generator.database.cells import faces_at, occupied_cells
 from generator.database.entries import list_objects
+from generator.database.lab import lab_key as stored_lab_key
 from generator.database.open import open_database
 from generator.database.read import read_array, read_object
+from generator.database.registered import RegisteredArray
 from generator.database.transaction import read_transaction
 
 
@@ -32,7 +36,7 @@ class Registered:
     cells: NDArray[np.int64]  #: (n, 2) rows and columns, all different
 
 
-def read_registered(url: str, profile: str = "") -> Registered:
+def read_registered(url: str, profile: str = "", lab_key: str = "") -> Registered:
     """Return the array of a database and its registered cells.
 
     Parameters
@@ -41,6 +45,8 @@ def read_registered(url: str, profile: str = "") -> Registered:
         `lab.db`, `sqlite:///lab.db` or `postgresql://host/name`.
     profile
         Which array, by the profile it was asked for, where the database holds several.
+    lab_key
+        Whose, where several labs' are registered; the database's own if left out.
 
     Raises
     ------
@@ -50,20 +56,32 @@ def read_registered(url: str, profile: str = "") -> Registered:
         It holds no such array, or several and none is named.
     """
     with read_transaction(open_database(url, writable=False)) as connection:
-        arrays = {entry.array_id: entry.profile for entry in list_objects(connection)}
-        named = [number for number, name in arrays.items() if profile in ("", name)]
+        numbers = sorted({entry.array_id for entry in list_objects(connection)})
+        arrays = [read_array(connection, number) for number in numbers]
+        key = read_lab_key(lab_key) if lab_key else stored_lab_key(connection)
+        named = [one for one in arrays if profile in ("", one.profile)]
+        if lab_key or len(named) > 1:
+            named = [one for one in named if one.lab_key in ("", key)]
         if len(named) != 1:
-            kept = ", ".join(sorted(set(arrays.values()))) or "none"
-            asked = f"no array of profile '{profile}'" if profile else f"{len(named)} arrays"
-            raise DecoderError(
-                f"the database holds {asked}; it holds: {kept}",
-                fix="name one of them with --profile" if arrays else "register an object first",
-                place=url,
-            )
-        array = array_from(read_array(connection, named[0]).definition)
-        return Registered(
-            url, named[0], array, np.stack(occupied_cells(connection, named[0]), axis=1)
-        )
+            raise _no_array(url, arrays, profile, lab_key, len(named))
+        number = named[0].array_id
+        array = array_from(named[0].definition)
+        return Registered(url, number, array, np.stack(occupied_cells(connection, number), axis=1))
+
+
+def _no_array(
+    url: str, arrays: Sequence[RegisteredArray], profile: str, lab_key: str, number: int
+) -> DecoderError:
+    names = {f"{one.profile} (lab {one.lab_key})" if one.lab_key else one.profile for one in arrays}
+    asked = f"no array of profile '{profile}'" if profile else f"{number} arrays"
+    return DecoderError(
+        f"the database holds {asked}{f' of lab {lab_key}' if lab_key else ''}; it holds: "
+        f"{', '.join(sorted(names)) or 'none'}",
+        fix="name one of them with --profile and --lab-key"
+        if arrays
+        else "register an object first",
+        place=url,
+    )
 
 
 def prior(held: Registered, window: Labels) -> NDArray[np.int64]:

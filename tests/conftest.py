@@ -25,6 +25,14 @@ ENGINES = ("sqlite", "postgresql")
 NUMBERS = count(1)  # of schemas on the server
 
 
+@pytest.fixture(scope="session", autouse=True)
+def one_lab_key():
+    """Draw the same key for every new database of this process: the same arrays in every run."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("generator.array.lab_key.token_bytes", bytes)
+        yield
+
+
 @pytest.fixture(scope="session")
 def postgresql_server():
     """URL of a real server; its absence is a failure, so that nothing goes untested."""

@@ -13,22 +13,19 @@ import dataclasses
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, overload
 
 from generator.cad.read import polyhedron_from
-from generator.database.open import open_if_there
-from generator.database.transaction import read_transaction
 from generator.layout.placement import Layout
-from generator.pipeline.choose import choose_array
+from generator.pipeline.choose import Choice
 from generator.pipeline.encode import encode as encode_specs
-from generator.pipeline.encode import new_database
+from generator.pipeline.encode import plan_in_lab
 from generator.pipeline.files import parts_of
 from generator.pipeline.made import Encoded, MadeObject
 from generator.pipeline.make import Order, make_under_lock
-from generator.pipeline.plan import plan_object
+from generator.pipeline.plan import ObjectPlan, plan_object
 from generator.polyhedron import Polyhedron
 from generator.polyhedron.read import MESHES, STEP
 from generator.solid import Part
@@ -157,7 +154,7 @@ def encode(
         Allow another solid, or other settings, under a registered name.
     **settings
         What else a spec can say: ``symbols={"pitch": "8 mm"}``, ``print={"parts": "whole"}``,
-        ``layout="faces"``, ``encoding={...}``.
+        ``layout="faces"``, ``encoding={...}``, ``output={"lab_key": "..."}``.
 
     Returns
     -------
@@ -193,11 +190,15 @@ def encode(
     polyhedron = polyhedron_from(given)
     url = url or database_option("lab.db")
     located = spec_of(named, ShapeSpec("solid", {"sha256": _digest(polyhedron)}))
-    engine = open_if_there(url)
-    with read_transaction(engine) if engine else nullcontext() as connection:
-        choice = choose_array([located], connection, polyhedron)
-    plan = plan_object(choice.specs[0], polyhedron)
-    plan = dataclasses.replace(plan, notes=(*plan.notes, *choice.notes))
+
+    def plan_solid(choice: Choice) -> list[ObjectPlan]:
+        plan = plan_object(choice.specs[0], polyhedron)
+        return [dataclasses.replace(plan, notes=(*plan.notes, *choice.notes))]
+
+    engine, (plan,) = plan_in_lab(
+        [located], url, plan_solid, lab_key="", make=True, replace_changed=replace, solid=polyhedron
+    )
+    assert engine is not None  # it was made
     order = Order(
         plan,
         where or plan.spec.folder,
@@ -205,7 +206,7 @@ def encode(
         verify,
         replace,
     )
-    product = make_under_lock(engine or new_database(url, plan), order)
+    product = make_under_lock(engine, order)
     layout = product.placed.layout
     return EncodedSolid(product.made, url, polyhedron, layout, parts_of(plan, layout)[0])
 

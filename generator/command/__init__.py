@@ -5,9 +5,10 @@
     __init__.py        which command is meant
     encode.py          encode-object SPEC.yaml...
     tools.py           encode-object init | schema | printers
-    objects.py         encode-object list | show | retire | export | import
+    objects.py         encode-object lab | list | show | retire | export | import
     made_report.py     what was made, as text and as JSON
     object_report.py   what is registered, as text and as JSON
+    lab_report.py      the lab's key, and how full its arrays are
 
 Results go to stdout, progress and messages to stderr (`encoded_objects.console`). Exit codes:
 0 done, 1 could not be written, 2 bad input, 4 database, 130 interrupted. Nothing heavy is
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 NAME = "encode-object"
 TOOLS = ("init", "schema", "printers")
-OBJECTS = ("list", "show", "retire", "export", "import")
+OBJECTS = ("lab", "list", "show", "retire", "export", "import")
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:

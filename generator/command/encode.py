@@ -60,6 +60,11 @@ def encode(
         str, typer.Option(metavar="URL", show_default=False,
                           help="Registers the cells: lab.db, sqlite:///lab.db, postgresql://host/name."),
     ] = "",
+    lab_key: Annotated[
+        str, typer.Option(metavar="KEY", show_default=False,
+                          help="Of a new database: the same key, the same arrays and bytes; drawn "
+                               "if left out. encode-object lab prints it."),
+    ] = "",
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Say what would be made; write nothing."),
     ] = False,
@@ -109,8 +114,8 @@ def encode(
             return 0
         if print_profile or print_faults:
             raise typer.BadParameter("print profile and faults need --printed-check")
-        _make(specs, folder, formats, database, dry_run=dry_run, verify=verify, replace=replace,
-              jobs=jobs, as_json=as_json)  # fmt: skip
+        _make(specs, folder, formats, database, lab_key=lab_key, dry_run=dry_run,
+              verify=verify, replace=replace, jobs=jobs, as_json=as_json)  # fmt: skip
         return 0
 
     return action
@@ -122,6 +127,7 @@ def _make(
     formats: str,
     database: str,
     *,
+    lab_key: str,
     dry_run: bool,
     verify: bool,
     replace: bool,
@@ -146,6 +152,7 @@ def _make(
             folder=folder,
             formats=wanted,
             database=url,
+            lab_key=lab_key,
             dry_run=dry_run,
             verify=verify,
             replace=replace,

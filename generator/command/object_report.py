@@ -11,22 +11,25 @@ from typing import TYPE_CHECKING, Any
 from rich.markup import escape
 
 from encoded_objects.console import output
+from generator.command.lab_report import fullness_text, fullness_values
 from generator.database.read import surfaces_of
 from generator.database.url import without_password
 
 if TYPE_CHECKING:
     from generator.database.carry import CopyReport
+    from generator.database.fullness import Fullness
     from generator.database.part_state import PartState
     from generator.database.registered import ObjectEntry, RegisteredObject
     from generator.layout.placement import FaceLayout, Placement
 
 
-def print_list(entries: Sequence[ObjectEntry], url: str, *, as_json: bool) -> None:
-    """Say which objects a database holds."""
+def print_list(
+    entries: Sequence[ObjectEntry], fullness: Fullness, url: str, *, as_json: bool
+) -> None:
+    """Say which objects a database holds, and how full it is."""
     if as_json:
-        output.write_json(
-            {"objects": [_entry_values(e) for e in entries], "database": without_password(url)}
-        )
+        values = {"objects": [_entry_values(e) for e in entries], "database": without_password(url)}
+        output.write_json(values | fullness_values(fullness))
         return
     if not entries:
         output.write(
@@ -42,6 +45,7 @@ def print_list(entries: Sequence[ObjectEntry], url: str, *, as_json: bool) -> No
         row = [e.name, e.object_type, *counts, array, f"{e.pitch_mm:g} mm", _minute(e.utc)]
         table.add_row(*map(escape, row + ([_minute(e.retired_utc)] if some_retired else [])))
     output.show(table)
+    output.write("\n".join(fullness_text(fullness)))
 
 
 def print_object(

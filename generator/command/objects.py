@@ -1,4 +1,4 @@
-"""`encode-object list | show | retire | export | import`: the objects of a lab's database."""
+"""`encode-object lab | list | show | retire | export | import`: what a lab's database holds."""
 
 from __future__ import annotations
 
@@ -34,14 +34,39 @@ def list_(database: Database = LAB, as_json: Json = False) -> Action:
     def action() -> int:
         from generator.command import object_report
         from generator.database.entries import list_objects
+        from generator.database.fullness import read_fullness
         from generator.database.open import open_database
         from generator.database.transaction import read_transaction
         from generator.spec.option import database_option
 
         url = database_option(database)
         with read_transaction(open_database(url, writable=False)) as connection:
-            entries = list_objects(connection)
-        object_report.print_list(entries, url, as_json=as_json)
+            entries, fullness = list_objects(connection), read_fullness(connection)
+        object_report.print_list(entries, fullness, url, as_json=as_json)
+        return 0
+
+    return action
+
+
+@app.command()
+def lab(database: Database = LAB, as_json: Json = False) -> Action:
+    """Print the lab's key, its arrays, and how full they are.
+
+    Every new database draws a key, from which its arrays are made: two labs agree on a touch by
+    chance only. A new database that is given the same key, --lab-key KEY, has the same arrays.
+    """
+
+    def action() -> int:
+        from generator.command.lab_report import print_lab
+        from generator.database.fullness import read_fullness
+        from generator.database.open import open_database
+        from generator.database.transaction import read_transaction
+        from generator.spec.option import database_option
+
+        url = database_option(database)
+        with read_transaction(open_database(url, writable=False)) as connection:
+            fullness = read_fullness(connection)
+        print_lab(fullness, url, as_json=as_json)
         return 0
 
     return action

@@ -11,6 +11,8 @@
     race.py         place and register in one transaction; who loses a race does it anew
     register.py     an object -> its rows, all or none
     retire.py       an object out of use, its cells kept or freed
+    lab.py          the lab's key, and on which arrays its objects are made
+    fullness.py     how full the arrays are, and how full before a touch is not enough
     entries.py      which objects there are: a line for each
     read.py         rows -> objects and layouts, bit for bit
     cells.py        which cells are taken, and by which object and face

@@ -104,8 +104,9 @@ def check_cells(target: Connection, name: str, here: ArrayHere, cells: Rows) -> 
             f"needs {np.count_nonzero(held)} cells that "
             f"{_holders(target, here.array_id, r[held], c[held])} here",
             f"make '{name}' again here from its spec, on cells of its own, and print it again; or "
-            "import the others with --skip-refused. Every database fills its array from the same "
-            "corner: import before objects are made, or share one database, postgresql://HOST/NAME",
+            "import the others with --skip-refused. Labs with a key each (encode-object lab) have "
+            "arrays of their own; without one, or with the same, share one database instead, "
+            "postgresql://HOST/NAME",
         )
 
 

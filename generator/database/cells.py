@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
 from itertools import chain
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,11 +20,11 @@ _CHUNK = 64  #: cells looked up in one statement
 def array_key(array: SymbolArray) -> str:
     """Return the digest by which the database knows an array.
 
-    The window is left out: it changes no symbol, so objects registered with another
-    window stand on the same cells.
+    The window is left out, and where placing begins: they change no symbol, so objects
+    registered with others stand on the same cells.
     """
-    definition = array.definition()
-    return digest(canonical({name: definition[name] for name in definition if name != "window"}))
+    kept = {name: v for name, v in array.definition().items() if name not in ("window", "first")}
+    return digest(canonical(kept))
 
 
 def find_array(connection: Connection, array: SymbolArray) -> int | None:
@@ -36,22 +33,6 @@ def find_array(connection: Connection, array: SymbolArray) -> int | None:
     return connection.execute(
         select(arrays.array_id).where(arrays.definition_sha256 == array_key(array))
     ).scalar_one_or_none()
-
-
-def array_of_profile(connection: Connection, profiles: Sequence[str]) -> dict[str, Any] | None:
-    """Return the definition of the first array that was asked for by one of these names.
-
-    A profile may change from one version to the next; the objects of a database stay on one
-    array, so that their room and their rivals are counted together.
-    """
-    arrays = tables.arrays.c
-    text = connection.execute(
-        select(arrays.definition)
-        .where(arrays.profile.in_(profiles))
-        .order_by(arrays.array_id)
-        .limit(1)
-    ).scalar_one_or_none()
-    return None if text is None else json.loads(text)
 
 
 def occupancy(connection: Connection, array: SymbolArray) -> Occupancy:

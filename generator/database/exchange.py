@@ -5,10 +5,9 @@ command reads it. Importing works on a copy, so that a file is never changed, wh
 schema version it has, and brings in all objects or none. Files of parts are not carried:
 they are named from where they lie, and made again from the same spec on the same cells.
 
-Every new database fills its array from the same corner, since the same spec gives the same
-bytes in every lab. Two labs that both made objects so hold the same cells, and what one imports
-of the other is refused; who imports first and makes then goes around the cells. Labs that
-make and exchange for years share one database on a server.
+Labs have arrays of their own (`lab.py`), so that what one imports of another stands beside its
+own objects, on the arrays that it came on. Labs of schema version 1 and 2 have none: two of them
+hold the same cells, and what one imports of the other is refused.
 """
 
 from __future__ import annotations

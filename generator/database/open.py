@@ -10,6 +10,7 @@ from pathlib import Path
 
 from sqlalchemy import URL, Connection, Engine, insert, inspect, select, text
 
+from generator.array.lab_key import draw_lab_key
 from generator.database.engine import check_place, database_engine
 from generator.database.migrate import migrate
 from generator.database.tables import FORMAT, SCHEMA_VERSION, meta, metadata
@@ -19,7 +20,12 @@ from generator.errors import DatabaseError
 
 
 def open_database(
-    url: str, *, writable: bool = True, wait_s: float = WAIT_S, keep_older: bool = True
+    url: str,
+    *,
+    writable: bool = True,
+    wait_s: float = WAIT_S,
+    keep_older: bool = True,
+    lab_key: str = "",
 ) -> Engine:
     """Return an engine on a database with the schema of this tool.
 
@@ -36,6 +42,8 @@ def open_database(
         How long to wait for other writers, seconds.
     keep_older
         Copy a SQLite file of an earlier schema version before it is changed, and say so.
+    lab_key
+        Of a database that is new, as `read_lab_key` returns it; drawn if left out.
 
     Raises
     ------
@@ -52,7 +60,7 @@ def open_database(
         raise DatabaseError("no objects are registered here", fix=fix, place=place)
     with write_transaction(engine) as connection:
         if _schema_version(connection) is None:  # nobody else made it meanwhile
-            _create_schema(connection)
+            _create_schema(connection, lab_key or draw_lab_key())
     return engine
 
 
@@ -155,7 +163,7 @@ def _columns_of_meta(connection: Connection) -> set[str]:
     return set(connection.execute(text("SELECT * FROM meta LIMIT 0")).keys())
 
 
-def _create_schema(connection: Connection) -> None:
+def _create_schema(connection: Connection, lab_key: str) -> None:
     metadata.create_all(connection, checkfirst=False)
-    rows = {"format": FORMAT, "schema_version": str(SCHEMA_VERSION)}
+    rows = {"format": FORMAT, "schema_version": str(SCHEMA_VERSION), "lab_key": lab_key}
     connection.execute(insert(meta), [{"key": key, "value": rows[key]} for key in rows])

@@ -167,6 +167,7 @@ def read_array(connection: Connection, array_id: int) -> RegisteredArray:
         columns=row.columns,
         window=(row.window_rows, row.window_columns),
         order=row.order,
+        lab_key=row.lab_key or "",
     )
 
 

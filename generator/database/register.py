@@ -57,6 +57,7 @@ class ObjectRecord:
     spec: Mapping[str, Any]  #: plain values; equal values are the same object
     tool_version: str
     parts: tuple[RegisteredPart, ...] = ()
+    lab_key: str = ""  #: from which the array was made; empty: the published one
 
 
 def register(connection: Connection, registration: ObjectRecord, *, replace: bool = False) -> int:
@@ -257,6 +258,7 @@ def _insert_object(
         window_rows=window_rows,
         window_columns=window_columns,
         order=array.order,
+        lab_key=registration.lab_key or None,
     )
     alphabet = canonical(registration.alphabet.definition())
     alphabet_id = definition_number(

@@ -108,6 +108,7 @@ class RegisteredArray:
     columns: int
     window: tuple[int, int]
     order: int
+    lab_key: str = ""  #: from which it was made; empty: the published array
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,11 +1,11 @@
-"""`profile: auto`: the array that the objects need.
+"""The array of a run: the lab's own of the profile, and for `auto` the one that the objects need.
 
 Of arrays with the same symbols the smallest is taken in which the objects fit beside what the
 database holds: `one-touch`, `large`, and its next sizes. Objects that are registered keep the array
-they are on, and a database goes on with the arrays that it has: where another one was registered
-under a profile's name, that profile means that one. Faces that stay blank and would show a place
-with the finer symbols of `fine` make it the choice where the spec names a printer for them, and a
-note where it does not.
+they are on, and a lab goes on with the arrays that it has: what it made objects on under a
+profile's name is what that profile means. Faces that stay blank and would show a place with the
+finer symbols of `fine` make it the choice where the spec names a printer for them, and a note
+where it does not. Objects that came from another lab, asked for again, keep that lab's array.
 """
 
 from __future__ import annotations
@@ -18,8 +18,12 @@ from sqlalchemy import Connection
 
 from generator.array.contract import SymbolArray
 from generator.array.profiles import DEFAULT_PROFILE, PROFILES, Profile, next_larger
-from generator.database.cells import array_of_profile, occupancy
+from generator.database.cells import occupancy
 from generator.database.entries import find_object
+from generator.database.fullness import LIMITS
+from generator.database.lab import LabArrays
+from generator.database.read import read_array
+from generator.database.registered import RegisteredArray
 from generator.errors import ArrayError, GeneratorError, LayoutError
 from generator.layout.placement import Layout
 from generator.pipeline.place import NO_CELLS, lay_out_object
@@ -40,43 +44,57 @@ class Choice:
 
 
 def choose_array(
-    specs: Sequence[LocatedSpec], connection: Connection | None, solid: Polyhedron | None = None
+    specs: Sequence[LocatedSpec],
+    lab: LabArrays,
+    connection: Connection | None,
+    solid: Polyhedron | None = None,
+    *,
+    replace_changed: bool = False,
 ) -> Choice:
-    """Return the specs on the database's arrays, with a profile in place of `auto`.
+    """Return the specs on the array that they are made on, with a profile in place of `auto`.
 
     Parameters
     ----------
     specs
         Of one run; where one of them names its profile, those of `auto` follow it.
+    lab
+        Whose arrays they are.
     connection
         Of a `reading` transaction; None where there is no database yet.
     solid
         Shape of the one object, where it does not come from its spec.
+    replace_changed
+        Objects of another lab may be made anew, on an array of this one.
 
     Raises
     ------
     GeneratorError
         No array is large enough, or an object cannot be made at all.
     """
-    specs = tuple(_keep(one, connection) for one in specs)
-    if not any(one.spec.profile == AUTO for one in specs):
-        return Choice(specs)
+    other = None if replace_changed else _array_of_another_lab(specs, lab, connection)
     named = [one.spec for one in specs if one.spec.profile != AUTO]
     if named:  # on the same array, or the specs would have been refused
-        profile, encoding = named[0].profile, named[0].encoding
-        defaults = profile if profile in PROFILES else DEFAULT_PROFILE
-        return Choice(tuple(_follow(one, profile, defaults, encoding) for one in specs))
+        profile = named[0].profile
+        if profile not in PROFILES or not PROFILES[profile].keyed:
+            published = named[0].encoding, ""
+            return Choice(tuple(_follow(one, profile, *published) for one in specs))
+        made = (other.definition, other.lab_key) if other else _made_on(PROFILES[profile], lab)
+        return Choice(tuple(_follow(one, profile, *made) for one in specs))
+    if other is not None:
+        made = other.definition, other.lab_key
+        return Choice(tuple(_with_array(one, other.profile, *made) for one in specs))
     if connection is not None:
         for one in specs:
             known = find_object(connection, one.spec.name)
-            kept = None if known is None else _profile_of_object(known.profile, connection)
-            if kept is not None:
-                array = kept.array()
-                return Choice(tuple(_with_array(each, kept, array) for each in specs))
+            kept = lab.made.get(known.profile) if known else None
+            if kept is not None and _of_candidate(kept.profile):
+                made = kept.definition, kept.lab_key
+                return Choice(tuple(_with_array(each, kept.profile, *made) for each in specs))
     short: list[str] = []  # why each smaller array does not do
-    for candidate in _candidates(connection):
-        array = candidate.array()
-        tried = tuple(_with_array(one, candidate, array) for one in specs)
+    for candidate in _candidates():
+        array = lab.of_profile(candidate)
+        made = array.definition(), lab.key_of(candidate)
+        tried = tuple(_with_array(one, candidate.name, *made) for one in specs)
         needed, blank = _count_needs(tried, solid)
         room = _room(array, connection)
         size = f"{candidate.name} {array.rows}x{array.columns}"
@@ -87,7 +105,7 @@ def choose_array(
         else:
             notes = (_larger_note(candidate, array, short[-1]),) if short else ()
             found = Choice(tried, notes)
-            return _choose_finer(found, blank, connection, solid) if blank else found
+            return _choose_finer(found, blank, lab, connection, solid) if blank else found
     raise LayoutError(
         f"the objects fit no array that is made here: {short[-1]}",
         fix="make them in several databases",
@@ -103,13 +121,18 @@ def _larger_note(chosen: Profile, array: SymbolArray, why: str) -> str:
 
 
 def _choose_finer(
-    coarse: Choice, blank: int, connection: Connection | None, solid: Polyhedron | None
+    coarse: Choice,
+    blank: int,
+    lab: LabArrays,
+    connection: Connection | None,
+    solid: Polyhedron | None,
 ) -> Choice:
     """Take the finer symbols where they show faces that stay blank otherwise."""
-    fine = _stored_profile(PROFILES["fine"], connection)
-    array = fine.array()
+    fine = PROFILES["fine"]
+    array = lab.of_profile(fine)
+    made = array.definition(), lab.key_of(fine)
     try:
-        finer = tuple(_with_array(one, fine, array) for one in coarse.specs)
+        finer = tuple(_with_array(one, fine.name, *made) for one in coarse.specs)
         needed, left = _count_needs(finer, solid)
     except GeneratorError:  # the printer that the spec names cannot make them
         return coarse
@@ -122,10 +145,10 @@ def _choose_finer(
     return Choice(coarse.specs, (*coarse.notes, note))
 
 
-def _candidates(connection: Connection | None) -> Iterator[Profile]:
+def _candidates() -> Iterator[Profile]:
     """Yield the arrays from the smallest on."""
-    yield _stored_profile(PROFILES["one-touch"], connection)
-    larger = _stored_profile(PROFILES["large"], connection)
+    yield PROFILES["one-touch"]
+    larger = PROFILES["large"]
     yield larger
     for _ in range(CHOICE.larger):
         try:
@@ -136,49 +159,49 @@ def _candidates(connection: Connection | None) -> Iterator[Profile]:
         yield replace(larger, name=f"large-{rows}x{columns}")
 
 
-def _stored_profile(profile: Profile, connection: Connection | None) -> Profile:
-    """Return a profile on the array that the database has under its name, if it has one."""
-    if connection is None:
-        return profile
-    alike = [name for name, one in PROFILES.items() if one.encoding == profile.encoding]
-    kept = array_of_profile(connection, alike or [profile.name])
-    if kept is None:
-        return profile
-    return replace(profile, encoding=kept, window=tuple(kept["window"]))
+def _made_on(profile: Profile, lab: LabArrays) -> tuple[Mapping[str, Any], str]:
+    """Return the definition of the lab's array of a profile, and the key it was made from."""
+    return lab.of_profile(profile).definition(), lab.key_of(profile)
 
 
-def _profile_of_object(name: str, connection: Connection) -> Profile | None:
-    """Return the profile of an object that got its array by `auto`, None for another one."""
-    base = "large" if name.startswith("large-") else name
-    kept = array_of_profile(connection, [name])
-    if kept is None or base not in ("one-touch", "large"):
+def _array_of_another_lab(
+    specs: Sequence[LocatedSpec], lab: LabArrays, connection: Connection | None
+) -> RegisteredArray | None:
+    """Return the one array of another lab that all objects are registered on, with its profile."""
+    numbers = set()
+    for one in specs:
+        known = None if connection is None else find_object(connection, one.spec.name)
+        if known is None or one.spec.profile not in (AUTO, known.profile):
+            return None
+        numbers.add(known.array_id)
+    if connection is None or len(numbers) != 1:
         return None
-    return replace(PROFILES[base], name=name, encoding=kept, window=tuple(kept["window"]))
+    array = read_array(connection, numbers.pop())
+    keyed = _of_candidate(array.profile) or array.profile == "fine"
+    return array if keyed and array.lab_key != lab.key else None
 
 
-def _keep(located: LocatedSpec, connection: Connection | None) -> LocatedSpec:
-    """Return a spec that names its profile, on the array of `_stored_profile`."""
-    name = located.spec.profile
-    if name not in PROFILES:
-        return located
-    kept = _stored_profile(PROFILES[name], connection)
-    if kept is PROFILES[name]:
-        return located
-    return _with_array(located, kept, kept.array())
+def _of_candidate(profile: str) -> bool:
+    """Whether a profile's name is one that `auto` gives: one-touch, large, large-511x513, ..."""
+    return profile == DEFAULT_PROFILE or profile.partition("-")[0] == "large"
 
 
-def _with_array(located: LocatedSpec, profile: Profile, array: SymbolArray) -> LocatedSpec:
-    defaults = "large" if profile.name.startswith("large") else profile.name
-    return with_profile(located, profile.name, defaults, array.definition())
+def _with_array(
+    located: LocatedSpec, profile: str, encoding: Mapping[str, Any], array_key: str
+) -> LocatedSpec:
+    defaults = "large" if profile.startswith("large") else profile
+    return with_profile(located, profile, defaults, encoding, array_key)
 
 
 def _follow(
-    located: LocatedSpec, profile: str, defaults: str, encoding: Mapping[str, Any]
+    located: LocatedSpec, profile: str, encoding: Mapping[str, Any], array_key: str
 ) -> LocatedSpec:
-    """Return a spec with the array of another one, if its own is to be chosen."""
+    """Return a spec on an array; with the profile of another one, if its own is to be chosen."""
     if located.spec.profile != AUTO:
-        return located
-    return with_profile(located, profile, defaults, encoding)
+        spec = replace(located.spec, encoding=encoding, array_key=array_key)
+        return replace(located, spec=spec)
+    defaults = profile if profile in PROFILES else DEFAULT_PROFILE
+    return with_profile(located, profile, defaults, encoding, array_key)
 
 
 def _count_needs(specs: Sequence[LocatedSpec], solid: Polyhedron | None) -> tuple[int | None, int]:
@@ -208,7 +231,7 @@ def _counts(plan: ObjectPlan, layout: Layout) -> tuple[int, int]:
 def _room(array: SymbolArray, connection: Connection | None) -> int:
     """Return how many more cells of an array faces of all shapes can have."""
     taken = 0 if connection is None else occupancy(connection, array).used
-    return max(0, int(CHOICE.full * array.rows * array.columns) - taken)
+    return max(0, int(LIMITS.full * array.rows * array.columns) - taken)
 
 
 def _names_printer(located: LocatedSpec) -> bool:

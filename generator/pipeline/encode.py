@@ -11,24 +11,27 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 
 from sqlalchemy import Connection, Engine
 
 from generator.database.cells import occupancy
+from generator.database.lab import lab_key as stored_lab_key
 from generator.database.open import open_database, open_if_there
 from generator.database.transaction import read_transaction
-from generator.pipeline.choose import choose_array
+from generator.pipeline.choose import Choice, choose_array
 from generator.pipeline.faces import face_reports
 from generator.pipeline.files import parts_of
+from generator.pipeline.lab import lab_of
 from generator.pipeline.made import Encoded, MadeObject, describe_object
 from generator.pipeline.make import Order, make_under_lock
 from generator.pipeline.place import occupancy_of, occupancy_with, place_object
 from generator.pipeline.plan import ObjectPlan, plan_object
 from generator.pipeline.progress import Progress, no_progress, part_of_progress
 from generator.pipeline.sets import make_set, set_folder
+from generator.polyhedron import Polyhedron
 from generator.spec import LocatedSpec
 
 
@@ -38,6 +41,7 @@ def encode(
     folder: Path | None = None,
     formats: Sequence[str] | None = None,
     database: str | None = None,
+    lab_key: str = "",
     dry_run: bool = False,
     verify: bool = False,
     replace: bool = False,
@@ -56,6 +60,8 @@ def encode(
         In place of the specs' own: step, stl, 3mf, glb.
     database
         URL in place of the specs' own.
+    lab_key
+        Of a new database, in place of the specs' own; drawn where neither says one.
     dry_run
         Plan, lay out and build, but write nothing: no file, no row, no new database.
     verify
@@ -80,22 +86,25 @@ def encode(
     """
     began = time.perf_counter()
     url = database or specs[0].spec.database
-    plans: list[ObjectPlan] = []
-    engine = open_if_there(url, writable=not dry_run)
-    with read_transaction(engine) if engine else nullcontext() as connection:
-        choice = choose_array(specs, connection)
-    for number, located in enumerate(choice.specs):
-        progress(f"planning {located.spec.name}", 0.1 * number / len(specs))
-        plan = plan_object(located)
-        notes = choice.notes if number == 0 else ()
-        plans.append(dataclasses.replace(plan, notes=(*plan.notes, *notes)))
+
+    def plan_all(choice: Choice) -> list[ObjectPlan]:
+        plans = []
+        for number, located in enumerate(choice.specs):
+            progress(f"planning {located.spec.name}", 0.1 * number / len(specs))
+            plan = plan_object(located)
+            notes = choice.notes if number == 0 else ()
+            plans.append(dataclasses.replace(plan, notes=(*plan.notes, *notes)))
+        return plans
+
+    engine, plans = plan_in_lab(
+        specs, url, plan_all, lab_key=lab_key, make=not dry_run, replace_changed=replace
+    )
     rest = part_of_progress(progress, 0.1, 1.0)
     files: tuple[Path, ...] = ()
-    if dry_run:
+    if engine is None or dry_run:
         with read_transaction(engine) if engine else nullcontext() as connection:
             made, used = _rehearse(connection, plans, replace, rest)
     else:
-        engine = engine or new_database(url, plans[0])
         orders = [
             Order(plan, _folder(plan, folder, len(plans)), _formats(plan, formats), verify, replace)
             for plan in plans
@@ -111,10 +120,43 @@ def encode(
     return Encoded(tuple(made), url, array.rows, array.columns, used, seconds, files)
 
 
-def new_database(url: str, plan: ObjectPlan) -> Engine:
-    """Make a database; an object that cannot be made leaves none behind."""
-    parts_of(plan, place_object(None, plan, replace=False).layout)
-    return open_database(url)
+def plan_in_lab(
+    specs: Sequence[LocatedSpec],
+    url: str,
+    plan_all: Callable[[Choice], list[ObjectPlan]],
+    *,
+    lab_key: str,
+    make: bool,
+    replace_changed: bool,
+    solid: Polyhedron | None = None,
+) -> tuple[Engine | None, list[ObjectPlan]]:
+    """Return a lab's database, and the plans of objects on its array.
+
+    Parameters
+    ----------
+    plan_all
+        The plans of specs whose array is chosen.
+    lab_key
+        See `encode`.
+    make
+        Make the database if it is new, where the first object can be made. A key that was drawn
+        for it gives way to that of another program which made it meanwhile.
+    replace_changed, solid
+        See `choose_array`.
+    """
+    while True:
+        engine = open_if_there(url, writable=make)
+        with read_transaction(engine) if engine else nullcontext() as connection:
+            lab = lab_of(specs, connection, lab_key)
+            choice = choose_array(specs, lab, connection, solid, replace_changed=replace_changed)
+        plans = plan_all(choice)
+        if engine is not None or not make:
+            return engine, plans
+        parts_of(plans[0], place_object(None, plans[0], replace=False).layout)
+        engine = open_database(url, lab_key=lab.key)
+        with read_transaction(engine) as connection:
+            if stored_lab_key(connection) == lab.key:
+                return engine, plans
 
 
 def _rehearse(

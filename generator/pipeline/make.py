@@ -94,6 +94,7 @@ def _register(
         layout=place.layout,
         array=plan.array,
         profile=plan.spec.profile,
+        lab_key=plan.spec.array_key,
         alphabet=plan.alphabet,
         style=plan.spec.style,
         spec=plan.meaning,

@@ -15,6 +15,7 @@ from generator.database.open import open_if_there
 from generator.database.transaction import read_transaction
 from generator.pipeline.choose import choose_array
 from generator.pipeline.files import parts_of
+from generator.pipeline.lab import lab_of
 from generator.pipeline.place import occupancy_of, occupancy_with, place_object
 from generator.pipeline.plan import ObjectPlan, plan_object
 from generator.pipeline.progress import Progress, no_progress, part_of_progress
@@ -100,7 +101,8 @@ def _build(
     built = []
     with read_transaction(engine) if engine else nullcontext() as connection:
         taken = None
-        for number, located in enumerate(choose_array(specs, connection).specs):
+        choice = choose_array(specs, lab_of(specs, connection), connection)
+        for number, located in enumerate(choice.specs):
             progress(f"building {located.spec.name}", number / len(specs))
             plan = plan_object(located)
             taken = occupancy_of(connection, plan) if taken is None else taken

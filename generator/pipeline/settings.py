@@ -9,7 +9,6 @@ from dataclasses import dataclass
 class ChoiceSettings:
     """Which array and how many processes."""
 
-    full: float = 0.8  #: share of an array that faces of all shapes fill without a search
     larger: int = 4  #: sizes tried beyond `large`
     few: int = 16  #: fewer tasks are done in this process, where nobody asked for others
 

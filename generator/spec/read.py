@@ -191,6 +191,9 @@ def _shared_problems(found: Sequence[LocatedSpec], database: str | None) -> list
         elif database is None and spec.database != first.spec.database:
             path, what = "output.database", "database"
             one, two = spec.database, first.spec.database
+        elif spec.lab_key != first.spec.lab_key:
+            path, what = "output.lab_key", "lab key"
+            one, two = spec.lab_key or "none", first.spec.lab_key or "none"
         if path:
             cause = f"'{spec.name}' is on another {what} ({one}) than '{first.spec.name}' ({two})"
             fix = f"run encode-object once for each {what}"

@@ -114,6 +114,7 @@ def resolve(
         formats=tuple(dict.fromkeys(settings.output.formats or FORMATS)),
         folder=Path(settings.output.folder or f"out/{_folder_name(settings.name)}"),
         database=settings.output.database or DATABASE,
+        lab_key=settings.output.lab_key or "",
     )
     if settings.copies == 1:
         return (spec,)

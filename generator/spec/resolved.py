@@ -59,6 +59,8 @@ class ObjectSpec:
     formats: tuple[str, ...]  #: of step, stl, 3mf, glb
     folder: Path  #: for the files; relative to the current folder
     database: str  #: URL
+    lab_key: str = ""  #: of the database, where the spec says it
+    array_key: str = ""  #: lab key that `encoding` was made from; empty: the published array
 
     @property
     def meaning(self) -> dict[str, Any]:

@@ -73,7 +73,7 @@ def tree_from(settings: Mapping[str, Any]) -> Tree:
 
 
 def with_profile(
-    located: LocatedSpec, name: str, defaults: str, encoding: Mapping[str, Any]
+    located: LocatedSpec, name: str, defaults: str, encoding: Mapping[str, Any], array_key: str
 ) -> LocatedSpec:
     """Return a spec on another array.
 
@@ -87,6 +87,8 @@ def with_profile(
         Profile whose symbols and printer hold where the spec names none.
     encoding
         Complete definition of the array.
+    array_key
+        Lab key that it was made from; empty for a published one.
 
     Raises
     ------
@@ -96,7 +98,8 @@ def with_profile(
     value = {key: inner for key, inner in located.tree.value.items() if key != "shape"}
     read = NamedSettings.model_validate({**value, "profile": defaults, "copies": 1})
     (spec,) = resolve(read, located.tree, located.spec.shape)
-    own = replace(spec, name=located.spec.name, profile=name, encoding=encoding)  # of a copy
+    name_of_copy = located.spec.name
+    own = replace(spec, name=name_of_copy, profile=name, encoding=encoding, array_key=array_key)
     return replace(located, spec=own)
 
 

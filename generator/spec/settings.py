@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from generator.alphabet.known import ALPHABETS
+from generator.array.lab_key import read_lab_key
+from generator.errors import LabKeyError
 from generator.spec.block import Block, ObjectName, PathText, whole_number
 from generator.spec.encoding import Encoding
 from generator.spec.quantity import Angle, Length, LengthOrZero, refuse
@@ -78,6 +80,16 @@ def database_url(value: Any) -> str:
     return value
 
 
+def lab_key(value: Any) -> str:
+    """Return a lab's key, as it is written everywhere."""
+    if not isinstance(value, str):
+        raise refuse(f"a lab key is text, not {value!r}", f"put it in quotes: '{value}'")
+    try:
+        return read_lab_key(value)
+    except LabKeyError as error:
+        raise refuse(error.cause, error.fix) from None
+
+
 Version = Annotated[Literal[1], BeforeValidator(version)]
 Copies = Annotated[int, Field(ge=1, le=COPIES_MAX), whole_number(1, COPIES_MAX, "copies")]
 FormatList = Annotated[
@@ -86,6 +98,7 @@ FormatList = Annotated[
     BeforeValidator(format_list, json_schema_input_type=list[Format] | str),
 ]
 DatabaseUrl = Annotated[str, BeforeValidator(database_url)]
+LabKey = Annotated[str, BeforeValidator(lab_key)]
 
 
 class Symbols(Block):
@@ -125,6 +138,9 @@ class Output(Block):
     """Files to write: step, stl, 3mf, glb; the first three if left out."""
     database: DatabaseUrl | None = None
     """Database that registers the cells: sqlite:///lab.db, postgresql://host/name."""
+    lab_key: LabKey | None = None
+    """Key of the lab, for a database that is new: the same key, the same arrays and bytes; drawn
+    at random if left out. encode-object lab prints a database's."""
 
 
 class Defaults(Block):

@@ -14,14 +14,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from generator.database import DatabaseError
 from generator.database.entries import list_objects
-from generator.database.open import open_database
+from generator.database.open import database_exists, open_database
 from generator.database.read import read_parts
 from generator.database.transaction import read_transaction
 from recognizer.validation.errors import SetError
 
 PARTS, LAB = "parts", "lab.db"
+LAB_KEY = "VA11-DATE-0000-0002"  #: of the sets that are made here and say none
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +49,8 @@ def make_parts(specs: list[Path], folder: Path, database: str) -> None:
     folder
         Where the parts go.
     database
-        Where they are registered; what is registered already is written again, the same.
+        Where they are registered; what is registered already is written again, the same. A new
+        one has the key of the specs, or `LAB_KEY`: the same specs, the same touches.
 
     Raises
     ------
@@ -56,10 +60,23 @@ def make_parts(specs: list[Path], folder: Path, database: str) -> None:
     command = [sys.executable, "-c", "from generator.command import main; main()"]
     command += [*map(str, specs), "-o", str(folder), "--database", database]
     command += ["--format", "stl", "--json"]
+    if not (any(map(_says_lab_key, specs)) or database_exists(database)):
+        command += ["--lab-key", LAB_KEY]
     done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
     if done.returncode:
         cause, fix, place = _first_problem(done.stdout, done.stderr)
         raise SetError(f"encode-object: {cause}", fix=fix, place=place, exit_code=done.returncode)
+
+
+def _says_lab_key(spec: Path) -> bool:
+    """Whether a spec, or an object written out in a set, names the key of its lab."""
+    try:
+        read = yaml.safe_load(spec.read_text(encoding="utf-8"))
+    except (OSError, ValueError, yaml.YAMLError):
+        return False  # encode-object says what is wrong with it
+    blocks = [read, *(read.get("objects") or ())] if isinstance(read, dict) else []
+    outputs = [block.get("output") for block in blocks if isinstance(block, dict)]
+    return any(isinstance(output, dict) and "lab_key" in output for output in outputs)
 
 
 def members_of(database: str) -> tuple[Member, ...]:

@@ -3,7 +3,7 @@
 Kinds + the set that is made -> more members in its database, and databases of other labs in a
 folder beside it. Members are made from specs in the profile and at the pitch of the set's first
 object, so that they are rivals of all others; another lab has made its parts with the same
-profile, and knows nothing of this one.
+profile and a key of its own, and knows nothing of this one.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from generator.array.lab_key import lab_key_of
 from recognizer.validation.encoded_set import LAB, PARTS, Member, make_parts, members_of
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.settings import MAKING
@@ -65,7 +66,8 @@ def make_for_kinds(folder: Path, database: str, kinds: Collection[str], seed: in
             lab.mkdir(parents=True, exist_ok=True)
             rng = np.random.default_rng([seed, number, 5])
             specs = list(_random_specs(number, rng))
-            _make(specs, first, lab / "set.yaml", lab / PARTS, str(lab / LAB))
+            key = lab_key_of(np.random.default_rng([seed, number, 6]).bytes(16))
+            _make(specs, first, lab / "set.yaml", lab / PARTS, str(lab / LAB), lab_key=key)
 
 
 def labs_of(folder: Path, kinds: Collection[str]) -> tuple[str, ...]:
@@ -129,13 +131,21 @@ def _random_specs(lab: int, rng: np.random.Generator) -> Iterator[dict[str, Any]
 
 
 def _make(
-    specs: list[dict[str, Any]], like: Member, file: Path, folder: Path, database: str
+    specs: list[dict[str, Any]],
+    like: Member,
+    file: Path,
+    folder: Path,
+    database: str,
+    lab_key: str = "",
 ) -> None:
     style = {
         "profile": like.array.rpartition(" ")[0],
         "symbols": {"pitch": f"{like.pitch_mm:g} mm"},
     }
-    text = json.dumps({"version": 1, "objects": [style | spec for spec in specs]}, indent=1)
+    whole: dict[str, Any] = {"version": 1, "objects": [style | spec for spec in specs]}
+    if lab_key:
+        whole["output"] = {"lab_key": lab_key}
+    text = json.dumps(whole, indent=1)
     file.write_text(text + "\n", "utf-8")
     make_parts([file], folder, database)
 

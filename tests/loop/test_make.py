@@ -118,15 +118,20 @@ def test_placements_map_cells_to_symbol_centres(tmp_path):
         assert ((columns + place.column) % 65 == face.columns).all()
 
 
-def test_same_spec_gives_same_bytes_in_other_processes_and_folders(tmp_path):
+def test_same_spec_and_key_give_same_bytes_in_other_processes_and_folders(tmp_path):
     everything = []
-    for folder in (tmp_path / "a", tmp_path / "another" / "place"):
+    for name in ("a", "another/place", "another lab"):
+        folder = tmp_path / name
         folder.mkdir(parents=True)
         command = [sys.executable, "-c", ENTRY, str(ROOT / "fixtures" / "cube.yaml"), "--format",
                    "step,stl,3mf,glb", "-o", str(folder / "out")]  # fmt: skip
+        if name != "another lab":
+            command += ["--lab-key", "0123-4567-89AB-CDER"]
         subprocess.run(command, cwd=folder, check=True, capture_output=True)
         everything.append(digests(folder / "out"))
     assert everything[0] == everything[1]
+    assert everything[0].keys() == everything[2].keys()
+    assert everything[0]["Cube-F1.stl"] != everything[2]["Cube-F1.stl"]  # drew a key of its own
     assert len(everything[0]) == 6 * 2 + 5
 
 

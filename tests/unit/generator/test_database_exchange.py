@@ -142,7 +142,7 @@ def test_an_object_on_cells_that_are_held_is_refused_by_name(new_database, lab_u
         import_objects(lab_url, str(file))
     assert "cells that 'Other' holds here" in str(caught.value)
     assert "make 'Cube' again here" in caught.value.fix
-    assert "same corner: import before objects are made" in caught.value.fix
+    assert "have arrays of their own" in caught.value.fix
     assert "Tetra" not in str(caught.value)
     assert names(lab_url) == ["Other"]
     done = import_objects(lab_url, str(file), skip_refused=True)

@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 from sqlalchemy import select, text
 
+from generator.array.lab_key import read_lab_key
+from generator.database.lab import lab_key
 from generator.database.open import database_exists, open_database
 from generator.database.tables import SCHEMA_VERSION, meta, metadata
 from generator.database.transaction import read_transaction, write_transaction
@@ -68,8 +70,10 @@ def test_a_new_database_has_all_tables_and_its_version(tmp_path):
     engine = open_database(str(path))
     assert path.is_file()
     with read_transaction(engine) as connection:
-        stored = [tuple(row) for row in connection.execute(select(meta).order_by(meta.c.key))]
-        assert stored == [("format", "encoded-objects"), ("schema_version", str(SCHEMA_VERSION))]
+        stored = {row.key: row.value for row in connection.execute(select(meta))}
+        key = stored.pop("lab_key")
+        assert read_lab_key(key) == key == lab_key(connection)
+        assert stored == {"format": "encoded-objects", "schema_version": str(SCHEMA_VERSION)}
         for table in metadata.sorted_tables:
             connection.execute(select(table)).all()
     assert os.listdir(tmp_path) == [path.name]  # one file, so that it can be copied
@@ -206,7 +210,7 @@ def test_a_read_only_place_is_refused_for_writing_alone(unprivileged):
     assert "may not be written" in refused(path)
     folder.chmod(0o555)
     with read_transaction(open_database(str(path), writable=False)) as connection:
-        assert len(connection.execute(select(meta)).all()) == 2
+        assert len(connection.execute(select(meta)).all()) == 3
 
 
 def test_a_writer_waits_for_its_turn_and_no_longer(tmp_path):
@@ -241,7 +245,7 @@ def test_many_may_make_a_database_at_once(tmp_path):
         maker.stdin.close()
         assert maker.wait(timeout=60) == 0
     with read_transaction(open_database(str(path), writable=False)) as connection:
-        assert len(connection.execute(select(meta)).all()) == 2
+        assert len(connection.execute(select(meta)).all()) == 3
 
 
 @pytest.fixture(scope="module")

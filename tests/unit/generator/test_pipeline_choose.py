@@ -14,6 +14,7 @@ from generator.database.open import open_if_there
 from generator.database.transaction import read_transaction
 from generator.pipeline import encode
 from generator.pipeline.choose import choose_array
+from generator.pipeline.lab import lab_of
 from generator.pipeline.plan import plan_object
 from generator.spec import SpecError, read_specs
 
@@ -33,7 +34,8 @@ def choice(folder: Path, text: str):
     file.write_text(text)
     lab = open_if_there(f"sqlite:///{folder / 'lab.db'}")
     with read_transaction(lab) if lab else nullcontext() as connection:
-        return choose_array(read_specs([file]), connection)
+        specs = read_specs([file])
+        return choose_array(specs, lab_of(specs, connection), connection)
 
 
 def profiles(found) -> set[str]:
