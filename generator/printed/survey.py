@@ -13,17 +13,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.alphabet.outline import Ring, Tiers
-from generator.plane.polygon import points_inside
-from generator.plane.rings import distance
 from generator.printed.surface import PrintedSurface
+from generator.printed.symbol_design import (
+    LATTICE,
+    DesignLattice,
+    SymbolDesign,
+    footprint_shift,
+    over_face,
+    symbol_designs,
+)
 from generator.solid.emboss import turn
 from generator.solid.part import Embossing
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-_GOLDEN = (5**0.5 - 1) / 2
 SURVIVES, DOUBTFUL, LOST = "survives", "doubtful", "lost"
 
 
@@ -40,10 +44,8 @@ class SurveyLimits:
     ahead: float = 0.05  #: of the overlap with the next symbol of the alphabet
     height: float = 0.70  #: of the designed height; one layer of four is within it
     height_least: float = 0.40
-    base_clear_mm: float = 0.3  #: from a foot, where the face around it is measured
-    top_clear_mm: float = 0.2  #: from the edge of the top, where its height is measured
     moved_mm: float = 0.5  #: in x and y, by which a symbol is looked for beside its place
-    step_mm: float = 0.05  #: of the lattice on which symbols are compared
+    lattice: DesignLattice = LATTICE  #: on which symbols are compared
 
 
 LIMITS = SurveyLimits()
@@ -77,17 +79,6 @@ class SymbolTile:
     deposited: Floats  #: (m, m)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Design:
-    """A symbol as designed, on the lattice of its cell."""
-
-    footprint: Mask  #: (m, m) at half height
-    top: Mask  #: well inside of the top
-    around: Mask  #: well outside of the foot
-    heights: Floats  #: (m, m) mm
-    height_mm: float
-
-
 def survey_face(
     surface: PrintedSurface,
     embossing: Embossing,
@@ -107,7 +98,7 @@ def survey_face(
     part, face
         Their names.
     """
-    points, designs = _designs(embossing, limits)
+    points, designs = symbol_designs(embossing, limits.lattice)
     R = turn(embossing.rotation_rad)
     side = designs[0].footprint.shape if designs else (0, 0)
 
@@ -118,14 +109,15 @@ def survey_face(
     tiles = []
     for number, label in enumerate(embossing.labels.tolist()):
         design = designs[label]
-        found, base = _over_face(sample(number, np.zeros(2)), design)
+        found, base = over_face(sample(number, np.zeros(2)), design)
         moved = np.zeros(2)
         for _ in range(2):  # the first shift changes what lies in the cell
-            moved = (moved + _middle(found, design, points)).clip(-limits.moved_mm, limits.moved_mm)
-            found, base = _over_face(sample(number, moved), design)
+            moved = moved + footprint_shift(found, design, points)
+            moved = moved.clip(-limits.moved_mm, limits.moved_mm)
+            found, base = over_face(sample(number, moved), design)
         printed = found > design.height_mm / 2
         rivals = [d for k, d in enumerate(designs) if k != label]
-        pixel = limits.step_mm**2
+        pixel = limits.lattice.step_mm**2
         top = found[design.top]
         height = float(np.median(top)) if len(top) and np.isfinite(base) else 0.0
         check = SymbolCheck(
@@ -158,77 +150,17 @@ def _judge(check: SymbolCheck, limits: SurveyLimits) -> SymbolCheck:
     return replace(check, verdict=verdict)
 
 
-def _designs(embossing: Embossing, limits: SurveyLimits) -> tuple[Floats, list[_Design]]:
-    """Return the lattice of a cell, (m * m, 2), and every label's design on it."""
-    reach = max(float(np.abs(ring).max()) for tiers in embossing.tiers for ring in tiers.rings[0])
-    half = embossing.pitch_mm / 2 if embossing.pitch_mm else reach + 2 * limits.base_clear_mm
-    count = int(half / limits.step_mm)
-    line = np.arange(-count, count + 1) * limits.step_mm
-    x, y = np.meshgrid(line, line)
-    # Rows and columns are shifted by parts of a step, or all places along a straight edge would
-    # fall on the same side of it.
-    shift = (np.arange(len(line)) * _GOLDEN % 1 - 0.5) * limits.step_mm
-    x, y = x + shift[:, None], y + shift
-    points = np.stack([x.ravel(), y.ravel()], axis=1)
-    side = (len(line), len(line))
-    return points, [_design(tiers, points, side, limits) for tiers in embossing.tiers]
-
-
-def _design(tiers: Tiers, points: Floats, side: tuple[int, int], limits: SurveyLimits) -> _Design:
-    high = tiers.z_mm[-1]
-    foot, top = tiers.rings[0], tiers.rings[-1]
-    clear = distance(points, foot) > limits.base_clear_mm
-    heights = np.zeros(len(points))
-    for level in np.linspace(0.0, high, 11):
-        heights[points_inside(points, rings_at(tiers, float(level)))] = level
-    return _Design(
-        footprint=points_inside(points, rings_at(tiers, high / 2)).reshape(side),
-        top=(points_inside(points, top) & (distance(points, top) > limits.top_clear_mm)).reshape(
-            side
-        ),
-        around=(clear & ~points_inside(points, foot)).reshape(side),
-        heights=heights.reshape(side),
-        height_mm=high,
-    )
-
-
-def rings_at(tiers: Tiers, z_mm: float) -> list[Ring]:
-    """Return a symbol's outline at a height over the face; corners move on straight lines."""
-    k = int(np.clip(np.searchsorted(tiers.z_mm, z_mm) - 1, 0, len(tiers.z_mm) - 2))
-    share = (z_mm - tiers.z_mm[k]) / (tiers.z_mm[k + 1] - tiers.z_mm[k])
-    return [a + share * (b - a) for a, b in zip(tiers.rings[k], tiers.rings[k + 1], strict=True)]
-
-
-def _over_face(found: Floats, design: _Design) -> tuple[Floats, float]:
-    """Return heights over the face around a symbol as printed, and that face's own height."""
-    around = found[design.around & np.isfinite(found)]
-    base = float(np.median(around)) if len(around) else -np.inf
-    return (found - base if np.isfinite(base) else np.full_like(found, -np.inf)), base
-
-
-def _middle(found: Floats, design: _Design, points: Floats) -> Floats:
-    """Return how far the printed footprint's middle lies from the designed one's.
-
-    What lies further from the foot, such as strings, is not counted.
-    """
-    printed = ((found > design.height_mm / 2) & ~design.around).ravel()
-    if not printed.any():
-        return np.zeros(2)
-    moved: Floats = points[printed].mean(axis=0) - points[design.footprint.ravel()].mean(axis=0)
-    return moved
-
-
 def _overlap(a: Mask, b: Mask) -> float:
     union = float((a | b).sum())
     return float((a & b).sum()) / union if union else 0.0
 
 
-def _best_overlap(printed: Mask, design: _Design, limits: SurveyLimits) -> float:
+def _best_overlap(printed: Mask, design: SymbolDesign, limits: SurveyLimits) -> float:
     """Return the overlap where the middles of both lie on each other, or nearly so."""
     near = printed & ~design.around
     if not near.any():
         return 0.0
-    most = round(limits.moved_mm / limits.step_mm)
+    most = round(limits.moved_mm / limits.lattice.step_mm)
     at = [np.argwhere(mask).mean(axis=0) for mask in (near, design.footprint)]
     by = np.rint(at[1] - at[0]).astype(np.int64).clip(-most, most)
     return _overlap(np.roll(printed, by, axis=(0, 1)), design.footprint)
