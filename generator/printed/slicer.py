@@ -18,6 +18,7 @@ import subprocess
 import tempfile
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +33,7 @@ Floats = NDArray[np.float64]
 
 NAMES = ("prusa-slicer", "PrusaSlicer", "prusa-slicer-console")
 TIMEOUT_S = 600
+_TURNS = count()  # of the slicers that this process has begun
 _BED_MARGIN_MM = 20.0  # around the part: skirt, brim, purge line
 _AGREE_MM = 0.25  # by which plastic may reach beyond the part's box: half a bead, and seams
 _POINTED_WIDTHS = 3.0  # by which it may fall short: beads are round in corners of 20 degrees
@@ -191,24 +193,32 @@ def _run(file: Path, settings: str, middle: str, gcode: Path) -> None:
                 fix="open the part in PrusaSlicer and look",
                 place=str(file),
             )
-        shutil.move(written, gcode)
+        # The folder may be on another disk than where the slicer wrote.
+        undone = gcode.with_name(f"{gcode.name}.{os.getpid()}.writing")
+        shutil.copyfile(written, undone)
+        undone.replace(gcode)
 
 
-@lru_cache(maxsize=1)
 def _repeatable_command() -> tuple[str, ...]:
     """Return the command's beginning that makes the slicer give the same G-code again."""
     steady: tuple[str, ...] = ()
-    if shutil.which("setarch"):
+    if _works("setarch", "-R"):
         steady += ("setarch", "-R")
-    if shutil.which("taskset"):
-        # Any one processor does; several slicers at once take different ones.
-        allowed = sorted(os.sched_getaffinity(0))
-        steady += ("taskset", "-c", str(allowed[os.getpid() % len(allowed)]))
-    if steady:
-        tried = subprocess.run([*steady, "true"], capture_output=True, check=False)  # noqa: S603
-        if tried.returncode:  # a container that forbids it
-            return ()
+    allowed = sorted(os.sched_getaffinity(0))
+    if _works("taskset", "-c", str(allowed[0])):
+        # Any one processor does; slicers that run at once take one after the other.
+        turn = os.getpid() + next(_TURNS)
+        steady += ("taskset", "-c", str(allowed[turn % len(allowed)]))
     return steady
+
+
+@lru_cache(maxsize=8)
+def _works(*beginning: str) -> bool:
+    """Whether a program is there and allowed; some containers forbid it."""
+    if not shutil.which(beginning[0]):
+        return False
+    command = [*beginning, "true"]
+    return not subprocess.run(command, capture_output=True, check=False).returncode  # noqa: S603
 
 
 def _check_place(sliced: SlicedPart, file: Path) -> None:
