@@ -10,6 +10,7 @@ import pytest
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
 from generator.plane.polygon import points_inside
+from generator.printed.middle import symbols_shift
 from generator.printed.surface import Coverage, PrintedSurface
 from generator.printed.survey import DOUBTFUL, LOST, SURVIVES, SymbolTile, survey_face
 from generator.printed.symbol_design import rings_at
@@ -117,3 +118,17 @@ def test_a_string_across_the_cell_moves_nothing() -> None:
     assert check.moved_mm == pytest.approx((0.0, 0.0), abs=0.02)
     assert check.verdict == SURVIVES
     assert check.widened_mm2 > 0.9
+
+
+@pytest.mark.parametrize("rotation", [0.0, math.radians(90), 0.3])
+def test_the_middle_of_the_symbols_is_found_in_the_faces_frame(rotation: float) -> None:
+    moved = surface([0, 1, 2, 3], moved=(0.15, -0.1), base=0.2, rotation=rotation)
+    found = symbols_shift(moved, embossing(rotation))
+    assert found == pytest.approx((0.15, -0.1), abs=0.012)
+
+
+def test_symbols_that_are_gone_do_not_move_the_middle() -> None:
+    some = symbols_shift(surface([0, -1, -1, 3], moved=(0.2, 0.1)), embossing())
+    assert some == pytest.approx((0.2, 0.1), abs=0.012)
+    assert (symbols_shift(surface([-1, -1, -1, -1]), embossing()) == 0).all()
+    assert (symbols_shift(surface([0, 1, 2, 3], base=-np.inf), embossing()) == 0).all()

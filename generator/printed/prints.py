@@ -1,0 +1,163 @@
+"""Registered parts, printed in simulation and kept: PrintJob + PrintPlan -> files of surfaces.
+
+A folder of prints holds what many runs share, by its content::
+
+    gcode/      NAME-KEY.gcode, by the part's bytes, all settings, the slicer's version
+    surfaces/   KEY.npy and KEY.json (`surface_file`), by the part's bytes, settings, version,
+                faults, seed, and the face's place in the part
+
+A part is printed once for all its faces, in the frame of its own bed; scale and skew act about
+the middle of its box. Each surface is then moved so that the middle of its symbols stands where
+it was designed (`middle`). What a file holds follows from its name, whoever made it and when.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from generator.alphabet.known import alphabet_from
+from generator.alphabet.outline import outlines
+from generator.database.registered import RegisteredFace, RegisteredObject, RegisteredPart
+from generator.printed.deposit import deposit
+from generator.printed.faults import PrintFaults, print_faults
+from generator.printed.middle import symbols_shift
+from generator.printed.profiles import PrintProfile, print_profile, settings_of
+from generator.printed.slicer import slice_part, slicer_version
+from generator.printed.surface import DEPTH_MM, MARGIN_MM, STEP_MM, Floats
+from generator.printed.surface_file import FORMAT, is_written, write_surface
+from generator.printed.view import face_surface, is_seen
+from generator.solid.emboss import embossing_of
+from generator.solid.part import Embossing
+
+GCODE, SURFACES = "gcode", "surfaces"
+
+
+@dataclass(frozen=True, slots=True)
+class PrintPlan:
+    """How parts are printed."""
+
+    profile: PrintProfile
+    faults: PrintFaults
+    seed: int  #: of what faults leave to chance
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FaceOnPart:
+    """A face whose print is looked at."""
+
+    name: str
+    outline_mm: Floats  #: (k, 2) face frame
+    embossing: Embossing  #: its symbols; its T_part_facet is where the face lies in the part
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PrintJob:
+    """A written part and those of its faces that the beads show."""
+
+    name: str
+    file: Path  #: binary STL, as it is printed
+    sha256: str  #: of its bytes
+    supports: bool  #: more than one face bears symbols: some stand on nothing
+    faces: tuple[FaceOnPart, ...]
+
+
+def print_plan(profile: str, faults: str, seed: int) -> PrintPlan:
+    """Return how parts are printed, by the names that a person gave.
+
+    Raises
+    ------
+    PrintError
+        An unknown profile or fault.
+    """
+    return PrintPlan(print_profile(profile), print_faults(faults), seed)
+
+
+def print_job(
+    held: RegisteredObject, part: RegisteredPart, file: Path, faces: Sequence[RegisteredFace]
+) -> tuple[PrintJob, tuple[str, ...]]:
+    """Return what is printed of a part, and the names of the faces that cannot be looked at.
+
+    Parameters
+    ----------
+    held
+        Whose part it is.
+    part, file
+        As it is registered, and where it is.
+    faces
+        Those of the object that this part bears.
+    """
+    tiers = outlines(alphabet_from(held.alphabet), held.style)
+    shown, unseen = [], []
+    for face in faces:
+        T_part_face = np.linalg.inv(part.T_object_part) @ face.T_object_face
+        if face.round is not None or not is_seen(T_part_face):
+            unseen.append(face.name)
+            continue
+        layout = held.layout.faces[face.face_id]
+        embossing = embossing_of(layout, tiers, 0, T_part_face, held.style.pitch_mm)
+        shown.append(FaceOnPart(face.name, np.concatenate(face.polygon_mm), embossing))
+    job = PrintJob(part.name, file, part.sha256, len(faces) > 1, tuple(shown))
+    return job, tuple(unseen)
+
+
+def surface_keys(job: PrintJob, plan: PrintPlan) -> dict[str, str]:
+    """Return under which names the surfaces of a part's faces are kept."""
+    common = [
+        FORMAT,
+        job.sha256,
+        job.supports,
+        _settings(plan.profile),
+        slicer_version(),
+        asdict(plan.faults),
+        plan.seed,
+        [STEP_MM, DEPTH_MM, MARGIN_MM],
+    ]
+    keys = {}
+    for face in job.faces:
+        place = np.round(face.embossing.T_part_facet, 9) + 0.0
+        values = [*common, place.tolist(), np.round(face.outline_mm, 9).tolist()]
+        keys[face.name] = hashlib.sha256(json.dumps(values).encode()).hexdigest()[:32]
+    return keys
+
+
+@lru_cache(maxsize=4)
+def _settings(profile: PrintProfile) -> list[tuple[str, str]]:
+    return sorted(settings_of(profile).items())
+
+
+def surface_path(folder: Path, key: str) -> Path:
+    """Return where a surface is kept in a folder of prints, without suffix."""
+    return folder / SURFACES / key
+
+
+def left_to_print(job: PrintJob, plan: PrintPlan, folder: Path) -> bool:
+    """Whether a face of a part is not in the folder yet."""
+    keys = surface_keys(job, plan).values()
+    return not all(is_written(surface_path(folder, key)) for key in keys)
+
+
+def print_part(job: PrintJob, plan: PrintPlan, folder: Path) -> None:
+    """Slice and deposit a part, and keep the surfaces of its faces.
+
+    Raises
+    ------
+    PrintError
+        PrusaSlicer is missing or refuses the part.
+    """
+    sliced = slice_part(job.file, plan.profile, supports=job.supports, cache=folder / GCODE)
+    rng = np.random.default_rng([plan.seed, int(job.sha256[:16], 16)])
+    printed = deposit(sliced, plan.faults, rng)
+    keys = surface_keys(job, plan)
+    for face in job.faces:
+        embossing = face.embossing
+        surface = face_surface(printed, embossing.T_part_facet, outline_mm=face.outline_mm)
+        x, y = symbols_shift(surface, embossing)
+        path = surface_path(folder, keys[face.name])
+        write_surface(surface, path, moved_mm=(float(x), float(y)))

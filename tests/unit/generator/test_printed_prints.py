@@ -1,0 +1,157 @@
+"""Surfaces in files: what is read is what was written, under a name that says what it holds."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from generator.alphabet.known import alphabet_named
+from generator.alphabet.outline import SymbolStyle, outlines
+from generator.errors import PrintError
+from generator.printed import prints
+from generator.printed.gcode import toolpath_of
+from generator.printed.prints import (
+    FaceOnPart,
+    PrintJob,
+    left_to_print,
+    print_part,
+    print_plan,
+    surface_keys,
+    surface_path,
+)
+from generator.printed.slicer import SlicedPart
+from generator.printed.surface import Coverage, PrintedSurface
+from generator.printed.surface_file import UNIT_MM, is_written, read_surface, write_surface
+from generator.solid.part import Embossing
+
+SIZE = np.array([9.0, 6.0, 0.6])
+
+
+def rough_surface(rng: np.random.Generator) -> PrintedSurface:
+    heights = rng.uniform(-2.5, 1.4, (40, 60)).astype(np.float32)
+    heights[:5] = -np.inf
+    T = np.eye(4)
+    T[:2, :2] = [[0.0, -1.0], [1.0, 0.0]]
+    T[:2, 3] = (3.0, -1.0)
+    return PrintedSurface(heights, (-0.5, 0.25), 0.05, T, np.eye(4), Coverage(0, 0, 0))
+
+
+def test_a_surface_reads_as_it_was_to_half_a_unit(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    surface = rough_surface(rng)
+    write_surface(surface, tmp_path / "a")
+    held = read_surface(tmp_path / "a")
+    points = rng.uniform(-5.0, 6.0, (4000, 2))
+    asked, found = surface.heights_mm(points), held.heights_mm(points)
+    laid = np.isfinite(asked)
+    assert 100 < laid.sum() < 4000
+    assert (laid == np.isfinite(found)).all()
+    assert np.abs(asked[laid] - found[laid]).max() <= UNIT_MM / 2 + 1e-9
+    assert surface.top_mm <= held.top_mm <= surface.top_mm + UNIT_MM
+    assert found.max() <= held.top_mm
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.json", "a.npy"]
+
+
+def test_a_print_that_stands_aside_is_moved_back(tmp_path: Path) -> None:
+    surface = rough_surface(np.random.default_rng(2))
+    write_surface(surface, tmp_path / "a", moved_mm=(0.3, -0.2))
+    held = read_surface(tmp_path / "a")
+    points = np.random.default_rng(3).uniform(0.0, 3.0, (500, 2))
+    asked = surface.heights_mm(points + np.array((0.3, -0.2)))
+    assert np.isfinite(asked).any()
+    assert held.heights_mm(points) == pytest.approx(asked, abs=UNIT_MM)
+    assert held.moved_mm == (0.3, -0.2)
+
+
+def test_without_plastic_nothing_is_read(tmp_path: Path) -> None:
+    bare = replace(rough_surface(np.random.default_rng(2)),
+                   heights=np.full((3, 3), -np.inf, np.float32))  # fmt: skip
+    write_surface(bare, tmp_path / "a")
+    held = read_surface(tmp_path / "a")
+    assert np.isneginf(held.top_mm)
+    assert np.isneginf(held.heights_mm(np.zeros((1, 2)))).all()
+
+
+def test_what_is_damaged_or_of_another_format_is_no_surface(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    assert not is_written(path)
+    with pytest.raises(PrintError, match="not there or cannot be read") as caught:
+        read_surface(path)
+    assert "--resume" in caught.value.fix
+    write_surface(rough_surface(np.random.default_rng(1)), path)
+    assert is_written(path)
+    values = json.loads((tmp_path / "a.json").read_text())
+    (tmp_path / "a.json").write_text(json.dumps(values | {"format": 0}))
+    assert not is_written(path)
+    (tmp_path / "a.json").write_text("{")
+    assert not is_written(path)
+    with pytest.raises(PrintError):
+        read_surface(path)
+    (tmp_path / "a.json").write_text(json.dumps(values))
+    (tmp_path / "a.npy").unlink()
+    assert not is_written(path)
+
+
+def wall_gcode() -> str:
+    """A block of SIZE in three layers, lines along x, its middle at (50, 50)."""
+    lines = ["M83"]
+    for k in (1, 2, 3):
+        lines.append(f"G1 Z{0.2 * k:.1f}")
+        for n in range(15):
+            y = 50 - SIZE[1] / 2 + 0.2 + 0.4 * n
+            lines += [f"G1 X{50 - SIZE[0] / 2 + 0.2} Y{y:.3f}", f"G1 X{50 + SIZE[0] / 2 - 0.2} E.3"]
+    return "\n".join(lines)
+
+
+@pytest.fixture
+def job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> PrintJob:
+    """A block with a face on top; the slicer is left out."""
+    T_part_gcode = np.eye(4)
+    T_part_gcode[:2, 3] = -50.0
+    low = np.array([-SIZE[0] / 2, -SIZE[1] / 2, 0.0])
+    sliced = SlicedPart(toolpath_of(wall_gcode()), T_part_gcode, low, low + SIZE)
+    monkeypatch.setattr(prints, "slicer_version", lambda: "test")
+    monkeypatch.setattr(prints, "slice_part", lambda *_args, **_options: sliced)
+    T = np.eye(4)
+    T[:3, 3] = (*low[:2], SIZE[2])
+    tiers = outlines(alphabet_named("dense-4"), SymbolStyle())
+    symbols = Embossing(0, 0, T, 0.0, np.zeros((0, 2)), np.zeros(0, np.int64), (), tiers, 7.0)
+    corners = np.array([(0.0, 0.0), (SIZE[0], 0.0), (SIZE[0], SIZE[1]), (0.0, SIZE[1])])
+    face = FaceOnPart("F1", corners, symbols)
+    return PrintJob("Block-F1", tmp_path / "b.stl", "ab" * 32, False, (face,))
+
+
+def test_a_part_is_printed_once_and_the_same_again(job: PrintJob, tmp_path: Path) -> None:
+    plan = print_plan("fdm-0.4-0.2", "usual", 3)
+    assert left_to_print(job, plan, tmp_path / "one")
+    for folder in ("one", "two"):
+        print_part(job, plan, tmp_path / folder)
+        assert not left_to_print(job, plan, tmp_path / folder)
+    (key,) = surface_keys(job, plan).values()
+    first, second = (surface_path(tmp_path / folder, key) for folder in ("one", "two"))
+    for suffix in (".npy", ".json"):
+        assert first.with_suffix(suffix).read_bytes() == second.with_suffix(suffix).read_bytes()
+    middle = np.array([[SIZE[0] / 2, SIZE[1] / 2]])
+    assert read_surface(first).heights_mm(middle) == pytest.approx([0.0], abs=0.12)
+    assert np.isneginf(read_surface(first).heights_mm(middle + SIZE[0])).all()
+
+
+def test_a_key_follows_from_what_decides_the_surface_alone(job: PrintJob) -> None:
+    plan = print_plan("fdm-0.4-0.2", "usual", 3)
+    known = surface_keys(job, plan)
+    assert surface_keys(replace(job, file=Path("elsewhere.stl"), name="Other"), plan) == known
+    moved = replace(job.faces[0].embossing, T_part_facet=np.eye(4))
+    others = [
+        surface_keys(job, print_plan("fdm-0.4-0.3", "usual", 3)),
+        surface_keys(job, print_plan("fdm-0.4-0.2", "bad", 3)),
+        surface_keys(job, print_plan("fdm-0.4-0.2", "usual,flow=1.03", 3)),
+        surface_keys(job, print_plan("fdm-0.4-0.2", "usual", 4)),
+        surface_keys(replace(job, sha256="cd" * 32), plan),
+        surface_keys(replace(job, supports=True), plan),
+        surface_keys(replace(job, faces=(replace(job.faces[0], embossing=moved),)), plan),
+    ]
+    assert len({keys["F1"] for keys in [known, *others]}) == 1 + len(others)
