@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from probe.contact.engines import engine_named
 from probe.simulate.world.levels import LEVELS
 from recognizer.touch.reader import Reader
 from recognizer.touch.settings import DEFAULTS
@@ -27,6 +28,8 @@ TOUCHES = "touches"  #: name of the series that is counted
 BLANK, STRANGE = "blank", "foreign"
 ON_FACES = ("face", "edge", "corner", "worn", COPY, NEAR, SMALL, SIDE)
 ON_PARTS = (*ON_FACES, SAME_PROFILE)  #: all that touch written parts
+#: What is touched: the written STL files, what a printer leaves of them, the registered faces.
+FILES, PRINTED, REGISTERED = SURFACES = ("files", "printed", "database")
 
 Shares = tuple[tuple[str, float], ...]
 
@@ -62,15 +65,20 @@ class Campaign:
     kinds: Shares = KINDS
     levels: Shares = LEVEL_SHARES
     overlay: str = "tab"
-    files: bool = True  #: touch the written STL files
+    surfaces: str = "files"  #: what is touched: `SURFACES`
+    print_profile: str = ""  #: of printed surfaces: machine, nozzle, layers
+    faults: str = ""  #: of printed surfaces: what the machine does wrong
     engine: str = "own"  #: of contact
     sensor_per: str = "touch"  #: or `run`: how long the errors of a sensor stay the same
     study: int = 0  #: touches of every reader of `READERS`; 0: no study
     shard: int = SHARING.shard  #: touches in a file: at most so many are lost with a run
 
 
-def bodies_alone(campaign: Campaign, named: bool) -> Campaign:
-    """Return a campaign whose engine touches closed bodies: no surfaces of no database.
+def parts_alone(campaign: Campaign, named: bool) -> Campaign:
+    """Return a campaign that touches parts alone, where it can touch nothing else.
+
+    Engines of closed bodies know written parts, prints are of parts of the set; neither knows
+    surfaces of no database.
 
     Parameters
     ----------
@@ -82,23 +90,29 @@ def bodies_alone(campaign: Campaign, named: bool) -> Campaign:
     Raises
     ------
     ValidationError
-        It asks for what such an engine cannot touch.
+        It asks for what cannot be touched so.
     """
-    other = [kind for kind, _ in campaign.kinds if kind not in ON_PARTS]
-    if named and other:
+    bodies = engine_named(campaign.engine).bodies
+    if not bodies and campaign.surfaces != PRINTED:
+        return campaign
+    if bodies and (campaign.surfaces != FILES or campaign.overlay != "tab"):
+        known = {PRINTED: "prints, which are height maps", REGISTERED: "registered faces"}
+        what = "the pad" if campaign.overlay != "tab" else known[campaign.surfaces]
         raise ValidationError(
-            f"engine {campaign.engine} touches written parts, not {', '.join(other)}",
-            fix=f"name kinds among {', '.join(ON_PARTS)}, or take --engine own",
-            place="--kinds",
-        )
-    if not campaign.files or campaign.overlay != "tab":
-        what = "the pad" if campaign.overlay != "tab" else "registered faces"
-        raise ValidationError(
-            f"engine {campaign.engine} touches written parts by tabs, not {what}",
+            f"engine {campaign.engine} touches closed bodies by tabs, not {what}",
             fix="take --surfaces files and --overlay tab, or --engine own",
             place="--engine",
         )
-    kept = [(kind, share) for kind, share in campaign.kinds if kind in ON_PARTS]
+    allowed = ON_FACES if campaign.surfaces == PRINTED else ON_PARTS
+    other = [kind for kind, _ in campaign.kinds if kind not in allowed]
+    if named and other:
+        who = f"engine {campaign.engine} touches" if bodies else "prints are"
+        raise ValidationError(
+            f"{who} parts of the set, not {', '.join(other)}",
+            fix=f"name kinds among {', '.join(allowed)}, or take --engine own and --surfaces files",
+            place="--kinds",
+        )
+    kept = [(kind, share) for kind, share in campaign.kinds if kind in allowed]
     total = sum(share for _, share in kept)
     return replace(campaign, kinds=tuple((kind, share / total) for kind, share in kept))
 
@@ -155,16 +169,21 @@ def plan_of(
     database: str,
     number: int,
     labs: tuple[str, ...] = (),
+    prints: str = "",
 ) -> tuple[str, TouchPlan]:
-    """Return the kind of a touch as `kinds` names it, and the plan that draws it."""
+    """Return the kind of a touch as `kinds` names it, and the plan that draws it.
+
+    `prints` is the listing of the printed surfaces, where these are touched.
+    """
     rng = np.random.default_rng([campaign.seed, number, 1])
     kind, level = _draw(series.kinds, rng), _draw(series.levels, rng)
     surface = kind
     if kind == STRANGE:
         strange = [name for name in FOREIGN if name != BLANK]
         surface = strange[int(rng.integers(len(strange)))]
-    plan = TouchPlan(database, campaign.seed, level, surface, files=campaign.files,
-                     engine=campaign.engine, sensor_per=campaign.sensor_per, labs=labs)  # fmt: skip
+    plan = TouchPlan(database, campaign.seed, level, surface, files=campaign.surfaces == FILES,
+                     prints=prints, engine=campaign.engine, sensor_per=campaign.sensor_per,
+                     labs=labs)  # fmt: skip
     return kind, plan
 
 

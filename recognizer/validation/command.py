@@ -103,10 +103,25 @@ def touch_set(
         str, typer.Option(metavar="tab|pad", show_default=False, help="Elastic overlay; tab."),
     ] = "",
     surfaces: Annotated[
-        str, typer.Option(metavar="files|database", show_default=False,
-                          help="What is touched: the written STL files, or the registered faces; "
+        str, typer.Option(metavar="files|printed|database", show_default=False,
+                          help="What is touched: the written STL files, what a filament printer "
+                               "leaves of them (needs PrusaSlicer), or the registered faces; "
                                "files."),
     ] = "",
+    print_profile: Annotated[
+        str, typer.Option(metavar="NAME", show_default=False,
+                          help="Of printed surfaces: nozzle and layer, as fdm-0.6-0.3, or a .ini "
+                               "file that PrusaSlicer exported; fdm-0.4-0.2."),
+    ] = "",
+    faults: Annotated[
+        str, typer.Option(metavar="none|usual|bad|k=v,...", show_default=False,
+                          help="Of printed surfaces: what the machine does wrong; none."),
+    ] = "",
+    prints: Annotated[
+        Path | None, typer.Option(metavar="DIR", show_default=False,
+                                  help="Folder of printed surfaces and G-code that runs share; "
+                                       "printed in the folder of the run."),
+    ] = None,
     engine: Annotated[
         str, typer.Option(metavar="own|mujoco", show_default=False,
                           help="Who computes the contact; own. mujoco shares no model with the "
@@ -160,9 +175,10 @@ def touch_set(
         with progress_bar("making the set") as bar:
             result = validate(
                 specs or (), folder=folder, touches=touches, database=database, kinds=kinds,
-                levels=levels, overlay=overlay, surfaces=surfaces, engine=engine,
-                sensor_per=sensor_per, study=study, shard=shard, seed=seed, jobs=processes,
-                cluster=cluster, resume=resume, progress=TouchProgress(bar),
+                levels=levels, overlay=overlay, surfaces=surfaces, print_profile=print_profile,
+                faults=faults, prints=prints or "", engine=engine, sensor_per=sensor_per,
+                study=study, shard=shard, seed=seed, jobs=processes, cluster=cluster,
+                resume=resume, progress=TouchProgress(bar),
             )  # fmt: skip
         _say(result, as_json=as_json)
         return result.exit_code(fail_under)

@@ -28,6 +28,7 @@ from probe.surface.contract import HeightMap
 from probe.surface.face import FaceSurface
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.reader import Reader
+from recognizer.validation.errors import ValidationError
 from recognizer.validation.made_kinds import SAME_PROFILE, SIDE, is_extra
 from recognizer.validation.settings import DRAWING
 from recognizer.validation.surfaces import FOREIGN
@@ -55,6 +56,7 @@ class TouchPlan:
     tilt_rad: float = DRAWING.tilt_rad
     worn: float = DRAWING.worn
     files: bool = False  #: touch the written STL files, not what the database says of them
+    prints: str = ""  #: listing of the printed surfaces that are touched instead; empty: none
     engine: str = "own"  #: of contact, `probe.contact.engines`
     sensor_per: str = "touch"  #: or `run`: the errors of the sensor stay the same
     labs: tuple[str, ...] = ()  #: databases of other labs, of `same_profile`
@@ -83,11 +85,21 @@ class DrawnTouch:
 def draw_touch(plan: TouchPlan, number: int, reader: Reader) -> DrawnTouch:
     """Return what is touched in a trial, and the reading."""
     rng = np.random.default_rng([plan.seed, number])
-    level = LEVELS[plan.level]
+    level = level_of(plan)
     ranges = _ranges(plan, level)
     copy = _copy_of_run(plan.seed, reader.sensor) if plan.sensor_per == "run" else None
     anew: list[str] = []
-    arrays = [one for one in reader.lab.arrays if plan.kind in FOREIGN or _by_name(one, plan.kind)]
+    arrays = [
+        one
+        for one in reader.lab.arrays
+        if plan.kind in FOREIGN or _by_name(one, plan.kind, plan.prints)
+    ]
+    if not arrays:
+        raise ValidationError(
+            f"no face for touches of kind {plan.kind}{' was printed' if plan.prints else ''}",
+            fix="name other kinds, or another set",
+            place=plan.prints or plan.database,
+        )
     encoding = arrays[int(rng.integers(len(arrays)))]
     while True:
         met = _meet(plan, encoding, ranges, rng)
@@ -128,12 +140,12 @@ def _meet(
             scene, plan.kind, _inradius_mm(lab, name, shown, plan.files), rng, ranges
         )
         return MetSurface(scene.under(touch).surface, touch, scene)
-    known = _by_name(encoding, plan.kind)
+    known = _by_name(encoding, plan.kind, plan.prints)
     face = encoding.face(known[int(rng.integers(len(known)))])
-    scene = scene_of(plan.database, face.object, face.face, plan.files)
+    scene = scene_of(plan.database, face.object, face.face, plan.files, plan.prints)
     if plan.kind == SIDE:
         return _lay_beside(plan, encoding, scene, ranges, rng)
-    most = _inradius_mm(plan.database, face.object, face.face, plan.files)
+    most = _inradius_mm(plan.database, face.object, face.face, plan.files, plan.prints)
     touch = _draw_on_face(scene, plan.kind, most, rng, ranges)
     surface = scene.under(touch).surface
     if plan.kind == "worn" and isinstance(surface, FaceSurface):
@@ -149,10 +161,10 @@ def _lay_beside(
     rng: np.random.Generator,
 ) -> MetSurface:  # fmt: skip
     """Lay a face of another object beside one, and touch near where they meet."""
-    faces = [encoding.face(n) for n in _by_name(encoding, SIDE)]
+    faces = [encoding.face(n) for n in _by_name(encoding, SIDE, plan.prints)]
     others = [face for face in faces if face.object != scene.object_name]
     other = others[int(rng.integers(len(others)))]
-    second = scene_of(plan.database, other.object, other.face, plan.files)
+    second = scene_of(plan.database, other.object, other.face, plan.files, plan.prints)
     place, at = lay_beside(scene.region, second.region, rng)
     touch = replace(_draw_anywhere(rng, ranges), x_mm=float(at[0]), y_mm=float(at[1]))
     surface = SideBySide(scene.surface, second.surface, place)
@@ -191,8 +203,10 @@ def _copy_of_run(seed: int, sensor: SensorType) -> SensorCopy:
 
 
 @lru_cache(maxsize=32)
-def _by_name(encoding: EmbossedArray, kind: str) -> list[int]:
+def _by_name(encoding: EmbossedArray, kind: str, prints: str = "") -> list[int]:
     """Return the faces that a kind touches, in the order of their objects' names.
+
+    With prints, those that were printed alone.
 
     Their numbers follow the order of registration, which a set made in parallel leaves to chance.
     """
@@ -201,12 +215,28 @@ def _by_name(encoding: EmbossedArray, kind: str) -> list[int]:
     found = [n for n in found if is_extra(names[faces[n][0]], kind)]
     if kind == SIDE:  # round faces roll away from each other
         found = [n for n in found if encoding.face(n).round is None]
-    return found
+    if not prints:
+        return found
+    from probe.simulate.printed import read_listing
+
+    printed = read_listing(prints).keys
+    shown = {n: encoding.face(n) for n in found}
+    return [n for n, face in shown.items() if (face.object, face.face) in printed]
+
+
+def level_of(plan: TouchPlan) -> Level:
+    """Return what is wrong with the sensor; a printed surface brings the print's faults itself."""
+    level = LEVELS[plan.level]
+    return replace(level, wider_mm=0.0, scale=0.0) if plan.prints else level
 
 
 @lru_cache(maxsize=512)
-def scene_of(database: str, object_name: str, face: str, files: bool) -> Scene:
-    """Return a face as it was written, or as the database says that it is."""
+def scene_of(database: str, object_name: str, face: str, files: bool, prints: str = "") -> Scene:
+    """Return a face as it was printed, as it was written, or as the database says that it is."""
+    if prints:
+        from probe.simulate.printed import printed_scene
+
+        return printed_scene(prints, database, object_name, face)
     if files:
         return written_surface(database, object_name, face)
     return registered_surface(database, object_name, face)
@@ -233,9 +263,11 @@ def _draw_on_face(
 
 
 @lru_cache(maxsize=512)
-def _inradius_mm(database: str, object_name: str, face: str, files: bool) -> float:
+def _inradius_mm(
+    database: str, object_name: str, face: str, files: bool, prints: str = ""
+) -> float:
     """Return how far the inmost point of a face lies from its edges, mm, nearly."""
-    scene = scene_of(database, object_name, face, files)
+    scene = scene_of(database, object_name, face, files, prints)
     low, high = scene.region.box_mm
     x, y = (low + (high - low) * np.linspace(0, 1, 64)[:, None]).T
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)

@@ -15,12 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from probe.contact.engines import ENGINES, engine_named
+from probe.contact.engines import ENGINES
 from recognizer.validation.campaign import (
+    FILES,
+    PRINTED,
+    SURFACES,
     Campaign,
-    bodies_alone,
     kinds_of,
     levels_of,
+    parts_alone,
     series_of,
     shards_of,
 )
@@ -68,6 +71,8 @@ class CampaignOptions:
     levels: str = ""
     overlay: str = ""
     surfaces: str = ""
+    print_profile: str = ""
+    faults: str = ""
     engine: str = ""
     sensor_per: str = ""
     study: int | None = None
@@ -84,6 +89,9 @@ def validate(
     levels: str = "",
     overlay: str = "",
     surfaces: str = "",
+    print_profile: str = "",
+    faults: str = "",
+    prints: str | Path = "",
     engine: str = "",
     sensor_per: str = "",
     study: int | None = None,
@@ -111,7 +119,14 @@ def validate(
     overlay
         `tab` or `pad`; tabs if empty.
     surfaces
-        `files`: the written STL files are touched; `database`: the registered faces.
+        `files`: the written STL files are touched; `printed`: what PrusaSlicer's G-code leaves of
+        them; `database`: the registered faces.
+    print_profile
+        Of printed surfaces: a name such as `fdm-0.4-0.2`, or a file that PrusaSlicer exported.
+    faults
+        Of printed surfaces: none, usual, bad, or k=v,... of the machine's faults.
+    prints
+        Folder of printed surfaces that runs share; `printed` in the folder if empty.
     engine
         Of contact: `own`, or `mujoco` (extra `engines`), which touches written files alone and
         draws no surfaces of no database.
@@ -135,6 +150,8 @@ def validate(
     ------
     ValidationError, SetError, WorkersError
         See `run.prepare`, `workers`, `cluster`.
+    PrintError
+        Printed surfaces without PrusaSlicer, or an unknown profile or fault.
     MissingExtraError
         What writes tables and pictures is not installed.
 
@@ -149,12 +166,21 @@ def validate(
     begun, start = datetime.now(UTC), time.monotonic()
     named = [Path(spec) for spec in ([specs] if isinstance(specs, str | Path) else specs)]
     place, steps = Path(folder), progress or TouchProgress()
-    options = CampaignOptions(touches, seed, kinds, levels, overlay, surfaces, engine,
-                              sensor_per, study, shard)  # fmt: skip
+    options = CampaignOptions(touches, seed, kinds, levels, overlay, surfaces, print_profile,
+                              faults, engine, sensor_per, study, shard)  # fmt: skip
     known = resume and (place / RECORD).exists()
     campaign = _campaign(options, read_record(place).campaign if known else None)
+    printed = campaign.surfaces == PRINTED
+    if printed and not known:
+        from recognizer.validation.printing import print_options
+
+        print_options(campaign).plan()  # before anything is made: is all there that it needs?
     with lock_folder(place):
         record = prepare_run(place, campaign, named, database, resume=resume)
+        if printed:
+            from recognizer.validation.printing import print_set
+
+            print_set(record, place, Path(prints) if prints else None, jobs, steps)
         touch_all(record, place, workers_of(jobs, cluster), steps)
         steps.begin("report", 0, 0)
         results = _finish(record, place)
@@ -187,7 +213,7 @@ def _campaign(options: CampaignOptions, known: Campaign | None) -> Campaign:
     """Return what is record for, options over what was record before over defaults."""
     for given, allowed, option in (
         (options.overlay, ("tab", "pad"), "--overlay"),
-        (options.surfaces, ("files", "database"), "--surfaces"),
+        (options.surfaces, SURFACES, "--surfaces"),
         (options.engine, tuple(ENGINES), "--engine"),
         (options.sensor_per, ("touch", "run"), "--sensor-per"),
     ):
@@ -205,17 +231,25 @@ def _campaign(options: CampaignOptions, known: Campaign | None) -> Campaign:
         kinds=kinds_of(options.kinds) if options.kinds else base.kinds,
         levels=levels_of(options.levels) if options.levels else base.levels,
         overlay=options.overlay or base.overlay,
-        files=options.surfaces == "files" if options.surfaces else base.files,
+        surfaces=options.surfaces or base.surfaces,
+        print_profile=options.print_profile or base.print_profile,
+        faults=options.faults or base.faults,
         engine=options.engine or base.engine,
         sensor_per=options.sensor_per or base.sensor_per,
         study=study if options.study is None else options.study,
         shard=base.shard if options.shard is None else options.shard,
     )
-    return (
-        bodies_alone(campaign, bool(options.kinds))
-        if engine_named(campaign.engine).bodies
-        else campaign
-    )
+    for given, option in (
+        (campaign.print_profile, "--print-profile"),
+        (campaign.faults, "--faults"),
+    ):
+        if given and campaign.surfaces != PRINTED:
+            raise ValidationError(
+                f"{campaign.surfaces} are touched, nothing is printed",
+                fix="add --surfaces printed",
+                place=option,
+            )
+    return parts_alone(campaign, bool(options.kinds))
 
 
 def _finish(record: RunRecord, folder: Path) -> dict[str, Any]:
@@ -238,13 +272,18 @@ def _finish(record: RunRecord, folder: Path) -> dict[str, Any]:
             "decoders": decoder_study(reader.lab.arrays[0], campaign.seed),
             "readers": reader_study(folder, campaign),
         }
-        plan = TouchPlan(work.database, campaign.seed, kind="face", files=campaign.files,
+        plan = TouchPlan(work.database, campaign.seed, kind="face",
+                         files=campaign.surfaces == FILES, prints=work.prints,
                          engine=campaign.engine)  # fmt: skip
         saved = find_savings(reader, plan, studies["readers"])
         results["study"] = {name: study.counted for name, study in studies.items()}
         results["left_out"] = saved.counted
         times |= {name: study.spent for name, study in studies.items()}
         times["left_out"] = saved.spent
+    if campaign.surfaces == PRINTED:
+        from recognizer.validation.printing import prints_as_results
+
+        results["printed"] = prints_as_results(folder, campaign)
     results["extremes"] = extremes(reader)
     results["provenance"] = asked
     write_table(table, folder / TRIALS)

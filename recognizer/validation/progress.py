@@ -25,6 +25,14 @@ class TouchProgress:
         self._start = time.monotonic()
         self._bar.begin(stage, touches or None, done)
 
+    def step(self, what: str) -> None:
+        """Take note of one more thing that is done in a stage without touches."""
+        self._new += 1
+        done = self._before + self._new
+        rate = self._new / max(time.monotonic() - self._start, 1e-3)
+        left = timedelta(seconds=round((self._touches - done) / max(rate, 1e-9)))
+        self._bar.show(done, f"{done:,}/{self._touches:,} {what}, {left} left")
+
     def add(self, rows: Iterable[Row]) -> None:
         """Take note of some more touches."""
         for row in rows:

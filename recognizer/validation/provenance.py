@@ -92,8 +92,11 @@ def command_of(record: RunRecord) -> str:
         words += ["--engine", campaign.engine]
     if campaign.sensor_per != plain.sensor_per:
         words += ["--sensor-per", campaign.sensor_per]
-    if campaign.files != plain.files:
-        words += ["--surfaces", "database"]
+    if campaign.surfaces != plain.surfaces:
+        words += ["--surfaces", campaign.surfaces]
+    if campaign.print_profile:
+        words += ["--print-profile", _bare_path(campaign.print_profile)]
+    words += ["--faults", campaign.faults] if campaign.faults else []
     words += ["--study", str(campaign.study)]
     words += ["--shard", str(campaign.shard)] if campaign.shard != plain.shard else []
     return shlex.join(words)

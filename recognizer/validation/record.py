@@ -12,14 +12,15 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from generator.database.url import normal_url
-from recognizer.validation.campaign import Campaign
+from recognizer.validation.campaign import PRINTED, Campaign
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.files import write_json
 from recognizer.validation.made_kinds import labs_of
 from recognizer.validation.work import Work, code_digest
 
 RECORD = "asked.json"
-FORMAT = 1  #: of the record; another one is refused
+PRINTS = "printed.json"  #: which surface of the folder of prints is which face
+FORMAT = 2  #: of the record; another one is refused
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +37,8 @@ class RunRecord:
         """Return what the workers get."""
         url = absolute_database(self.database, folder)
         labs = labs_of(folder, [kind for kind, _ in self.campaign.kinds])
-        return Work(self.campaign, url, self.set_digest, self.code_digest, labs)
+        prints = str(folder.absolute() / PRINTS) if self.campaign.surfaces == PRINTED else ""
+        return Work(self.campaign, url, self.set_digest, self.code_digest, labs, prints)
 
     def work_now(self, folder: Path) -> Work:
         """Return the same for this version, which may be another than that of the touches."""

@@ -75,7 +75,7 @@ def repeat_touch(folder: Path, number: int, plot: Path | None) -> dict[str, Any]
         )
     work = record.work_now(folder)
     reader = prepare_reader(work)
-    kind, plan = plan_of(record.campaign, series, work.database, number, work.labs)
+    kind, plan = plan_of(record.campaign, series, work.database, number, work.labs, work.prints)
     found = draw_touch(plan, number, reader)
     answer = recognise(reader, signal_of(found.counts.astype(np.float64)), number)
     trial = judge(plan, number, found, answer, 0.0)

@@ -34,6 +34,7 @@ class Work:
     set_digest: str
     code_digest: str
     labs: tuple[str, ...] = ()  #: databases of other labs, as the workers find them
+    prints: str = ""  #: listing of the printed surfaces, as the workers find it; empty: none
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +63,7 @@ def touch(work: Work, batch: Batch) -> BatchResult:
     reading = reader_with(reader, series.reader)
     rows, times = [], []
     for number in range(batch.first, batch.last):
-        kind, plan = plan_of(work.campaign, series, work.database, number, work.labs)
+        kind, plan = plan_of(work.campaign, series, work.database, number, work.labs, work.prints)
         start = time.process_time()
         found = trial(plan, number, reading)
         spent = time.process_time() - start

@@ -16,11 +16,14 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from multiprocessing import active_children, connection, get_context, parent_process
+from typing import Any, TypeVar
 
 from recognizer.validation.campaign import Batch
 from recognizer.validation.errors import WorkersError
 from recognizer.validation.settings import SHARING
 from recognizer.validation.work import BatchResult, Work, Workers, touch
+
+Result = TypeVar("Result")
 
 
 def workers_of(processes: int, cluster: str = "") -> Workers:
@@ -51,7 +54,7 @@ def in_processes(processes: int, work: Work, batches: Iterable[Batch]) -> Iterat
     while left:
         before = len(left)
         try:
-            for done in _run_pool(processes, work, left):
+            for done in run_pool(processes, touch, [(work, batch) for batch in left]):
                 left.remove(done.batch)
                 yield done
         except BrokenProcessPool as error:
@@ -63,11 +66,20 @@ def in_processes(processes: int, work: Work, batches: Iterable[Batch]) -> Iterat
                 ) from error
 
 
-def _run_pool(processes: int, work: Work, batches: list[Batch]) -> Iterator[BatchResult]:
+def run_pool(
+    processes: int, function: Callable[..., Result], calls: Iterable[tuple[Any, ...]]
+) -> Iterator[Result]:
+    """Yield what calls of a function return, as they are done by several processes at a time.
+
+    Raises
+    ------
+    BrokenProcessPool
+        A process was lost; also what a call raises.
+    """
     # Begun anew rather than forked: no open database and no thread is taken over.
     pool = ProcessPoolExecutor(processes, get_context("spawn"), initializer=_prepare_worker)
     try:
-        waiting = [pool.submit(touch, work, batch) for batch in batches]
+        waiting = [pool.submit(function, *call) for call in calls]
         yield from _as_done(waiting)
     except BaseException:
         for process in active_children():
@@ -77,7 +89,7 @@ def _run_pool(processes: int, work: Work, batches: list[Batch]) -> Iterator[Batc
         pool.shutdown(cancel_futures=True)
 
 
-def _as_done(waiting: list[Future[BatchResult]]) -> Iterator[BatchResult]:
+def _as_done(waiting: list[Future[Result]]) -> Iterator[Result]:
     """Yield what is done, as it is done; an interrupt comes through at once."""
     left = set(waiting)
     while left:

@@ -8,10 +8,13 @@ from scipy.stats import binomtest, chi2
 
 from recognizer.validation.campaign import (
     KINDS,
+    PRINTED,
+    REGISTERED,
     Campaign,
     batches_of,
     kinds_of,
     levels_of,
+    parts_alone,
     plan_of,
     series_of,
     shards_of,
@@ -114,6 +117,29 @@ def test_kinds_come_in_their_shares_and_from_the_number_alone():
     assert plan_of(campaign, series, "lab.db", 77) == drawn[77]
     other = Campaign(80, seed=3)
     assert plan_of(other, series_of(other)[0], "lab.db", 77) == drawn[77]
+
+
+@pytest.mark.parametrize("engine", ["own", "mujoco"])
+def test_prints_and_bodies_are_parts_of_the_set(engine):
+    campaign = Campaign(surfaces=PRINTED if engine == "own" else "files", engine=engine)
+    kept = dict(parts_alone(campaign, named=False).kinds)
+    assert sum(kept.values()) == pytest.approx(1.0)
+    assert kept["face"] / kept["edge"] == pytest.approx(5.5)
+    assert not {"blank", "foreign"} & set(kept)
+    with pytest.raises(ValidationError, match="not blank, foreign"):
+        parts_alone(campaign, named=True)
+    named = Campaign(surfaces=campaign.surfaces, engine=engine, kinds=(("edge", 1.0),))
+    assert parts_alone(named, named=True) == named
+
+
+def test_registered_faces_and_the_pad_are_no_bodies():
+    for asked in (Campaign(surfaces=REGISTERED, engine="mujoco"),
+                  Campaign(overlay="pad", engine="mujoco")):  # fmt: skip
+        with pytest.raises(ValidationError, match="by tabs, not"):
+            parts_alone(asked, named=False)
+    assert parts_alone(Campaign(surfaces=REGISTERED), named=True) == Campaign(surfaces=REGISTERED)
+    pad = Campaign(overlay="pad", surfaces=PRINTED)
+    assert parts_alone(pad, named=False).overlay == "pad"
 
 
 @pytest.mark.parametrize("touches", [1, 24, 25, 999, 1000, 1001, 2530])
