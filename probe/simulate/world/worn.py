@@ -15,6 +15,8 @@ from probe.surface.face import FaceSurface
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+_ASKED = 9  # heights along each edge of a cell
+
 
 def wear_face(face: FaceSurface, share: float, rng: np.random.Generator) -> FaceSurface:
     """Return a face of which a share of the symbols is worn away."""
@@ -41,6 +43,7 @@ class WornAway:
     centres_mm: Array  #: (n, 2) of the worn symbols, surface frame
     rotation_rad: float  #: turns the surface's x axis into the array's
     pitch_mm: float
+    bases_mm: Array  #: (n,) height of the face about each: 0 as designed, others where it is bowed
 
     @property
     def top_mm(self) -> float:
@@ -50,13 +53,16 @@ class WornAway:
     def heights_mm(self, points_mm: Array) -> Array:
         """Return the heights, none above the face in the cell of a worn symbol."""
         heights = self.surface.heights_mm(points_mm)
+        if len(self.centres_mm) == 0:
+            return heights
         c, s = np.cos(self.rotation_rad), np.sin(self.rotation_rad)
         turned = np.array([[c, s], [-s, c]])
-        high = np.flatnonzero(heights > 0)
+        high = np.flatnonzero(heights > self.bases_mm.min())
         away = points_mm[high, None, :] @ turned - self.centres_mm @ turned
-        gone = (np.abs(away) <= self.pitch_mm / 2).all(axis=2).any(axis=1)
+        within = (np.abs(away) <= self.pitch_mm / 2).all(axis=2)
         heights = heights.copy()
-        heights[high[gone]] = 0.0
+        lowest = np.where(within, self.bases_mm, np.inf).min(axis=1)
+        heights[high] = np.minimum(heights[high], lowest)
         return heights
 
     @property
@@ -69,7 +75,8 @@ class WornAway:
         side, top = self.pitch_mm, self.top_mm
         box = Manifold.cube((side, side, 2 * top)).translate((-side / 2, -side / 2, 0))
         box = box.rotate((0, 0, -math.degrees(self.rotation_rad)))
-        boxes = [box.translate((float(x), float(y), 0)) for x, y in self.centres_mm]
+        places = np.column_stack([self.centres_mm, self.bases_mm]).tolist()
+        boxes = [box.translate((x, y, z)) for x, y, z in places]
         gone = Manifold.batch_boolean(boxes, OpType.Add)
         corners, triangles = indexed_triangles(manifold_of(body_of(self.surface)) - gone)
         return corners[triangles]
@@ -96,5 +103,22 @@ def wear_part(
     rng
         Draws them.
     """
-    gone = rng.random(len(centres_mm)) < share
-    return WornAway(surface, centres_mm[gone], rotation_rad, pitch_mm)
+    gone = centres_mm[rng.random(len(centres_mm)) < share]
+    bases = _bases(surface, gone, rotation_rad, pitch_mm)
+    return WornAway(surface, gone, rotation_rad, pitch_mm, bases)
+
+
+def _bases(surface: HeightMap, centres_mm: Array, rotation_rad: float, pitch_mm: float) -> Array:
+    """Return the height of the face about each symbol (n,): the median along its cell's edge.
+
+    Cells lie wholly on the face but for parts of them, and no symbol reaches their edges.
+    """
+    along = pitch_mm * np.linspace(-0.5, 0.5, _ASKED)
+    side = np.full(_ASKED, pitch_mm / 2)
+    sides = [(along, side), (along, -side), (side, along), (-side, along)]
+    edge = np.concatenate([np.column_stack(pair) for pair in sides])
+    c, s = math.cos(rotation_rad), math.sin(rotation_rad)
+    points = centres_mm[:, None] + edge @ np.array([[c, -s], [s, c]])
+    heights = surface.heights_mm(points.reshape(-1, 2)).reshape(len(centres_mm), len(edge))
+    middle: Array = np.median(heights, axis=1) if len(centres_mm) else np.zeros(0)
+    return np.where(np.isfinite(middle), np.round(middle, 6), 0.0)
