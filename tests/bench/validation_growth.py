@@ -39,7 +39,11 @@ def main() -> None:
             fill([engine], array, objects, have, want)
             have = want
             campaign = Campaign(
-                options.touches, options.seed, (("face", 1.0),), (("typical", 1.0),), files=False
+                options.touches,
+                options.seed,
+                (("face", 1.0),),
+                (("typical", 1.0),),
+                surfaces="database",
             )
             work = Work(campaign, url, set_digest(url), code_digest())
             start = time.process_time()
