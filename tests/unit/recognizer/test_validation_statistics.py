@@ -132,10 +132,13 @@ def test_prints_and_bodies_are_parts_of_the_set(engine):
     assert parts_alone(named, named=True) == named
 
 
-def test_registered_faces_and_the_pad_are_no_bodies():
-    for asked in (Campaign(surfaces=REGISTERED, engine="mujoco"),
-                  Campaign(overlay="pad", engine="mujoco")):  # fmt: skip
-        with pytest.raises(ValidationError, match="by tabs, not"):
+def test_height_maps_and_the_pad_are_no_bodies():
+    for asked, said in (
+        (Campaign(surfaces=REGISTERED, engine="mujoco"), "registered faces"),
+        (Campaign(surfaces=PRINTED, engine="mujoco"), "prints, which are height maps"),
+        (Campaign(overlay="pad", engine="mujoco"), "the pad"),
+    ):
+        with pytest.raises(ValidationError, match=f"by tabs, not {said}"):
             parts_alone(asked, named=False)
     assert parts_alone(Campaign(surfaces=REGISTERED), named=True) == Campaign(surfaces=REGISTERED)
     pad = Campaign(overlay="pad", surfaces=PRINTED)
