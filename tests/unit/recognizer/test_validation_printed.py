@@ -197,7 +197,7 @@ def test_other_faces_than_those_of_the_lab_are_refused(
     values = json.loads(Path(listing).read_text())
     (tmp_path / "other.json").write_text(json.dumps(values | {"faces": {"Ball": {"F1": "a"}}}))
     reader = Reader(open_lab(panels), sensor_of("tab"))
-    with pytest.raises(ValidationError, match="none of these faces was printed"):
+    with pytest.raises(ValidationError, match="no face for touches of kind face was printed"):
         draw_touch(TouchPlan(panels, prints=str(tmp_path / "other.json")), 0, reader)
 
 
