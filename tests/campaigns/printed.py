@@ -27,7 +27,7 @@ from generator.solid.part import Part
 from generator.solid.triangulate import triangles
 from generator.spec.read import read_specs
 
-SPECS = ("one-touch", "fine", "thesis", "product")
+SPECS = ("one-touch", "large", "fine", "thesis", "product")
 PRINTS = ("fdm-0.4-0.2", "fdm-0.4-0.3", "fdm-0.6-0.3")
 FAULTS = ("none", "usual", "bad")
 
