@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from encoded_objects.console import output
+from generator.command.promise_report import face_values, promise_lines
 from generator.database.url import without_password
 from generator.pipeline import Encoded, MadeObject
 
@@ -48,18 +48,20 @@ def _object_text(made: MadeObject, dry_run: bool) -> str:
     elif made.reused:
         verb = "registered before, same cells"
     counts = f"{_count(made.faces, 'face')}, {_count(made.symbols, 'symbol')}"
-    parts, places = _count(made.parts, "part"), _count(made.places, "place")
-    lines = [f"{made.name}: {verb}; {counts}, {parts}, {places} told apart by touch"]
+    lines = [f"{made.name}: {verb}; {counts}, {_count(made.parts, 'part')}"]
     if made.touches > 1:
         lines.append(f"  read by a scan: about {made.touches} touches (recognize-object --scan)")
     for face in made.face_reports:
-        size, least = (
-            " x ".join(f"{v:.3g}" for v in each) for each in (face.size_mm, face.smallest_mm)
-        )
-        lines.append(
-            f"  {face.name:6} {size} mm, {_count(face.symbols, 'symbol')}, "
-            f"{_count(face.places, 'place')}; it could be as small as {least} mm"
-        )
+        if face.smallest_mm is not None:
+            size, least = (
+                " x ".join(f"{v:.3g}" for v in each) for each in (face.size_mm, face.smallest_mm)
+            )
+            answered = f"{face.promise.at_once:.0%} answered at once, " if face.promise else ""
+            lines.append(
+                f"  {face.name:6} {size} mm, {_count(face.symbols, 'symbol')}, "
+                f"{answered}it could be as small as {least} mm"
+            )
+    lines += promise_lines(made.face_reports)
     for folder in dict.fromkeys(file.parent for file in made.files):
         lines.append(f"  {folder}{os.sep}  {_file_list(folder, made.files)}")
     return "\n".join(lines)
@@ -107,7 +109,7 @@ def _encoded_values(result: Encoded, dry_run: bool) -> dict[str, Any]:
                 "parts": made.parts,
                 "reused": made.reused,
                 "skipped": made.skipped,
-                "face_reports": [asdict(face) for face in made.face_reports],
+                "face_reports": [face_values(face) for face in made.face_reports],
                 "warnings": list(made.warnings),
             }
             for made in result.objects

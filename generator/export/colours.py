@@ -1,4 +1,7 @@
-"""The two colours of every file: body and symbols, far apart in lightness and hue."""
+"""The two colours of every file, body and symbols, and those of faces by what they answer.
+
+Body and symbols are far apart in lightness and hue.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,18 @@ RGB = tuple[int, int, int]
 
 BODY_RGB: RGB = (198, 205, 214)  #: a light, cool grey
 SYMBOL_RGB: RGB = (232, 119, 34)  #: orange: told apart from the body by every kind of eye
+#: of faces of which no touch, half of them and all are answered: lightness rises with the share,
+#: so that it shows without colours too
+ANSWERED_RGB: tuple[RGB, RGB, RGB] = ((205, 124, 150), (226, 205, 150), (196, 226, 232))
+
+
+def answered_rgb(share: float) -> RGB:
+    """Return the colour of a face that answers a share of touches, 0 to 1."""
+    low = 0 if share < 0.5 else 1
+    part = 2 * min(max(share, 0.0), 1.0) - low
+    ends = zip(ANSWERED_RGB[low], ANSWERED_RGB[low + 1], strict=True)
+    red, green, blue = (round(a + part * (b - a)) for a, b in ends)
+    return red, green, blue
 
 
 def hexadecimal(colour: RGB) -> str:

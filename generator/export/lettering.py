@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from PIL import Image, ImageDraw, ImageFont
 
+from generator.export.colours import answered_rgb
 from generator.export.settings import PREVIEW
 
 Font = ImageFont.ImageFont | ImageFont.FreeTypeFont
@@ -17,6 +18,7 @@ Font = ImageFont.ImageFont | ImageFont.FreeTypeFont
 MARGIN = 30  #: px beside what is drawn and written
 FONT_SIZES = (30, 16, 15)  #: title, names, all else
 CAPTIONS = ("from the front, right, above", "from behind, left, below")
+LEGEND = (132, 11)  #: px wide, and steps of colour
 INK, GREY = (15, 23, 42), (100, 116, 139)
 
 
@@ -87,3 +89,14 @@ def write_lettering(
     for x in (left, right):
         draw.line((x, y - 5, x, y + 5), GREY, 2)
     draw.text(((left + right) / 2, y - 8), f"{length:g} mm", GREY, small, anchor="mb")
+
+
+def write_legend(image: Image.Image, font: Font) -> None:
+    """Say at the top what the colours of faces mean."""
+    draw = ImageDraw.Draw(image)
+    left, y, step = 3 * image.size[0] // 5, 58, LEGEND[0] // LEGEND[1]
+    draw.text((left - 8, y + 8), "touches answered at once: 0 %", GREY, font, anchor="rm")
+    for k in range(LEGEND[1]):
+        x = left + k * step
+        draw.rectangle((x, y, x + step - 1, y + 15), answered_rgb(k / (LEGEND[1] - 1)))
+    draw.text((left + LEGEND[1] * step + 8, y + 8), "100 %", GREY, font, anchor="lm")

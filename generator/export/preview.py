@@ -1,5 +1,6 @@
 """Parts -> PNG: the object from two opposite corners, with the names of its faces.
 
+Where it is known, faces bear the share of touches that they answer, as a number and a colour.
 The left view looks from the front, right and above; the right one from the opposite corner,
 with panels moved apart, so that every face of a convex object is seen. Orthographic, flat
 shading, two by two samples for each pixel. Object frame in mm, z up. Why by hand: `raster`.
@@ -10,14 +11,15 @@ from __future__ import annotations
 import struct
 import sys
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageFont
 
-from generator.export.colours import BODY_RGB, SYMBOL_RGB
+from generator.export.colours import BODY_RGB, SYMBOL_RGB, answered_rgb
 from generator.export.faces import (
     centre_and_normal,
     named_facets,
@@ -31,6 +33,7 @@ from generator.export.lettering import (
     Font,
     Label,
     transliterate,
+    write_legend,
     write_lettering,
 )
 from generator.export.raster import DepthBuffer, rasterise
@@ -40,6 +43,8 @@ from generator.solid.triangulate import Mesh
 
 Points = NDArray[np.float64]
 Colours = NDArray[np.uint32]  # 0xXXBBGGRR
+
+NOTHING_KNOWN: Mapping[str, float] = MappingProxyType({})
 
 # Directions towards the eye, the best first; the second view looks from the opposite side.
 _EYES = tuple(np.array([x, -1.0, z]) for z in (0.62, 0.45, 0.8) for x in (0.62, 0.45, 0.8, 0.3))
@@ -60,7 +65,11 @@ class _Scene:
 
 
 def preview_png(
-    name: str, size_mm: Sequence[float], parts: Sequence[Part], meshes: Sequence[Mesh]
+    name: str,
+    size_mm: Sequence[float],
+    parts: Sequence[Part],
+    meshes: Sequence[Mesh],
+    answered: Mapping[str, float] = NOTHING_KNOWN,
 ) -> bytes:
     """Return the picture.
 
@@ -72,6 +81,8 @@ def preview_png(
         Its extent in x, y and z, mm, for the subtitle.
     parts, meshes
         The parts and the mesh of each, part frame, mm.
+    answered
+        Share of touches that are answered, by the name of a face: its colour, and in its label.
     """
     samples, width, top = PREVIEW.samples, PREVIEW.width, PREVIEW.top
     bottom = PREVIEW.height - PREVIEW.bottom
@@ -93,10 +104,12 @@ def preview_png(
     labels = []
     for i, (scene, axes) in enumerate(zip(scenes, cameras, strict=True)):
         box = (i * width // 2, top, (i + 1) * width // 2, bottom)
-        labels += _draw_view(picture, scene, axes, scale, box, memory, fonts[1])
+        labels += _draw_view(picture, scene, axes, scale, box, memory, fonts[1], answered)
     image = Image.frombuffer("RGBX", picture.shape[::-1], picture, "raw", "RGBX", 0, 1)
     image = image.reduce(samples).convert("RGB")
     write_lettering(image, _subtitle(size_mm, parts), name, labels, scale, fonts, apart=apart)
+    if answered:
+        write_legend(image, fonts[2])
     return _png(np.asarray(image))
 
 
@@ -206,6 +219,7 @@ def _draw_view(
     box: tuple[int, int, int, int],
     memory: NDArray[np.int64],
     font: Font,
+    answered: Mapping[str, float],
 ) -> list[Label]:
     """Draw one view into its box (pixels); return the names of the faces seen."""
     left, top, right, bottom = (PREVIEW.samples * value for value in box)
@@ -220,9 +234,12 @@ def _draw_view(
 
     seen = rasterise(screen(flat), scene.triangles, memory)
     view = picture[top:bottom, left:right]
-    seen.paint(view, _shade(scene, flat))
+    seen.paint(view, _shade(scene, flat, answered))
     _draw_edges(view, screen(scene.edges @ axes.T), seen, 0.6 * fine)
-    texts = [transliterate(name) for name in scene.names]
+    texts = [
+        transliterate(name) + (f" {answered[name]:.0%}" if name in answered else "")
+        for name in scene.names
+    ]
     halves = [font.getlength(text) / 2 + 9 for text in texts]
     middles = screen(scene.centres @ axes.T)[:, :2] / PREVIEW.samples
     facing = np.flatnonzero(scene.normals @ axes[2] > PREVIEW.facing).tolist()
@@ -239,10 +256,12 @@ def _draw_view(
     ]
 
 
-def _shade(scene: _Scene, flat: Points) -> Colours:
+def _shade(scene: _Scene, flat: Points, answered: Mapping[str, float]) -> Colours:
     """Return the colour of each triangle under the light; `flat` in screen axes."""
     light = np.array(PREVIEW.light) / np.linalg.norm(PREVIEW.light)
-    tints = np.array([BODY_RGB, SYMBOL_RGB], np.float64)
+    faces = [answered_rgb(answered[name]) if name in answered else BODY_RGB for name in scene.names]
+    tints = np.array([*faces, BODY_RGB, SYMBOL_RGB], np.float64)  # the face -1 is the body
+    tint_of = np.where(scene.symbols, len(faces) + 1, scene.faces % (len(faces) + 1))
     colours = np.empty(len(scene.triangles), np.uint32)
     for start in range(0, len(colours), PREVIEW.block):
         some = slice(start, start + PREVIEW.block)
@@ -253,7 +272,7 @@ def _shade(scene: _Scene, flat: Points) -> Colours:
         cosine = light @ normals / np.where(lengths > 0, lengths, 1.0)
         # Half of the way round the object still gets some light, so that no face is black.
         shade = PREVIEW.ambient + (1.0 - PREVIEW.ambient) * (0.5 + 0.5 * cosine)
-        tint = tints[scene.symbols[some].astype(np.int64)]
+        tint = tints[tint_of[some]]
         colours[some] = _pack_colours(np.minimum(np.rint(1.06 * tint * shade[:, None]), 255.0))
     return colours
 

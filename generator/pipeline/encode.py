@@ -172,8 +172,12 @@ def _rehearse(
         place = place_object(connection, plan, replace, taken)
         step(f"building {plan.spec.name}", 0.5)
         parts, warnings = parts_of(plan, place.layout)
-        one = describe_object(plan, place.layout, len(parts), warnings, (), reused=place.reused)
-        made.append(dataclasses.replace(one, face_reports=face_reports(plan, place.layout)))
+        faces = face_reports(plan, place.layout, smallest=True)
+        made.append(
+            describe_object(
+                plan, place.layout, len(parts), warnings, (), faces, reused=place.reused
+            )
+        )
         if not place.reused:
             taken = occupancy_with(taken, place.layout)
         used = place.taken + made[-1].symbols

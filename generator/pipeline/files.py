@@ -22,6 +22,7 @@ from generator.export.stl import stl_chunks
 from generator.export.threemf import print_files
 from generator.layout.placement import Layout
 from generator.pipeline.blame import errors_at
+from generator.pipeline.faces import FaceReport, face_reports
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress
 from generator.polyhedron import face_polygon
@@ -35,6 +36,7 @@ class StagedObject:
     registered: tuple[RegisteredPart, ...]
     parts: int
     warnings: tuple[str, ...]
+    faces: tuple[FaceReport, ...]  #: what they show and promise
 
 
 def stage(
@@ -107,9 +109,11 @@ def stage(
         staging.write(f"{spec.name}.glb", glb_bytes(spec.name, parts, meshes))
     progress("drawing", 0.85)
     size = np.ptp(plan.polyhedron.vertices, axis=0).tolist()
-    staging.write(f"{spec.name}.png", preview_png(spec.name, size, parts, meshes))
+    faces = face_reports(plan, layout)
+    shares = {face.name: face.promise.at_once for face in faces if face.promise is not None}
+    staging.write(f"{spec.name}.png", preview_png(spec.name, size, parts, meshes, shares))
     staging.write(f"{spec.name}-array.svg", _array_picture(plan, layout).encode())
-    return StagedObject(tuple(registered), len(parts), warnings)
+    return StagedObject(tuple(registered), len(parts), warnings, faces)
 
 
 def parts_of(plan: ObjectPlan, layout: Layout) -> tuple[tuple[Part, ...], tuple[str, ...]]:

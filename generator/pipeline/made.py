@@ -25,9 +25,7 @@ class MadeObject:
     reused: bool  #: registered before, so the same cells again
     skipped: bool = False  #: registered before, and all its files stand unchanged
     touches: int = 1  #: about so many that overlap name a place; 1: no scan is needed
-    face_reports: tuple[
-        FaceReport, ...
-    ] = ()  #: of a dry run: face by face, and how small it may be
+    face_reports: tuple[FaceReport, ...] = ()  #: of what was made or would be, face by face
 
     @property
     def folder(self) -> Path | None:
@@ -88,6 +86,7 @@ def describe_object(
     parts: int,
     warnings: tuple[str, ...],
     files: tuple[Path, ...],
+    faces: tuple[FaceReport, ...] = (),
     *,
     reused: bool,
     skipped: bool = False,
@@ -106,4 +105,5 @@ def describe_object(
         touches=touches_needed(
             plan.array.order, plan.array.rows * plan.array.columns, plan.spec.style.pitch_mm
         ),
+        face_reports=faces,
     )

@@ -109,6 +109,7 @@ def _register(
 def _finish(order: Order, place: ObjectPlacement, files: StagedObject, staging: Staging) -> Product:
     written = tuple(w.path for w in staging.commit())
     made = describe_object(
-        order.plan, place.layout, files.parts, files.warnings, written, reused=place.reused
-    )
+        order.plan, place.layout, files.parts, files.warnings, written, files.faces,
+        reused=place.reused,
+    )  # fmt: skip
     return Product(made, place)

@@ -20,7 +20,8 @@ from generator.array.rivals import rival_shares
 from generator.array.visible import visible_sets
 from generator.layout.layout import lay_out
 from generator.layout.placement import FaceLayout
-from generator.layout.promise import FaceViews, PromiseSettings, SeenRanks, SensorView, face_views
+from generator.layout.promise import measured_answers, promised_share
+from generator.layout.views import FaceViews, SensorView, ViewSettings, face_views
 from generator.polyhedron import face_polygon, shapes
 
 PITCHES_MM = (7.0, 6.0, 5.5, 5.0, 4.5)
@@ -103,7 +104,7 @@ def chance() -> Iterable[str]:
     )  # fmt: skip
     yield "| --- |" * 1 + " --- |" * (4 + len(REGISTERED))
     for pitch in CHANCE_PITCHES_MM:
-        face, views = square_face(pitch, PromiseSettings(20_000))
+        face, views = square_face(pitch, ViewSettings(20_000))
         near = (np.minimum(views.centre_mm, FACE_MM - views.centre_mm) < NEAR_MM).sum(axis=1)
         bits = [2 * views.seen[near == sides] for sides in range(3)]
         columns = [f"{one.mean():.0f}, {np.percentile(one, 10):.0f}" for one in bits]
@@ -120,7 +121,7 @@ def arrays() -> Iterable[str]:
     yield "| --- |" + " --- |" * len(REGISTERED)
     known = [one.array() for one in sizes(6)]
     for pitch in CHANCE_PITCHES_MM:
-        face, _ = square_face(pitch, PromiseSettings(10))
+        face, _ = square_face(pitch, ViewSettings(10))
         columns = []
         for registered in REGISTERED:
             needed = registered * len(face.labels) / FILL
@@ -132,29 +133,28 @@ def arrays() -> Iterable[str]:
 
 def promise() -> Iterable[str]:
     """What a 60 mm face shows, and what it takes to know that of a cube's six."""
-    yield "| pitch | seen whole | loaded | full rank | six faces |"
+    yield "| pitch | seen whole | loaded | answered at once | six faces |"
     yield "| --- | --- | --- | --- | --- |"
     for pitch in CHANCE_PITCHES_MM:
-        square_face(pitch, PromiseSettings())
-        ranks = SeenRanks(_array)
+        square_face(pitch, ViewSettings())
         start = time.process_time()
         for _ in range(6):
-            _, views = square_face(pitch, PromiseSettings(), laid=True, ranks=ranks)
+            _, views = square_face(pitch, ViewSettings(), laid=True)
+            share = promised_share(views, measured_answers(), pitch)
         spent = time.process_time() - start
         yield (
             f"| {pitch:g} mm | {views.seen.mean():.1f} | {views.loaded.mean():.2f} | "
-            f"{(views.rivals == 0).mean():.2f} | {1000 * spent:.0f} ms |"
+            f"{share:.2f} | {1000 * spent:.0f} ms |"
         )
 
 
 _laid: dict[float, FaceLayout] = {}
 _array = profile("large").array()
-_ranks = SeenRanks(_array)
 _solid = shapes.cube(FACE_MM)
 
 
 def square_face(
-    pitch_mm: float, settings: PromiseSettings, *, laid: bool = False, ranks: SeenRanks = _ranks
+    pitch_mm: float, settings: ViewSettings, *, laid: bool = False
 ) -> tuple[FaceLayout, FaceViews]:
     """Return a face of a 60 mm cube on the array of `large`, and what a sensor meets there."""
     if not laid:
@@ -167,7 +167,7 @@ def square_face(
     face = _laid[pitch_mm]
     view = SensorView(SENSOR_HALF_MM, SYMBOL_SHARE * pitch_mm)
     loops = face_polygon(_solid, face.face)
-    views = face_views(loops, face, pitch_mm, view, ranks, settings)
+    views = face_views(loops, face, pitch_mm, view, settings)
     return face, views
 
 

@@ -16,7 +16,7 @@ from PIL import Image
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
 from generator.export.array_svg import FaceOnArray, array_svg
-from generator.export.colours import BODY_RGB, SYMBOL_RGB
+from generator.export.colours import ANSWERED_RGB, BODY_RGB, SYMBOL_RGB, answered_rgb
 from generator.export.preview import preview_png
 from generator.export.raster import rasterise
 from generator.export.settings import PREVIEW
@@ -121,6 +121,35 @@ def test_the_preview_shows_a_plain_body_twice_on_paper() -> None:
         tint = np.array(BODY_RGB) / np.linalg.norm(BODY_RGB)
         for shade in large:
             assert shade @ tint / np.linalg.norm(shade) > 0.999
+
+
+def test_faces_are_coloured_by_what_they_answer() -> None:
+    parts = body_parts()
+    meshes = [triangles(p) for p in parts]
+    names = [facet.name for facet in parts[0].facets]
+    plain, low, high = (
+        np.asarray(Image.open(io.BytesIO(preview_png("C", (60, 60, 60), parts, meshes, shares))))
+        for shares in ({}, dict.fromkeys(names, 0.0), dict.fromkeys(names, 1.0))
+    )
+    for picture, rgb in ((low, ANSWERED_RGB[0]), (high, ANSWERED_RGB[2])):
+        body = np.unique(picture[150:600, 100:500].reshape(-1, 3), axis=0, return_counts=True)
+        shades = body[0][body[1] > 5000].astype(float)
+        assert len(shades) >= 3
+        tint = np.array(rgb) / np.linalg.norm(rgb)
+        assert all(shade @ tint / np.linalg.norm(shade) > 0.999 for shade in shades)
+        assert (picture[50:80, 480:900] != plain[50:80, 480:900]).any()  # the legend
+    one = np.asarray(
+        Image.open(io.BytesIO(preview_png("C", (60, 60, 60), parts, meshes, {names[0]: 0.0})))
+    )
+    assert (one[90:640] == plain[90:640]).all(axis=2).mean() > 0.6  # the other faces stay grey
+
+
+def test_the_colour_of_a_share_lies_between_its_neighbours() -> None:
+    assert answered_rgb(0.0) == answered_rgb(-1.0) == ANSWERED_RGB[0]
+    assert (answered_rgb(0.5), answered_rgb(1.0)) == ANSWERED_RGB[1:]
+    assert answered_rgb(2.0) == ANSWERED_RGB[2]
+    lightness = [sum(answered_rgb(share)) for share in np.linspace(0, 1, 21)]
+    assert (np.diff(lightness) > 0).all()
 
 
 _WRITE = """

@@ -6,14 +6,8 @@ import pytest
 from generator.array import profile
 from generator.layout.layout import lay_out
 from generator.layout.placement import FaceLayout, Placement
-from generator.layout.promise import (
-    AnswerTable,
-    PromiseSettings,
-    SeenRanks,
-    SensorView,
-    face_views,
-    promised_share,
-)
+from generator.layout.promise import AnswerTable, measured_answers, promised_share
+from generator.layout.views import SensorView, ViewSettings, face_views
 from generator.polyhedron import face_polygon, shapes
 
 NONE = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
@@ -60,9 +54,8 @@ def area(polygon):
 
 @pytest.mark.parametrize("loops", [(SQUARE,), (SQUARE, HOLE), (ELL,), (TRIANGLE,)])
 def test_views_are_those_of_each_pose_by_itself(loops):
-    array = profile().array()
     face = lattice(loops[0])
-    views = face_views(loops, face, 7.0, VIEW, SeenRanks(array), PromiseSettings(150))
+    views = face_views(loops, face, 7.0, VIEW, ViewSettings(150))
     assert len(views.seen) == 150
     for k in range(150):
         c, s = np.cos(views.turn_rad[k]), np.sin(views.turn_rad[k])
@@ -70,9 +63,10 @@ def test_views_are_those_of_each_pose_by_itself(loops):
         there = (face.centres_mm - views.centre_mm[k]) @ axes.T
         whole = (abs(there[:, 0]) <= 12.7 - 2.52) & (abs(there[:, 1]) <= 9.0 - 2.52)
         assert views.seen[k] == whole.sum()
-        rows, columns = face.rows[whole], face.columns[whole]
-        rank = array.rank(rows, columns) if whole.any() else 0
-        assert views.rivals[k] == pytest.approx(4.0 ** (6 - rank) - 1)
+        c, s = np.cos(0.3), np.sin(0.3)
+        lattice_mm = face.centres_mm[whole] @ np.array([[c, s], [-s, c]])
+        lines = [len(np.unique(np.rint(one / 7.0 * 2))) for one in lattice_mm.T]
+        assert views.lines[k] == min(lines)
         on_face = 0.0
         for loop in loops:
             part = loop - views.centre_mm[k]
@@ -83,10 +77,9 @@ def test_views_are_those_of_each_pose_by_itself(loops):
 
 
 def test_centres_lie_on_the_face_evenly():
-    array = profile().array()
     face = lattice(ELL)
-    poses = PromiseSettings(2000)
-    views = face_views((ELL,), face, 7.0, VIEW, SeenRanks(array), poses)
+    poses = ViewSettings(2000)
+    views = face_views((ELL,), face, 7.0, VIEW, poses)
     x, y = views.centre_mm.T
     assert (((y < 12) & (x < 50)) | ((x < 14) & (y < 60))).all()
     assert (x.min(), y.min()) >= (0, 0)
@@ -95,7 +88,7 @@ def test_centres_lie_on_the_face_evenly():
     for quarter in range(4):
         share = (views.turn_rad // (np.pi / 2) == quarter).mean()
         assert share == pytest.approx(0.25, abs=0.01)
-    again = face_views((ELL,), face, 7.0, VIEW, SeenRanks(array), poses)
+    again = face_views((ELL,), face, 7.0, VIEW, poses)
     assert np.array_equal(views.centre_mm, again.centre_mm)
 
 
@@ -109,7 +102,7 @@ def test_a_60_mm_face_shows_what_was_measured(pitch_mm, half_mm, mean):
     (face, *_) = lay_out(solid, array, pitch_mm, half_mm, clearances, NONE).faces
     views = face_views(
         face_polygon(solid, 0), face, pitch_mm, SensorView((12.7, 12.7), 0.36 * pitch_mm),
-        SeenRanks(array), PromiseSettings(4000),
+        ViewSettings(4000),
     )  # fmt: skip
     near = (np.minimum(views.centre_mm, 60 - views.centre_mm) < 9).sum(axis=1)
     for sides, symbols in enumerate(mean):
@@ -117,26 +110,35 @@ def test_a_60_mm_face_shows_what_was_measured(pitch_mm, half_mm, mean):
 
 
 def test_a_blank_face_shows_nothing():
-    array = profile().array()
     blank = FaceLayout(0, Placement(0, 0, 0.0, 0.0, 0.0), *NONE, NONE[0], np.empty((0, 2)), 0)
-    views = face_views((SQUARE,), blank, 7.0, VIEW, SeenRanks(array))
+    views = face_views((SQUARE,), blank, 7.0, VIEW)
     assert not views.seen.any()
-    assert (views.rivals == 4095).all()
+    assert not views.lines.any()
     assert (views.loaded > 0.2).all()
 
 
 def test_a_promise_weighs_measured_answers():
-    table = AnswerTable((4, 8, 12), (0.5, 1.0), np.array([[0.0, 0.2], [0.4, 0.8], [0.8, 1.0]]))
+    coarse = np.array([[0.0, 0.2], [0.4, 0.8], [0.8, 1.0]])
+    table = AnswerTable((5.0, 7.0), (4, 8, 12), (0.5, 1.0), np.stack([coarse / 2, coarse]))
     seen = np.array([0, 4, 6, 8, 10, 20, 6])
     loaded = np.array([1.0, 0.75, 1.0, 0.5, 0.2, 2.0, 0.75])
-    assert table.at(seen, loaded) == pytest.approx([0.2, 0.1, 0.5, 0.4, 0.6, 1.0, 0.35])
-    flat = AnswerTable((1,), (1.0,), np.array([[0.7]]))
-    assert flat.at(seen, loaded) == pytest.approx(0.7)
-    array = profile().array()
-    views = face_views((SQUARE,), lattice(SQUARE), 7.0, VIEW, SeenRanks(array))
-    assert promised_share(views, flat, 0.0) == pytest.approx(0.7)
-    alone = np.exp(-0.25 * views.rivals)
-    assert promised_share(views, flat, 0.25) == pytest.approx(0.7 * alone.mean())
-    answered = (table.at(views.seen, views.loaded) * alone).mean()
-    assert promised_share(views, table, 0.25) == pytest.approx(answered)
-    assert promised_share(views, flat, 1.0) < 0.7 * (views.rivals == 0).mean() + 0.06
+    expected = np.array([0.2, 0.1, 0.5, 0.4, 0.6, 1.0, 0.35])
+    for pitch, share in ((9.0, 1.0), (7.0, 1.0), (6.5, 0.875), (5.0, 0.5), (3.0, 0.5)):
+        assert table.at(pitch, seen, loaded) == pytest.approx(share * expected)
+    views = face_views((SQUARE,), lattice(SQUARE), 7.0, VIEW)
+    flat = AnswerTable((7.0,), (1.0,), (1.0,), np.array([[[0.7]]]))
+    assert promised_share(views, flat, 6.0) == pytest.approx(0.7)
+    answered = table.at(6.0, views.seen, views.loaded).mean()
+    assert promised_share(views, table, 6.0) == pytest.approx(answered)
+
+
+def test_the_table_that_ships_was_measured():
+    """More of the sensor on the face, or more symbols, never tells less; none tell nothing."""
+    table = measured_answers()
+    assert table.probability.shape == tuple(map(len, (table.pitch_mm, table.seen, table.loaded)))
+    assert ((table.probability >= 0) & (table.probability <= 1)).all()
+    assert (table.probability[:, -1, -1] > 0.9).all()
+    assert (table.probability[:, 0, 0] < 0.1).all()
+    for pitch in (4.5, 5.5, 7.0):
+        middle = table.at(pitch, np.full(5, 9), np.linspace(0.3, 1.0, 5))
+        assert (np.diff(middle) > -0.05).all()
