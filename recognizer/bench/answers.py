@@ -23,6 +23,7 @@ ADVICE = {
     "no contact": "nothing is touched",
     "too few symbols": "press harder, or move further onto the face",
     "ambiguous": "two places look alike here; touch a little beside it",
+    "ambiguous by chance": "these few symbols could be anyone's; touch a little beside it",
     "not an encoded surface": "no registered symbols are felt; is the object in this database?",
     "outside every face": "the sensor's centre lies beyond the face; move inwards",
 }

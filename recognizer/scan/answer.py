@@ -29,7 +29,7 @@ from recognizer.touch.locate import (
     under_centre,
 )
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognise import answer_at
+from recognizer.touch.recognise import answer_at, refuse_by_chance
 from recognizer.touch.recognition import (
     AMBIGUOUS,
     NOT_ENCODED,
@@ -175,11 +175,12 @@ def answer_scan(
         runner_up = RunnerUp(*other.face, other.index)
     if by_hand:
         margin = min(margin, _shift_margin(best, limits, reader.settings.hypotheses))
-    return answer_at(
+    answer = answer_at(
         best.encoding, best.fit, best.place, reader.settings, seq,
-        reason=_doubt(reader, best, margin, limits, by_hand=by_hand),
+        reason=_reject_reason(reader, best, margin, limits, by_hand=by_hand),
         margin=margin, runner_up=runner_up,
     )  # fmt: skip
+    return refuse_by_chance(reader, best.encoding, best.fit, best.place, answer)
 
 
 def _shift_margin(
@@ -212,7 +213,7 @@ def _shift_margin(
     return own - max(scores.values())
 
 
-def _doubt(
+def _reject_reason(
     reader: Reader, best: LocatedComposite, margin: float, limits: ScanSettings, *, by_hand: bool
 ) -> str:
     """Return why the best place may not be believed; nothing if it may."""

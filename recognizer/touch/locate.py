@@ -65,7 +65,7 @@ def find_rivals(
     number
         Of the fit, which the places get.
     """
-    scores = _bounded_scores(fit, settings)
+    scores = bounded_scores(fit, settings)
     held = labels_at(embossed, best, fit.cells)
     sure = np.where(held < embossed.array.order, scores.max(axis=1) - scores[:, -1], 0.0)
     found = _anchor_candidates(embossed, fit, scores, sure, settings.anchors_again, settings)
@@ -82,8 +82,18 @@ def log_likelihood(
 ) -> float:
     """Return the log-likelihood of the image if the fit lies at this place, nats."""
     labels = labels_at(embossed, hypothesis, fit.cells)
-    scores = _bounded_scores(fit, settings)[np.arange(len(labels)), labels]
+    scores = bounded_scores(fit, settings)[np.arange(len(labels)), labels]
     return float(scores.sum()) + fit.value
+
+
+def bounded_scores(fit: Fit, settings: HypothesisSettings) -> Array:
+    """Return scores (m, q + 1) in which a registered symbol may be worn away, or read wrong.
+
+    Of a cell of which the sensor sees only a corner, less is believed.
+    """
+    symbols = np.maximum(fit.scores[:, :-1], fit.scores[:, -1:] - settings.worn)
+    least = settings.cap * np.minimum(1.0, fit.seen / settings.corner)[:, None]
+    return np.asarray(np.maximum(np.concatenate([symbols, fit.scores[:, -1:]], axis=1), -least))
 
 
 def labels_at(embossed: EmbossedArray, hypothesis: Hypothesis, cells: Ints) -> Ints:
@@ -140,20 +150,10 @@ def coincide(
     )
 
 
-def _bounded_scores(fit: Fit, settings: HypothesisSettings) -> Array:
-    """Return scores (m, q + 1) in which a registered symbol may be worn away, or read wrong.
-
-    Of a cell of which the sensor sees only a corner, less is believed.
-    """
-    symbols = np.maximum(fit.scores[:, :-1], fit.scores[:, -1:] - settings.worn)
-    least = settings.cap * np.minimum(1.0, fit.seen / settings.corner)[:, None]
-    return np.asarray(np.maximum(np.concatenate([symbols, fit.scores[:, -1:]], axis=1), -least))
-
-
 def _hypotheses_of(
     embossed: EmbossedArray, fit: Fit, number: int, settings: HypothesisSettings
 ) -> list[Hypothesis]:
-    scores = _bounded_scores(fit, settings)
+    scores = bounded_scores(fit, settings)
     found = _window_candidates(embossed, fit, settings)
     if found is None:
         symbol = scores[:, :-1].max(axis=1) - scores[:, -1]  # a symbol rather than none

@@ -7,21 +7,24 @@
     pose       where the sensor stands on the face and on the object
 
 The answer is given only if no other place explains the image nearly as well, if it explains
-the image better than a surface with symbols of no registered place, and if the sensor's
-centre lies on the face.
+the image better than a surface with symbols of no registered place, if the sensor's centre
+lies on the face, and if symbols drawn at random would hardly match any place as well (`chance`).
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from recognizer.touch.belief import VerifiedHypothesis, symbols_to_name
+from recognizer.touch.chance import expected_matches
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.locate import Hypothesis, under_centre
 from recognizer.touch.pose import face_covariance, face_pose, inside_mm, pose_on_object
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.recognition import (
     AMBIGUOUS,
+    BY_CHANCE,
     NO_CONTACT,
     NOT_ENCODED,
     OUTSIDE,
@@ -45,6 +48,16 @@ def recognise_with_hypothesis(
     reader: PreparedLab, signal: Signal, seq: int = 0
 ) -> tuple[Recognition, VerifiedHypothesis | None]:
     """Return what one touch says, and the hypothesis that was judged; None where there is none."""
+    answer, best = _answer_at_effort(reader, signal, seq)
+    if best is not None:
+        answer = refuse_by_chance(reader, best.embossed, best.fit, best.hypothesis, answer)
+    return answer, best
+
+
+def _answer_at_effort(
+    reader: PreparedLab, signal: Signal, seq: int
+) -> tuple[Recognition, VerifiedHypothesis | None]:
+    """Return what the first try says, or the second where that is not enough."""
     if not signal.contact:
         return refusal(seq, NO_CONTACT), None
     settings, limits = reader.settings, reader.settings.belief
@@ -111,6 +124,24 @@ def _refuse_few(
     if not reason:
         return answer
     return refusal(answer.seq, reason, margin=answer.margin, runner_up=answer.runner_up)
+
+
+def refuse_by_chance(
+    reader: PreparedLab,
+    embossed: EmbossedArray,
+    fit: Fit,
+    hypothesis: Hypothesis,
+    answer: Recognition,
+) -> Recognition:
+    """Return an answer with its doubt, or the refusal where that is too large."""
+    if not answer:
+        return answer
+    settings = reader.settings
+    doubt = expected_matches(reader.lab.arrays, embossed, fit, hypothesis, settings)
+    if doubt <= settings.belief.doubt:
+        return replace(answer, doubt=doubt)
+    margin, runner_up = answer.margin, answer.runner_up
+    return refusal(answer.seq, BY_CHANCE, margin=margin, runner_up=runner_up, doubt=doubt)
 
 
 def answer_at(

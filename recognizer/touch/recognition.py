@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 NO_CONTACT = "no contact"
 TOO_FEW = "too few symbols"
 AMBIGUOUS = "ambiguous"
+BY_CHANCE = "ambiguous by chance"
 NOT_ENCODED = "not an encoded surface"
 OUTSIDE = "outside every face"
 
@@ -26,6 +27,8 @@ WAYS_OUT = {
     NO_CONTACT: "press the probe onto the object",
     TOO_FEW: "press harder, or where more symbols are: away from edges and holes",
     AMBIGUOUS: "touch again a few mm beside",
+    BY_CHANCE: "so few symbols match a registered place by chance as well: touch again a few mm "
+    "beside and read both as one (--scan)",
     NOT_ENCODED: "touch again more evenly, away from edges; is the object in this database, and "
     "the overlay the right one (--overlay)?",
     OUTSIDE: "move the probe onto the face",
@@ -64,6 +67,9 @@ class Recognition:
     noise: float | None = None  #: standard deviation of psi that the symbols leave unexplained
     scale: float | None = None  #: of the print as this touch felt it: 1 is as designed
     stroke_mm: float | None = None  #: width of the strokes, likewise
+    doubt: float | None = None
+    """Expected number of registered places that a foreign surface (other symbols than any that
+    are registered) would match as well by chance; None where no place is believed otherwise."""
 
     def __bool__(self) -> bool:
         return self.object is not None
@@ -74,6 +80,8 @@ class Recognition:
             others = ""
             if self.runner_up is not None and self.reason == AMBIGUOUS:
                 others = f", {self.runner_up.object}/{self.runner_up.face} among others"
+            if self.doubt is not None and self.reason == BY_CHANCE:
+                others = f", as {places_by_chance(self.doubt)} would match"
             way_out = f"; {self.way_out}" if self.way_out else ""
             return f"not recognised: {self.reason}{others}{way_out}"
         alone = self.margin is None or math.isinf(self.margin)
@@ -132,16 +140,34 @@ class Recognition:
                 "index": list(runner_up.index),
             },
             "reason": self.reason,
+            "doubt": self.doubt,
             "scale": self.scale,
             "stroke_mm": self.stroke_mm,
         }
 
 
 def refusal(
-    seq: int, reason: str, *, margin: float | None = None, runner_up: RunnerUp | None = None
+    seq: int,
+    reason: str,
+    *,
+    margin: float | None = None,
+    runner_up: RunnerUp | None = None,
+    doubt: float | None = None,
 ) -> Recognition:
     """Return the value of a touch that is not answered."""
-    return Recognition(seq, None, None, None, None, None, None, margin, runner_up, reason)
+    none = None, None, None, None, None, None
+    return Recognition(seq, *none, margin, runner_up, reason, doubt=doubt)
+
+
+def places_by_chance(doubt: float) -> str:
+    """Return a doubt in words, to one digit.
+
+    Examples
+    --------
+    >>> places_by_chance(0.0312), places_by_chance(4e-06)
+    ('0.03 places', '4e-06 places')
+    """
+    return f"{doubt:.1g} places"
 
 
 def _as_lists(matrix: NDArray[np.float64] | None) -> list[list[float]] | None:

@@ -212,6 +212,10 @@ class BeliefSettings:
     plainly: float = 16.0
     whole: float = 6.0  #: tactels that look at a cell which counts as seen
     rim_mm: float = 2.0  #: how far the sensor's centre may lie beyond the face
+    #: registered places that foreign symbols may match as well by chance; a hundredth of it would
+    #: refuse a third of the answers at the edges of a cube (`docs/recognizer.md`)
+    doubt: float = 1e-2
+    grain: float = 0.25  #: nats to which scores are rounded where that is counted
 
 
 @dataclass(frozen=True, slots=True)

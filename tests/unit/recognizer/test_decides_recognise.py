@@ -13,6 +13,7 @@ from recognizer.touch.locate import Hypothesis
 from recognizer.touch.recognise import recognise, recognise_with_hypothesis
 from recognizer.touch.recognition import (
     AMBIGUOUS,
+    BY_CHANCE,
     NO_CONTACT,
     NOT_ENCODED,
     OUTSIDE,
@@ -21,7 +22,7 @@ from recognizer.touch.recognition import (
 from recognizer.touch.settings import ReaderSettings
 
 TOUCHED = SimpleNamespace(contact=True)
-READER = SimpleNamespace(settings=ReaderSettings())
+READER = SimpleNamespace(settings=ReaderSettings(), lab=SimpleNamespace(arrays=("one", "two")))
 SURE = Support(surprise=20.0, explained=0.95, inliers=16, clear=0, plain=0, wider=0.0)
 T_OBJECT_FACE = np.array([[0.0, 0, 1, 5], [1, 0, 0, 6], [0, 1, 0, 7], [0, 0, 0, 1]])
 
@@ -75,8 +76,15 @@ def reads(small, lab, monkeypatch):
         covariance=np.diag([1.0, 2.0, 3.0]),
     )  # fmt: skip
 
-    def read(first, second=None, signal=TOUCHED, **fit):
+    def read(first, second=None, signal=TOUCHED, doubt=1e-3):
         tries = []
+
+        def matches(arrays, embossed, fit, hypothesis, settings):
+            assert (arrays, settings) == (READER.lab.arrays, READER.settings)
+            judged = first if len(tries) == 1 else second
+            best = judged[0]
+            assert (embossed, fit, hypothesis) == (best.embossed, best.fit, best.hypothesis)
+            return doubt
 
         def found(reader, given, effort):
             assert reader is READER
@@ -85,6 +93,7 @@ def reads(small, lab, monkeypatch):
             return first if len(tries) == 1 else second
 
         monkeypatch.setattr(recognizer.touch.recognise, "verify_hypotheses", found)
+        monkeypatch.setattr(recognizer.touch.recognise, "expected_matches", matches)
         answer, judged = recognise_with_hypothesis(READER, signal, 7)
         assert answer.seq == 7
         assert tries == [READER.settings.first, READER.settings.thorough][: len(tries)]
@@ -283,6 +292,22 @@ def test_an_answer_says_how_the_print_was_felt(reads):
     assert answer.scale == pytest.approx(1 / 1.01)  # a lattice that looks large is a small print
     assert answer.stroke_mm == pytest.approx(1.4 - 0.05)
     assert (refused(reads).scale, refused(reads).stroke_mm) == (None, None)
+
+
+@pytest.mark.parametrize(("doubt", "reason"), [(0.0, ""), (1e-2, ""), (1.01e-2, BY_CHANCE)])
+@pytest.mark.parametrize("inliers", [16, 10])
+def test_what_many_places_match_by_chance_is_refused(reads, doubt, reason, inliers):
+    found = [reads.one(inliers=inliers), reads.one("rival", -40.0, face=1, index=(9, 12))]
+    answer, judged, tries = reads.read(found, found, doubt=doubt)
+    assert (answer.reason, answer.doubt, bool(answer)) == (reason, doubt, not reason)
+    assert (answer.margin, answer.runner_up.face) == (40.0, "F2")
+    assert judged is found[0]
+    assert tries == (1 if inliers == 16 else 2)
+
+
+def test_what_is_refused_for_another_reason_has_no_doubt(reads):
+    assert refused(reads).doubt is None
+    assert reads.read([], [])[0].doubt is None
 
 
 def refused(reads):

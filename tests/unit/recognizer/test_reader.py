@@ -23,6 +23,7 @@ from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import (
     AMBIGUOUS,
+    BY_CHANCE,
     NO_CONTACT,
     NOT_ENCODED,
     OUTSIDE,
@@ -135,13 +136,27 @@ def test_trust_must_fit_and_bad_tactels_are_not_believed(reader, counts):
 
 
 def test_every_reason_has_a_way_out():
-    for reason in (NO_CONTACT, TOO_FEW, AMBIGUOUS, NOT_ENCODED, OUTSIDE):
+    for reason in (NO_CONTACT, TOO_FEW, AMBIGUOUS, BY_CHANCE, NOT_ENCODED, OUTSIDE):
         assert refusal(0, reason).way_out
         assert str(refusal(0, reason)).startswith(f"not recognised: {reason}; ")
     doubt = refusal(0, AMBIGUOUS, runner_up=RunnerUp("Prism", "F2", (0, 0)))
     assert str(doubt).startswith("not recognised: ambiguous, Prism/F2 among others; ")
+    chance = refusal(0, BY_CHANCE, runner_up=RunnerUp("Prism", "F2", (0, 0)), doubt=0.0312)
+    assert str(chance).startswith(
+        "not recognised: ambiguous by chance, as 0.03 places would match;"
+    )
+    assert chance.as_json()["doubt"] == 0.0312
     assert math.isnan(doubt.x_mm)
     assert math.isnan(doubt.theta_deg)
+
+
+def test_an_answer_says_what_would_match_by_chance(reader, counts):
+    answer = reader.read(counts)
+    assert 0 < answer.doubt < 1e-4
+    assert answer.as_json()["doubt"] == answer.doubt
+    sure = replace(DEFAULTS, belief=replace(DEFAULTS.belief, doubt=answer.doubt / 2))
+    refused = replace(reader, settings=sure).read(counts)
+    assert (refused.reason, refused.doubt, refused.face) == (BY_CHANCE, answer.doubt, None)
 
 
 def test_a_reader_decides_by_its_settings(reader, counts):

@@ -1,0 +1,170 @@
+"""How many places match by chance: against every combination of symbols, and random ones."""
+
+import itertools
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from recognizer.touch.chance import chance_of_match, expected_matches
+from recognizer.touch.locate import Hypothesis, bounded_scores
+from recognizer.touch.settings import BeliefSettings, HypothesisSettings, ReaderSettings
+
+SETTINGS = ReaderSettings()
+SEEN = [(i, j) for j in range(3) for i in range(3)]
+
+
+def counted(scores, held):
+    """The share of all combinations that score as well, one after another."""
+    own = sum(row[k] for row, k in zip(scores, held, strict=True))
+    sums = [sum(combination) for combination in itertools.product(*scores)]
+    return sum(value >= own - 1e-9 for value in sums) / len(sums)
+
+
+@pytest.mark.parametrize(("order", "cells"), [(2, 5), (4, 3), (8, 2)])
+def test_clear_symbols_are_one_in_the_number_of_kinds_each(order, cells):
+    held = np.arange(cells) % order
+    scores = np.where(np.arange(order) == held[:, None], 0.0, -8.0)
+    assert chance_of_match(scores, held, 0.25) == pytest.approx(float(order) ** -cells)
+
+
+@pytest.mark.parametrize(
+    ("scores", "chance"),
+    [
+        ([[0.0, -8, -8, -8]], 1 / 4),
+        ([[0.0, -0.1, -8, -8]], 2 / 4),  # nearer than the grain: it scores as well
+        ([[0.0, -0.3, -8, -8]], 1 / 4),
+        ([[0.0, 0.5, -8, -8]], 2 / 4),  # another one is likelier
+        ([[0.0, 0.5, 0.6, 0.7]], 1.0),
+        ([[0.0, -8, -8, -8], [0.0, 0, 0, 0]], 1 / 4),  # a cell that says nothing
+        # the likelier symbol of one cell makes up for a lesser one of the other
+        ([[0.0, 4.0, -8, -8], [0.0, -3.0, -8, -8]], 3 / 16),
+        ([[0.0, 4.0, -8, -8], [0.0, -5.0, -8, -8]], 2 / 16),
+    ],
+)
+def test_a_soft_cell_counts_as_many_symbols_as_score_as_well(scores, chance):
+    held = np.zeros(len(scores), np.int64)
+    assert chance_of_match(np.array(scores), held, 0.25) == pytest.approx(chance)
+
+
+def test_without_a_symbol_everything_matches():
+    assert chance_of_match(np.zeros((0, 4)), np.zeros(0, np.int64), 0.25) == 1.0
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_it_is_the_share_of_all_combinations_and_never_less(seed):
+    rng = np.random.default_rng(seed)
+    scores = -rng.exponential(3.0, (5, 4))
+    held = np.where(rng.random(5) < 0.7, scores.argmax(axis=1), rng.integers(4, size=5))
+    truth = counted(scores.tolist(), held.tolist())
+    assert chance_of_match(scores, held, 1e-4) == pytest.approx(truth, abs=1e-12)
+    coarse = [chance_of_match(scores, held, grain) for grain in (0.25, 1.0)]
+    assert truth - 1e-12 <= coarse[0]
+    assert truth - 1e-12 <= coarse[1]
+    assert coarse[0] <= 5 * truth
+
+
+def test_random_labs_match_as_often_as_it_says(small):
+    rng = np.random.default_rng(7)
+    held = {(r, c): (0, int(rng.integers(4))) for r in range(11) for c in range(13)}
+    lab = small.Lab(held, dense=True)  # all round: every place sees nine symbols
+    place = Hypothesis(0, 5, 5, 0, 0.0)
+    scores = -rng.exponential(3.0, (9, 5))
+    scores[:, 4] = -8.0
+    labels = np.array(lab.shows(5, 5, 0, SEEN))
+    scores[np.arange(9), labels] = 0.0
+    scores[3, (labels[3] + 1) % 4] = 1.5  # another symbol is likelier there
+    scores -= scores.max(axis=1, keepdims=True)
+    fit = small.fit_of(SEEN, scores)
+    doubt = expected_matches([lab.embossed], lab.embossed, fit, place, SETTINGS)
+    bounded = bounded_scores(fit, SETTINGS.hypotheses)[:, :4]
+    own = bounded[np.arange(9), labels].sum()
+    drawn = rng.integers(4, size=(400_000, 9))
+    as_well = (bounded[np.arange(9), drawn].sum(axis=1) >= own).mean() * 143
+    assert 0.9 * as_well <= doubt <= 2.5 * as_well
+
+
+def doubt_of(small, lab, row=4, column=4, settings=SETTINGS, arrays=None, **changed):
+    """Of a touch that shows beyond doubt what a place of the first face of a lab holds."""
+    labels = lab.shows(row, column, 0, SEEN)
+    fit = small.fit_of(SEEN, small.sure_of(labels, lab.order), **changed)
+    arrays = [lab.embossed] if arrays is None else arrays
+    place = Hypothesis(0, row, column, 0, 0.0)
+    return expected_matches(arrays, lab.embossed, fit, place, settings)
+
+
+def square(small, side, order=4, **changed):
+    labels = np.random.default_rng(3).integers(order, size=(side, side))
+    held = {(r, c): (0, int(labels[r, c])) for r in range(side) for c in range(side)}
+    return small.Lab(held, rows=side + 4, columns=side + 5, order=order, **changed)
+
+
+def test_places_times_chance(small):
+    assert doubt_of(small, square(small, 8)) == pytest.approx(64 / 4**9)
+    assert doubt_of(small, square(small, 8, order=2)) == pytest.approx(64 / 2**9)
+    assert doubt_of(small, square(small, 8, dense=True)) == pytest.approx(64 / 4**9)
+
+
+def test_it_rises_with_what_is_registered_and_falls_with_what_is_seen(small):
+    found = [doubt_of(small, square(small, side)) for side in (8, 10, 14)]
+    assert found == pytest.approx([64 / 4**9, 100 / 4**9, 196 / 4**9])
+    lab = square(small, 8)
+    soft = np.full(9, 20.0)
+    soft[4] = 0.0  # of this cell nothing is seen
+    assert doubt_of(small, lab, seen=soft) == pytest.approx(64 / 4**8)
+
+
+def test_all_arrays_that_are_embossed_alike_count(small):
+    lab, other = square(small, 8), square(small, 10)
+    larger = SimpleNamespace(**vars(other.embossed.style) | {"pitch_mm": 12.0})
+    unlike = replace(other.embossed, style=larger)
+    letters = replace(other.embossed, alphabet="letters-4")
+    both = [lab.embossed, other.embossed, unlike, letters]
+    assert doubt_of(small, lab, arrays=both) == pytest.approx(164 / 4**9)
+
+
+def test_at_an_edge_the_places_count_whose_border_agrees(small):
+    lab = square(small, 8)
+    # cells (0, 0) ... (2, 2) of a place at row 4, column 7: the left column of them alone is held
+    assert doubt_of(small, lab, column=7) == pytest.approx(6 / 4**3 + 2 / 4**3)
+    # in the corner one cell is held, and one place is such a corner
+    assert doubt_of(small, lab, row=0, column=7) == pytest.approx(1 / 4)
+    # a large lab is not gone through
+    large = ReaderSettings(hypotheses=HypothesisSettings(large=63))
+    assert doubt_of(small, lab, column=7, settings=large) == pytest.approx(64 / 4**3)
+    at_most = ReaderSettings(hypotheses=HypothesisSettings(large=64))
+    assert doubt_of(small, lab, column=7, settings=at_most) == pytest.approx(8 / 4**3)
+
+
+@pytest.mark.parametrize(("behind", "places"), [(0.0, 8), (3.9, 8), (4.1, 64)])
+def test_a_place_that_itself_falls_behind_may_be_matched_over_a_bare_cell(small, behind, places):
+    """A bare cell costs a place that holds a symbol 4 nats: as much as a worn one."""
+    lab = square(small, 8)
+    cells = [(0, 0), (0, 1), (1, 0)]  # the last one is beyond the edge
+    scores = small.sure_of(lab.shows(4, 7, 0, cells))
+    label = lab.shows(4, 7, 0, cells)[0]
+    scores[0, :4] = -12.0
+    scores[0, label], scores[0, (label + 1) % 4] = -behind, 0.0
+    fit = small.fit_of(cells, scores)
+    found = expected_matches(
+        [lab.embossed], lab.embossed, fit, Hypothesis(0, 4, 7, 0, 0.0), SETTINGS
+    )
+    # of the first cell two symbols score as well, of the second one does
+    assert found == pytest.approx(places * 2 / 4 / 4)
+
+
+def test_scores_are_rounded_by_the_grain_that_is_set(small):
+    lab = square(small, 8)
+    scores = small.sure_of(lab.shows(4, 4, 0, SEEN))
+    other = (lab.shows(4, 4, 0, SEEN)[0] + 1) % 4
+    scores[0, other] = -0.3
+    fit, place = small.fit_of(SEEN, scores), Hypothesis(0, 4, 4, 0, 0.0)
+    for grain, symbols in ((0.25, 1), (0.5, 2)):
+        settings = ReaderSettings(belief=BeliefSettings(grain=grain))
+        found = expected_matches([lab.embossed], lab.embossed, fit, place, settings)
+        assert found == pytest.approx(64 * symbols / 4**9)
+
+
+def test_the_limit_and_the_grain():
+    assert (SETTINGS.belief.doubt, SETTINGS.belief.grain) == (1e-2, 0.25)
