@@ -69,7 +69,8 @@ class Recognition:
     stroke_mm: float | None = None  #: width of the strokes, likewise
     doubt: float | None = None
     """Expected number of registered places that a foreign surface (other symbols than any that
-    are registered) would match as well by chance; None where another reason refuses, or the thesis's way is read."""
+    are registered) would match as well by chance; None where another reason refuses, and where the
+    thesis's way is read."""
 
     def __bool__(self) -> bool:
         return self.object is not None
