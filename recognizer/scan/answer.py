@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from recognizer.scan.composite import Composite
 from recognizer.scan.settings import ScanSettings
 from recognizer.touch.belief import null_log_likelihood, unworn_labels_at, weigh_cells
+from recognizer.touch.chance import expected_matches
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.locate import (
     Hypothesis,
@@ -29,7 +30,7 @@ from recognizer.touch.locate import (
     under_centre,
 )
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognise import answer_at, refuse_by_chance
+from recognizer.touch.recognise import answer_at
 from recognizer.touch.recognition import (
     AMBIGUOUS,
     NOT_ENCODED,
@@ -180,7 +181,11 @@ def answer_scan(
         reason=_reject_reason(reader, best, margin, limits, by_hand=by_hand),
         margin=margin, runner_up=runner_up,
     )  # fmt: skip
-    return refuse_by_chance(reader, best.encoding, best.fit, best.place, answer)
+    if not answer:
+        return answer
+    arrays, settings = reader.lab.arrays, reader.settings
+    doubt = expected_matches(arrays, best.encoding, best.fit, best.place, settings)
+    return replace(answer, doubt=doubt)
 
 
 def _shift_margin(

@@ -50,7 +50,7 @@ def recognise_with_hypothesis(
     """Return what one touch says, and the hypothesis that was judged; None where there is none."""
     answer, best = _answer_at_effort(reader, signal, seq)
     if best is not None:
-        answer = refuse_by_chance(reader, best.embossed, best.fit, best.hypothesis, answer)
+        answer = _refuse_by_chance(reader, best.embossed, best.fit, best.hypothesis, answer)
     return answer, best
 
 
@@ -126,7 +126,7 @@ def _refuse_few(
     return refusal(answer.seq, reason, margin=answer.margin, runner_up=answer.runner_up)
 
 
-def refuse_by_chance(
+def _refuse_by_chance(
     reader: PreparedLab,
     embossed: EmbossedArray,
     fit: Fit,
