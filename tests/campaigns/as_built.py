@@ -88,20 +88,34 @@ def touched(scene, reader, seed, touches, level):
         yield touch, TouchImage(number, 0, 1, counts.astype(float), np.zeros(4), None)
 
 
-def judged(reader, felt):
-    away, chi2, turns = [], [], []
+def errors_of(reader, felt):
+    """Return squares of place (mm) and turn (degrees), and chi squared, of what is answered."""
+    found = []
     for touch, image in felt:
         answer = reader.read(image.counts)
         if not answer:
             continue
         turn = math.remainder(math.radians(answer.theta_deg) - touch.theta_rad, math.tau)
         error = np.array([answer.x_mm - touch.x_mm, answer.y_mm - touch.y_mm, turn])
-        away.append(error[:2] @ error[:2])
-        turns.append(math.degrees(turn) ** 2)
-        chi2.append(error @ np.linalg.solve(answer.covariance, error))
-    inside = 100 * np.mean(np.array(chi2) < CHI2_95) if chi2 else math.nan
-    rms = (math.sqrt(np.mean(each)) if each else math.nan for each in (away, turns))
-    return f"{len(chi2):3d} {next(rms):6.3f} mm {next(rms):5.2f} deg {inside:4.0f} %"
+        chi2 = error @ np.linalg.solve(answer.covariance, error)
+        found.append((error[:2] @ error[:2], math.degrees(turn) ** 2, chi2))
+    return found
+
+
+def summary(errors):
+    """Return how many, rms of place and turn, and the share inside the 95 % ellipsoid."""
+    if not errors:
+        return "  0"
+    away, turns, chi2 = np.array(errors).T
+    inside = 100 * np.mean(chi2 < CHI2_95)
+    return (
+        f"{len(errors):3d} {math.sqrt(away.mean()):6.3f} mm {math.sqrt(turns.mean()):5.2f} deg "
+        f"{inside:4.0f} %"
+    )
+
+
+def judged(reader, felt):
+    return summary(errors_of(reader, felt))
 
 
 def main() -> None:
