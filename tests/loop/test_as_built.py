@@ -1,6 +1,7 @@
 """A part that is printed small: touched, estimated, kept, and every later pose is better."""
 
 import json
+import re
 import sqlite3
 import struct
 from contextlib import closing
@@ -74,7 +75,7 @@ def test_what_touches_tell_of_a_print_betters_later_poses(lab, capsys):
 
     assert recognize_object(["as-built", "1.h5", "--store", "--material", "PLA"]) == 0
     said = capsys.readouterr()
-    assert said.out.startswith("Cube-F1: X is 2.0 % short, Y is 1.")
+    assert re.match(r"Cube-F1: X is (1\.9|2\.0|2\.1) % short, Y is 1\.", said.out)
     assert "kept in lab.db; parts of fdm-0.4 PLA" in said.err
     after, _ = rms_mm(capsys, 2)
     assert after < 0.06

@@ -161,7 +161,7 @@ def test_a_touch_of_the_file_is_a_touch_of_the_registered_face(lab):
         assert one.counts.max() > 50
         # A point on an upright step may fall on either side in float32: one of a tab's 19.
         assert np.abs(one.counts.astype(int) - other.counts.astype(int)).max() <= 12
-        assert (one.counts != other.counts).mean() < 0.05
+        assert (one.counts != other.counts).mean() < 0.1
 
 
 def test_same_generator_gives_the_same_frame_and_the_truth_stays_outside(lab):
