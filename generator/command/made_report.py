@@ -62,6 +62,11 @@ def _object_text(made: MadeObject, dry_run: bool) -> str:
                 f"{answered}it could be as small as {least} mm"
             )
     lines += promise_lines(made.face_reports)
+    if made.fit is not None:
+        lines.append(
+            f"  panels put together: {made.fit.overlap_mm3:.3f} mm3 overlap, "
+            + ("none near another" if made.fit.gap_mm is None else f"gap {made.fit.gap_mm:.3f} mm")
+        )
     for folder in dict.fromkeys(file.parent for file in made.files):
         lines.append(f"  {folder}{os.sep}  {_file_list(folder, made.files)}")
     return "\n".join(lines)
@@ -110,6 +115,7 @@ def _encoded_values(result: Encoded, dry_run: bool) -> dict[str, Any]:
                 "reused": made.reused,
                 "skipped": made.skipped,
                 "face_reports": [face_values(face) for face in made.face_reports],
+                "fit": None if made.fit is None else asdict(made.fit),
                 "warnings": list(made.warnings),
             }
             for made in result.objects

@@ -81,6 +81,9 @@ class ReadBackSettings:
 
     step_volume: float = 1e-9  #: greatest relative error of a volume in STEP
     stl_volume: float = 1e-5  #: the same in STL: 32-bit coordinates
+    fit_overlap_mm3: float = 1e-3  #: greatest volume that two panels may both fill
+    fit_rounding_mm: float = 1e-4  #: by which a gap may be smaller: 32-bit coordinates
+    fit_reach_mm: float = 1.0  #: up to which distances of panels are measured
     folded_cos: float = -0.999  #: between neighbours, from which the exact test looks at them
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from generator.database.registered import RegisteredPart
 from generator.export.array_svg import FaceOnArray, array_svg
 from generator.export.atomic import StagedFile, Staging
+from generator.export.fit_check import FitReport, PanelFile, verify_fit
 from generator.export.glb import glb_bytes
 from generator.export.preview import preview_png
 from generator.export.step import step_chunks
@@ -37,6 +38,7 @@ class StagedObject:
     parts: int
     warnings: tuple[str, ...]
     faces: tuple[FaceReport, ...]  #: what they show and promise
+    fit: FitReport | None = None  #: of panels that were verified as STL
 
 
 def stage(
@@ -73,6 +75,7 @@ def stage(
         prove_closed(part)
     meshes = [triangles(part) for part in parts]
     registered: list[RegisteredPart] = []
+    panel_files: list[PanelFile] = []
     for number, (part, mesh) in enumerate(zip(parts, meshes, strict=True)):
         progress(f"writing {part.name}", 0.1 + 0.6 * number / len(parts))
         step = stl = None
@@ -82,6 +85,7 @@ def stage(
         if "stl" in formats:
             stl = staging.write(f"{part.name}.stl", stl_chunks(mesh))
             registered.append(_part_entry(part, "stl", stl))
+            panel_files.append(PanelFile(part.name, stl.staged, part.T_object_part))
         if verify and (step or stl):
             progress(f"verifying {part.name}", 0.1 + 0.6 * (number + 0.5) / len(parts))
             from generator.export.check import verify as read_back  # loads the CAD kernel
@@ -92,6 +96,10 @@ def stage(
                 step=step.staged if step else None,
                 stl=stl.staged if stl else None,
             )
+    fit = None
+    if verify and len(panel_files) > 1:
+        progress("putting the panels together", 0.7)
+        fit = verify_fit(panel_files, spec.gap_mm)
     if "3mf" in formats:
         progress("arranging the bed", 0.7)
         plates = print_files(spec.name, parts, plan.printer.bed_mm)
@@ -113,7 +121,7 @@ def stage(
     shares = {face.name: face.promise.at_once for face in faces if face.promise is not None}
     staging.write(f"{spec.name}.png", preview_png(spec.name, size, parts, meshes, shares))
     staging.write(f"{spec.name}-array.svg", _array_picture(plan, layout).encode())
-    return StagedObject(tuple(registered), len(parts), warnings, faces)
+    return StagedObject(tuple(registered), len(parts), warnings, faces, fit)
 
 
 def parts_of(plan: ObjectPlan, layout: Layout) -> tuple[tuple[Part, ...], tuple[str, ...]]:
@@ -123,7 +131,13 @@ def parts_of(plan: ObjectPlan, layout: Layout) -> tuple[tuple[Part, ...], tuple[
         return (emboss_whole(plan.polyhedron, layout, plan.outlines, spec.name),), ()
     with errors_at(plan.located, "print.wall, print, shape"):
         made = panels(
-            plan.polyhedron, layout, plan.outlines, spec.wall_mm, plan.printer, name=spec.name
+            plan.polyhedron,
+            layout,
+            plan.outlines,
+            spec.wall_mm,
+            plan.printer,
+            name=spec.name,
+            gap_mm=spec.gap_mm,
         )
     return made.parts, made.warnings
 

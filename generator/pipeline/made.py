@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from generator.array.touches import touches_needed
+from generator.export.fit_check import FitReport
 from generator.layout.placement import Layout
 from generator.pipeline.faces import FaceReport
 from generator.pipeline.plan import ObjectPlan
@@ -26,6 +27,7 @@ class MadeObject:
     skipped: bool = False  #: registered before, and all its files stand unchanged
     touches: int = 1  #: about so many that overlap name a place; 1: no scan is needed
     face_reports: tuple[FaceReport, ...] = ()  #: of what was made or would be, face by face
+    fit: FitReport | None = None  #: how its panels fit, where they were verified
 
     @property
     def folder(self) -> Path | None:
@@ -90,6 +92,7 @@ def describe_object(
     *,
     reused: bool,
     skipped: bool = False,
+    fit: FitReport | None = None,
 ) -> MadeObject:
     """Return what is told of an object; a round face counts as one."""
     return MadeObject(
@@ -102,6 +105,7 @@ def describe_object(
         warnings=(*plan.polyhedron.notes, *plan.notes, *layout.warnings, *warnings),
         reused=reused,
         skipped=skipped,
+        fit=fit,
         touches=touches_needed(
             plan.array.order, plan.array.rows * plan.array.columns, plan.spec.style.pitch_mm
         ),

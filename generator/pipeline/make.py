@@ -110,6 +110,6 @@ def _finish(order: Order, place: ObjectPlacement, files: StagedObject, staging: 
     written = tuple(w.path for w in staging.commit())
     made = describe_object(
         order.plan, place.layout, files.parts, files.warnings, written, files.faces,
-        reused=place.reused,
+        reused=place.reused, fit=files.fit,
     )  # fmt: skip
     return Product(made, place)

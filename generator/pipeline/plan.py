@@ -17,7 +17,7 @@ from generator.alphabet.known import Alphabet, alphabet_named
 from generator.alphabet.outline import Tiers, footprint_half_mm, outlines
 from generator.alphabet.printable import check_printable
 from generator.array import SymbolArray, array_from
-from generator.errors import ArrayError
+from generator.errors import ArrayError, SolidError
 from generator.layout.layout import Clearances, Outlines
 from generator.pipeline.blame import errors_at
 from generator.pipeline.round import RoundFaces, as_one_part, reach_mm, round_faces
@@ -28,7 +28,7 @@ from generator.polyhedron.shapes import SHAPES
 from generator.printers import Printer, printer_named
 from generator.solid.frame import edge_numbers
 from generator.solid.mitre import symbol_clearance_mm
-from generator.solid.panels import top_insets_mm
+from generator.solid.plate import cut_corners, plain_panels, top_insets_mm
 from generator.spec import LocatedSpec, ObjectSpec, ShapeSpec
 
 
@@ -102,8 +102,9 @@ def plan_object(located: LocatedSpec, solid: Polyhedron | None = None) -> Object
     plain = [k for k in range(len(polyhedron.faces)) if k not in faces.blank]
     plain = [k for k in plain if k not in faces.developments]
     covered = covered_parts(polyhedron, plain, reach_mm(spec, printer))
-    clearances = _clearances(polyhedron, spec, printer, faces, covered)
-    outlines_of = {k: (*face_polygon(polyhedron, k), *loops) for k, loops in covered.items()}
+    kept_free = {**covered, **_cut_corners(polyhedron, spec, printer, covered)}
+    clearances = _clearances(polyhedron, spec, printer, faces, kept_free)
+    outlines_of = {k: (*face_polygon(polyhedron, k), *loops) for k, loops in kept_free.items()}
     outlines_of |= {number: (face.outline,) for number, face in faces.developments.items()}
     return ObjectPlan(
         located,
@@ -144,6 +145,23 @@ def _check_order(alphabet: Alphabet, array: SymbolArray) -> None:
         )
 
 
+def _cut_corners(
+    polyhedron: Polyhedron,
+    spec: ObjectSpec,
+    printer: Printer,
+    covered: Mapping[int, tuple[Loop, ...]],
+) -> dict[int, tuple[Loop, ...]]:
+    """Return what is cut off the tops of panels, with what other faces cover of the same ones."""
+    if spec.parts != "panels":
+        return {}
+    try:
+        plain = plain_panels(polyhedron, spec.wall_mm, printer, spec.gap_mm, spec.name)
+    except SolidError:
+        return {}  # told with its place when the parts are built
+    cut = cut_corners(polyhedron, plain, printer)
+    return {face: (*covered.get(face, ()), *loops) for face, loops in cut.items()}
+
+
 def _covered_note(
     polyhedron: Polyhedron, covered: Mapping[int, tuple[Loop, ...]], reach: float
 ) -> tuple[str, ...]:
@@ -172,7 +190,7 @@ def _clearances(
             loops = [faces.developments[number].outline_edges()]
         needs = [np.array([apart[edge] for edge in loop]) for loop in loops]
         if spec.parts == "panels":
-            insets = top_insets_mm(polyhedron, number, spec.wall_mm, printer)
+            insets = top_insets_mm(polyhedron, number, spec.wall_mm, printer, gap_mm=spec.gap_mm)
             needs = [np.maximum(need, inset) for need, inset in zip(needs, insets, strict=True)]
         needs += [np.zeros(len(loop)) for loop in covered.get(number, ())]
         clearances.append(tuple(printer.edge_min_mm + need for need in needs))

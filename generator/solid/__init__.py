@@ -4,8 +4,9 @@ from generator.solid.closed import prove_closed
 from generator.solid.explicit import ExpandedSolid, expand_part
 from generator.solid.measure import box, volume
 from generator.solid.mitre import symbol_clearance_mm, top_inset_mm
-from generator.solid.panels import Panels, panels, top_insets_mm
+from generator.solid.panels import Panels, panels
 from generator.solid.part import Embossing, Facet, Part
+from generator.solid.plate import cut_corners, plain_panels, top_insets_mm
 from generator.solid.triangulate import Mesh, body_mesh, symbol_meshes, triangles
 from generator.solid.whole import emboss_whole
 
@@ -18,9 +19,11 @@ __all__ = [
     "Part",
     "body_mesh",
     "box",
+    "cut_corners",
     "emboss_whole",
     "expand_part",
     "panels",
+    "plain_panels",
     "prove_closed",
     "symbol_clearance_mm",
     "symbol_meshes",

@@ -30,26 +30,29 @@ def mitre(
 ) -> Mitre:
     """Return the side along an edge with interior dihedral angle `theta_rad`.
 
-    The side stays on its own side of the bisecting plane at every depth, and overhangs by
+    The side keeps half of `gap_mm` from the bisecting plane at every depth, and overhangs by
     at most `printer.overhang_max_rad`.
     """
-    slope = _cotangent_of_half(theta_rad)
-    back = max(wall_mm * slope, -EMBOSS.reflex_limit * wall_mm) + gap_mm
-    steepest = math.tan(printer.overhang_max_rad)
-    if theta_rad > EMBOSS.right_rad:
-        return Mitre(max(0.0, back - wall_mm * steepest), 0.0, back)
-    land = min(printer.layer_mm, wall_mm / 4)
-    top = max(back - (wall_mm - land) * steepest, land * slope)
-    return Mitre(top, land, back)
+    gap = _gap_inset_mm(theta_rad, gap_mm)
+    land = 0.0 if theta_rad > EMBOSS.right_rad else min(printer.layer_mm, wall_mm / 4)
+    top = _top_inset_mm(theta_rad, wall_mm, printer, gap, gap)
+    return Mitre(top, land, _back_inset_mm(theta_rad, wall_mm) + gap)
 
 
-def top_inset_mm(theta_rad: float, wall_mm: float, printer: Printer) -> float:
-    """Return how far a panel's top edge stands back from the object's edge, mm.
+def top_inset_mm(
+    theta_rad: float, wall_mm: float, printer: Printer, gap_mm: float = EMBOSS.assembly_gap_mm
+) -> float:
+    """Return what the layout adds to the printer's clearance along an edge, mm.
 
-    What the layout adds to the printer's clearance along an edge with interior dihedral
-    angle `theta_rad` (rad) and panels `wall_mm` thick; 0 where the edge is whole.
+    How far the top edge of a panel `wall_mm` thick stands back from the object's edge with
+    interior dihedral angle `theta_rad`. The gap counts only beyond a share of the clearance,
+    so that panels and a whole body, and objects of any ordinary gap, show the same symbols.
     """
-    return mitre(theta_rad, wall_mm, printer).top_mm
+    usual = EMBOSS.usual_gap_inset_mm
+    whole = _top_inset_mm(theta_rad, wall_mm, printer, usual, 0.0)
+    gap = _gap_inset_mm(theta_rad, gap_mm)
+    top = _top_inset_mm(theta_rad, wall_mm, printer, gap, gap)
+    return max(whole, top - EMBOSS.gap_in_clearance * printer.edge_min_mm)
 
 
 def symbol_clearance_mm(theta_rad: float, height_mm: float) -> float:
@@ -59,6 +62,29 @@ def symbol_clearance_mm(theta_rad: float, height_mm: float) -> float:
     they meet its bisecting plane; 0 at a convex edge.
     """
     return max(0.0, -height_mm * _cotangent_of_half(theta_rad))
+
+
+def _top_inset_mm(
+    theta_rad: float, wall_mm: float, printer: Printer, gap_mm: float, least_mm: float
+) -> float:
+    """Return the inset of the top edge, with an inset for the gap, the least one at whole edges."""
+    back = _back_inset_mm(theta_rad, wall_mm) + gap_mm
+    steepest = math.tan(printer.overhang_max_rad)
+    if theta_rad > EMBOSS.right_rad:
+        return max(least_mm, back - wall_mm * steepest)
+    land = min(printer.layer_mm, wall_mm / 4)
+    return max(back - (wall_mm - land) * steepest, land * _cotangent_of_half(theta_rad) + least_mm)
+
+
+def _back_inset_mm(theta_rad: float, wall_mm: float) -> float:
+    """Return where the bisecting plane meets the back; limited where it reaches far out."""
+    return max(wall_mm * _cotangent_of_half(theta_rad), -EMBOSS.reflex_limit * wall_mm)
+
+
+def _gap_inset_mm(theta_rad: float, gap_mm: float) -> float:
+    """Return how far inward half the gap is, measured in the face; rounded up to 0.01 mm."""
+    exact = gap_mm / 2 / max(math.sin(theta_rad / 2), 1e-9)
+    return math.ceil(exact * EMBOSS.gap_steps_per_mm - 1e-6) / EMBOSS.gap_steps_per_mm
 
 
 def _cotangent_of_half(theta_rad: float) -> float:

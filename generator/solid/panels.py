@@ -17,16 +17,14 @@ from generator.alphabet.outline import Tiers
 from generator.errors import SolidError
 from generator.layout.placement import FaceLayout, Layout
 from generator.plane.polygon import face_vector
-from generator.polyhedron.frame import dihedral, face_frame, face_polygon
 from generator.polyhedron.winged import Polyhedron
 from generator.printers import Printer
 from generator.solid.emboss import embossing_of
 from generator.solid.frame import edge_numbers, in_frame, plane_frame
-from generator.solid.inset import inset, regular, shared_insets
 from generator.solid.marks import BackMark, marks_on
 from generator.solid.measure import box
-from generator.solid.mitre import Mitre, mitre
-from generator.solid.part import Embossing, Facet, Part
+from generator.solid.part import Embossing, Part
+from generator.solid.plate import edge_loops, plain_panels
 from generator.solid.settings import EMBOSS
 from generator.solid.whole import move_part
 
@@ -39,14 +37,6 @@ class Panels:
 
     parts: tuple[Part, ...]
     warnings: tuple[str, ...]  #: at most one: numbers that found no room on a back
-
-
-@dataclass(frozen=True, slots=True)
-class _Tier:
-    """The outline of a panel at one height."""
-
-    z_mm: float
-    rings: tuple[Ring, ...]  #: face frame
 
 
 def panels(
@@ -77,7 +67,7 @@ def panels(
     name
         Put before each face's name to name the part: "Cube-F1".
     gap_mm
-        By which the back edges stay away from the bisecting planes.
+        Least distance of two panels in the finished object.
     numbers
         Whether backs bear the numbers of their edges and faces.
 
@@ -88,20 +78,26 @@ def panels(
     """
     if not (math.isfinite(wall_mm) and wall_mm > 0):
         raise SolidError(f"wall {wall_mm:g} mm", fix="set wall to more than 0 mm, 3 prints well")
+    if not (math.isfinite(gap_mm) and gap_mm > 0):
+        raise SolidError(f"gap {gap_mm:g} mm", fix="set gap to more than 0 mm, 0.14 fits well")
     by_face = {face.face: face for face in layout.faces}
     edges = edge_numbers(polyhedron)
-    angles = [dihedral(polyhedron, edge) for edge in range(len(polyhedron.edges))]
+    plain = plain_panels(polyhedron, wall_mm, printer, gap_mm, name)
     parts = []
     missing: dict[str, tuple[str, ...]] = {}
-    for face in range(len(polyhedron.faces)):
-        numbered = _edge_loops(polyhedron, face, edges)
-        outline = _tiers_of(polyhedron, face, numbered, angles, wall_mm, printer, gap_mm)
-        part = _body(polyhedron, face, numbered, outline, wall_mm, name)
+    for face, part in enumerate(plain.fitted):
         embossings: tuple[Embossing, ...] = ()
         if face in by_face and len(by_face[face].labels):
             embossings = (_symbols(by_face[face], tiers, wall_mm, layout.pitch_mm),)
         if numbers:
-            marks, without_room = _numbers(part, numbered, face, wall_mm, printer)
+            marks, without_room = _numbers(
+                plain.mitred[face],
+                part,
+                edge_loops(polyhedron, face, edges),
+                face,
+                wall_mm,
+                printer,
+            )
             embossings += marks
             if without_room:
                 missing[polyhedron.faces[face].name] = without_room
@@ -110,127 +106,6 @@ def panels(
         middle = (low + high) / 2
         parts.append(move_part(part, np.array([-middle[0], -middle[1], 0.0])))
     return Panels(tuple(parts), (_no_room(missing),) if missing else ())
-
-
-def top_insets_mm(
-    polyhedron: Polyhedron, face: int, wall_mm: float, printer: Printer
-) -> tuple[NDArray[np.float64], ...]:
-    """Return how far a panel's top stands back from each edge of a face, loop after loop.
-
-    `top_inset_mm` of each edge, raised where nearly parallel neighbours share one inset.
-    """
-    loops = _edge_loops(polyhedron, face, edge_numbers(polyhedron))
-    return tuple(
-        shared_insets(
-            ring,
-            np.array([mitre(dihedral(polyhedron, edge), wall_mm, printer).top_mm for edge in loop]),
-        )
-        for ring, loop in zip(face_polygon(polyhedron, face), loops, strict=True)
-    )
-
-
-def _edge_loops(
-    polyhedron: Polyhedron, face: int, edges: dict[tuple[int, int], int]
-) -> list[list[int]]:
-    """Return the edge numbers along each loop of a face."""
-    return [
-        [edges[a, b] for a, b in zip(loop, loop[1:] + loop[:1], strict=True)]
-        for loop in polyhedron.faces[face].loops
-    ]
-
-
-def _tiers_of(
-    polyhedron: Polyhedron,
-    face: int,
-    numbered: list[list[int]],
-    angles: list[float],
-    wall_mm: float,
-    printer: Printer,
-    gap_mm: float,
-) -> list[_Tier]:
-    """Return the outlines of a panel from the top down, proven regular."""
-    rings = face_polygon(polyhedron, face)
-
-    def outline(wall: float) -> list[_Tier] | None:
-        cut = [[mitre(angles[e], wall, printer, gap_mm) for e in loop] for loop in numbered]
-        found = _outline(rings, cut, wall)
-        ok = all(regular(rings, tier.rings, printer.layer_mm) for tier in found)
-        return found if ok else None
-
-    found = outline(wall_mm)
-    if found is not None:
-        return found
-    fits, fails = 0.0, wall_mm
-    for _ in range(24):
-        trial = (fits + fails) / 2
-        fits, fails = (fits, trial) if outline(trial) is None else (trial, fails)
-    largest = math.floor(fits * 10) / 10
-    fix = "make the object larger, or print it whole (parts: whole)"
-    if largest >= printer.stroke_min_mm:
-        fix = f"set wall to {largest:g} mm or less, or {fix}"
-    raise SolidError(
-        f"the face is too small for a wall of {wall_mm:g} mm: its mitred back closes up",
-        fix=fix,
-        place=polyhedron.faces[face].name,
-    )
-
-
-def _outline(rings: tuple[Ring, ...], cut: list[list[Mitre]], wall: float) -> list[_Tier]:
-    """Return the outlines at the top, under the land if there is one, and at the back."""
-    land = max(side.land_mm for loop in cut for side in loop)
-    tops, middles, backs = [], [], []
-    for ring, loop in zip(rings, cut, strict=True):
-        top = shared_insets(ring, np.array([side.top_mm for side in loop]))
-        back = shared_insets(ring, np.array([side.back_mm for side in loop]))
-        sloped = np.array([side.land_mm == 0 for side in loop])
-        middle = np.where(sloped, top + (back - top) * (land / wall), top)
-        tops.append(inset(ring, top))
-        middles.append(inset(ring, shared_insets(ring, middle)))
-        backs.append(inset(ring, back))
-    found = [_Tier(wall, tuple(tops)), _Tier(wall - land, tuple(middles)), _Tier(0.0, tuple(backs))]
-    return found if land > 0 else [found[0], found[2]]
-
-
-def _body(
-    polyhedron: Polyhedron,
-    face: int,
-    numbered: list[list[int]],
-    outline: list[_Tier],
-    wall_mm: float,
-    name: str,
-) -> Part:
-    """Return the plain panel: facet 0 is the face, facet 1 the back, then the sides."""
-    face_name = polyhedron.faces[face].name
-    sizes = [len(loop) for loop in numbered]
-    total = sum(sizes)
-    firsts = np.cumsum([0, *sizes[:-1]]).tolist()
-    vertices = np.concatenate(
-        [np.c_[ring, np.full(len(ring), tier.z_mm)] for tier in outline for ring in tier.rings]
-    )
-    bottom = total * (len(outline) - 1)
-    top = tuple(tuple(range(a, a + n)) for a, n in zip(firsts, sizes, strict=True))
-    back = tuple(
-        tuple(bottom + a + k for k in reversed(range(n)))
-        for a, n in zip(firsts, sizes, strict=True)
-    )
-    facets = [Facet(face_name, top), Facet(f"{face_name} back", back)]
-    for a, loop in zip(firsts, numbered, strict=True):
-        for k, edge in enumerate(loop):
-            ahead = (k + 1) % len(loop)
-            for level in range(len(outline) - 1):
-                high, low = level * total + a, (level + 1) * total + a
-                land = " land" if level + 2 < len(outline) else ""
-                quad = (low + k, low + ahead, high + ahead, high + k)
-                facets.append(Facet(f"{face_name} edge {edge + 1}{land}", (quad,)))
-    T_face_part = np.eye(4)
-    T_face_part[2, 3] = -wall_mm
-    return Part(
-        name=f"{name}-{face_name}" if name else face_name,
-        vertices=vertices,
-        facets=tuple(facets),
-        embossings=(),
-        T_object_part=face_frame(polyhedron, face) @ T_face_part,
-    )
 
 
 def _symbols(
@@ -242,12 +117,21 @@ def _symbols(
 
 
 def _numbers(
-    part: Part, numbered: list[list[int]], face: int, wall_mm: float, printer: Printer
+    plain: Part,
+    fitted: Part,
+    numbered: list[list[int]],
+    face: int,
+    wall_mm: float,
+    printer: Printer,
 ) -> tuple[tuple[Embossing, ...], tuple[str, ...]]:
-    """Return the engraved numbers of a plain panel's back, and those without room."""
-    corners = [part.vertices[list(loop)] for loop in part.facets[1].loops]
+    """Return the engraved numbers of a panel's back, and those without room.
+
+    They stand along the edges that the back had before it was cut at corners.
+    """
+    corners = [plain.vertices[list(loop)] for loop in plain.facets[1].loops]
     T = plane_frame(corners[0][0], corners[0][1] - corners[0][0], face_vector(corners))
     rings = [in_frame(T, corner)[:, :2] for corner in corners]
+    left = [in_frame(T, fitted.vertices[list(loop)])[:, :2] for loop in fitted.facets[1].loops]
     marks = []
     for ring, edges in zip(rings, numbered, strict=True):
         # Seen from behind, corners run the other way: edge k of the back is edge n - 2 - k.
@@ -256,7 +140,7 @@ def _numbers(
             marks.append(BackMark(str(edge + 1), ring[k], ring[(k + 1) % len(ring)]))
     centre = (rings[0].min(axis=0) + rings[0].max(axis=0)) / 2
     marks.append(BackMark(f"F{face + 1}", centre, centre))
-    return marks_on(marks, rings, 1, T, wall_mm, printer)
+    return marks_on(marks, left, 1, T, wall_mm, printer)
 
 
 def _no_room(missing: dict[str, tuple[str, ...]]) -> str:

@@ -11,12 +11,30 @@ class EmbossingSettings:
     """Tolerances, gaps and sizes of solids."""
 
     # mitre.py
-    assembly_gap_mm: float = 0.1
-    """Between two assembled panels' back edges and the bisecting plane, each."""
+    assembly_gap_mm: float = 0.14
+    """Between two assembled panels, wherever they meet; glue and a filament printer's errors."""
+    gap_steps_per_mm: int = 500
+    """Half the gap, measured in the face, is rounded up to one of these."""
+    usual_gap_inset_mm: float = 0.1
+    """Half the gap, in the face, that the layout counts at edges that are cut back."""
+    gap_in_clearance: float = 0.5
+    """Share of the clearance of symbols that a panel's own edge may take."""
     reflex_limit: float = 2.0
     """A reflex edge's back reaches out at most this many walls (angles up to 307 degrees)."""
     right_rad: float = math.pi / 2 + 1e-6
     """Angles up to this count as a right angle."""
+
+    # fit.py
+    fit_rounding_mm: float = 1e-6
+    """A gap that is smaller by less is kept; rounding of 64-bit coordinates is far below."""
+    fit_parallel: float = 1e-6
+    """Faces whose normals differ by less have no bisecting plane (both of unit length)."""
+    fit_edge_mm: float = 0.05
+    """A cut that leaves a shorter edge is moved back: nothing shorter prints or keeps in STL."""
+    fit_step_mm: float = 0.02
+    """By which a cut is moved back at a time."""
+    fit_steps: int = 12
+    """Tries at that; the one with the longest shortest edge is taken where none is enough."""
 
     # inset.py
     flat_turn_rad: float = math.radians(15)

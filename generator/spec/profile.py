@@ -17,6 +17,7 @@ HEIGHT_MM = 1.0  # a multiple of common layer heights
 DRAFTS_RAD = (0.174532925199, 0.130899693900, 0.087266462600, 0.043633231300)
 """10 degrees, and 7.5, 5, 2.5 where strokes leave no room for the ones before."""
 WALL_MM = 3.0
+GAP_MM = 0.14  # between assembled panels
 FORMATS = ("step", "stl", "3mf")
 DATABASE = "sqlite:///lab.db"
 

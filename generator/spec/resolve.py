@@ -29,6 +29,7 @@ from generator.spec.profile import (
     DRAFTS_RAD,
     EXPLICIT,
     FORMATS,
+    GAP_MM,
     HEIGHT_MM,
     WALL_MM,
     SymbolDefaults,
@@ -98,6 +99,13 @@ def resolve(
             f"a wall of {wall:g} mm is thinner than {printer} prints solid",
             f"set wall to {thinnest:g} mm or more",
         )
+    gap = settings.print.gap or GAP_MM
+    if gap > wall:
+        refuse(
+            "print.gap",
+            f"a gap of {gap:g} mm is wider than the wall of {wall:g} mm",
+            f"set gap to {GAP_MM:g} mm, or more for much glue",
+        )
     if problems or shape is None:
         raise SpecError(problems)
     spec = ObjectSpec(
@@ -110,6 +118,7 @@ def resolve(
         layout=settings.layout,
         parts=settings.print.parts,
         wall_mm=wall,
+        gap_mm=gap,
         printer=printer,
         formats=tuple(dict.fromkeys(settings.output.formats or FORMATS)),
         folder=Path(settings.output.folder or f"out/{_folder_name(settings.name)}"),

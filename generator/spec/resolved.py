@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from generator.alphabet.outline import SymbolStyle
+from generator.spec.profile import GAP_MM
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +56,7 @@ class ObjectSpec:
     layout: Literal["auto", "net", "faces"]
     parts: Literal["panels", "whole"]
     wall_mm: float  #: thickness of panels
+    gap_mm: float  #: between panels where they meet in the finished object
     printer: str
     formats: tuple[str, ...]  #: of step, stl, 3mf, glb
     folder: Path  #: for the files; relative to the current folder
@@ -69,6 +71,7 @@ class ObjectSpec:
         Comments, key order, units, names, folders, formats and the database do not count;
         a default counts as if it had been written; a file counts by its content.
         """
+        gap = {} if self.gap_mm == GAP_MM else {"gap_mm": self.gap_mm}  # older specs had none
         style = {name: round(value, 9) for name, value in asdict(self.style).items()}
         return {
             "shape": {"kind": self.shape.kind, **self.shape.parameters},
@@ -79,4 +82,5 @@ class ObjectSpec:
             "parts": self.parts,
             "wall_mm": self.wall_mm,
             "printer": self.printer,
+            **gap,
         }

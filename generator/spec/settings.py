@@ -125,6 +125,8 @@ class Print(Block):
     """panels: one mitred plate for each face, without overhang; whole: one solid body."""
     wall: Length | None = None
     """Thickness of the panels; 3 mm."""
+    gap: Length | None = None
+    """Between panels where they meet in the finished object; 0.14 mm."""
     printer: Literal["fdm-0.4", "fdm-0.25", "resin"] | None = None
     """What prints: its limits hold for strokes, gaps and the bed."""
 

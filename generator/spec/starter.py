@@ -35,6 +35,7 @@ name: {name}
 # print:
 #   parts: panels        # panels (mitred plates, no supports) | whole (one body)
 #   wall: 3 mm           # thickness of the panels
+#   gap: 0.14 mm         # between panels in the finished object
 #   printer: fdm-0.4     # encode-object printers lists them
 
 # output:

@@ -4,9 +4,10 @@
 
 Random shapes are made as panels and as whole bodies in turn. Every part is written as STEP
 and STL and read back: STEP by the CAD kernel (one valid solid, volume against the closed
-form), STL by pymeshlab (closed, two-manifold, no triangle cuts another). Shapes that the
-tool refuses (too small for the wall, say) are counted with their reason. Exit code 1 when a
-written part fails.
+form), STL by pymeshlab (closed, two-manifold, no triangle cuts another);
+panels are put together by `T_object_part` and may neither overlap nor come nearer than the gap.
+Shapes that the tool refuses (too small for the wall, say) are counted with their reason. Exit
+code 1 when a written part fails.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ import numpy as np
 
 from generator.errors import GeneratorError
 from generator.export.check import verify
+from generator.export.fit_check import PanelFile, verify_fit
 from generator.export.step import step_chunks
 from generator.export.stl import stl_chunks
 from generator.pipeline.files import parts_of
@@ -50,6 +52,9 @@ class Outcome:
     mesh_error: float
     refused: str
     failed: str
+    panels: int = 0  #: of an object made of panels
+    overlap_mm3: float = 0.0  #: that two of its panels both fill
+    gap_mm: float = np.inf  #: smallest distance of two of its panels
 
 
 def random_spec(kind: str, seed: int, number: int, folder: Path) -> Path:
@@ -90,9 +95,12 @@ def outcome(located: LocatedSpec) -> Outcome:
         return Outcome(name, 0, 0, 0.0, 0.0, error.cause, "")
     symbols = sum(len(face.labels) for face in layout.faces)
     step_error = mesh_error = 0.0
+    fit = None
     with tempfile.TemporaryDirectory() as folder:
-        step, stl = Path(folder) / "part.step", Path(folder) / "part.stl"
+        panels = []
         for part in parts:
+            step, stl = Path(folder) / "part.step", Path(folder) / f"{part.name}.stl"
+            panels.append(PanelFile(part.name, stl, part.T_object_part))
             try:
                 prove_closed(part)
                 step.write_bytes(b"".join(step_chunks(part)))
@@ -104,7 +112,16 @@ def outcome(located: LocatedSpec) -> Outcome:
             assert report.stl is not None
             step_error = max(step_error, abs(report.step.volume_error))
             mesh_error = max(mesh_error, abs(report.stl.volume_error))
-    return Outcome(name, len(parts), symbols, step_error, mesh_error, "", "")
+        try:
+            fit = verify_fit(panels, located.spec.gap_mm) if len(panels) > 1 else None
+        except GeneratorError as error:
+            return Outcome(name, len(parts), symbols, step_error, mesh_error, "", str(error))
+    if fit is None:
+        return Outcome(name, len(parts), symbols, step_error, mesh_error, "", "")
+    gap = np.inf if fit.gap_mm is None else fit.gap_mm
+    return Outcome(
+        name, len(parts), symbols, step_error, mesh_error, "", "", len(parts), fit.overlap_mm3, gap
+    )
 
 
 def main() -> int:
@@ -136,6 +153,10 @@ def main() -> int:
     step = max((o.step_error for o in made), default=0.0)
     mesh = max((o.mesh_error for o in made), default=0.0)
     print(f"largest relative volume error: STEP {step:.1e}, STL {mesh:.1e}")
+    fitted = [o for o in made if o.panels]
+    print(f"{len(fitted)} objects of {sum(o.panels for o in fitted)} panels put together: overlap "
+          f"{sum(o.overlap_mm3 for o in fitted):.6f} mm3, smallest gap "
+          f"{min((o.gap_mm for o in fitted), default=np.inf):.6f} mm")  # fmt: skip
     for reason, count in refused.most_common():
         print(f"  refused {count}: {reason} ...")
     for o in failed:

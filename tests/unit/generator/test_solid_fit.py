@@ -1,0 +1,198 @@
+"""Panels that fit: no overlap and the gap wherever they meet, and symbols that stay whole."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from manifold3d import Manifold, Mesh64
+from random_shapes import convex_hull, extruded, random_convex
+
+from generator.errors import SolidError
+from generator.export.fit_check import PanelFile, verify_fit
+from generator.export.stl import stl_chunks
+from generator.layout.placement import Layout
+from generator.pipeline.files import parts_of
+from generator.pipeline.place import NO_CELLS, lay_out_object
+from generator.pipeline.plan import plan_object
+from generator.plane.rings import distance
+from generator.polyhedron.shapes import cube, dodecahedron, pyramid
+from generator.polyhedron.winged import polyhedron
+from generator.printers import PRINTERS
+from generator.solid import panels, plain_panels, prove_closed, triangles, volume
+from generator.solid.clip import PlainBody, beyond, body_volume, cut_off, shortest_edge_mm
+from generator.solid.emboss import turn
+from generator.spec import read_specs
+
+FDM = PRINTERS["fdm-0.4"]
+EMPTY = Layout("faces", 7.0, ())
+UNEQUAL = np.array([(0, 0, 0), (60, 0, 0), (60, 80, 0), (0, 80, 0), (30, 40, 70)], dtype=float)
+BIPYRAMID = np.array(
+    [(40, 0, 0), (0, 28, 0), (-44, 5, 0), (0, -30, 0), (0, 0, 50), (0, 0, -35)], dtype=float
+)
+ELL = np.array([(0, 0), (60, 0), (60, 20), (20, 20), (20, 60), (0, 60)], dtype=float)
+
+
+def hull_of_14():
+    points = np.random.default_rng(14).normal(size=(14, 3))
+    return convex_hull(50 * points / np.linalg.norm(points, axis=1)[:, None])
+
+
+def dented():
+    """A hull whose corners are moved in and out: faces meet in corners, convex or not."""
+    hull = random_convex(np.random.default_rng([1, 38, True]))
+    scale = np.random.default_rng(3).uniform(0.75, 1.1, size=(len(hull.vertices), 1))
+    return polyhedron("dented", hull.vertices * scale, [face.loops for face in hull.faces])
+
+
+def seated(part):
+    mesh = triangles(part)
+    T = part.T_object_part
+    points = mesh.vertices @ T[:3, :3].T + T[:3, 3]
+    return Manifold(Mesh64(points, mesh.triangles.astype(np.uint64)))
+
+
+def measured(parts):
+    """Return overlap (mm3) and smallest gap (mm, 2 at most) of all pairs."""
+    solids = [seated(part) for part in parts]
+    pairs = list(itertools.combinations(solids, 2))
+    overlap = sum(float((one ^ other).volume()) for one, other in pairs)
+    return overlap, min(float(one.min_gap(other, 2.0)) for one, other in pairs)
+
+
+@pytest.mark.parametrize(
+    ("solid", "cuts"),
+    [
+        (cube(60.0), False),
+        (dodecahedron(40.0), False),
+        (pyramid(4, 60.0, 60.0), False),
+        (convex_hull(UNEQUAL), True),
+        (convex_hull(BIPYRAMID), True),
+        (hull_of_14(), True),
+        (extruded([ELL], 50.0), False),
+        (dented(), True),
+    ],
+    ids=["cube", "dodecahedron", "pyramid", "unequal", "bipyramid", "hull", "bracket", "dented"],
+)
+def test_panels_keep_the_gap_everywhere(solid, cuts):
+    made = plain_panels(solid, 2.0, FDM, 0.14, "P")
+    overlap, gap = measured(made.fitted)
+    assert overlap == 0.0
+    assert 0.14 - 1e-6 <= gap <= 0.144
+    for part in made.fitted:
+        prove_closed(part)
+        assert volume(part) == pytest.approx(float(seated(part).volume()), rel=1e-12)
+        assert shortest_edge_mm(PlainBody(part.vertices, part.facets)) >= 0.05
+    assert any(a is not b for a, b in zip(made.mitred, made.fitted, strict=True)) == cuts
+    if cuts:  # mitres alone are too near or run into each other; the cuts cost little
+        assert measured(made.mitred)[1] < 0.139
+        before, after = (sum(map(volume, parts)) for parts in (made.mitred, made.fitted))
+        assert 0.99 < after / before < 1.0
+
+
+@pytest.mark.parametrize("gap", [0.05, 0.14, 0.6, 2.0])
+def test_the_gap_is_what_was_asked_for(gap):
+    made = panels(convex_hull(UNEQUAL), EMPTY, (), 3.0, FDM, gap_mm=gap).parts
+    overlap, found = measured(made)
+    assert overlap == 0.0
+    assert gap - 1e-6 <= found <= gap + 0.003
+
+
+@pytest.mark.parametrize("gap", [0.0, -1.0, math.nan])
+def test_no_gap_is_refused(gap):
+    with pytest.raises(SolidError, match="set gap to more than 0"):
+        panels(cube(60.0), EMPTY, (), 3.0, FDM, gap_mm=gap)
+
+
+def test_numbers_stay_on_backs_that_were_cut():
+    made = panels(hull_of_14(), EMPTY, (), 3.0, FDM)
+    assert any(part.embossings for part in made.parts)
+    for part in made.parts:
+        prove_closed(part)
+
+
+@pytest.mark.parametrize("gap", ["0.14 mm", "2 mm"])
+def test_symbols_stand_on_what_the_cuts_leave(tmp_path, gap):
+    spec = tmp_path / "pyramid.yaml"
+    faces = "[[0, 3, 2, 1], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]"
+    spec.write_text(
+        f"name: P\nprint: {{gap: {gap}}}\nshape:\n  polyhedron:\n"
+        f"    vertices: {UNEQUAL.tolist()}\n    faces: {faces}\n"
+    )
+    plan = plan_object(read_specs([spec])[0])
+    layout = lay_out_object(plan, NO_CELLS)
+    parts, _ = parts_of(plan, layout)
+    assert sum(part.symbols for part in parts) == sum(len(face.labels) for face in layout.faces)
+    for part in parts:
+        prove_closed(part)
+        top = [part.vertices[list(loop), :2] for loop in part.facets[0].loops]
+        for embossing in part.embossings:
+            if embossing.face is None:
+                continue
+            R = turn(embossing.rotation_rad)
+            T = embossing.T_part_facet
+            for centre, label in zip(embossing.centres_mm, embossing.labels, strict=True):
+                foot = (embossing.tiers[label].rings[0][0] @ R.T + centre) @ T[:2, :2].T + T[:2, 3]
+                assert distance(foot, top).min() >= FDM.edge_min_mm / 2 - 1e-9
+    assert measured(parts)[0] == 0.0
+
+
+def test_a_cube_loses_a_corner():
+    corners = np.array(list(itertools.product((0.0, 1.0), repeat=3)))
+    solid = convex_hull(corners)
+    part = panels(solid, EMPTY, (), 0.2, FDM, numbers=False, gap_mm=0.01)
+    assert len(part.parts) == 6
+    facets = tuple(plain_facets(solid))
+    body = PlainBody(solid.vertices, facets)
+    normal = np.ones(3) / math.sqrt(3)
+    offset = float(normal @ (1, 1, 0.5))
+    (piece,) = beyond(body, normal, offset)
+    assert piece.sum() == 1
+    cut = cut_off(body, normal, offset, piece, "lid")
+    assert cut is not None
+    assert body_volume(cut) == pytest.approx(1 - 0.5**3 / 6)
+    assert [len(facet.loops[0]) for facet in cut.facets if facet.name == "lid"] == [3]
+    assert len(cut.vertices) == 10
+    assert cut_off(body, normal, -1.0, np.ones(8, dtype=bool), "lid") is None
+
+
+def plain_facets(solid):
+    from generator.solid.part import Facet
+
+    return [Facet(face.name, face.loops) for face in solid.faces]
+
+
+def test_a_piece_of_a_fork_is_cut_alone():
+    fork = np.array([(0, 0), (9, 0), (9, 9), (6, 9), (6, 3), (3, 3), (3, 9), (0, 9)], dtype=float)
+    solid = extruded([fork], 2.0)
+    body = PlainBody(solid.vertices, tuple(plain_facets(solid)))
+    pieces = beyond(body, np.array([0.0, 1.0, 0.0]), 5.0)
+    assert [int(piece.sum()) for piece in pieces] == [4, 4]
+    cut = cut_off(body, np.array([0.0, 1.0, 0.0]), 5.0, pieces[0], "lid")
+    assert cut is not None
+    assert body_volume(body) - body_volume(cut) == pytest.approx(3 * 4 * 2)
+    # Along the arms the fork would fall in two.
+    (handle,) = beyond(body, np.array([0.0, -1.0, 0.0]), -2.0)
+    both = cut_off(body, np.array([0.0, -1.0, 0.0]), -2.0, handle, "lid")
+    assert both is not None
+    (bridge,) = beyond(body, np.array([0.0, -1.0, 0.0]), -5.0)
+    assert bridge.sum() == 8
+    assert cut_off(body, np.array([0.0, -1.0, 0.0]), -5.0, bridge, "lid") is None
+
+
+def test_written_panels_are_put_together(tmp_path):
+    def files(parts):
+        for part in parts:
+            (tmp_path / part.name).write_bytes(b"".join(stl_chunks(triangles(part))))
+        return [PanelFile(part.name, tmp_path / part.name, part.T_object_part) for part in parts]
+
+    plain = plain_panels(convex_hull(UNEQUAL), 3.0, FDM, 0.14, "P")
+    report = verify_fit(files(plain.fitted), 0.14)
+    assert report.overlap_mm3 == 0.0
+    assert report.gap_mm == pytest.approx(0.14, abs=1e-4)
+    assert report.pairs == 10
+    with pytest.raises(SolidError, match=r"panels 'P-F\d' and 'P-F\d' overlap by \d"):
+        verify_fit(files(plain.mitred), 0.14)
+    with pytest.raises(SolidError, match=r"apart where 0\.2 mm was meant"):
+        verify_fit(files(plain.fitted), 0.2)
+    assert verify_fit(files(plain.fitted[:1]), 0.14).gap_mm is None
