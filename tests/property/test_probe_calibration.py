@@ -78,7 +78,8 @@ def test_what_is_expected_of_a_force_reads_as_that_force(calibration, seed):
     assert (read.bad >= calibration.bad).all()
     clipped = (counts <= 0) | (counts >= calibration.full)  # its column's coupling is not known
     told = ~read.bad & (read.values > 0) & ~clipped.any(axis=0)
-    np.testing.assert_allclose(read.values[told], forces[told], rtol=1e-4)
+    # a bad tactel's count is not known, and its neighbours hear a thousandth of it
+    np.testing.assert_allclose(read.values[told], forces[told], rtol=1e-3)
 
 
 @settings(deadline=None, max_examples=60)
