@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from generator.errors import ShapeError
 from generator.polyhedron.read import file_content
+from generator.polyhedron.read.settings import MODEL
 from generator.polyhedron.read.stl import stl_triangles
 
-MOST_TRIANGLES = 20_000_000  #: of a part; in binary STL they take 1 GB
-LARGEST_BYTES = 84 + 50 * MOST_TRIANGLES
+LARGEST_BYTES = 84 + 50 * MODEL.most_part_triangles
 
 
 def part_triangles(file: str | os.PathLike[str]) -> NDArray[np.float64]:
@@ -36,7 +36,7 @@ def part_triangles(file: str | os.PathLike[str]) -> NDArray[np.float64]:
     """
     place = str(file)
     content = file_content(Path(file), place, LARGEST_BYTES)
-    corners = stl_triangles(content, place, most=MOST_TRIANGLES, padded=False)
+    corners = stl_triangles(content, place, most=MODEL.most_part_triangles, padded=False)
     if not len(corners):
         raise ShapeError("the file holds no triangle", fix="export the part again", place=place)
     return corners

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from generator.errors import SolidError
 from generator.export.settings import READ_BACK
+from generator.polyhedron.read.settings import MODEL
+from generator.polyhedron.read.stl import stl_triangles
 
 Floats = NDArray[np.float64]
 
@@ -73,12 +75,12 @@ def verify_fit(panels: Sequence[PanelFile], gap_mm: float) -> FitReport:
 
 def _solid(panel: PanelFile) -> Manifold:
     """Return a written panel as it stands in the object."""
-    content = panel.path.read_bytes()
-    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-    corners = np.frombuffer(content, record, offset=84)["corners"].reshape(-1, 3)
-    points, numbers = np.unique(corners, axis=0, return_inverse=True)
+    corners = stl_triangles(
+        panel.path.read_bytes(), str(panel.path), most=MODEL.most_part_triangles, padded=False
+    )
+    points, numbers = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
     T = panel.T_object_part
-    seated = points.astype(np.float64) @ T[:3, :3].T + T[:3, 3]
+    seated = points @ T[:3, :3].T + T[:3, 3]
     solid = Manifold(Mesh64(seated, numbers.reshape(-1, 3).astype(np.uint64)))
     if solid.status() != Error.NoError:
         raise _misfit(f"'{panel.name}' is no closed mesh", panel)

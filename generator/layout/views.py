@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from generator.layout.footprint import Points
 from generator.layout.placement import FaceLayout
+from generator.plane.polygon import points_inside, signed_area
 
 _STEPS = 1.2207440846057596 ** -np.arange(1.0, 4.0)  # of x, y and turn: 1.22^4 = 1.22 + 1
 
@@ -76,8 +77,7 @@ def face_views(
     settings
         How many poses.
     """
-    start, end = _edges(loops)
-    centre, turn = _poses_on(start, end, settings.poses)
+    centre, turn = _poses_on(loops, settings.poses)
     return views_at(loops, face, pitch_mm, view, centre, turn)
 
 
@@ -115,23 +115,18 @@ def _edges(loops: Sequence[Points]) -> tuple[Points, Points]:
     )
 
 
-def _poses_on(start: Points, end: Points, number: int) -> tuple[Points, Points]:
+def _poses_on(loops: Sequence[Points], number: int) -> tuple[Points, Points]:
     """Return centres (P, 2) inside the outline and turns (P,), `number` of them."""
-    low = start.min(axis=0)
-    size = start.max(axis=0) - low
-    area = float((start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]).sum()) / 2
+    corners = np.concatenate(list(loops))
+    low = corners.min(axis=0)
+    size = corners.max(axis=0) - low
+    area = sum(signed_area(loop) for loop in loops)
     found = np.empty((0, 3))
     first, batch = 1, int(1.1 * number * float(size.prod()) / area) + 16
     while len(found) < number:
         fractions = (0.5 + np.arange(first, first + batch)[:, None] * _STEPS) % 1.0
         points = low + fractions[:, :2] * size
-        x, y = points[:, :1], points[:, 1:]
-        rising = (start[:, 1] <= y) != (end[:, 1] <= y)
-        slope = (end[:, 0] - start[:, 0]) / np.where(
-            start[:, 1] == end[:, 1], 1.0, end[:, 1] - start[:, 1]
-        )
-        crossed = rising & (x < start[:, 0] + slope * (y - start[:, 1]))
-        inside = crossed.sum(axis=1) % 2 == 1
+        inside = points_inside(points, loops)
         found = np.concatenate([found, np.c_[points, fractions[:, 2] * 2 * np.pi][inside]])
         first += batch
     return found[:number, :2], found[:number, 2]

@@ -24,6 +24,7 @@ from generator.layout.places import array_cells, rank_test
 from generator.layout.promise import PROMISE, measured_answers, promised_share
 from generator.layout.views import VIEWS, SensorView, ViewSettings, face_views
 from generator.pipeline.plan import ObjectPlan
+from generator.plane.polygon import is_convex
 from generator.polyhedron import face_polygon
 
 Loops = tuple[Points, ...]
@@ -64,7 +65,7 @@ def promise_faces(plan: ObjectPlan, layout: Layout) -> dict[int, FacePromise]:
             remedy = ""
             if share < PROMISE.low:  # faces as narrow, longer than a sensor, need the same
                 narrow, wide = sorted(np.ptp(loops[0], axis=0).round(1).tolist())
-                like = narrow, min(wide, 1.5 * SENSOR_MM), _convex(loops[0])
+                like = narrow, min(wide, 1.5 * SENSOR_MM), is_convex(loops[0])
                 if like not in remedies:
                     remedies[like] = _remedy(plan, loops, face.face)
                 remedy = remedies[like]
@@ -115,7 +116,7 @@ def _wider(plan: ObjectPlan, loops: Loops, region: Region) -> tuple[float, float
     """Return the width (mm) of a simple face and how many times wider it must be; zeros if not."""
     size = np.ptp(loops[0], axis=0)
     narrow = int(np.argmin(size))
-    if len(region.start) != len(loops[0]) or not _convex(loops[0]):
+    if len(region.start) != len(loops[0]) or not is_convex(loops[0]):
         return 0.0, 0.0
 
     def keeps(factor: float) -> bool:
@@ -132,12 +133,6 @@ def _wider(plan: ObjectPlan, loops: Loops, region: Region) -> tuple[float, float
         middle = (low + high) / 2
         low, high = (low, middle) if keeps(middle) else (middle, high)
     return float(size[narrow]), high
-
-
-def _convex(loop: Points) -> bool:
-    along = np.roll(loop, -1, axis=0) - loop
-    after = np.roll(along, -1, axis=0)
-    return bool((along[:, 0] * after[:, 1] - along[:, 1] * after[:, 0] >= 0).all())
 
 
 def _prints(plan: ObjectPlan, style: SymbolStyle) -> bool:

@@ -18,7 +18,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.plane.polygon import area_vector, face_vector
+from generator.plane.polygon import area_vector, face_vector, signed_volume
 from generator.solid.part import Facet
 
 Points = NDArray[np.float64]
@@ -144,9 +144,7 @@ def shortest_edge_mm(body: PlainBody) -> float:
 
 def body_volume(body: PlainBody) -> float:
     """Return the volume, mm^3."""
-    centre = body.vertices.mean(axis=0)
-    rings = [[body.vertices[list(loop)] - centre for loop in f.loops] for f in body.facets]
-    return sum(float(face_vector(loops) @ loops[0][0]) for loops in rings) / 3
+    return signed_volume(body.vertices, [facet.loops for facet in body.facets])
 
 
 class _Cuts:

@@ -198,7 +198,7 @@ def _first_near(
 ) -> NDArray[np.bool_] | None:
     """Return a piece beyond the plane whose box meets that of the other panel."""
     for piece in beyond(body, normal, offset):
-        mine = corners_beyond(body, normal, offset, piece) @ T[:3, :3].T + T[:3, 3]
+        mine = _seated(T, corners_beyond(body, normal, offset, piece))
         if (mine.min(axis=0) <= high).all() and (mine.max(axis=0) >= low).all():
             return piece
     return None
@@ -219,14 +219,17 @@ def _gap(one: Part, other: Part, reach: float) -> float:
 
 def _manifold(part: Part) -> Manifold:
     mesh = triangles(part)
-    T = part.T_object_part
-    seated = mesh.vertices @ T[:3, :3].T + T[:3, 3]
+    seated = _seated(part.T_object_part, mesh.vertices)
     return Manifold(Mesh64(seated, mesh.triangles.astype(np.uint64)))
 
 
 def _in_object(part: Part) -> Points:
-    T = part.T_object_part
-    seated: Points = part.vertices @ T[:3, :3].T + T[:3, 3]
+    return _seated(part.T_object_part, part.vertices)
+
+
+def _seated(T_object_part: Points, points: Points) -> Points:
+    """Return points (n, 3) of a part's frame in the object's."""
+    seated: Points = points @ T_object_part[:3, :3].T + T_object_part[:3, 3]
     return seated
 
 

@@ -106,7 +106,7 @@ def draw_touch(plan: TouchPlan, number: int, reader: Reader) -> DrawnTouch:
         try:
             counts, _ = read_sensor(
                 met.surface, reader.sensor, met.touch, level, rng, plan.engine,
-                datum_mm=_datum(met.face), copy=copy,
+                datum_mm=_datum(met.face if level.scale else None), copy=copy,
             )  # fmt: skip
         except ContactError as error:
             anew.append(DRAWING.why_anew(error.cause))

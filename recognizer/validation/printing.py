@@ -105,7 +105,7 @@ def find_parts(database: str) -> list[PartToPrint]:
             if face.placement is not None:
                 part = stl_part(held, face.name)
                 files[face.name] = (part, part_path(url, part.file))
-        for part, path in files.values():
+        for part, path in {part.file: (part, path) for part, path in files.values()}.values():
             check_file(path, part)
         parts += parts_to_print(database, name, files)
     if not any(part.job.faces for part in parts):

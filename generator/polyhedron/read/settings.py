@@ -21,6 +21,8 @@ class ModelSettings:
     # stl.py
     most_triangles: int = 500_000
     """Of a mesh: bounds time and memory."""
+    most_part_triangles: int = 20_000_000
+    """Of a part that was written; in binary STL they take 1 GB."""
 
     # obj.py
     most_polygons: int = 500_000
