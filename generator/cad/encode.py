@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, overload
 
+from encoded_objects.document.tree import Tree, tree_of
 from generator.cad.read import polyhedron_from
 from generator.layout.placement import Layout
 from generator.pipeline.choose import Choice
@@ -30,8 +31,8 @@ from generator.polyhedron import Polyhedron
 from generator.polyhedron.read import MESHES, STEP
 from generator.solid import Part
 from generator.spec import Problem, SpecError, read_specs
-from generator.spec.document import Tree, tree_of
 from generator.spec.option import database_option
+from generator.spec.problem import SPEC
 from generator.spec.resolved import ShapeSpec
 from generator.spec.script import SOURCE, spec_of, tree_from
 
@@ -221,7 +222,7 @@ def _spec_source(given: str | Path | Mapping[str, Any], named: Mapping[str, Any]
         cause = f"'{more[0]}' stands beside a spec, which says it itself"
         raise SpecError([Problem(cause, "write it in the spec, or give a dict", file=SOURCE)])
     if isinstance(given, str) and "\n" in given:
-        return tree_of(given, SOURCE, Path())
+        return tree_of(given, SOURCE, Path(), SPEC)
     return Path(given)
 
 

@@ -110,7 +110,8 @@ def _printer_values(name: str) -> dict[str, Any]:
 
 def _write_new(path: Path, text: str, force: bool) -> None:
     """Write a file whole or not at all; one that is there only with `force`."""
-    from generator.spec.problem import Problem, SpecError
+    from encoded_objects.document.problem import Problem
+    from generator.spec.problem import SpecError
 
     if path.exists() and not force:
         fix = "choose another name, or replace it with --force"

@@ -2,9 +2,8 @@
 
 ::
 
-    document.py   file -> values that remember line and column
-    settings.py   the settings, with shape.py, encoding.py and quantity.py (pydantic)
-    explain.py    validation errors in plain words, at their places
+    settings.py   the settings, with shape.py, encoding.py and name.py (pydantic)
+    explain.py    validation errors in the words of specs
     profile.py    what a profile's name gives
     resolve.py    defaults, and what settings mean together -> resolved.ObjectSpec
     read.py       files and sets -> located.Located objects
@@ -12,12 +11,15 @@
     starter.py    commented specs to begin with
 
     SpecError     problem.py: every problem with place, line, caret and fix
+
+How files become values that remember line and column: `encoded_objects.document`.
 """
 
 from __future__ import annotations
 
+from encoded_objects.document.problem import Problem
 from generator.spec.located import LocatedSpec, error_at, locate
-from generator.spec.problem import Problem, SpecError
+from generator.spec.problem import SpecError
 from generator.spec.read import read_specs
 from generator.spec.resolved import ObjectSpec, ShapeSpec
 

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from encoded_objects.document.problem import Problem, SourceMark
+from encoded_objects.document.tree import Place, Tree
 from generator.errors import GeneratorError
-from generator.spec.document import Place, Tree
-from generator.spec.problem import Problem, SourceMark, SpecError
+from generator.spec.problem import SpecError
 from generator.spec.resolved import ObjectSpec
 
 INPUT_ERROR = 2  # exit code of errors that a spec can cause

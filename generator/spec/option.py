@@ -6,7 +6,8 @@ from typing import get_args
 
 from pydantic_core import PydanticCustomError
 
-from generator.spec.problem import Problem, SpecError, did_you_mean
+from encoded_objects.document.problem import Problem, did_you_mean
+from generator.spec.problem import SpecError
 from generator.spec.settings import Format, database_url
 
 

@@ -1,147 +1,22 @@
-"""What is wrong with a spec: places in files, problems, and how they read.
-
-A problem prints as `file:line:column: error: cause`, the line, a caret and a `fix:`.
-Lines and columns count from 1.
-"""
+"""What is wrong with a spec, in the words of specs."""
 
 from __future__ import annotations
 
-import re
-import unicodedata
-from collections.abc import Iterable
-from dataclasses import dataclass, field
-from difflib import get_close_matches
-from typing import Any
-
-from encoded_objects.errors import printable
+from encoded_objects.document.problem import DocumentError, DocumentKind
 from generator.errors import GeneratorError
 
-_LINE_END = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
-LINE_SHOWN = 100  # characters of a source line that are printed
+
+class SpecError(DocumentError, GeneratorError):
+    """A spec that cannot be used; holds every problem that was found, in file order."""
 
 
-@dataclass(frozen=True, slots=True)
-class SpecSource:
-    """A file as it was read."""
-
-    name: str  #: as the person named it
-    lines: tuple[str, ...] = field(repr=False)
-
-    @classmethod
-    def of(cls, name: str, text: str) -> SpecSource:
-        """Return a file by its name and its text; lines end where YAML ends them."""
-        return cls(name, tuple(_LINE_END.split(text)))
-
-
-@dataclass(frozen=True, slots=True)
-class SourceMark:
-    """A place in a file."""
-
-    source: SpecSource
-    line: int  #: from 1
-    column: int  #: from 1
-
-    @classmethod
-    def at(cls, source: SpecSource, before: str) -> SourceMark:
-        """Return the place that follows the text `before`."""
-        lines = _LINE_END.split(before)
-        return cls(source, len(lines), len(lines[-1]) + 1)
-
-    def __str__(self) -> str:
-        return f"{self.source.name}:{self.line}:{self.column}"
-
-
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """One thing that is wrong, where, and the way out."""
-
-    cause: str
-    fix: str = ""
-    mark: SourceMark | None = None
-    file: str = ""  #: where there is no line to show
-
-    @property
-    def place(self) -> str:
-        """`file:line:column`, or the file alone."""
-        return str(self.mark) if self.mark else self.file
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the problem as plain values."""
-        return {
-            "place": self.place,
-            "file": self.mark.source.name if self.mark else None,
-            "line": self.mark.line if self.mark else None,
-            "column": self.mark.column if self.mark else None,
-            "cause": self.cause,
-            "fix": self.fix,
-        }
-
-    def __str__(self) -> str:
-        """Return the problem as it is printed."""
-        place = printable(self.place)
-        head = f"{place}: error: " if place else "error: "
-        text = [head + "\n".join(printable(line) for line in self.cause.split("\n"))]
-        if self.mark:
-            text += _excerpt(self.mark)
-        if self.fix:
-            text.append(f"  fix: {printable(self.fix)}")
-        return "\n".join(text)
-
-
-class SpecError(GeneratorError):
-    """A spec that cannot be used; holds every problem that was found, in file order.
-
-    Parameters
-    ----------
-    problems
-        One or more problems.
-    """
-
-    def __init__(self, problems: Iterable[Problem]) -> None:
-        self.problems = tuple(problems)
-        first = self.problems[0]
-        more = len(self.problems) - 1
-        cause = first.cause + (f" (and {more} more)" if more else "")
-        super().__init__(cause, fix=first.fix, place=first.place)
-
-    def __reduce__(self) -> tuple[type[SpecError], tuple[tuple[Problem, ...]]]:
-        """Return how another process sends the error here."""
-        return type(self), (self.problems,)
-
-    def __str__(self) -> str:
-        """Return all problems as they are printed."""
-        return "\n\n".join(str(problem) for problem in self.problems)
-
-    def as_text(self) -> str:
-        """Return all problems as they are printed."""
-        return str(self)
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the first problem as every error, and all of them under `problems`."""
-        return super().as_json() | {"problems": [problem.as_json() for problem in self.problems]}
-
-
-def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """Return the known word nearest to `word`, or an empty string where none is near."""
-    lowered = {name.lower(): name for name in known}
-    near = get_close_matches(word.lower()[:80], lowered, n=1, cutoff=0.6)
-    return lowered[near[0]] if near else ""
-
-
-def _excerpt(mark: SourceMark) -> list[str]:
-    """Return the source line and the caret under the place; empty past the last line."""
-    if not 1 <= mark.line <= len(mark.source.lines):
-        return []
-    line = mark.source.lines[mark.line - 1].replace("\t", " ")
-    at = min(mark.column - 1, len(line))
-    start = max(0, min(at - LINE_SHOWN // 2, len(line) - LINE_SHOWN))
-    shown = printable(line[start : start + LINE_SHOWN]).rstrip()
-    width = sum(_cells(c) for c in line[start:at])
-    return [f"{mark.line:5d} | {shown}", f"      | {' ' * width}^"]
-
-
-def _cells(character: str) -> int:
-    """Return how many terminal cells a character takes."""
-    if unicodedata.combining(character):
-        return 0
-    return 2 if unicodedata.east_asian_width(character) in "FW" else 1
+SPEC = DocumentKind(
+    error=SpecError,
+    name="a spec",
+    empty="write  name: Cube  and, in the next line,  shape: {cube: 60 mm}",
+    example="encode-object init cube",
+    first="write a first one with: encode-object init cube -o cube.yaml",
+    several="list several objects under objects:, in one document",
+    repeat="write the value out; a set shares what stands beside objects:",
+    large="give a large polyhedron as a file, for example shape: {file: part.stl}",
+)

@@ -10,10 +10,11 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from generator.spec.document import Place, Tree, read_tree
+from encoded_objects.document.problem import Problem
+from encoded_objects.document.tree import Place, Tree, read_tree
 from generator.spec.explain import explain_errors
 from generator.spec.located import LocatedSpec, mark_of
-from generator.spec.problem import Problem, SpecError
+from generator.spec.problem import SPEC, SpecError
 from generator.spec.resolve import resolve
 from generator.spec.settings import Defaults, ObjectSettings
 
@@ -82,7 +83,7 @@ def _collect_trees(trees: Iterable[Tree], problems: list[Problem]) -> list[Tree]
 
 def _objects(source: Path | str | Tree, problems: list[Problem]) -> Iterable[Tree]:
     """Yield the objects of a file; those of a set with the set's defaults merged in."""
-    tree = source if isinstance(source, Tree) else read_tree(Path(source))
+    tree = source if isinstance(source, Tree) else read_tree(Path(source), SPEC)
     problems += tree.problems
     if not isinstance(tree.value, dict) or "objects" not in tree.value:
         yield tree
@@ -119,7 +120,7 @@ def _objects(source: Path | str | Tree, problems: list[Problem]) -> Iterable[Tre
 def _object_file(path: Path, entry: Tree, problems: list[Problem]) -> Tree | None:
     """Return the object in a file that a set names; problems with the file stand in the set."""
     try:
-        tree = read_tree(path)
+        tree = read_tree(path, SPEC)
     except SpecError as error:
         here = entry.value_mark(())
         problems += [

@@ -11,6 +11,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from encoded_objects.document.problem import Problem
+from encoded_objects.document.tree import Tree
 from generator.alphabet.known import ALPHABETS, Alphabet
 from generator.alphabet.outline import SymbolStyle
 from generator.alphabet.printable import check_printable
@@ -18,10 +20,9 @@ from generator.array.definition import array_from
 from generator.array.profiles import PROFILES
 from generator.errors import AlphabetError, ArrayError
 from generator.printers import PRINTERS, printer_named
-from generator.spec.document import Tree
 from generator.spec.encoding import Encoding
 from generator.spec.located import mark_of
-from generator.spec.problem import Problem, SpecError
+from generator.spec.problem import SpecError
 from generator.spec.profile import (
     AUTO,
     DATABASE,

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from difflib import get_close_matches
 from pathlib import Path
 
+from encoded_objects.document.tree import Tree
 from generator.polyhedron.read import MESHES, STEP
-from generator.spec.document import Tree
 from generator.spec.resolved import ShapeSpec
 from generator.spec.shape import EXAMPLES, KINDS, Shape
 

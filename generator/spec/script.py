@@ -14,10 +14,11 @@ from typing import Any
 import yaml
 from pydantic import ValidationError
 
-from generator.spec.document import Tree, tree_of
+from encoded_objects.document.problem import Problem
+from encoded_objects.document.tree import Tree, tree_of
 from generator.spec.explain import explain_errors
 from generator.spec.located import LocatedSpec
-from generator.spec.problem import Problem, SpecError
+from generator.spec.problem import SPEC, SpecError
 from generator.spec.resolve import resolve
 from generator.spec.resolved import ShapeSpec
 from generator.spec.settings import NamedSettings
@@ -69,7 +70,7 @@ def tree_from(settings: Mapping[str, Any]) -> Tree:
         fix = "give numbers, texts, lists and dicts of them, as in a spec file"
         cause = f"a setting is not a plain value: {error}"
         raise SpecError([Problem(cause, fix, file=SOURCE)]) from None
-    return tree_of(text, SOURCE, Path())
+    return tree_of(text, SOURCE, Path(), SPEC)
 
 
 def with_profile(

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
+from encoded_objects.document.block import Block, PathText, whole_number
+from encoded_objects.document.quantity import Angle, Length, LengthOrZero, refuse
 from generator.alphabet.known import ALPHABETS
 from generator.array.lab_key import read_lab_key
 from generator.errors import LabKeyError
-from generator.spec.block import Block, ObjectName, PathText, whole_number
 from generator.spec.encoding import Encoding
-from generator.spec.quantity import Angle, Length, LengthOrZero, refuse
+from generator.spec.name import ObjectName
 from generator.spec.shape import EXAMPLES, Shape
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ import yaml
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from encoded_objects.document.quantity import MILLIMETRES, length_mm
 from generator.spec import LocatedSpec, SpecError, read_specs
-from generator.spec.quantity import MILLIMETRES, length_mm
 
 MUTATIONS = int(os.environ.get("SPEC_MUTATIONS", "300"))
 FIXTURES = Path(__file__).parents[2] / "fixtures"

@@ -4,8 +4,9 @@ import os
 
 import pytest
 
+from encoded_objects.document.tree import read_tree
 from generator.spec import SpecError, read_specs
-from generator.spec.document import read_tree
+from generator.spec.problem import SPEC
 
 SYNTAX = {
     "empty": ("# nothing yet\n", """\
@@ -234,7 +235,7 @@ def test_values_follow_yaml_1_2(text, value):
         file.write(text)
     from pathlib import Path
 
-    assert read_tree(Path("c.yaml")).value == {"a": value}
+    assert read_tree(Path("c.yaml"), SPEC).value == {"a": value}
 
 
 def test_marks_of_keys_and_values():
@@ -242,7 +243,7 @@ def test_marks_of_keys_and_values():
         file.write(b"\xef\xbb\xbfa: 1\r\nb:\r\n  - {c: 2}\r\n")
     from pathlib import Path
 
-    tree = read_tree(Path("c.yaml"))
+    tree = read_tree(Path("c.yaml"), SPEC)
     assert tree.value == {"a": 1, "b": [{"c": 2}]}
     assert str(tree.value_mark(("b", 0, "c"))) == "c.yaml:3:9"
     assert str(tree.key_mark(("b", 0, "c"))) == "c.yaml:3:6"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import yaml
 
-from generator.spec.problem import Problem, SourceMark, SpecSource
+from encoded_objects.document.problem import DocumentKind, Problem, SourceMark, TextSource
 
 _SYNTAX = (
     (r"'\t'", "a tab cannot be used here", "use spaces"),
@@ -19,7 +19,9 @@ _SYNTAX = (
 )  # fmt: skip
 
 
-def explain_syntax(error: yaml.YAMLError, source: SpecSource, text: str) -> Problem:
+def explain_syntax(
+    error: yaml.YAMLError, source: TextSource, text: str, kind: DocumentKind
+) -> Problem:
     """Return the problem behind an error of the YAML parser, in plain words."""
     if isinstance(error, yaml.reader.ReaderError):
         at = SourceMark.at(source, text[: error.position])
@@ -40,4 +42,4 @@ def explain_syntax(error: yaml.YAMLError, source: SpecSource, text: str) -> Prob
     for pattern, cause, fix in _SYNTAX:
         if pattern in said:
             return Problem(cause, fix, mark, source.name)
-    return Problem(f"not YAML: {said}", "compare with: encode-object init cube", mark, source.name)
+    return Problem(f"not YAML: {said}", f"compare with: {kind.example}", mark, source.name)

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, model_validator
 
-from generator.spec.quantity import refuse
-
-NAME_LENGTH_MAX = 60
-_NAME = re.compile(r"[^\W_][\w .()+-]*\Z")
+from encoded_objects.document.quantity import refuse
 
 
 class Block(BaseModel):
@@ -25,21 +21,6 @@ class Block(BaseModel):
         if not isinstance(value, dict):
             return value
         return {k: v for k, v in value.items() if v is not None or k not in cls.model_fields}
-
-
-def object_name(value: Any) -> str:
-    """Return the name of an object: it names files and rows of the database too."""
-    if not isinstance(value, str):
-        raise refuse(f"a name must be text, not {value!r}", f"put it in quotes: '{value}'")
-    if not value.strip():
-        raise refuse("the name is empty", "write, for example, name: Cube")
-    if len(value) > NAME_LENGTH_MAX:
-        cause = f"the name has {len(value)} characters, {NAME_LENGTH_MAX} are allowed"
-        raise refuse(cause, "shorten it")
-    if not _NAME.match(value) or value[-1] in " .":
-        fix = "use letters, digits, spaces and - _ . ( ) +, a letter or digit first"
-        raise refuse(f"{value!r} cannot be part of a file name", fix)
-    return value
 
 
 def path_text(value: Any) -> str:
@@ -69,4 +50,3 @@ def whole_number(low: int, high: int, what: str) -> BeforeValidator:
 
 
 PathText = Annotated[str, BeforeValidator(path_text)]
-ObjectName = Annotated[str, BeforeValidator(object_name)]

@@ -16,9 +16,9 @@ from typing import Any
 
 import yaml
 
-from generator.spec.problem import Problem, SourceMark, SpecError, SpecSource
-from generator.spec.syntax import explain_syntax
-from generator.spec.text import read_text
+from encoded_objects.document.problem import DocumentKind, Problem, SourceMark, TextSource
+from encoded_objects.document.syntax import explain_syntax
+from encoded_objects.document.text import read_text
 
 DEPTH_MAX = 16
 
@@ -74,13 +74,15 @@ class Tree:
         return {key: Tree(self.value[key], values[key], names[key], self.folder) for key in keys}
 
 
-def read_tree(path: Path) -> Tree:
+def read_tree(path: Path, kind: DocumentKind) -> Tree:
     """Read a YAML file.
 
     Parameters
     ----------
     path
         The file; its name appears in messages as it is given here.
+    kind
+        What it is: the words of messages, and the error that is raised.
 
     Returns
     -------
@@ -90,32 +92,33 @@ def read_tree(path: Path) -> Tree:
 
     Raises
     ------
-    SpecError
+    DocumentError
         The file is missing, too large, too deep, not UTF-8, not YAML, or empty.
     """
-    return tree_of(read_text(path), str(path), path.parent)
+    return tree_of(read_text(path, kind), str(path), path.parent, kind)
 
 
-def tree_of(text: str, name: str, folder: Path) -> Tree:
+def tree_of(text: str, name: str, folder: Path, kind: DocumentKind) -> Tree:
     """Read YAML text; `name` stands in messages, file names in it are relative to `folder`.
 
     Raises
     ------
-    SpecError
+    DocumentError
         As for `read_tree`.
     """
-    source = SpecSource.of(name, text)
-    reader = _Reader(source, folder)
+    source = TextSource.of(name, text)
+    reader = _Reader(source, folder, kind)
     try:
         return reader.tree(yaml.parse(text, Loader=yaml.SafeLoader))
     except yaml.YAMLError as error:
-        raise SpecError([*reader.problems, explain_syntax(error, source, text)]) from None
+        raise kind.error([*reader.problems, explain_syntax(error, source, text, kind)]) from None
 
 
 class _Reader:
     """Turns the events of the YAML parser into values and marks."""
 
-    def __init__(self, source: SpecSource, folder: Path) -> None:
+    def __init__(self, source: TextSource, folder: Path, kind: DocumentKind) -> None:
+        self.kind = kind
         self.source = source
         self.folder = folder
         self.problems: list[Problem] = []
@@ -123,22 +126,22 @@ class _Reader:
         self.keys: dict[Place, SourceMark] = {}
 
     def tree(self, events: Iterator[Any]) -> Tree:
-        """Read one document; raises `SpecError` with all that is wrong."""
+        """Read one document; raises `DocumentError` with all that is wrong."""
         value: Any = None
         documents = 0
         for event in events:
             if isinstance(event, yaml.DocumentStartEvent):
                 documents += 1
                 if documents == 2:
-                    fix = "list several objects under objects:, in one document"
-                    self._refuse(event, "a second document starts here", fix)
+                    self._refuse(event, "a second document starts here", self.kind.several)
                     break
                 value = self._node(next(events), events, ())
         if value is None:
             if not self.problems:
-                fix = "write  name: Cube  and, in the next line,  shape: {cube: 60 mm}"
-                self.problems.append(Problem("the file is empty", fix, file=self.source.name))
-            raise SpecError(self.problems)
+                self.problems.append(
+                    Problem("the file is empty", self.kind.empty, file=self.source.name)
+                )
+            raise self.kind.error(self.problems)
         return Tree(value, self.values, self.keys, self.folder, tuple(self.problems))
 
     def _node(self, event: Any, events: Iterator[Any], place: Place) -> Any:
@@ -148,7 +151,7 @@ class _Reader:
             self._refuse(
                 event,
                 f"'*{event.anchor}' repeats another value, which is not read here",
-                "write the value out; a set shares what stands beside objects:",
+                self.kind.repeat,
             )
             return None
         if event.anchor is not None:
@@ -164,7 +167,7 @@ class _Reader:
             return self._scalar(event)
         if len(place) >= DEPTH_MAX:
             self._refuse(event, f"more than {DEPTH_MAX} levels of nesting", "flatten the file")
-            raise SpecError(self.problems)
+            raise self.kind.error(self.problems)
         if isinstance(event, yaml.SequenceStartEvent):
             return self._sequence(events, place)
         return self._mapping(events, place)
