@@ -21,6 +21,7 @@ from generator.export.preview import preview_png
 from generator.export.step import step_chunks
 from generator.export.stl import stl_chunks
 from generator.export.threemf import print_files
+from generator.layout.object_code import object_code
 from generator.layout.placement import Layout
 from generator.pipeline.blame import errors_at
 from generator.pipeline.faces import FaceReport, face_reports
@@ -137,6 +138,7 @@ def parts_of(plan: ObjectPlan, layout: Layout) -> tuple[tuple[Part, ...], tuple[
             spec.wall_mm,
             plan.printer,
             name=spec.name,
+            code=object_code(layout, plan.array.rows, plan.array.columns),
             gap_mm=spec.gap_mm,
         )
     return made.parts, made.warnings

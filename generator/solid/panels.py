@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from generator.alphabet.figures import in_figures
 from generator.alphabet.outline import Tiers
 from generator.errors import SolidError
 from generator.layout.placement import FaceLayout, Layout
@@ -21,7 +22,7 @@ from generator.polyhedron.winged import Polyhedron
 from generator.printers import Printer
 from generator.solid.emboss import embossing_of
 from generator.solid.frame import edge_numbers, in_frame, plane_frame
-from generator.solid.marks import BackMark, marks_on
+from generator.solid.marks import BackMarks, EdgeMark, NameMark, marks_on
 from generator.solid.measure import box
 from generator.solid.part import Embossing, Part
 from generator.solid.plate import edge_loops, plain_panels
@@ -36,7 +37,7 @@ class Panels:
     """The panels of an object, in the order of its faces."""
 
     parts: tuple[Part, ...]
-    warnings: tuple[str, ...]  #: at most one: numbers that found no room on a back
+    warnings: tuple[str, ...]  #: numbers and names that found no room on a back
 
 
 def panels(
@@ -47,6 +48,7 @@ def panels(
     printer: Printer,
     *,
     name: str = "",
+    code: str = "",
     gap_mm: float = EMBOSS.assembly_gap_mm,
     numbers: bool = True,
 ) -> Panels:
@@ -65,11 +67,14 @@ def panels(
     printer
         Limits the overhang of the sides and gives the stroke of the numbers.
     name
-        Put before each face's name to name the part: "Cube-F1".
+        Of the object, engraved on the backs, and put before each face's name to name the part:
+        "Cube-F1".
+    code
+        Engraved in place of the name where that has no room, see `layout.object_code`.
     gap_mm
         Least distance of two panels in the finished object.
     numbers
-        Whether backs bear the numbers of their edges and faces.
+        Whether backs bear the numbers of their edges, and names.
 
     Raises
     ------
@@ -85,27 +90,34 @@ def panels(
     plain = plain_panels(polyhedron, wall_mm, printer, gap_mm, name)
     parts = []
     missing: dict[str, tuple[str, ...]] = {}
+    nameless: list[str] = []
+    letters = in_figures(name) if name else None
     for face, part in enumerate(plain.fitted):
         embossings: tuple[Embossing, ...] = ()
         if face in by_face and len(by_face[face].labels):
             embossings = (_symbols(by_face[face], tiers, wall_mm, layout.pitch_mm),)
         if numbers:
-            marks, without_room = _numbers(
+            marks = _marks(
                 plain.mitred[face],
                 part,
                 edge_loops(polyhedron, face, edges),
-                face,
+                NameMark.of(letters, code, f"F{face + 1}"),
                 wall_mm,
                 printer,
             )
-            embossings += marks
-            if without_room:
-                missing[polyhedron.faces[face].name] = without_room
+            embossings += marks.embossings
+            if marks.missing:
+                missing[polyhedron.faces[face].name] = marks.missing
+            if not marks.named:
+                nameless.append(polyhedron.faces[face].name)
         part = Part(part.name, part.vertices, part.facets, embossings, part.T_object_part)
         low, high = box(part)
         middle = (low + high) / 2
         parts.append(move_part(part, np.array([-middle[0], -middle[1], 0.0])))
-    return Panels(tuple(parts), (_no_room(missing),) if missing else ())
+    warnings = [_no_room(missing)] if missing else []
+    if nameless:
+        warnings.append(f"no room for a name on the back of {', '.join(nameless)}: mark by hand")
+    return Panels(tuple(parts), tuple(warnings))
 
 
 def _symbols(
@@ -116,17 +128,17 @@ def _symbols(
     return embossing_of(face, tiers, 0, T_part_face, pitch_mm)
 
 
-def _numbers(
+def _marks(
     plain: Part,
     fitted: Part,
     numbered: list[list[int]],
-    face: int,
+    name: NameMark,
     wall_mm: float,
     printer: Printer,
-) -> tuple[tuple[Embossing, ...], tuple[str, ...]]:
-    """Return the engraved numbers of a panel's back, and those without room.
+) -> BackMarks:
+    """Return what a panel's back bears: the numbers of its edges and its name.
 
-    They stand along the edges that the back had before it was cut at corners.
+    The numbers stand along the edges that the back had before it was cut at corners.
     """
     corners = [plain.vertices[list(loop)] for loop in plain.facets[1].loops]
     T = plane_frame(corners[0][0], corners[0][1] - corners[0][0], face_vector(corners))
@@ -137,22 +149,17 @@ def _numbers(
         # Seen from behind, corners run the other way: edge k of the back is edge n - 2 - k.
         for k in range(len(ring)):
             edge = edges[(len(edges) - 2 - k) % len(edges)]
-            marks.append(BackMark(str(edge + 1), ring[k], ring[(k + 1) % len(ring)]))
-    centre = (rings[0].min(axis=0) + rings[0].max(axis=0)) / 2
-    marks.append(BackMark(f"F{face + 1}", centre, centre))
-    return marks_on(marks, left, 1, T, wall_mm, printer)
+            marks.append(EdgeMark(str(edge + 1), ring[k], ring[(k + 1) % len(ring)]))
+    return marks_on(marks, name, left, 1, T, wall_mm, printer)
 
 
 def _no_room(missing: dict[str, tuple[str, ...]]) -> str:
     """Return the warning about texts that found no room, by the name of the back's face."""
     backs: dict[str, list[str]] = {}
     for face, texts in missing.items():
-        edges = sorted(int(text) for text in texts if text.isdecimal())
-        what = (
-            [f"edge{'s' if len(edges) > 1 else ''} {', '.join(map(str, edges))}"] if edges else []
-        )
-        what += ["the face itself"] if len(edges) < len(texts) else []
-        backs.setdefault(" and ".join(what), []).append(face)
+        edges = sorted(map(int, texts))
+        what = f"edge{'s' if len(edges) > 1 else ''} {', '.join(map(str, edges))}"
+        backs.setdefault(what, []).append(face)
     told = [
         f"of {what} on the back{'s' if len(faces) > 1 else ''} of {', '.join(faces)}"
         for what, faces in list(backs.items())[: EMBOSS.listed_marks]

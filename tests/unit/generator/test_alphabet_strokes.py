@@ -5,7 +5,7 @@ import json
 import pytest
 
 from generator.alphabet import ALPHABETS, Counts, Glyph, alphabet_from, alphabet_named, counts
-from generator.alphabet.figures import FIGURES
+from generator.alphabet.figures import FIGURES, figures_of, in_figures
 from generator.alphabet.known import line
 from generator.alphabet.strokes import same_shape, turn_glyph
 from generator.errors import AlphabetError
@@ -101,5 +101,12 @@ def test_unknown_alphabet_lists_the_known():
 
 def test_figures_are_single_pieces_and_all_different():
     assert all(counts(figure).pieces == 1 for figure in FIGURES)
-    shapes = [(a, b) for i, a in enumerate(FIGURES) for b in FIGURES[:i]]
-    assert not any(same_shape(a, b) for a, b in shapes)
+    digits = [figure for figure in FIGURES if figure.name in "0123456789F-"]
+    assert not any(same_shape(a, b) for i, a in enumerate(digits) for b in digits[:i])
+    assert len({frozenset(map(frozenset, figure.strokes)) for figure in FIGURES}) == len(FIGURES)
+
+
+def test_names_are_written_in_capitals_or_not_at_all():
+    every = "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.+()"
+    assert in_figures(every.lower()) == every == "".join(FIGURES[k].name for k in figures_of(every))
+    assert [in_figures(text) for text in ("Bügel 1", "a:b", "\u7acb")] == ["BUGEL 1", None, None]

@@ -184,8 +184,8 @@ def test_shared_edges_bear_the_same_number_and_six_is_underlined():
         for embossing in part.embossings:
             text = embossing.names[0].split()[0]
             bars = [name for name in embossing.names if " bar " in name]
-            assert bool(bars) == ("6" in text or "9" in text)
-            if text[0] != "F":
+            assert bool(bars) == (text.isdecimal() and ("6" in text or "9" in text))
+            if text.isdecimal():
                 seen.setdefault(int(text), []).append(face)
                 # The number stands beside its own edge: nearest of all edge middles.
                 T = part.T_object_part @ embossing.T_part_facet
@@ -225,11 +225,58 @@ def test_points_on_a_line_are_kept_without_flat_triangles():
 def test_numbers_without_room_make_one_short_warning():
     solid = solid_box((60.0, 60.0, 7.0))
     made = panels(solid, EMPTY, (), 2.0, FDM)
-    (warning,) = made.warnings
+    warning, nameless = made.warnings
+    assert nameless == "no room for a name on the back of F2, F3, F4, F5: mark by hand"
     backs = [k for k in range(6) if f"F{k + 1}" in warning]
     written = [
         {name.split()[0] for e in part.embossings for name in e.names} for part in made.parts
     ]
-    assert backs == [k for k in range(6) if len(written[k]) < 5]
+    assert backs == [k for k in range(6) if len(written[k]) < 4]
     assert warning.startswith("no room for the numbers of ")
     assert len(warning) < 250
+
+
+TEXTS = [
+    # box, what its backs say in the order of faces; the sixth as the first
+    ((60.0, 60.0, 60.0), "COURSE BLOCK-12", [["COURSE", "BLOCK-12"]] * 5),
+    ((60.0, 60.0, 60.0), "\u7acb", [["K7M"]] * 5),
+    ((60.0, 40.0, 20.0), "Bracket-12",
+     [["BRACKET-12"], ["K7M"], ["K7M"], ["K7M"], ["K7M"]]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("size", "name", "texts"), TEXTS)
+def test_every_back_says_object_and_face_beside_its_edges(size, name, texts):
+    made = panels(solid_box(size), EMPTY, (), 3.0, FDM, name=name, code="K7M")
+    assert made.warnings == ()
+    for face, (part, words) in enumerate(zip(made.parts, texts, strict=False), 1):
+        said = [e.names[0].rpartition(" figure")[0] for e in part.embossings]
+        assert [text for text in said if text.isdecimal()] == said[:4]
+        lines = words if words[-1].endswith(f"F{face}") else [*words, f"F{face}"]
+        assert said[4:] == lines
+
+
+def test_a_code_goes_before_numbers_and_what_finds_no_room_is_told():
+    made = panels(solid_box((40.0, 14.0, 14.0)), EMPTY, (), 3.0, FDM, name="Tiny", code="K7M")
+    said = [{e.names[0].rpartition(" figure")[0] for e in p.embossings} for p in made.parts]
+    assert said[2] == {"8"}  # a back of 8 x 8 mm
+    assert "mark by hand" in made.warnings[-1]
+    assert made.warnings[-1].count("F") == sum(
+        not any("F" in text for text in texts) for texts in said
+    )
+    larger = panels(solid_box((60.0, 40.0, 12.0)), EMPTY, (), 3.0, FDM, name="Tiny", code="K7M")
+    said = [{e.names[0].rpartition(" figure")[0] for e in p.embossings} for p in larger.parts]
+    assert all(any("F" in text for text in texts) for texts in said)
+    assert [w.split(" the ")[0] for w in larger.warnings] == ["no room for"]
+
+
+def test_lines_of_a_name_run_downwards_and_keep_clear_of_numbers():
+    part = panels(solid_box((60.0, 40.0, 30.0)), EMPTY, (), 3.0, FDM, name="A-B", code="K").parts[1]
+    found = {e.names[0].rpartition(" figure")[0]: e for e in part.embossings}
+    up = turn(found["A-B"].rotation_rad)[:, 1]
+    low, high = found["F2"].centres_mm.mean(axis=0), found["A-B"].centres_mm.mean(axis=0)
+    assert (high - low) @ up > 4.0
+    names = np.concatenate([found["A-B"].centres_mm, found["F2"].centres_mm])
+    numbers = np.concatenate([e.centres_mm for text, e in found.items() if text.isdecimal()])
+    apart = np.linalg.norm(names[:, None] - numbers[None], axis=-1).min()
+    assert apart > 3.2 + 2 * 0.8
