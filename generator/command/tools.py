@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 import os
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from encoded_objects import console
 from encoded_objects.console import Action
+
+if TYPE_CHECKING:
+    from generator.printers import Printer
 
 app = console.application()
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, also for errors.")]
@@ -74,12 +77,12 @@ def printers(as_json: Json = False) -> Action:
 
     def action() -> int:
         from encoded_objects.console import output
-        from generator.printers import PRINTERS
+        from generator.printers import NOZZLES_MM, known_printers
 
+        rows = [_printer_values(printer) for printer in known_printers()]
         if as_json:
-            output.write_json({"printers": [_printer_values(name) for name in PRINTERS]})
+            output.write_json({"printers": rows})
             return 0
-        rows = [_printer_values(name) for name in PRINTERS]
         table = output.table(
             "printer", "bed", "layer", "stroke >=", "gap >=", "height >=", "made for",
             broken=("made for",),
@@ -91,19 +94,22 @@ def printers(as_json: Json = False) -> Action:
                 row["name"], bed, *(f"{row[key]:g}" for key in limits), row["description"]
             )
         output.show(table)
-        output.write("lengths in mm; choose one with  print: {printer: NAME}")
+        nozzles = ", ".join(f"{nozzle:g}" for nozzle in NOZZLES_MM)
+        output.write(
+            "lengths in mm; choose one with  print: {printer: NAME}, with another nozzle "
+            f"({nozzles}) as ender-3-0.6,\nor describe your own:  "
+            "print: {printer: {like: ender-3, bed: 300 x 300 mm, layer: 0.15 mm}}"
+        )
         return 0
 
     return action
 
 
-def _printer_values(name: str) -> dict[str, Any]:
+def _printer_values(printer: Printer) -> dict[str, Any]:
     """Return a printer's limits as plain values; angles in degrees."""
     from dataclasses import asdict
 
-    from generator.printers import PRINTERS
-
-    values = asdict(PRINTERS[name])
+    values = asdict(printer)
     values["overhang_max_deg"] = round(math.degrees(values.pop("overhang_max_rad")), 6)
     return values
 

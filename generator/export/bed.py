@@ -45,7 +45,12 @@ class _Skyline:
     places: list[BedPlace]
 
 
-def arrange_plates(sizes: Sequence[Size], bed_mm: Size, gap_mm: float = 5.0) -> tuple[Plate, ...]:
+def arrange_plates(
+    sizes: Sequence[Size],
+    bed_mm: Size,
+    gap_mm: float = 5.0,
+    groups: Sequence[int] | None = None,
+) -> tuple[Plate, ...]:
     """Arrange rectangles on as many plates as needed.
 
     Parameters
@@ -56,6 +61,9 @@ def arrange_plates(sizes: Sequence[Size], bed_mm: Size, gap_mm: float = 5.0) -> 
         Usable width and depth of the bed, mm.
     gap_mm
         Least distance between two parts, mm.
+    groups
+        Group of each part. A group lies on one plate if one can hold it, and on plates of its own
+        if not; left out, all parts are one group.
 
     Returns
     -------
@@ -69,21 +77,44 @@ def arrange_plates(sizes: Sequence[Size], bed_mm: Size, gap_mm: float = 5.0) -> 
     [6]
     """
     room = (bed_mm[0] + gap_mm, bed_mm[1] + gap_mm)
+    grown = [(width + gap_mm, depth + gap_mm) for width, depth in sizes]
     order = sorted(range(len(sizes)), key=lambda i: (-max(sizes[i]), -min(sizes[i]), i))
+    kinds = [0] * len(sizes) if groups is None else list(groups)
     open_plates: list[_Skyline] = []
-    plates: list[Plate] = []
-    for part in order:
-        size = (sizes[part][0] + gap_mm, sizes[part][1] + gap_mm)
-        if not any(_fits(turned, room) for turned in (size, size[::-1])):
-            plates.append(_oversize_plate(part, sizes[part], bed_mm))
-            continue
-        for plate in open_plates:
-            if _place_part(plate, part, size, room):
+    oversize: list[Plate] = []
+    for kind in dict.fromkeys(kinds):
+        own = [part for part in order if kinds[part] == kind]
+        small = [
+            p for p in own if any(_fits(turned, room) for turned in (grown[p], grown[p][::-1]))
+        ]
+        oversize += [_oversize_plate(p, sizes[p], bed_mm) for p in own if p not in small]
+        for number, plate in enumerate(open_plates):
+            together = _add_parts(plate, small, grown, room)
+            if together is not None:
+                open_plates[number] = together
                 break
         else:
-            open_plates.append(_Skyline([(0.0, 0.0)], []))
-            _place_part(open_plates[-1], part, size, room)
-    return (*(_centre(plate, sizes, bed_mm) for plate in open_plates), *plates)
+            open_plates += _fill_plates(small, grown, room)
+    return (*(_centre(plate, sizes, bed_mm) for plate in open_plates), *oversize)
+
+
+def _add_parts(
+    plate: _Skyline, parts: Sequence[int], grown: Sequence[Size], room: Size
+) -> _Skyline | None:
+    """Return the plate with all parts on it, or None where it cannot hold them."""
+    more = _Skyline(list(plate.steps), list(plate.places))
+    fit = all(_place_part(more, part, grown[part], room) for part in parts)
+    return more if fit else None
+
+
+def _fill_plates(parts: Sequence[int], grown: Sequence[Size], room: Size) -> list[_Skyline]:
+    """Return new plates with parts that each fit a plate alone."""
+    plates: list[_Skyline] = []
+    for part in parts:
+        if not any(_place_part(plate, part, grown[part], room) for plate in plates):
+            plates.append(_Skyline([(0.0, 0.0)], []))
+            _place_part(plates[-1], part, grown[part], room)
+    return plates
 
 
 def _fits(size: Size, room: Size) -> bool:

@@ -8,7 +8,8 @@ made in both, from the same meshes:
   together; PrusaSlicer asks when a person opens the file, and headless it drops the symbols
   beside the body.
 - ``volumes``: each part is one mesh, and a settings file that PrusaSlicer and SuperSlicer
-  read names the two ranges of its triangles. Others see one mesh of two materials.
+  read names the two ranges of its triangles, beside `SlicerSettings`. Others see one mesh of
+  two materials.
 
 Body and symbols have a material each. The file is a zip whose dates are fixed; mm.
 """
@@ -26,6 +27,7 @@ from numpy.typing import NDArray
 
 from generator.export.bed import BedPlace, Plate, Size, arrange_plates
 from generator.export.colours import BODY_RGB, SYMBOL_RGB, hexadecimal
+from generator.export.slicer_settings import SlicerSettings
 from generator.solid.part import Part
 from generator.solid.triangulate import Mesh, body_mesh, symbol_meshes
 
@@ -89,6 +91,7 @@ def print_files(
     title: str,
     parts: Sequence[Part],
     bed_mm: Size,
+    settings: SlicerSettings | None = None,
     gap_mm: float = 5.0,
 ) -> tuple[PrintFile, ...]:
     """Arrange parts on plates and return the 3MF files of each plate.
@@ -101,27 +104,34 @@ def print_files(
         In their own frames, mm, as they lie on the bed.
     bed_mm
         Usable width and depth of the bed, mm.
+    settings
+        For slicers that read them; None where there are none.
     gap_mm
         Least distance between two parts, mm.
     """
     printed = [_print_meshes(part) for part in parts]
     plates = arrange_plates([part.size for part in printed], bed_mm, gap_mm)
-    return tuple(_plate(title, printed, plate) for plate in plates)
+    return tuple(_plate(title, printed, plate, settings) for plate in plates)
 
 
-def print_file(title: str, parts: Sequence[Part], plate: Plate) -> PrintFile:
+def print_file(
+    title: str, parts: Sequence[Part], plate: Plate, settings: SlicerSettings | None = None
+) -> PrintFile:
     """Return the 3MF files of one plate; its places count `parts`, which are all on it."""
-    return _plate(title, [_print_meshes(part) for part in parts], plate)
+    return _plate(title, [_print_meshes(part) for part in parts], plate, settings)
 
 
-def _plate(title: str, printed: Sequence[_Printed], plate: Plate) -> PrintFile:
-    return PrintFile(
-        plate,
-        _package({_MODEL: _components(title, printed, plate)}),
-        _package(
-            {_MODEL: _volumes(title, printed, plate), _CONFIG: _volume_settings(printed, plate)}
-        ),
-    )
+def _plate(
+    title: str, printed: Sequence[_Printed], plate: Plate, settings: SlicerSettings | None
+) -> PrintFile:
+    volumes: dict[str, Iterable[str]] = {
+        _MODEL: _volumes(title, printed, plate),
+        _CONFIG: _volume_settings(printed, plate, settings),
+    }
+    if settings is not None:
+        volumes |= settings.files()
+    components = _package({_MODEL: _components(title, printed, plate)})
+    return PrintFile(plate, components, _package(volumes))
 
 
 def _print_meshes(part: Part) -> _Printed:
@@ -190,8 +200,11 @@ def _volumes(title: str, printed: Sequence[_Printed], plate: Plate) -> Iterator[
     yield _footer(items)
 
 
-def _volume_settings(printed: Sequence[_Printed], plate: Plate) -> Iterator[str]:
+def _volume_settings(
+    printed: Sequence[_Printed], plate: Plate, settings: SlicerSettings | None
+) -> Iterator[str]:
     """Yield PrusaSlicer's settings of a plate: the ranges of triangles that are volumes."""
+    own = {} if settings is None else settings.of_object
     yield f"{_XML}<config>\n"
     for number, place in enumerate(plate.places, 2):
         part = printed[place.part]
@@ -199,6 +212,8 @@ def _volume_settings(printed: Sequence[_Printed], plate: Plate) -> Iterator[str]
             f'<object id="{number}" instances_count="1">\n'
             f'<metadata type="object" key="name" value={quoteattr(part.name)}/>\n'
         )
+        for key, value in own.items():
+            yield f'<metadata type="object" key="{key}" value="{value}"/>\n'
         first = 0
         for name, material, shape in part.shapes():
             last = first + len(shape.triangles) - 1

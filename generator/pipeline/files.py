@@ -18,6 +18,7 @@ from generator.export.atomic import StagedFile, Staging
 from generator.export.fit_check import FitReport, PanelFile, verify_fit
 from generator.export.glb import glb_bytes
 from generator.export.preview import preview_png
+from generator.export.slicer_settings import SlicerSettings, slicer_settings
 from generator.export.step import step_chunks
 from generator.export.stl import stl_chunks
 from generator.export.threemf import print_files
@@ -103,7 +104,7 @@ def stage(
         fit = verify_fit(panel_files, spec.gap_mm)
     if "3mf" in formats:
         progress("arranging the bed", 0.7)
-        plates = print_files(spec.name, parts, plan.printer.bed_mm)
+        plates = print_files(spec.name, parts, plan.printer.bed_mm, settings_of(plan))
         for number, plate in enumerate(plates, 1):
             suffix = f"-plate-{number}" if len(plates) > 1 else ""
             staging.write(f"{spec.name}{suffix}.3mf", plate.content)
@@ -123,6 +124,14 @@ def stage(
     staging.write(f"{spec.name}.png", preview_png(spec.name, size, parts, meshes, shares))
     staging.write(f"{spec.name}-array.svg", _array_picture(plan, layout).encode())
     return StagedObject(tuple(registered), len(parts), warnings, faces, fit)
+
+
+def settings_of(plan: ObjectPlan) -> SlicerSettings | None:
+    """Return how a slicer prints the parts of an object."""
+    spec = plan.spec
+    panelled = spec.parts == "panels"
+    change = spec.wall_mm if panelled and spec.colours > 1 else 0.0
+    return slicer_settings(plan.printer, supports=not panelled, colour_change_mm=change)
 
 
 def parts_of(plan: ObjectPlan, layout: Layout) -> tuple[tuple[Part, ...], tuple[str, ...]]:

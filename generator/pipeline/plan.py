@@ -25,11 +25,13 @@ from generator.polyhedron import Polyhedron, dihedral, face_polygon
 from generator.polyhedron.front import Loop, covered_parts
 from generator.polyhedron.round import ROUND_SHAPES
 from generator.polyhedron.shapes import SHAPES
-from generator.printers import Printer, printer_named
+from generator.printers import Printer
 from generator.solid.frame import edge_numbers
 from generator.solid.mitre import symbol_clearance_mm
 from generator.solid.plate import cut_corners, plain_panels, top_insets_mm
 from generator.spec import LocatedSpec, ObjectSpec, ShapeSpec
+
+LAYER_MM = 0.02  # by which a printed height may differ from the designed one, unsaid
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,8 +84,7 @@ def plan_object(located: LocatedSpec, solid: Polyhedron | None = None) -> Object
         alphabet, or the printer cannot make them: at the line that says so.
     """
     spec = located.spec
-    with errors_at(located, "print.printer"):
-        printer = printer_named(spec.printer)
+    printer = spec.printer
     with errors_at(located, "shape"):
         polyhedron = _polyhedron(spec.shape) if solid is None else solid
     located = as_one_part(located, polyhedron)
@@ -117,8 +118,33 @@ def plan_object(located: LocatedSpec, solid: Polyhedron | None = None) -> Object
         printer,
         outlines_of,
         faces.blank,
-        (*faces.notes, *_covered_note(polyhedron, covered, reach_mm(spec, printer))),
+        (
+            *faces.notes,
+            *_covered_note(polyhedron, covered, reach_mm(spec, printer)),
+            *_layer_note(spec),
+        ),
     )
+
+
+def _layer_note(spec: ObjectSpec) -> tuple[str, ...]:
+    """Return what whole layers make of a wall and symbols that are none."""
+    printer, height = spec.printer, spec.style.height_mm
+    if not printer.nozzle_mm:
+        return ()
+    wall = spec.wall_mm if spec.parts == "panels" else 0.0
+    low, high = (printer.printed_mm(z) if z else 0.0 for z in (wall, wall + height))
+    if not wall:
+        high = round(height / printer.layer_mm) * printer.layer_mm
+    if abs(low - wall) < LAYER_MM and abs(high - low - height) < LAYER_MM:
+        return ()
+    walls = f"walls of {wall:g} mm print {low:g} mm, " if abs(low - wall) > LAYER_MM else ""
+    better = f"wall {low:g} mm and height" if walls else "height"
+    whole = max(1, round(height / printer.layer_mm)) * printer.layer_mm
+    note = (
+        f"{walls}symbols of {height:g} mm print {high - low:.3g} mm high at layers of "
+        f"{printer.layer_mm:g} mm: {better} {whole:g} mm are whole layers"
+    )
+    return (note,)
 
 
 def _polyhedron(shape: ShapeSpec) -> Polyhedron:

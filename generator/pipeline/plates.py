@@ -16,13 +16,14 @@ from generator.export.atomic import Staging
 from generator.export.bed import Plate, arrange_plates
 from generator.export.overview import can_draw, overview_pdf
 from generator.export.packing import PackedPart, packing_csv
+from generator.export.slicer_settings import SlicerSettings
 from generator.export.threemf import PrintFile, print_file
 from generator.layout.placement import Layout
-from generator.pipeline.files import parts_of
+from generator.pipeline.files import parts_of, settings_of
 from generator.pipeline.parallel import Task, Workers
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress, part_of_progress
-from generator.printers import printer_named
+from generator.printers import Printer
 from generator.solid import Part, box
 
 
@@ -49,7 +50,8 @@ class _Measured:
 class _SetPlate:
     """One plate, and the parts that its places count."""
 
-    printer: str
+    printer: Printer
+    settings: SlicerSettings | None
     plate: Plate
     parts: tuple[_Measured, ...]
 
@@ -98,7 +100,7 @@ def write_set(
                 staging.write(f"{name}-plate-{number}-prusaslicer.3mf", content.prusaslicer)
         if overview:
             progress("drawing the overview", 0.9)
-            beds = [printer_named(plate.printer).bed_mm for plate in plates]
+            beds = [plate.printer.bed_mm for plate in plates]
             staging.write(overview[0], overview_pdf(name, packed, beds))
         staging.write(f"{name}-packing.csv", listed)  # last: it says that the others are there
         staging.commit()
@@ -122,14 +124,20 @@ def _measure(number: int, plan: ObjectPlan, layout: Layout) -> list[_Measured]:
 
 
 def _plates(objects: Sequence[SetObject], parts: Sequence[_Measured]) -> list[_SetPlate]:
-    """Arrange all parts, printer by printer."""
+    """Arrange all parts: what one printer prints with the same settings lies together."""
     plates: list[_SetPlate] = []
-    printers = dict.fromkeys(one.plan.printer.name for one in objects)
-    for printer in printers:
-        own = tuple(p for p in parts if objects[p.number].plan.printer.name == printer)
+    kinds = dict.fromkeys((one.plan.printer, settings_of(one.plan)) for one in objects)
+    for printer, settings in kinds:
+        own = tuple(
+            part
+            for part in parts
+            if (objects[part.number].plan.printer, settings_of(objects[part.number].plan))
+            == (printer, settings)
+        )
         sizes = [part.size_mm[:2] for part in own]
-        for plate in arrange_plates(sizes, printer_named(printer).bed_mm):
-            plates.append(_SetPlate(printer, plate, own))
+        groups = [part.number for part in own]
+        for plate in arrange_plates(sizes, printer.bed_mm, groups=groups):
+            plates.append(_SetPlate(printer, settings, plate, own))
     return plates
 
 
@@ -143,7 +151,7 @@ def _packing_rows(objects: Sequence[SetObject], plate: _SetPlate, number: int) -
                 object=objects[part.number].plan.spec.name,
                 part=part.name,
                 plate=number,
-                printer=plate.printer,
+                printer=plate.printer.name,
                 place=place,
                 size_mm=part.size_mm,
                 symbols=part.symbols,
@@ -155,7 +163,7 @@ def _packing_rows(objects: Sequence[SetObject], plate: _SetPlate, number: int) -
 
 def _plate_task(
     objects: Sequence[SetObject], title: str, plate: _SetPlate
-) -> tuple[str, list[tuple[ObjectPlan, Layout, list[str]]], Plate]:
+) -> tuple[str, list[tuple[ObjectPlan, Layout, list[str]]], Plate, SlicerSettings | None]:
     """Return what `_plate_files` needs: the objects on a plate, and the plate of them alone."""
     places = plate.plate.places
     numbers = dict.fromkeys(plate.parts[place.part].number for place in places)
@@ -168,18 +176,21 @@ def _plate_task(
     moved = tuple(
         dataclasses.replace(place, part=position[plate.parts[place.part].name]) for place in places
     )
-    return title, wanted, Plate(moved, plate.plate.overhang_mm)
+    return title, wanted, Plate(moved, plate.plate.overhang_mm), plate.settings
 
 
 def _plate_files(
-    title: str, objects: list[tuple[ObjectPlan, Layout, list[str]]], plate: Plate
+    title: str,
+    objects: list[tuple[ObjectPlan, Layout, list[str]]],
+    plate: Plate,
+    settings: SlicerSettings | None,
 ) -> PrintFile:
     """Build the parts of one plate and return its 3MF files."""
     parts: list[Part] = []
     for plan, layout, names in objects:
         by_name = {part.name: part for part in parts_of(plan, layout)[0]}
         parts += [by_name[name] for name in names]
-    return print_file(title, parts, plate)
+    return print_file(title, parts, plate, settings)
 
 
 def _same_files(folder: Path, names: Sequence[str], listed: bytes) -> bool:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from generator.errors import PrintError
+from generator.printers import Printer
 
 #: Where distributions put the vendors' settings.
 VENDOR_FOLDERS = (
@@ -22,6 +23,7 @@ VENDOR_FOLDERS = (
 _VENDOR = "PrusaResearch"
 _PRINTER = "Original Prusa i3 MK3S & MK3S+"
 _FILAMENT = "Prusament PLA"
+_NOZZLE_MM = 0.051  # by which a profile's nozzle may differ
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +52,6 @@ PROFILES: dict[str, PrintProfile] = {
 }
 DEFAULT = "fdm-0.4-0.2"
 
-#: Profile for each printer that specs name; resin lays no beads.
-OF_PRINTER = {"fdm-0.4": DEFAULT, "fdm-0.25": "fdm-0.25-0.1"}
-
 
 def print_profile(name: str) -> PrintProfile:
     """Return a profile by its name, or the one that an exported file holds.
@@ -75,20 +74,23 @@ def print_profile(name: str) -> PrintProfile:
     )
 
 
-def profile_of_printer(printer: str) -> PrintProfile:
-    """Return the profile by which a spec's printer prints.
+def profile_of_printer(printer: Printer) -> PrintProfile:
+    """Return the profile by which a spec's printer prints: of its nozzle, its layer or the nearest.
 
     Raises
     ------
     PrintError
-        For a printer that lays no beads.
+        For a printer that lays no beads, or a nozzle without a profile.
     """
-    if printer not in OF_PRINTER:
+    nozzle = printer.nozzle_mm
+    fitting = [one for one in PROFILES.values() if abs(one.nozzle_mm - nozzle) < _NOZZLE_MM]
+    if not nozzle or not fitting:
+        what = f"has a nozzle of {nozzle:g} mm" if nozzle else "lays no beads"
         raise PrintError(
-            f"printer {printer} lays no beads: what it prints is not simulated",
+            f"printer {printer.name} {what}: what it prints is not simulated",
             fix=f"choose a print profile, one of {', '.join(PROFILES)}",
         )
-    return PROFILES[OF_PRINTER[printer]]
+    return min(fitting, key=lambda one: abs(one.layer_mm - printer.layer_mm))
 
 
 def settings_of(profile: PrintProfile) -> dict[str, str]:

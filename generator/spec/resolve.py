@@ -19,9 +19,10 @@ from generator.alphabet.printable import check_printable
 from generator.array.definition import array_from
 from generator.array.profiles import PROFILES
 from generator.errors import AlphabetError, ArrayError
-from generator.printers import PRINTERS, printer_named
+from generator.printers import Printer, printer_named
 from generator.spec.encoding import Encoding
 from generator.spec.located import mark_of
+from generator.spec.printer import resolved_printer
 from generator.spec.problem import SpecError
 from generator.spec.profile import (
     AUTO,
@@ -81,8 +82,8 @@ def resolve(
         defaults = defaults_of_profile(_profile(settings))
     else:
         defaults = defaults_of_order(order)
-    printer = settings.print.printer or defaults.printer
-    style = _style(settings, defaults)
+    printer = _printer(settings, defaults, tree, problems)
+    style = _style(settings, defaults, printer)
     alphabet = ALPHABETS[settings.symbols.alphabet or defaults.alphabet]
     if order is not None and alphabet.order < order:
         _refuse_order(alphabet, order, refuse)
@@ -92,12 +93,12 @@ def resolve(
             _refuse_style(found, refuse)
         else:
             style = found
-    wall = settings.print.wall or WALL_MM
-    thinnest = WALL_STROKES * printer_named(printer).stroke_min_mm
+    wall = settings.print.wall or printer.printed_mm(WALL_MM)
+    thinnest = WALL_STROKES * printer.stroke_min_mm
     if wall < thinnest:
         refuse(
             "print.wall",
-            f"a wall of {wall:g} mm is thinner than {printer} prints solid",
+            f"a wall of {wall:g} mm is thinner than {printer.name} prints solid",
             f"set wall to {thinnest:g} mm or more",
         )
     gap = settings.print.gap or GAP_MM
@@ -121,6 +122,7 @@ def resolve(
         wall_mm=wall,
         gap_mm=gap,
         printer=printer,
+        colours=settings.print.colours,
         formats=tuple(dict.fromkeys(settings.output.formats or FORMATS)),
         folder=Path(settings.output.folder or f"out/{_folder_name(settings.name)}"),
         database=settings.output.database or DATABASE,
@@ -135,14 +137,34 @@ def _folder_name(name: str) -> str:
     return re.sub(r"\s+", "-", name.lower())
 
 
-def _style(settings: NamedSettings, defaults: SymbolDefaults) -> SymbolStyle:
+def _printer(
+    settings: NamedSettings, defaults: SymbolDefaults, tree: Tree, problems: list[Problem]
+) -> Printer:
+    """Return what prints; problems of its file are added."""
+    if settings.print.printer is not None:
+        try:
+            return resolved_printer(settings.print.printer, tree)
+        except SpecError as error:
+            problems += error.problems
+    return printer_named(defaults.printer)
+
+
+def _whole_layers_mm(height_mm: float, printer: Printer) -> float:
+    """Return the height of whole layers nearest to a height, and no less than the printer's."""
+    layers = max(round(height_mm / printer.layer_mm), 1)
+    while layers * printer.layer_mm < printer.height_min_mm - 1e-9:
+        layers += 1
+    return round(layers * printer.layer_mm, 6)
+
+
+def _style(settings: NamedSettings, defaults: SymbolDefaults, printer: Printer) -> SymbolStyle:
     """Return how symbols are embossed; the stroke follows the pitch and the alphabet."""
     symbols = settings.symbols
     pitch = symbols.pitch or defaults.pitch_mm
     ratio = ALPHABETS[symbols.alphabet or defaults.alphabet].stroke_ratio
     return SymbolStyle(
         pitch_mm=pitch,
-        height_mm=symbols.height or HEIGHT_MM,
+        height_mm=symbols.height or _whole_layers_mm(HEIGHT_MM, printer),
         stroke_mm=symbols.stroke or round(ratio * pitch, 2),
         draft_rad=DRAFTS_RAD[0] if symbols.draft is None else symbols.draft,
         chamfer_mm=symbols.chamfer or 0.0,
@@ -150,7 +172,7 @@ def _style(settings: NamedSettings, defaults: SymbolDefaults) -> SymbolStyle:
 
 
 def _printable(
-    alphabet: Alphabet, style: SymbolStyle, printer: str, steeper: bool
+    alphabet: Alphabet, style: SymbolStyle, printer: Printer, steeper: bool
 ) -> SymbolStyle | AlphabetError:
     """Return the style, with less draft where `steeper` allows it and strokes need the room.
 
@@ -160,7 +182,7 @@ def _printable(
     refused = None
     for trial in trials:
         try:
-            check_printable(alphabet, trial, PRINTERS[printer])
+            check_printable(alphabet, trial, printer)
             return trial
         except AlphabetError as error:
             refused = error

@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from generator.alphabet.outline import SymbolStyle
+from generator.errors import GeneratorError
+from generator.printers import Printer, printer_named
 from generator.spec.profile import GAP_MM
 
 
@@ -57,11 +59,12 @@ class ObjectSpec:
     parts: Literal["panels", "whole"]
     wall_mm: float  #: thickness of panels
     gap_mm: float  #: between panels where they meet in the finished object
-    printer: str
+    printer: Printer
     formats: tuple[str, ...]  #: of step, stl, 3mf, glb
     folder: Path  #: for the files; relative to the current folder
     database: str  #: URL
     lab_key: str = ""  #: of the database, where the spec says it
+    colours: int = 1  #: of the filament: 2 where it is changed for the symbols
     array_key: str = ""  #: lab key that `encoding` was made from; empty: the published array
 
     @property
@@ -81,6 +84,14 @@ class ObjectSpec:
             "layout": self.layout,
             "parts": self.parts,
             "wall_mm": self.wall_mm,
-            "printer": self.printer,
+            "printer": self._printer_meaning(),
             **gap,
         }
+
+    def _printer_meaning(self) -> Any:
+        """Return the name of a known printer, or the values of another one."""
+        try:
+            known = printer_named(self.printer.name) == self.printer
+        except GeneratorError:
+            known = False
+        return self.printer.name if known else asdict(self.printer)

@@ -17,6 +17,7 @@ from generator.array.lab_key import read_lab_key
 from generator.errors import LabKeyError
 from generator.spec.encoding import Encoding
 from generator.spec.name import ObjectName
+from generator.spec.printer import PrinterChoice
 from generator.spec.shape import EXAMPLES, Shape
 
 if TYPE_CHECKING:
@@ -128,8 +129,11 @@ class Print(Block):
     """Thickness of the panels; 3 mm."""
     gap: Length | None = None
     """Between panels where they meet in the finished object; 0.14 mm."""
-    printer: Literal["fdm-0.4", "fdm-0.25", "resin"] | None = None
-    """What prints: its limits hold for strokes, gaps and the bed."""
+    printer: PrinterChoice | None = None
+    """What prints: its limits hold for strokes, gaps and the bed. A name, a YAML file, or a block
+    of one's own: {like: ender-3, layer: 0.3 mm}."""
+    colours: Literal[1, 2] = 1
+    """2: the filament is changed where the symbols begin (panels in PrusaSlicer)."""
 
 
 class Output(Block):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import stat
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from generator.printed.profiles import (
     profile_of_printer,
     settings_of,
 )
-from generator.printers import PRINTERS
+from generator.printers import known_printers, printer_named
 
 BOX = ((0, 2, 1), (0, 3, 2), (4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4), (1, 2, 6), (1, 6, 5),
        (2, 3, 7), (2, 7, 6), (3, 0, 4), (3, 4, 7))  # fmt: skip
@@ -85,15 +86,18 @@ def test_names_of_profiles(tmp_path: Path) -> None:
 
 
 def test_each_printer_of_specs_has_a_profile_or_says_why_not() -> None:
-    for name in PRINTERS:
-        if name == "resin":
+    for printer in known_printers():
+        if not printer.nozzle_mm:
             with pytest.raises(PrintError, match="lays no beads"):
-                profile_of_printer(name)
+                profile_of_printer(printer)
         else:
-            profile = profile_of_printer(name)
-            assert (f"fdm-{profile.nozzle_mm:g}", profile.layer_mm) == (
-                name, PRINTERS[name].layer_mm,
-            )  # fmt: skip
+            profile = profile_of_printer(printer)
+            assert profile.nozzle_mm == printer.nozzle_mm
+            assert abs(profile.layer_mm - printer.layer_mm) <= 0.11
+    finer = replace(printer_named("fdm-0.4"), layer_mm=0.28)
+    assert profile_of_printer(finer).name == "fdm-0.4-0.3"
+    with pytest.raises(PrintError, match="a nozzle of 1 mm"):
+        profile_of_printer(replace(finer, nozzle_mm=1.0))
 
 
 def test_the_box_of_a_part(tmp_path: Path) -> None:

@@ -11,7 +11,6 @@ from generator.alphabet.printable import check_printable
 from generator.array.profiles import PROFILES
 from generator.errors import DatabaseError, LayoutError, ShapeError
 from generator.polyhedron.shapes import SHAPES
-from generator.printers import PRINTERS
 from generator.spec import SpecError, error_at, locate, read_specs
 
 FIXTURES = Path(__file__).parents[3] / "fixtures"
@@ -38,7 +37,7 @@ def test_smallest_spec():
     (found,) = read_specs([FIXTURES / "cube.yaml"])
     cube = found.spec
     assert (cube.name, cube.shape.kind, cube.shape.parameters) == ("Cube", "cube", {"side": 60.0})
-    assert (cube.profile, cube.alphabet, cube.printer) == ("one-touch", "dense-4", "fdm-0.4")
+    assert (cube.profile, cube.alphabet, cube.printer.name) == ("one-touch", "dense-4", "fdm-0.4")
     assert cube.style == SymbolStyle(7.0, 1.0, 1.4, pytest.approx(math.radians(10)), 0.0)
     assert (cube.layout, cube.parts, cube.wall_mm) == ("auto", "panels", 3.0)
     assert cube.formats == ("step", "stl", "3mf")
@@ -52,7 +51,7 @@ def test_defaults_of_every_profile_print(profile):
     assert made.encoding == PROFILES[profile].array().definition()
     assert made.alphabet == PROFILES[profile].alphabet
     assert made.style.pitch_mm == PROFILES[profile].pitch_mm
-    check_printable(ALPHABETS[made.alphabet], made.style, PRINTERS[made.printer])
+    check_printable(ALPHABETS[made.alphabet], made.style, made.printer)
 
 
 def test_stroke_follows_the_pitch_and_the_alphabet():

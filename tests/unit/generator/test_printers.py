@@ -1,0 +1,157 @@
+"""Printers that people have, their own ones, and the layers that walls and symbols lie on."""
+
+from __future__ import annotations
+
+import io
+import re
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from generator.errors import GeneratorError
+from generator.export.bed import arrange_plates
+from generator.export.slicer_settings import slicer_settings
+from generator.pipeline.plan import plan_object
+from generator.printers import PRINTERS, known_printers, printer_named
+from generator.spec import ObjectSpec, SpecError, read_specs
+
+CUBE = "name: Cube\nshape: {cube: 60 mm}\n"
+
+
+def spec_of(folder: Path, text: str) -> ObjectSpec:
+    path = folder / "c.yaml"
+    path.write_text(CUBE + text)
+    return read_specs([path])[0].spec
+
+
+def test_machines_have_beds_and_the_limits_of_their_nozzles() -> None:
+    a1 = printer_named("bambu-a1-mini-0.2")
+    assert (a1.bed_mm, a1.nozzle_mm, a1.layer_mm) == ((180.0, 180.0), 0.2, 0.1)
+    assert a1.stroke_min_mm == PRINTERS["fdm-0.25"].stroke_min_mm
+    assert printer_named("ender-3").stroke_min_mm == PRINTERS["fdm-0.4"].stroke_min_mm
+    assert printer_named("voron-300-0.6").layer_mm == 0.3
+    assert len({printer.name for printer in known_printers()}) == len(list(known_printers())) > 15
+    for wrong in ("ender", "ender-3-0.5", "prusa-sl1s-0.4", "bambu"):
+        with pytest.raises(GeneratorError, match=f"unknown printer '{wrong}'") as caught:
+            printer_named(wrong)
+        assert "prusa-mk4" in caught.value.fix
+
+
+@pytest.mark.parametrize(
+    ("text", "bed", "nozzle", "layer", "stroke"),
+    [
+        ("prusa-mini", (180, 180), 0.4, 0.2, 0.8),
+        ("{like: ender-3, layer: 0.15 mm, bed: 300 x 310 mm}", (300, 310), 0.4, 0.15, 0.8),
+        ("{bed: [10 in, 200 mm], stroke: 0.9 mm}", (254, 200), 0.4, 0.2, 0.9),
+        ("{like: ender-3, nozzle: 0.25 mm}", (220, 220), 0.25, 0.1, 0.5),
+        ("mine.yaml", (300, 300), 0.4, 0.12, 0.8),
+    ],
+)
+def test_a_spec_names_or_describes_its_printer(tmp_path, text, bed, nozzle, layer, stroke) -> None:
+    (tmp_path / "mine.yaml").write_text("like: voron-300\nlayer: 0.12 mm\n")
+    printer = spec_of(tmp_path, f"print: {{printer: {text}}}\n").printer
+    assert (printer.bed_mm, printer.nozzle_mm, printer.layer_mm) == (bed, nozzle, layer)
+    assert printer.stroke_min_mm == stroke
+
+
+def test_own_printers_count_by_their_values_known_ones_by_their_names(tmp_path) -> None:
+    def meaning(text: str) -> object:
+        return spec_of(tmp_path, f"print: {{printer: {text}}}\n").meaning["printer"]
+
+    assert meaning("fdm-0.4") == meaning("{like: fdm-0.4}") == "fdm-0.4"
+    assert meaning("ender-3-0.25") == "ender-3-0.25"
+    assert meaning("{layer: 0.15 mm}") == meaning("{layer: 0.15}") != meaning("{layer: 0.16}")
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "fix"),
+    [
+        ("ender3", "c.yaml:3:18", "did you mean 'ender-3'?"),
+        ("{like: ender-3, layers: 1}", "c.yaml:3:34", "did you mean 'layer'?"),
+        ("{bed: 300 mm}", "c.yaml:3:24", "write bed: 250 x 210 mm"),
+        ("mine.yaml", "mine.yaml:1:1", "did you mean 'layer'?"),
+        ("none.yaml", "none.yaml", "did you mean"),
+    ],
+)
+def test_what_is_wrong_with_a_printer_is_said_where_it_stands(tmp_path, text, place, fix) -> None:
+    (tmp_path / "mine.yaml").write_text("layr: 0.12 mm\n")
+    with pytest.raises(SpecError) as caught:
+        spec_of(tmp_path, f"print: {{printer: {text}}}\n")
+    (problem,) = caught.value.problems
+    assert problem.place.endswith(place)
+    assert fix in problem.fix
+
+
+@pytest.mark.parametrize(
+    ("printer", "wall", "height"),
+    [("fdm-0.4", 3.0, 1.0), ("{layer: 0.3 mm}", 3.0, 0.9), ("{layer: 0.28 mm}", 3.08, 1.12),
+     ("prusa-mk4-0.25", 3.0, 1.0), ("resin", 3.0, 1.0)],
+)  # fmt: skip
+def test_walls_and_symbols_are_whole_layers(tmp_path, printer, wall, height) -> None:
+    spec = spec_of(tmp_path, f"print: {{printer: {printer}}}\n")
+    assert (spec.wall_mm, spec.style.height_mm) == (wall, height)
+    layers = (spec.wall_mm - spec.printer.first_layer_mm) / spec.printer.layer_mm
+    assert layers == pytest.approx(round(layers))
+
+
+def test_layers_that_do_not_divide_what_was_asked_for_are_told(tmp_path) -> None:
+    path = tmp_path / "c.yaml"
+    path.write_text(CUBE + "print: {wall: 3.5 mm, printer: {layer: 0.3 mm}}\n")
+    (note,) = plan_object(read_specs([path])[0]).notes
+    assert note == (
+        "walls of 3.5 mm print 3.6 mm, symbols of 0.9 mm print 0.9 mm high at layers of 0.3 mm: "
+        "wall 3.6 mm and height 0.9 mm are whole layers"
+    )
+    path.write_text(CUBE + "symbols: {height: 1.2 mm}\nprint: {wall: 3.5 mm, printer: resin}\n")
+    assert plan_object(read_specs([path])[0]).notes == ()
+
+
+def test_settings_say_layers_bed_and_where_the_colour_changes() -> None:
+    settings = slicer_settings(printer_named("ender-3"), supports=False, colour_change_mm=3.0)
+    assert settings is not None
+    said = settings.entries()
+    assert (said["layer_height"], said["first_layer_height"]) == ("0.2", "0.2")
+    assert said["bed_shape"] == "0x0,220x0,220x220,0x220"
+    assert said["support_material"] == "0"
+    change = settings.files()["Metadata/Prusa_Slicer_custom_gcode_per_print_z.xml"][0]
+    assert re.search(r'print_z="3.2" .* gcode="M600"', change)
+    plain = slicer_settings(printer_named("ender-3"), supports=True)
+    assert plain is not None
+    assert len(plain.files()) == 1
+    assert plain.entries()["support_material"] == "1"
+    assert slicer_settings(printer_named("resin"), supports=False) is None
+
+
+def test_a_group_lies_on_one_plate_where_one_can_hold_it() -> None:
+    sizes = [(60.0, 60.0)] * 18  # six to a cube; nine fit a bed
+    plates = arrange_plates(sizes, (205, 205), groups=[k // 6 for k in range(18)])
+    assert [sorted(p.part for p in plate.places) for plate in plates] == [
+        list(range(6)), list(range(6, 12)), list(range(12, 18)),
+    ]  # fmt: skip
+    assert len(arrange_plates(sizes, (205, 205))) == 2
+    mixed = arrange_plates([*sizes[:6], *[(60.0, 60.0)] * 3], (205, 205), groups=[0] * 6 + [1] * 3)
+    assert [len(plate.places) for plate in mixed] == [9]
+    split = arrange_plates(sizes[:10], (205, 205), groups=[0] * 10)
+    assert [len(plate.places) for plate in split] == [9, 1]
+
+
+def test_a_file_for_prusaslicer_holds_its_settings(tmp_path) -> None:
+    from encoded_objects import encode
+
+    spec = {
+        "name": "C",
+        "shape": {"cube": "40 mm"},
+        "print": {"printer": "prusa-mk4", "colours": 2},
+    }
+    made = encode(spec, folder=tmp_path, database=f"sqlite:///{tmp_path}/l.db", formats=("3mf",))
+    file = next(f for f in made.files if f.name == "C-prusaslicer.3mf")
+    with zipfile.ZipFile(io.BytesIO(file.read_bytes())) as package:
+        config = package.read("Metadata/Slic3r_PE.config").decode()
+        objects = package.read("Metadata/Slic3r_PE_model.config").decode()
+        assert "Metadata/Prusa_Slicer_custom_gcode_per_print_z.xml" in package.namelist()
+    assert "\n; layer_height = 0.2\n" in config
+    assert objects.count('<metadata type="object" key="layer_height" value="0.2"/>') == 6
+    plain = next(f for f in made.files if f.name == "C.3mf")
+    with zipfile.ZipFile(plain) as package:
+        assert not any("Metadata" in name for name in package.namelist())
