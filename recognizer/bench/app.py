@@ -4,9 +4,10 @@
     WS    /live                      frames, mosaics (bytes) and topics (JSON); takes {"filter"}
     GET   /api/bench                 what there is: ports, sensor, arrays
     POST  /api/port | sensor | bias | record | replay | calibration | mosaic | lab
-    POST  /api/touch | load | unplug                            the simulated probe
+    POST  /api/touch[/next] | load | unplug                          the simulated probe
     GET   /api/objects[/NAME[/parts/N]], /api/map/N             what is registered
     GET   /api/recordings/NAME, /api/timeline, /api/frame.csv   POST /api/recordings?name=
+    GET   /api/touches[/N], /api/touches.csv, /api/touches.h5   POST, DELETE /api/touches/N
 
 What is refused is `{"error": {"cause", "fix", "place"}}`.
 """
@@ -35,6 +36,7 @@ from recognizer.bench.images import FILTERS
 from recognizer.bench.lab import lab_routes
 from recognizer.bench.session import Session
 from recognizer.bench.settings import PAGE
+from recognizer.bench.touches import touch_routes
 
 _BAD, _FULL = 1008, 1013  # codes of a line that is closed
 
@@ -64,6 +66,7 @@ def app_for(bench: BenchContext) -> FastAPI:
     app.add_exception_handler(RequestValidationError, _invalid_response)
     app.include_router(control_routes(bench.session, bench.ports))
     app.include_router(lab_routes(bench.session, bench.parts))
+    app.include_router(touch_routes(bench.session))
     page = Path(str(resources.files("recognizer.bench").joinpath("static")))
     app.mount("/static", StaticFiles(directory=page), name="static")
 

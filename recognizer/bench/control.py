@@ -160,6 +160,11 @@ def control_routes(session: Session, ports: Ports) -> APIRouter:
         )
         return {"touched": True}
 
+    @routes.post("/touch/next")
+    def touch_next() -> dict[str, Any]:
+        session.touch_next()
+        return {"touched": True}
+
     @routes.post("/load")
     def load(body: LoadRequest) -> dict[str, Any]:
         session.simulated().load(body.newtons)

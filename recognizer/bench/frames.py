@@ -78,7 +78,8 @@ class FrameHandler:
             values, self._sensor, bias, newtons, frame.seq, frame.t_ns * 1e-9, received_ms
         )
         self._broker.publish("frame", shown)
-        self._recognition.offer(PendingFrame(frame, self.state.calibration, received_ms))
+        load = self.guide is not None
+        self._recognition.offer(PendingFrame(frame, self.state.calibration, received_ms, load))
 
     def newest(self) -> tuple[Frame, Array, str]:
         """Return the newest frame, what is shown of it, and its unit.

@@ -1,7 +1,7 @@
 """Registered objects, arrays and alphabets as JSON, for the page to draw.
 
-An object is its faces (triangles, outlines, pose in the object) and its symbols (label and
-place on their face); how a symbol of each label looks is sent once. An array is the cells that
+An object is its faces (`face_mesh`) and its symbols (label, place on their face, pose on the
+object); how a symbol of each label looks is sent once. An array is the cells that
 objects hold, whatever its size: what nobody holds is not sent. mm, rad. Thesis 6.3.
 """
 
@@ -11,18 +11,16 @@ from collections import defaultdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from sqlalchemy import Connection, select
 
 from generator.database import tables
 from generator.database.entries import list_objects
 from generator.database.read import read_object
 from generator.database.registered import RegisteredObject
-from probe.surface.solids import symbol_triangles, triangulate
+from probe.surface.solids import symbol_triangles
 from probe.surface.symbols import Relief, emboss
+from recognizer.bench.face_mesh import DIGITS, drawn_faces, mesh_json, nested_lists, stands_json
 from recognizer.touch.lab import EmbossedArray, Lab
-
-DIGITS = 4  #: after the point, of mm: a tenth of a micrometre
 
 
 def objects_json(connection: Connection) -> list[dict[str, Any]]:
@@ -59,7 +57,7 @@ def object_json(connection: Connection, name: str) -> dict[str, Any]:
         "registered": held.entry.utc,
         "pitch_mm": held.style.pitch_mm,
         "height_mm": held.style.height_mm,
-        "faces": [_face(held, number) for number in range(len(held.faces))],
+        "faces": [_face(held, number) for number in drawn_faces(held)],
         "glyphs": _glyphs(held),
         "parts": [
             {"number": i, "name": part.name, "format": part.format}
@@ -70,16 +68,16 @@ def object_json(connection: Connection, name: str) -> dict[str, Any]:
 
 def _face(held: RegisteredObject, number: int) -> dict[str, Any]:
     face, cells = held.faces[number], held.layout.faces[number]
-    triangles = triangulate(face.polygon_mm)
+    loops = face.polygon_mm if face.round is None else (face.round.outline_mm,)
     return {
         "name": face.name,
-        "T_object_face": _nested_lists(face.T_object_face, 9),
-        "loops": [_nested_lists(loop) for loop in face.polygon_mm],
-        "triangles": triangles.tolist(),
-        "turn": 0.0 if face.placement is None else -face.placement.rotation_rad,
+        "loops": [nested_lists(loop) for loop in loops],
+        "round": face.round is not None,
         "blank": face.placement is None,
         "labels": cells.labels.tolist(),
-        "centres": _nested_lists(cells.centres_mm),
+        "centres": nested_lists(cells.centres_mm),
+        "stands": stands_json(face, cells.centres_mm),
+        **mesh_json(held, face),
     }
 
 
@@ -153,7 +151,3 @@ def _face_names(connection: Connection) -> dict[int, dict[int, str]]:
     ):
         found[object_id][face_id] = name
     return found
-
-
-def _nested_lists(values: NDArray[np.float64], digits: int = DIGITS) -> Any:
-    return np.round(values, digits).tolist()

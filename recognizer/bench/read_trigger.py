@@ -1,6 +1,6 @@
 """When a touch is worth reading: as soon as it is steady, and again when it has changed.
 
-Forces of frame after frame -> whether to read this one. The page wants an answer at once, so
+Forces of frame after frame -> what to do with this one. The page wants an answer at once, so
 one steady frame is enough (`recognizer.touch.contacts` averages many), and a touch that was not
 answered is read again. One that never comes to rest is read all the same after a while.
 """
@@ -8,6 +8,7 @@ answered is read again. One that never comes to rest is read all the same after 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,20 +17,24 @@ from recognizer.bench.settings import TRIGGER
 
 Array = NDArray[np.float64]
 
+Phase = Literal["none", "felt", "moving", "read", "again", "held"]
+"""none: nothing is touched. felt: a touch has begun that was not read yet. moving: what is felt is
+no longer what was read. read, again: read this frame; again: it was read and not answered.
+held: there is nothing to do."""
+
 
 @dataclass(slots=True)
 class ReadTrigger:
     """A mutable value: the touch at hand."""
 
-    touches: int = 0  #: begun so far
     _before: Array | None = None
     _read: Array | None = None
     _since_s: float = 0.0
     _read_s: float = 0.0
     _answered: bool = False
 
-    def due(self, forces: Array, *, contact: bool, now_s: float) -> bool:
-        """Return whether to read a frame.
+    def phase(self, forces: Array, *, contact: bool, now_s: float) -> Phase:
+        """Return what a frame is.
 
         Parameters
         ----------
@@ -43,22 +48,21 @@ class ReadTrigger:
         before, self._before = self._before, forces if contact else None
         if not contact:
             self._read = None
-            return False
+            return "none"
         if before is None:
-            self.touches += 1
             self._since_s = now_s
-            return False
-        steady = _relative_difference(forces, before) < TRIGGER.steady
-        if steady:
-            self._since_s = now_s
-        elif now_s - self._since_s < TRIGGER.restless_s:
-            return False
-        if (
+            return "felt"
+        changed = (
             self._read is None
             or _relative_difference(_shape(forces), _shape(self._read)) > TRIGGER.changed
-        ):
-            return True
-        return not self._answered and now_s - self._read_s > TRIGGER.again_s
+        )
+        if _relative_difference(forces, before) < TRIGGER.steady:
+            self._since_s = now_s
+        elif now_s - self._since_s < TRIGGER.restless_s:
+            return "felt" if self._read is None else "moving" if changed else "held"
+        if changed:
+            return "read"
+        return "again" if not self._answered and now_s - self._read_s > TRIGGER.again_s else "held"
 
     def read(self, forces: Array, *, answered: bool, now_s: float) -> None:
         """Take note that a frame was read."""

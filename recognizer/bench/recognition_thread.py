@@ -23,8 +23,9 @@ from probe.sensor import SensorType
 from recognizer.bench.answers import answer_json
 from recognizer.bench.broker import Broker
 from recognizer.bench.message import MosaicMessage, mosaic_message
-from recognizer.bench.read_trigger import ReadTrigger
+from recognizer.bench.read_trigger import Phase, ReadTrigger
 from recognizer.bench.settings import RECOGNITION
+from recognizer.bench.touch_log import TouchLog
 from recognizer.scan.mosaic.grow import add_touch
 from recognizer.scan.mosaic.mosaic import Mosaic, no_touches
 from recognizer.scan.mosaic.touch import PlacedTouch, decoded_place
@@ -42,6 +43,7 @@ class PendingFrame:
     frame: Frame
     calibration: Calibration | None
     received_ms: float
+    load: bool = False  #: of a calibration: nothing that is to be read
 
 
 class RecognitionThread:
@@ -55,10 +57,10 @@ class RecognitionThread:
         self._pending: PendingFrame | None = None
         self._stop = self._reload = False
         self._watch = ReadTrigger()
+        self.touches = TouchLog(broker)
         self._answers = 0
         self._mosaics: OrderedDict[tuple[str, str], Mosaic] = OrderedDict()
         self._grown = 0  #: touch that went into a mosaic last
-        self._contact: bool | None = None  #: not known yet
         self._thread = threading.Thread(target=self._run, name="reading", daemon=True)
         self._thread.start()
 
@@ -121,36 +123,45 @@ class RecognitionThread:
 
     def _look(self, pending: PendingFrame) -> None:
         signal = _signal(pending)
-        if signal.contact != self._contact:
-            self._contact = signal.contact
-            self._broker.publish("contact", {"contact": signal.contact})
         now_s = time.monotonic()
-        due = self._watch.due(signal.forces, contact=signal.contact, now_s=now_s)
-        if not due or self.reader is None:
+        contact = signal.contact and not pending.load
+        phase = self._watch.phase(signal.forces, contact=contact, now_s=now_s)
+        self._follow(phase, pending)
+        if phase not in ("read", "again") or self.reader is None:
             return
+        if phase == "read":
+            self.touches.read(pending.frame)
         answer = recognise(self.reader, signal, pending.frame.seq)
         done_s = time.monotonic()
         self._watch.read(signal.forces, answered=bool(answer), now_s=done_s)
         self._answers += 1
-        self._broker.publish(
-            "answer",
+        self.touches.conclude(
             answer_json(answer, self.reader.lab, self.sensor)
             | {
-                "touch": self._watch.touches,
                 "read": self._answers,
                 "read_ms": round(1e3 * (done_s - now_s), 1),
                 "received_ms": pending.received_ms,
                 "answered_ms": time.time() * 1e3,
             },
+            answered=bool(answer),
         )
-        if answer and self._grown != self._watch.touches:
+        if answer and self._grown != self.touches.newest:
             self._grow(answer, signal)
+
+    def _follow(self, phase: Phase, pending: PendingFrame) -> None:
+        """Begin, move and end records as the touch does."""
+        if phase == "none":
+            self.touches.lift()
+        elif phase == "moving":
+            self.touches.move()
+        elif phase in ("felt", "read") and not self.touches.is_new():
+            self.touches.begin(pending.frame, pending.received_ms)
 
     def _grow(self, answer: Recognition, signal: Signal) -> None:
         place = decoded_place(answer)
         if place is None or answer.object is None or answer.face is None:
             return
-        self._grown = self._watch.touches
+        self._grown = self.touches.newest
         key = (answer.object, answer.face)
         with self._news:
             mosaic = self._mosaics.get(key) or no_touches(self.sensor)

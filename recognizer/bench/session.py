@@ -63,7 +63,7 @@ class Session:
         self._feed: Feed = NoFeed()
         self._url = ""
         self._frames = FrameHandler(sensor, broker, self.recognition, self._note)
-        self._notices: deque[tuple[int, str]] = deque(maxlen=SESSION.notices)
+        self._notices: deque[tuple[int, float, str]] = deque(maxlen=SESSION.notices)
         self._noted = 0
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="bench", daemon=True)
@@ -143,6 +143,21 @@ class Session:
             )
         return self.simulation
 
+    def touch_next(self) -> None:
+        """Let the simulated probe make the step that the newest answer proposes.
+
+        Raises
+        ------
+        BusyError
+            It proposes none, or the probe is not simulated.
+        """
+        proposed = (self.recognition.touches.newest_answer() or {}).get("next")
+        if not proposed:
+            raise BusyError("no next touch is proposed", fix="touch the part first")
+        self.simulated().step(
+            proposed["dx_mm"], proposed["dy_mm"], proposed["turn_deg"], proposed["force_n"]
+        )
+
     def bias(self, *, on: bool) -> None:
         """Take the bias of the unloaded sensor, or do without it."""
         with self._turn:
@@ -163,7 +178,7 @@ class Session:
             elif not isinstance(self._feed, ProbeFeed):
                 raise BusyError("no probe is connected", fix="choose a port first")
             else:
-                self._frames.start_recording(self.folder, self._sensor_name(), self._url)
+                self._frames.start_recording(self.folder, self.sensor_name(), self._url)
             self._report()
 
     def calibrate(self, forces_n: list[float], seconds: float, *, simulated_board: bool) -> None:
@@ -177,7 +192,7 @@ class Session:
             if not isinstance(self._feed, ProbeFeed):
                 raise BusyError("no probe is connected", fix="choose a port first")
             forces = forces_given(forces_n)
-            self._frames.guide = CalibrationGuide(self._sensor_name(), forces, seconds, board, now)
+            self._frames.guide = CalibrationGuide(self.sensor_name(), forces, seconds, board, now)
             self._report()
 
     @contextmanager
@@ -218,7 +233,7 @@ class Session:
             found = None
             if name:
                 path = find_file(self.folder, name, ".json")
-                found = read_calibration(path, sensor=self._sensor_name() or None)
+                found = read_calibration(path, sensor=self.sensor_name() or None)
             self._note(self._frames.state.use(found, name))
             self._report()
 
@@ -243,7 +258,9 @@ class Session:
                 **self._frames.as_json(),
                 "recordings": list_files(self.folder, ".h5"),
                 "calibrations": list_files(self.folder, ".json"),
-                "notices": [{"number": n, "text": text} for n, text in self._notices],
+                "notices": [
+                    {"number": n, "at_ms": at_ms, "text": text} for n, at_ms, text in self._notices
+                ],
                 "pages": len(self._broker.subscribers),
             }  # fmt: skip
 
@@ -274,7 +291,8 @@ class Session:
             self.simulation = None
         self._url = ""
 
-    def _sensor_name(self) -> str:
+    def sensor_name(self) -> str:
+        """Return device and sensor, as recordings name them; empty where nothing is connected."""
         feed = self._feed.as_json()
         if isinstance(self._feed, ReplayFeed):
             return str(feed["device"])
@@ -283,7 +301,7 @@ class Session:
 
     def _note(self, text: str) -> None:
         self._noted += 1
-        self._notices.append((self._noted, text))
+        self._notices.append((self._noted, time.time() * 1e3, text))
 
     def _report(self) -> None:
         self._broker.publish("status", self.as_json())

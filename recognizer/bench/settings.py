@@ -89,6 +89,15 @@ class PageSettings:
     listed: int = 200  #: files of a kind that are offered
 
 
+@dataclass(frozen=True, slots=True)
+class TouchLogSettings:
+    """What is kept of the touches of a session."""
+
+    kept: int = 1000  #: newest touches
+    name: int = 80  #: characters that a touch's name may have
+
+
 TRIGGER, RECOGNITION, SESSION = TriggerSettings(), RecognitionSettings(), SessionSettings()
+TOUCHES = TouchLogSettings()
 GUIDE, REPLAY, PRESS = GuideSettings(), ReplaySettings(), PressSettings()
 LINE, PAGE = LineSettings(), PageSettings()

@@ -58,6 +58,7 @@ class TouchProbe:
         self.firmware = firmware
         self._presses = PressSequence(sensor, manner)
         self._scenes: OrderedDict[tuple[str, str], Scene] = OrderedDict()
+        self._last: tuple[str, str, float, float, float, float] | None = None
         self._turn = threading.Lock()
         self._closed = threading.Event()
         with ExitStack() as stack:
@@ -91,6 +92,22 @@ class TouchProbe:
         touch = Touch(x_mm, y_mm, math.radians(theta_deg), force_n)
         with self._turn:
             self._presses.touch(self._scene(object_name, face), touch)
+            self._last = (object_name, face, x_mm, y_mm, theta_deg, force_n)
+
+    def step(self, dx_mm: float, dy_mm: float, turn_deg: float, force_n: float) -> None:
+        """Touch again, a step further in the axes of the sensor as it stood; force 0: as before.
+
+        Raises
+        ------
+        BenchError
+            Nothing was touched yet. Otherwise as `touch`.
+        """
+        if self._last is None:
+            raise BenchError("nothing was touched yet", fix="touch the part first")
+        object_name, face, x, y, theta_deg, force = self._last
+        c, s = math.cos(math.radians(theta_deg)), math.sin(math.radians(theta_deg))
+        x, y = x + c * dx_mm - s * dy_mm, y + s * dx_mm + c * dy_mm
+        self.touch(object_name, face, x, y, theta_deg + turn_deg, force_n or force)
 
     def prepare(self, object_name: str) -> None:
         """Read an object's faces meanwhile, so that its first touch does not wait for it."""

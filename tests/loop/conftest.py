@@ -1,4 +1,4 @@
-"""A registered cube and a running `open-bench`, for the tests of its page and of its guard."""
+"""Two registered objects and a running `open-bench`, for the tests of its page and its guard."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ ENDED_S = 30.0
 
 @pytest.fixture(scope="session")
 def lab(tmp_path_factory):
-    """A folder with a registered cube, its files and its database, and a secret beside it."""
+    """A folder with a cube and a cylinder, their files and database, and a secret beside it."""
     from generator.pipeline import encode
     from generator.spec import read_specs
 
@@ -21,11 +21,14 @@ def lab(tmp_path_factory):
     lab = folder / "lab"
     lab.mkdir()
     (folder / "secret.txt").write_text("kept to itself")
-    (lab / "cube.yaml").write_text("name: Cube\nshape: {cube: 60 mm}\n")
-    encode(
-        read_specs([lab / "cube.yaml"]), folder=lab / "out", formats=("stl", "glb"),
-        database=str(lab / "lab.db"),
-    )  # fmt: skip
+    shapes = {"Cube": "{cube: 60 mm}", "Cylinder": "{cylinder: {diameter: 60 mm, height: 60 mm}}"}
+    for name, shape in shapes.items():
+        spec = lab / f"{name}.yaml"
+        spec.write_text(f"name: {name}\nshape: {shape}\n")
+        encode(
+            read_specs([spec]), folder=lab / "out", formats=("stl", "glb"),
+            database=str(lab / "lab.db"),
+        )  # fmt: skip
     return lab
 
 

@@ -113,6 +113,76 @@ def test_a_click_touches_there_and_the_face_is_lit(page):
     assert "Cube" in page.locator("#map-text").inner_text()
 
 
+def shown(page, name):
+    """Show an object of the lab, seen from a side."""
+    page.get_by_test_id("object").select_option(name)
+    until(page, f"bench.shown === '{name}'")
+
+
+@pytest.mark.parametrize("place", [(0.5, 0.5), (0.42, 0.55), (0.6, 0.5)])
+def test_a_click_on_a_round_face_touches_there(page, place):
+    shown(page, "Cylinder")
+    said = touched(page, *place)
+    assert said.startswith("Cylinder"), said
+    asked = [float(page.locator(f"#touch-{axis}").input_value()) for axis in "xy"]
+    read = re.search(r"x (-?[\d.]+), y (-?[\d.]+) mm", page.locator("#pose").inner_text())
+    assert np.allclose(asked, [float(value) for value in read.groups()], atol=0.5)
+    shown(page, "Cube")
+
+
+WATCH = """() => { window.seen = []; const look = () => {
+    window.seen.push([bench.touch, bench.state, bench.contact, bench.lit,
+      document.getElementById('answer').innerText, document.getElementById('pose').innerText]);
+    requestAnimationFrame(look); }; look(); }"""
+
+
+def test_no_picture_shows_the_last_answer_for_a_new_touch(page):
+    assert touched(page).startswith("Cube")
+    rest(page)
+    first = page.evaluate("bench.touch")
+    page.evaluate(WATCH)
+    for place in ((0.46, 0.5), (0.38, 0.6)):
+        touched(page, *place)
+        rest(page)
+    seen = page.evaluate("window.seen")
+    new = [one for one in seen if one[0] > first]
+    before = [one for one in new if one[1] in ("felt", "reading")]
+    assert len({one[0] for one in new}) >= 2
+    assert before, "no picture of a touch that was not read yet"
+    for _, _, _, lit, answer, pose in before:
+        assert (lit, pose) == ("", "")
+        assert "Cube" not in answer
+
+
+def test_touches_are_kept_to_go_back_to(page):
+    buttons = page.get_by_test_id("touch-list").locator("button")
+    said = touched(page).splitlines()[0]
+    rest(page)
+    kept = buttons.count()
+    other = touched(page, 0.46, 0.5).splitlines()[0]
+    rest(page)
+    assert buttons.count() == kept + 1
+    buttons.nth(kept - 1).click()
+    assert page.get_by_test_id("answer").inner_text().startswith(said)
+    expect(page.get_by_test_id("answer-of")).to_contain_text("seen again")
+    page.get_by_test_id("touch-name").fill("the first one")
+    page.get_by_test_id("touch-name").press("Enter")
+    expect(buttons.nth(kept - 1)).to_contain_text("the first one")
+    buttons.nth(kept).click(modifiers=["Shift"])
+    expect(page.get_by_test_id("touch-compared")).to_contain_text("Cube")
+    with page.expect_download() as download:
+        page.get_by_test_id("touch-csv").click()
+    assert "the first one" in download.value.path().read_text()
+    with page.expect_download() as download:
+        page.get_by_test_id("touch-h5").click()
+    assert len(Recording(download.value.path())) >= 2
+    page.get_by_test_id("touch-list").press("Escape")
+    buttons.nth(kept - 1).click()
+    page.get_by_test_id("touch-delete").click()
+    expect(buttons).to_have_count(kept)
+    assert page.get_by_test_id("answer").inner_text().startswith(other)
+
+
 def test_keys_turn_the_part_and_touch_it(page):
     part = page.get_by_test_id("part")
     part.focus()
@@ -268,6 +338,18 @@ def test_fits_a_narrow_dark_screen(browser, bench):
         assert page.evaluate("document.documentElement.scrollWidth") <= 1024
         paper = page.evaluate("getComputedStyle(document.body).backgroundColor")
         assert all(int(v) < 40 for v in re.findall(r"\d+", paper)[:3])
+
+
+@pytest.mark.parametrize("size", [(390, 844), (1024, 768), (1440, 900), (3840, 2160)])
+def test_the_answer_is_on_the_first_screen(browser, bench, size):
+    width, height = size
+    with opened(browser, bench, viewport={"width": width, "height": height}) as page:
+        rest(page)
+        touched(page)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        page.evaluate("scrollTo(0, 0)")
+        box = page.get_by_test_id("answer").bounding_box()
+        assert box["y"] + box["height"] <= height
 
 
 def test_a_token_is_asked_for_where_others_can_come(served, browser):

@@ -31,8 +31,9 @@ from recognizer.bench.images import FILTERS, filter_image
 from recognizer.bench.message import FrameMessage, mosaic_message
 from recognizer.bench.read_trigger import ReadTrigger
 from recognizer.bench.replay import ReplayFeed
-from recognizer.bench.settings import TRIGGER
+from recognizer.bench.settings import TRIGGER, TouchLogSettings
 from recognizer.bench.simulated import parse_simulation
+from recognizer.bench.touch_log import TouchLog
 from recognizer.scan.mosaic.image import GlobalImage
 
 
@@ -111,30 +112,112 @@ def test_a_touch_is_read_once_it_is_steady_and_again_when_it_has_changed():
     rng = np.random.default_rng(0)
     touch, other = rng.random((16, 16)), rng.random((16, 16))
     watch = ReadTrigger()
-    assert not watch.due(0 * touch, contact=False, now_s=0.0)
-    assert not watch.due(0.3 * touch, contact=True, now_s=0.01)
-    assert not watch.due(touch, contact=True, now_s=0.02)
-    assert watch.due(touch, contact=True, now_s=0.03)
+    assert watch.phase(0 * touch, contact=False, now_s=0.0) == "none"
+    assert watch.phase(0.3 * touch, contact=True, now_s=0.01) == "felt"
+    assert watch.phase(touch, contact=True, now_s=0.02) == "felt"
+    assert watch.phase(touch, contact=True, now_s=0.03) == "read"
     watch.read(touch, answered=True, now_s=0.03)
-    assert not watch.due(touch, contact=True, now_s=0.04)
-    assert not watch.due(0.6 * touch, contact=True, now_s=0.05)  # it is lifted
-    assert not watch.due(0.6 * touch, contact=True, now_s=0.06)
-    assert not watch.due(other, contact=True, now_s=0.07)
-    assert watch.due(other, contact=True, now_s=0.08)  # it has been moved
-    assert watch.touches == 1
+    assert watch.phase(touch, contact=True, now_s=0.04) == "held"
+    assert watch.phase(0.6 * touch, contact=True, now_s=0.05) == "held"  # it is lifted
+    assert watch.phase(0.6 * touch, contact=True, now_s=0.06) == "held"
+    assert watch.phase(other, contact=True, now_s=0.07) == "moving"
+    assert watch.phase(other, contact=True, now_s=0.08) == "read"  # it has been moved
+    assert watch.phase(0 * touch, contact=False, now_s=0.09) == "none"
 
 
 def test_restless_and_unanswered_touches_are_read_all_the_same():
     rng = np.random.default_rng(0)
     watch, now_s = ReadTrigger(), 0.0
-    while not watch.due(rng.random((16, 16)), contact=True, now_s=now_s):
+    while watch.phase(rng.random((16, 16)), contact=True, now_s=now_s) != "read":
         now_s += 0.01
     assert now_s == pytest.approx(TRIGGER.restless_s, abs=0.02)
     touch = rng.random((16, 16))
     watch.read(touch, answered=False, now_s=now_s)
-    watch.due(touch, contact=True, now_s=now_s)
-    assert not watch.due(touch, contact=True, now_s=now_s + 0.9 * TRIGGER.again_s)
-    assert watch.due(touch, contact=True, now_s=now_s + 1.1 * TRIGGER.again_s)
+    watch.phase(touch, contact=True, now_s=now_s)
+    assert watch.phase(touch, contact=True, now_s=now_s + 0.9 * TRIGGER.again_s) == "held"
+    assert watch.phase(touch, contact=True, now_s=now_s + 1.1 * TRIGGER.again_s) == "again"
+
+
+# -- the touches of a session
+
+
+def frame_of(value, t_ns=0):
+    return frame_from(np.full((16, 16), value), t_ns=t_ns, seq=0)
+
+
+def newest(board):
+    return json.loads(board.newest("touch"))
+
+
+def test_a_touch_begins_without_the_answer_of_the_last_one():
+    board = Broker()
+    log = TouchLog(board)
+    log.begin(frame_of(1), 1e3)
+    assert (newest(board)["number"], newest(board)["state"]) == (1, "felt")
+    log.read(frame_of(2))
+    assert newest(board)["state"] == "reading"
+    log.conclude({"object": "Cube", "next": {"dx_mm": 3.0}}, answered=True)
+    assert newest(board)["answer"]["object"] == "Cube"
+    assert log.newest_answer()["next"] == {"dx_mm": 3.0}
+    log.move()
+    assert newest(board)["moving"]
+    log.begin(frame_of(3), 2e3)
+    told = newest(board)
+    assert (told["number"], told["answer"], told["moving"]) == (2, None, False)
+    log.read(frame_of(3))
+    log.conclude({"object": None}, answered=False)
+    log.lift()
+    assert (newest(board)["state"], newest(board)["contact"]) == ("refused", False)
+    assert [one["number"] for one in log.all()] == [1, 2]
+
+
+def test_what_was_only_brushed_leaves_no_record():
+    board = Broker()
+    log = TouchLog(board)
+    log.lift()
+    assert board.newest("touch") is None
+    log.begin(frame_of(1), 1e3)
+    assert log.is_new()
+    log.lift()
+    assert newest(board)["dropped"]
+    assert log.all() == []
+    assert not log.is_new()
+    log.begin(frame_of(1), 2e3)
+    assert newest(board)["number"] == 2
+
+
+def test_touches_are_named_deleted_and_told_as_a_table():
+    log = TouchLog(Broker())
+    for value in (5, 6):
+        log.begin(frame_of(value, t_ns=value), 1e3)
+        log.read(frame_of(value, t_ns=value))
+        log.conclude({"object": "Cube", "face": "F1", "place": {"x_mm": 1.5}}, answered=True)
+        log.lift()
+    assert log.rename(1, "by hand, once")["name"] == "by hand, once"
+    lines = log.as_csv().split("\r\n")
+    assert lines[0].startswith("touch,name,felt_ms")
+    assert lines[1].startswith('1,"by hand, once",1000,0.0,answered,Cube,F1,1.5,')
+    assert lines[2].endswith(f",{6 * 256}")
+    assert log.one(2)["counts"] == np.full((16, 16), 6).tolist()
+    assert [frame.counts[0, 0] for frame in log.frames()] == [5, 6]
+    log.delete(1)
+    assert [one["number"] for one in log.all()] == [2]
+    for number in (1, 9):
+        with pytest.raises(UnknownError):
+            log.one(number)
+        with pytest.raises(UnknownError):
+            log.delete(number)
+    with pytest.raises(BenchError, match="81 characters"):
+        log.rename(2, "x" * 81)
+
+
+def test_the_oldest_touches_are_forgotten(monkeypatch):
+    monkeypatch.setattr("recognizer.bench.touch_log.TOUCHES", TouchLogSettings(kept=3))
+    log = TouchLog(Broker())
+    for value in range(5):
+        log.begin(frame_of(value), 1e3)
+        log.read(frame_of(value))
+    assert [one["number"] for one in log.all()] == [3, 4, 5]
 
 
 # -- what the pages get

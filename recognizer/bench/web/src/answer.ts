@@ -1,44 +1,61 @@
-/** The answer in words: object and face, margin, pose, or the reason why there is none. */
+/** One touch in words: what it is doing, object and face, margin, pose, or why there is no answer. */
 
 import { element, say } from "./dom";
-import type { Answer } from "./types";
+import type { Answer, TouchRecord } from "./types";
 
 const FULL = 5; // margins of the threshold fill the bar
 
 export class AnswerPanel {
   private readonly box = element("answer");
+  private shown = "";
 
   constructor(private readonly threshold: number) {
     element("margin-mark").style.left = `${100 / FULL}%`;
   }
 
-  tell(answer: Answer, clicked_ms: number | null): void {
+  /** Show a record; null: nothing was touched yet. */
+  tell(record: TouchRecord | null, clicked_ms: number | null, past: boolean): void {
+    this.box.classList.toggle("lifted", record !== null && !past && (!record.contact || record.moving));
+    say(element("answer-of"), record ? heading(record, past) : "");
+    const key = JSON.stringify([record?.number, record?.state, record?.answer?.read]);
+    if (key === this.shown) return;
+    this.shown = key;
+    const answer = record?.answer ?? null;
     const name = document.createElement("p"), more = document.createElement("p");
     name.className = "name";
-    if (answer.object) {
+    more.className = "muted";
+    if (!record) {
+      name.textContent = "Nothing touched yet";
+      name.classList.add("muted");
+    } else if (!answer || record.state === "felt" || record.state === "reading") {
+      name.textContent = record.state === "felt" ? "Touched…" : "Reading…";
+      name.classList.add("muted");
+    } else if (answer.object) {
       const face = document.createElement("small");
       face.textContent = ` ${answer.face}`;
       name.append(answer.object, face);
-      more.className = "muted";
       more.textContent = clicked_ms === null
         ? `read in ${answer.read_ms.toFixed(0)} ms` : `read in ${answer.read_ms.toFixed(0)} ms, ${clicked_ms.toFixed(0)} ms after the click`;
     } else {
       name.classList.add("reason");
       name.textContent = `Not recognised: ${answer.reason}`;
+      more.className = "";
       more.textContent = answer.advice;
     }
     this.box.replaceChildren(name, more);
-    this.box.classList.remove("lifted");
+    this.next(answer);
     this.margin(answer);
     this.pose(answer);
   }
 
-  contact(there: boolean): void {
-    this.box.classList.toggle("lifted", !there);
+  private next(answer: Answer | null): void {
+    const next = answer?.next;
+    element("next").hidden = !next;
+    if (next) say(element("next-text"), `Next: ${step(next)}${next.why ? ` (${next.why})` : ""}`);
   }
 
-  private margin(answer: Answer): void {
-    const known = answer.margin !== null || answer.alone;
+  private margin(answer: Answer | null): void {
+    const known = answer !== null && (answer.margin !== null || answer.alone);
     element("margin").hidden = !known;
     if (!known) return;
     const share = answer.alone ? 1 : Math.max(0, Math.min(1, answer.margin! / (FULL * this.threshold)));
@@ -52,19 +69,20 @@ export class AnswerPanel {
     say(element("margin-text"), size + next);
   }
 
-  private pose(answer: Answer): void {
+  private pose(answer: Answer | null): void {
     const rows: [string, string][] = [];
-    if (answer.place) {
+    if (answer?.place) {
       const { x_mm, y_mm, theta_deg, sigma_mm, sigma_deg } = answer.place;
       rows.push(["on the face", `x ${x_mm.toFixed(2)}, y ${y_mm.toFixed(2)} mm  ±${sigma_mm.toFixed(2)}`]);
       rows.push(["turn", `${theta_deg.toFixed(1)}°  ±${sigma_deg.toFixed(2)}`]);
     }
-    if (answer.T_object_probe) {
+    if (answer?.T_object_probe) {
       const at = answer.T_object_probe.slice(0, 3).map((row) => row[3]!.toFixed(1)).join(", ");
       rows.push(["in the object", `${at} mm`]);
     }
-    if (answer.index) rows.push(["in the array", `row ${answer.index[0]}, column ${answer.index[1]}`]);
-    if (answer.noise !== null) rows.push(["left unexplained", answer.noise.toFixed(3)]);
+    if (answer?.index) rows.push(["in the array", `row ${answer.index[0]}, column ${answer.index[1]}`]);
+    if (answer && typeof answer.doubt === "number") rows.push(["by chance", answer.doubt.toPrecision(1)]);
+    if (answer && answer.noise !== null) rows.push(["left unexplained", answer.noise.toFixed(3)]);
     element("pose").replaceChildren(...rows.flatMap(([term, value]) => {
       const dt = document.createElement("dt"), dd = document.createElement("dd");
       dt.textContent = term;
@@ -72,4 +90,20 @@ export class AnswerPanel {
       return [dt, dd];
     }));
   }
+}
+
+function heading(record: TouchRecord, past: boolean): string {
+  const now = past ? "seen again" : !record.contact ? "lifted" : record.moving ? "moving" : "";
+  const name = record.name ? `“${record.name}”` : "";
+  return [`touch ${record.number}`, name, new Date(record.felt_ms).toLocaleTimeString("en-GB"), now].filter(Boolean).join(" · ");
+}
+
+/** A step in the sensor's frame, in words. */
+export function step(next: NonNullable<Answer["next"]>): string {
+  const parts: string[] = [];
+  if (Math.abs(next.dx_mm) >= 0.5) parts.push(`${Math.abs(next.dx_mm).toFixed(0)} mm ${next.dx_mm > 0 ? "right" : "left"}`);
+  if (Math.abs(next.dy_mm) >= 0.5) parts.push(`${Math.abs(next.dy_mm).toFixed(0)} mm ${next.dy_mm > 0 ? "up" : "down"}`);
+  if (Math.abs(next.turn_deg) >= 0.5) parts.push(`turn ${next.turn_deg.toFixed(0)}°`);
+  if (next.force_n) parts.push(`press ${next.force_n.toFixed(0)} N`);
+  return parts.join(", ") || "the same again";
 }

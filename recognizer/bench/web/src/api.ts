@@ -5,11 +5,15 @@ import { showError } from "./dom";
 interface Refusal { error?: { cause?: string; fix?: string } }
 
 export async function get<T>(path: string): Promise<T> {
-  return answered<T>(await fetch(`/api/${path}`));
+  return answered<T>(await asked(path));
+}
+
+export async function remove(path: string): Promise<void> {
+  await answered<object>(await asked(path, { method: "DELETE" }));
 }
 
 export async function post<T>(path: string, body?: object): Promise<T> {
-  return answered<T>(await fetch(`/api/${path}`, {
+  return answered<T>(await asked(path, {
     method: "POST",
     headers: { "content-type": "application/json" },
     body: body === undefined ? null : JSON.stringify(body),
@@ -17,7 +21,16 @@ export async function post<T>(path: string, body?: object): Promise<T> {
 }
 
 export async function send<T>(path: string, file: Blob): Promise<T> {
-  return answered<T>(await fetch(`/api/${path}`, { method: "POST", body: file }));
+  return answered<T>(await asked(path, { method: "POST", body: file }));
+}
+
+async function asked(path: string, how?: RequestInit): Promise<Response> {
+  try {
+    return await fetch(`/api/${path}`, how);
+  } catch (error) {
+    showError("open-bench does not answer. What is on the page stays; the page looks for it.");
+    throw error;
+  }
 }
 
 async function answered<T>(response: Response): Promise<T> {

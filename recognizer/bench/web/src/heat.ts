@@ -10,23 +10,32 @@ const HELD = 0.985; // of the scale is left after each painting
 export class Heat {
   private readonly canvas = element<HTMLCanvasElement>("heat");
   private readonly ink = this.canvas.getContext("2d")!;
-  private readonly small = new OffscreenCanvas(16, 16);
-  private readonly dots = this.small.getContext("2d")!;
-  private readonly pixels = this.dots.createImageData(16, 16);
+  private readonly small: OffscreenCanvas;
+  private readonly dots: OffscreenCanvasRenderingContext2D;
+  private readonly pixels: ImageData;
   private spoken = 0;
+  private newtons = false;
   top = 0;
   answer: Answer | null = null;
   encodings: Encoding[] = [];
   symbols = true;
 
   constructor(private readonly sensor: Sensor) {
+    this.small = new OffscreenCanvas(sensor.columns, sensor.rows);
+    this.dots = this.small.getContext("2d")!;
+    this.pixels = this.dots.createImageData(sensor.columns, sensor.rows);
+    this.canvas.width = Math.round((this.canvas.height * sensor.columns) / sensor.rows);
     element("scale-bar").style.background = gradient();
   }
 
   paint(frame: Frame): void {
+    if (frame.newtons !== this.newtons) { // another unit: the scale begins anew
+      this.newtons = frame.newtons;
+      this.top = this.spoken = 0;
+    }
     this.top = Math.max(frame.largest, this.top * HELD, frame.newtons ? LEAST.newtons : LEAST.counts);
     const { data } = this.pixels;
-    for (let i = 0; i < 256; i++) {
+    for (let i = 0; i < frame.values.length; i++) {
       const colour = 3 * Math.min(255, Math.max(0, Math.round((frame.values[i]! / this.top) * 255)));
       data[4 * i] = TABLE[colour]!;
       data[4 * i + 1] = TABLE[colour + 1]!;
@@ -37,7 +46,8 @@ export class Heat {
     const { width, height } = this.canvas;
     this.ink.imageSmoothingEnabled = false;
     this.ink.drawImage(this.small, 0, 0, width, height);
-    if (this.symbols && this.answer) this.draw(this.answer);
+    if (this.symbols && this.answer?.object) this.draw(this.answer);
+    if (this.answer?.next) this.arrow(this.answer.next);
     this.speak(frame);
   }
 
@@ -67,6 +77,27 @@ export class Heat {
     }
   }
 
+  /** Where to touch next: an arrow from the middle, the sensor's axes. */
+  private arrow(next: { dx_mm: number; dy_mm: number }): void {
+    const away = Math.hypot(next.dx_mm, next.dy_mm);
+    if (away < 0.5) return;
+    const ink = this.ink, unit = this.canvas.width / (this.sensor.columns * this.sensor.pitch_mm);
+    const [u, v] = [next.dx_mm / away, -next.dy_mm / away], long = Math.min(away * unit, 0.45 * this.canvas.width);
+    const [x0, y0] = [this.canvas.width / 2, this.canvas.height / 2], [x1, y1] = [x0 + u * long, y0 + v * long];
+    for (const [width, colour] of [[9, "rgb(0 0 0 / .6)"], [4, "#ffd60a"]] as const) {
+      ink.lineWidth = width;
+      ink.strokeStyle = colour;
+      ink.lineCap = ink.lineJoin = "round";
+      ink.beginPath();
+      ink.moveTo(x0, y0);
+      ink.lineTo(x1, y1);
+      ink.moveTo(x1 - 16 * (u + v), y1 - 16 * (v - u));
+      ink.lineTo(x1, y1);
+      ink.lineTo(x1 - 16 * (u - v), y1 - 16 * (v + u));
+      ink.stroke();
+    }
+  }
+
   private speak(frame: Frame): void {
     const now = performance.now();
     if (now - this.spoken < 1000) return;
@@ -74,6 +105,6 @@ export class Heat {
     const unit = frame.newtons ? "N" : "counts", digits = frame.newtons ? 2 : 0;
     say(element("scale"), `0 to ${this.top.toFixed(digits)} ${unit}`);
     this.canvas.setAttribute("aria-label",
-      `Heat map of the 16 by 16 readings, largest ${frame.largest.toFixed(digits)} ${unit}`);
+      `Heat map of the ${this.sensor.rows} by ${this.sensor.columns} readings, largest ${frame.largest.toFixed(digits)} ${unit}`);
   }
 }

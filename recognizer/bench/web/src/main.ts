@@ -11,12 +11,13 @@ import { MosaicPanel } from "./mosaic";
 import { Part, type Place } from "./part";
 import { Replay } from "./replay";
 import { Surface } from "./surface";
-import type { Answer, ArrayMap, BenchInfo, Encoding, Frame, ObjectEntry, ObjectShape, ReaderState, Told } from "./types";
+import { Touches } from "./touches";
+import type { ArrayMap, BenchInfo, Encoding, Frame, ObjectEntry, ObjectShape, ReaderState, Told, TouchRecord } from "./types";
 import { Work } from "./work";
 
 /** What tests and measurements ask for. */
-interface Figures { frames: number; paints: number; latency_ms: number[]; answers: number; click_ms: number[]; lit: string; shown: string; contact: boolean | null }
-const figures: Figures = { frames: 0, paints: 0, latency_ms: [], answers: 0, click_ms: [], lit: "", shown: "", contact: null };
+interface Figures { frames: number; paints: number; latency_ms: number[]; answers: number; click_ms: number[]; lit: string; shown: string; contact: boolean; touch: number; state: string }
+const figures: Figures = { frames: 0, paints: 0, latency_ms: [], answers: 0, click_ms: [], lit: "", shown: "", contact: false, touch: 0, state: "" };
 Object.assign(window, { bench: figures });
 const KEPT = 5000;
 
@@ -27,13 +28,14 @@ async function begin(): Promise<void> {
   const answers = new AnswerPanel(info.margin), work = new Work(info), guide = new GuideDialog(), replay = new Replay();
   const part = new Part(sensor, (place) => void touch(place).catch(() => undefined));
   const map = new MapPanel((name) => void show(name));
-  let newest: Frame | null = null, painting = false, contact = false, simulated = false;
-  let answer: Answer | null = null, clicked: number | null = null, painted = 0;
+  const touches = new Touches((one, past) => void take(one, past));
+  let newest: Frame | null = null, painting = false, simulated = false, past = false;
+  let record: TouchRecord | null = null, clicked: number | null = null, painted = 0, read = 0;
 
   const line = new Live({
     frame(frame) {
       figures.frames++;
-      if (element<HTMLInputElement>("freeze").checked) return;
+      if (past || element<HTMLInputElement>("freeze").checked) return;
       newest = frame;
       if (!painting) {
         painting = true;
@@ -42,7 +44,11 @@ async function begin(): Promise<void> {
     },
     mosaic: (image) => mosaic.show(image),
     told,
-    connected: (there) => { if (!there) work.gone(); },
+    connected: (there) => {
+      for (const id of ["touch", "work-body"]) element(id).inert = !there;
+      if (there) void touches.load().catch(() => undefined);
+      else work.gone();
+    },
   }, "bias-free");
 
   function paint(): void {
@@ -66,33 +72,55 @@ async function begin(): Promise<void> {
       guide.tell(topic);
       replay.tell(topic);
       element("touch").querySelector("button")!.disabled = !simulated;
-    } else if (topic.topic === "answer") take(topic);
+      element("next-go").hidden = !simulated;
+    } else if (topic.topic === "touch") touches.tell(topic);
     else if (topic.topic === "mosaic-of") mosaic.told(topic);
-    else if (topic.topic === "reader") void reader(topic);
-    else {
-      contact = figures.contact = topic.contact;
-      answers.contact(contact);
-      if (!contact) heat.answer = null;
-      part.tell(answer, contact);
-    }
+    else void reader(topic);
   }
 
-  function take(read: Answer): void {
-    answer = read;
-    figures.answers++;
-    const since = clicked === null ? null : performance.now() - clicked;
-    clicked = null;
-    answers.tell(read, since);
-    heat.answer = read.object ? read : null;
-    map.tell(read);
-    if (since !== null) requestAnimationFrame(() => keep(figures.click_ms, since));
-    if (read.object && read.object !== part.shape?.name && element<HTMLInputElement>("follow").checked) void show(read.object);
+  /** Show one record in all panels; null: nothing was touched yet. */
+  function take(one: TouchRecord | null, ofPast: boolean): void {
+    record = one;
+    past = ofPast;
+    const answer = one?.answer ?? null;
+    if (one && !one.contact && figures.touch < one.number) read = Math.max(read, answer?.read ?? 0); // it was over before the page knew of it
+    const fresh = answer !== null && !past && answer.read > read;
+    let since: number | null = null;
+    if (fresh) {
+      read = answer.read;
+      figures.answers++;
+      since = clicked === null ? null : performance.now() - clicked;
+      clicked = null;
+      if (since !== null) requestAnimationFrame(() => keep(figures.click_ms, since!));
+    }
+    figures.contact = !past && (one?.contact ?? false);
+    figures.touch = one?.number ?? 0;
+    figures.state = one?.state ?? "";
+    answers.tell(one, since, past);
+    heat.answer = past || (one?.contact && !one.moving) ? answer : null;
+    map.tell(answer);
+    if (past) void image(one!.number);
+    if (answer?.object && (fresh || past) && answer.object !== part.shape?.name && element<HTMLInputElement>("follow").checked) void show(answer.object);
     else lights();
   }
 
+  /** Paint the image of a touch of the past. */
+  async function image(number: number): Promise<void> {
+    const { counts } = await get<{ counts: number[][] }>(`touches/${number}`);
+    if (!past || record?.number !== number) return;
+    const values = Float32Array.from(counts.flat()), low = Math.min(...values);
+    values.forEach((value, i) => { values[i] = value - low; });
+    const largest = Math.max(...values);
+    const frame: Frame = { newtons: false, filter: 0, seq: 0, time_s: record.time_s, received_ms: record.felt_ms, largest, sum: 0, values };
+    heat.top = 0;
+    heat.paint(frame);
+    surface.paint(frame, heat.top);
+  }
+
   function lights(): void {
-    part.tell(answer, contact);
-    if (answer?.face && answer.object === part.shape?.name && element<HTMLInputElement>("follow").checked) part.face(answer.face);
+    const answer = record?.answer ?? null;
+    part.tell(answer, past || (record?.contact ?? false));
+    if (answer?.T_object_probe && answer.object === part.shape?.name && element<HTMLInputElement>("follow").checked) part.face(answer.T_object_probe);
     mosaic.tell(answer, part.shape);
     figures.lit = part.litFace;
     element("part").dataset["lit"] = figures.lit;
@@ -101,6 +129,7 @@ async function begin(): Promise<void> {
   async function touch(place: Place): Promise<void> {
     element<HTMLSelectElement>("touch-face").value = place.face;
     for (const [id, value] of [["touch-x", place.x_mm], ["touch-y", place.y_mm]] as const) element<HTMLInputElement>(id).value = value.toFixed(1);
+    touches.live();
     clicked = performance.now();
     await post("touch", {
       object: part.shape?.name ?? "", ...place,
@@ -174,6 +203,10 @@ async function begin(): Promise<void> {
     event.preventDefault();
     const number = (id: string): number => Number(element<HTMLInputElement>(id).value);
     void touch({ face: element<HTMLSelectElement>("touch-face").value, x_mm: number("touch-x"), y_mm: number("touch-y") }).catch(() => undefined);
+  });
+  element("next-go").addEventListener("click", () => {
+    clicked = performance.now();
+    void post("touch/next").catch(() => undefined);
   });
   element("mosaic-clear").addEventListener("click", () => void post("mosaic"));
   element("save-picture").addEventListener("click", () => picture());

@@ -3,11 +3,11 @@
 import {
   BoxGeometry, BufferAttribute, BufferGeometry, Color, DoubleSide, EdgesGeometry, Float32BufferAttribute, Group,
   InstancedMesh, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshLambertMaterial, Object3D, Raycaster,
-  RingGeometry, Sphere, Vector2, Vector3,
+  RingGeometry, Sphere, Triangle, Vector2, Vector3,
 } from "three";
 import { element, isDark } from "./dom";
 import { Stage } from "./stage";
-import type { Answer, Matrix, ObjectShape, Sensor } from "./types";
+import type { Answer, FaceShape, Matrix, ObjectShape, Sensor } from "./types";
 
 const STILL_PX = 5; // farther, a press of the button is a turn and no click
 
@@ -89,27 +89,17 @@ export class Part {
 
   get litFace(): string { return this.shape?.faces[this.lit]?.name ?? ""; }
 
-  /** Turn the part so that a face is seen. */
-  face(name: string): void {
-    const face = this.shape?.faces.find((one) => one.name === name);
-    if (!face || !this.faces) return;
-    const T = matrixOf(face.T_object_face);
-    const out = new Vector3().setFromMatrixColumn(T, 2), up = new Vector3().setFromMatrixColumn(T, 1);
+  /** Turn the part so that a place on it is seen, as the probe stands there. */
+  face(T_object_probe: Matrix): void {
+    const out = new Vector3().setFromMatrixColumn(matrixOf(T_object_probe), 2);
     const now = this.stage.camera.position.clone().sub(this.stage.target).normalize();
     if (now.dot(out) > 0.35) return;
-    const ball = this.faces.geometry.boundingSphere!;
-    this.stage.look(ball.center.clone(), ball.radius, out.addScaledVector(up, 0.35).add(new Vector3(0.3, -0.2, 0.25)));
+    this.stage.glide(out.add(new Vector3(0.3, -0.35, 0.3)));
   }
 
   private facesOf(shape: ObjectShape): Mesh {
-    const corners: number[] = [], faceOf: number[] = [];
-    shape.faces.forEach((face, number) => {
-      const T = matrixOf(face.T_object_face), points = face.loops.flat();
-      for (const triangle of face.triangles) {
-        for (const k of triangle) corners.push(...new Vector3(points[k]![0], points[k]![1], 0).applyMatrix4(T).toArray());
-        faceOf.push(number);
-      }
-    });
+    const corners = shape.faces.flatMap((face) => face.corners);
+    const faceOf = shape.faces.flatMap((face, number) => new Array<number>(face.corners.length / 9).fill(number));
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new Float32BufferAttribute(corners, 3));
     geometry.setAttribute("color", new BufferAttribute(new Float32Array(corners.length), 3));
@@ -173,12 +163,22 @@ export class Part {
     const hit = ray.intersectObject(this.faces)[0];
     const face = hit && this.shape.faces[this.faceOf[hit.faceIndex!]!];
     if (!hit || !face) return;
-    const T = matrixOf(face.T_object_face), at = hit.point.clone().applyMatrix4(T.clone().invert());
-    this.ring.matrixAutoUpdate = false;
-    this.ring.matrix.copy(T).multiply(new Matrix4().makeTranslation(at.x, at.y, this.shape.height_mm + 0.2));
+    this.ring.position.copy(hit.point).addScaledVector(hit.face!.normal, this.shape.height_mm + 0.2);
+    this.ring.quaternion.setFromUnitVectors(new Vector3(0, 0, 1), hit.face!.normal);
     this.ring.visible = true;
     this.stage.draw();
+    const at = this.placeOf(face, hit.faceIndex!, hit.point);
     this.touched({ face: face.name, x_mm: at.x, y_mm: at.y });
+  }
+
+  /** The place on a face of a point on one of its triangles; of a round face, in its unrolled plane. */
+  private placeOf(face: FaceShape, triangle: number, point: Vector3): Vector2 {
+    const k = triangle - this.faceOf.indexOf(this.shape!.faces.indexOf(face));
+    const [a, b, c] = [0, 3, 6].map((i) => new Vector3().fromArray(face.corners, 9 * k + i)) as [Vector3, Vector3, Vector3];
+    const share = Triangle.getBarycoord(point, a, b, c, new Vector3()) ?? new Vector3(1, 0, 0);
+    const at = new Vector2();
+    share.toArray().forEach((part, i) => at.addScaledVector(new Vector2().fromArray(face.places, 6 * k + 2 * i), part));
+    return at;
   }
 }
 
@@ -189,10 +189,8 @@ function matrixOf(rows: Matrix): Matrix4 {
 function outlinesOf(shape: ObjectShape): BufferGeometry {
   const corners: number[] = [];
   for (const face of shape.faces) {
-    const T = matrixOf(face.T_object_face);
-    for (const loop of face.loops) loop.forEach((a, i) => {
-      const b = loop[(i + 1) % loop.length]!;
-      for (const p of [a, b]) corners.push(...new Vector3(p[0], p[1], 0).applyMatrix4(T).toArray());
+    for (const line of face.outlines) line.forEach((a, i) => {
+      if (i + 1 < line.length || !face.round) corners.push(...a, ...line[(i + 1) % line.length]!);
     });
   }
   return new BufferGeometry().setAttribute("position", new Float32BufferAttribute(corners, 3));
@@ -203,11 +201,9 @@ function symbolsOf(shape: ObjectShape): { mesh: InstancedMesh; faces: Uint16Arra
   return shape.glyphs.flatMap((corners, label) => {
     const places: Matrix4[] = [], faces: number[] = [];
     shape.faces.forEach((face, number) => {
-      const T = matrixOf(face.T_object_face), turn = new Matrix4().makeRotationZ(face.turn);
       face.labels.forEach((one, i) => {
         if (one !== label) return;
-        const [x, y] = face.centres[i]!;
-        places.push(T.clone().multiply(new Matrix4().makeTranslation(x, y, 0)).multiply(turn));
+        places.push(new Matrix4().fromArray([...face.stands[i]!, 0, 0, 0, 1]).transpose());
         faces.push(number);
       });
     });
@@ -222,7 +218,7 @@ function symbolsOf(shape: ObjectShape): { mesh: InstancedMesh; faces: Uint16Arra
 
 /** The probe in the sensor frame: overlay, board, and a dot at the upper left tactel. */
 function probeOf(sensor: Sensor): Group {
-  const side = sensor.columns * sensor.pitch_mm, group = new Group();
+  const wide = sensor.columns * sensor.pitch_mm, high = sensor.rows * sensor.pitch_mm, group = new Group();
   const box = (w: number, h: number, from: number, to: number, colour: number, opacity: number): void => {
     const geometry = new BoxGeometry(w, h, to - from).translate(0, 0, (from + to) / 2);
     const material = new MeshLambertMaterial({ color: colour, transparent: opacity < 1, opacity, depthWrite: opacity === 1 });
@@ -230,10 +226,10 @@ function probeOf(sensor: Sensor): Group {
     const line = new LineBasicMaterial({ color: 0x0f6c8c });
     group.add(new LineSegments(new EdgesGeometry(geometry), line));
   };
-  box(side, side, 0, sensor.overlay_mm, 0x2a9d8f, 0.35);
-  box(side + 5, side + 5, sensor.overlay_mm, sensor.overlay_mm + 3, 0x0f6c8c, 0.45);
+  box(wide, high, 0, sensor.overlay_mm, 0x2a9d8f, 0.35);
+  box(wide + 5, high + 5, sensor.overlay_mm, sensor.overlay_mm + 3, 0x0f6c8c, 0.45);
   const dot = new Mesh(new BoxGeometry(2.4, 2.4, 1), new MeshLambertMaterial({ color: 0xffffff }));
-  dot.position.set(-side / 2 + 1.5, side / 2 - 1.5, sensor.overlay_mm + 3.3);
+  dot.position.set(-wide / 2 + 1.5, high / 2 - 1.5, sensor.overlay_mm + 3.3);
   group.add(dot);
   group.matrixAutoUpdate = false;
   return group;

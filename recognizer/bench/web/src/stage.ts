@@ -7,6 +7,7 @@ import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { isDark } from "./dom";
 
 const STEP = Math.PI / 24;
+const GLIDE_MS = 350;
 
 export class Stage {
   readonly scene = new Scene();
@@ -14,6 +15,7 @@ export class Stage {
   private readonly renderer: WebGLRenderer;
   private readonly controls: OrbitControls;
   private waiting = false;
+  private gliding = 0; // number of the turn that is made; another one ends it
 
   constructor(readonly canvas: HTMLCanvasElement) {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: "low-power" });
@@ -25,6 +27,7 @@ export class Stage {
     this.scene.add(this.camera, new AmbientLight(0xffffff, 1.1));
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.addEventListener("change", () => this.draw());
+    this.controls.addEventListener("start", () => { this.gliding++; });
     canvas.addEventListener("keydown", (event) => this.key(event));
     new ResizeObserver(() => this.draw()).observe(canvas);
     this.theme();
@@ -44,6 +47,25 @@ export class Stage {
     this.camera.updateProjectionMatrix();
     this.controls.update();
     this.draw();
+  }
+
+  /** Turn to another side, upright and smoothly; at once where less motion is asked for. */
+  glide(from: Vector3): void {
+    const centre = this.controls.target, away = this.camera.position.clone().sub(centre);
+    const start = spherical(away), end = spherical(from.clone().setLength(away.length()));
+    const turn = Math.atan2(Math.sin(end.theta - start.theta), Math.cos(end.theta - start.theta));
+    const began = performance.now(), takes = matchMedia("(prefers-reduced-motion: reduce)").matches ? 0 : GLIDE_MS;
+    const number = ++this.gliding;
+    const step = (): void => {
+      if (number !== this.gliding) return;
+      const share = takes ? Math.min(1, (performance.now() - began) / takes) : 1, eased = share * share * (3 - 2 * share);
+      const at = new Spherical(start.radius, start.phi + eased * (end.phi - start.phi), start.theta + eased * turn).makeSafe();
+      this.camera.position.copy(centre).add(cartesian(at));
+      this.controls.update();
+      this.draw();
+      if (share < 1) requestAnimationFrame(step);
+    };
+    step();
   }
 
   get target(): Vector3 { return this.controls.target; }
@@ -75,15 +97,24 @@ export class Stage {
     if (!turn && nearer === 1) return;
     event.preventDefault();
     const away = this.camera.position.clone().sub(this.controls.target);
-    // three's spherical coordinates have y up, the bench z
-    const at = new Spherical().setFromVector3(new Vector3(away.x, away.z, -away.y));
+    const at = spherical(away);
+    this.gliding++;
     at.theta += turn?.[0] ?? 0;
     at.phi += turn?.[1] ?? 0;
     at.radius *= nearer;
     at.makeSafe();
-    const to = new Vector3().setFromSpherical(at);
-    this.camera.position.copy(this.controls.target).add(new Vector3(to.x, -to.z, to.y));
+    this.camera.position.copy(this.controls.target).add(cartesian(at));
     this.controls.update();
     this.draw();
   }
+}
+
+/** Of a vector; three's spherical coordinates have y up, the bench z. */
+function spherical(away: Vector3): Spherical {
+  return new Spherical().setFromVector3(new Vector3(away.x, away.z, -away.y));
+}
+
+function cartesian(at: Spherical): Vector3 {
+  const to = new Vector3().setFromSpherical(at);
+  return new Vector3(to.x, -to.z, to.y);
 }

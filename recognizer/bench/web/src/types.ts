@@ -32,12 +32,11 @@ export interface Status {
   recording: { name: string; frames: number } | null;
   guide: GuideStep | null;
   recordings: string[]; calibrations: string[];
-  notices: { number: number; text: string }[];
+  notices: { number: number; at_ms: number; text: string }[];
   pages: number;
 }
 
 export interface Answer {
-  topic: "answer";
   seq: number; object: string | null; face: string | null; index: [number, number] | null;
   T_face_probe: Matrix | null; T_object_probe: Matrix | null;
   margin: number | null; alone: boolean; noise: number | null;
@@ -47,13 +46,23 @@ export interface Answer {
   symbols: [number, number, number, number, number][];
   turn?: number;
   window: { encoding: number; corners: [number, number][] } | null;
-  touch: number; read: number; read_ms: number; received_ms: number; answered_ms: number;
+  next?: { dx_mm: number; dy_mm: number; turn_deg: number; force_n: number; why: string } | null;
+  doubt?: number | null;
+  read: number; read_ms: number; received_ms: number; answered_ms: number;
+}
+
+/** One touch: all panels show the same record. */
+export interface TouchRecord {
+  topic: "touch";
+  number: number; felt_ms: number; time_s: number;
+  state: "felt" | "reading" | "answered" | "refused";
+  contact: boolean; moving: boolean; answer: Answer | null; name: string;
+  dropped?: boolean;
 }
 
 export interface MosaicOf { topic: "mosaic-of"; object: string | null; face: string | null; touches: number }
 export interface ReaderState { topic: "reader"; state: "preparing" | "ready" | "off"; cause?: string; fix?: string }
-export interface ContactState { topic: "contact"; contact: boolean }
-export type Told = Status | Answer | MosaicOf | ReaderState | ContactState;
+export type Told = Status | TouchRecord | MosaicOf | ReaderState;
 
 export interface Frame {
   newtons: boolean; filter: number; seq: number; time_s: number; received_ms: number;
@@ -66,8 +75,9 @@ export interface MosaicImage {
 }
 
 export interface FaceShape {
-  name: string; T_object_face: Matrix; loops: [number, number][][]; triangles: [number, number, number][];
-  turn: number; blank: boolean; labels: number[]; centres: [number, number][];
+  name: string; loops: [number, number][][]; round: boolean; blank: boolean;
+  corners: number[]; places: number[]; outlines: [number, number, number][][];
+  labels: number[]; centres: [number, number][]; stands: number[][];
 }
 
 export interface ObjectShape {

@@ -84,11 +84,11 @@ export class Work {
 
   private notices(status: Status): void {
     const list = element("notices");
-    for (const { number, text } of status.notices) {
+    for (const { number, at_ms, text } of status.notices) {
       if (number <= this.shown) continue;
       this.shown = number;
       const item = document.createElement("li");
-      item.textContent = `${new Date().toLocaleTimeString("en-GB")}  ${text}`;
+      item.textContent = `${new Date(at_ms).toLocaleTimeString("en-GB")}  ${text}`;
       list.prepend(item);
       while (list.children.length > 60) list.lastElementChild?.remove();
     }

@@ -1,0 +1,79 @@
+"""A registered face as the page draws and picks it: triangles on the object, places on the face.
+
+Flat faces lie in their plane. A round face is drawn as the facets that stand for it; what is
+picked on them is a place of the unrolled plane, and each of its symbols stands in the plane that
+is tangent there. mm; lists of numbers for JSON.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.database.registered import RegisteredFace, RegisteredObject
+from probe.surface.solids import triangulate
+
+Array = NDArray[np.float64]
+
+DIGITS = 4  #: after the point, of mm: a tenth of a micrometre
+
+
+def drawn_faces(held: RegisteredObject) -> list[int]:
+    """Return the faces that are drawn, by number: of a round face's facets the carrier alone."""
+    facets = {facet for face in held.faces if face.round is not None
+              for facet in face.round.surface.facets}  # fmt: skip
+    return [n for n, face in enumerate(held.faces) if n not in facets or face.round is not None]
+
+
+def mesh_json(held: RegisteredObject, face: RegisteredFace) -> dict[str, Any]:
+    """Return a face's triangles and outlines.
+
+    `corners`: 9 numbers a triangle, object frame; `places`: 6 numbers a triangle, face frame or
+    unrolled plane; `outlines`: lines of points, object frame, closed on a flat face.
+    """
+    if face.round is None:
+        points = np.concatenate(face.polygon_mm)
+        places = points[triangulate(face.polygon_mm)]
+        corners = _seated(face.T_object_face, places)
+        outlines = [_seated(face.T_object_face, loop) for loop in face.polygon_mm]
+    else:
+        d = face.round.development
+        low, high = d.low, d.high
+        places = np.stack(
+            [np.stack([low[:-1], low[1:], high[1:]], axis=1),
+             np.stack([low[:-1], high[1:], high[:-1]], axis=1)], axis=1
+        )  # fmt: skip
+        corners = np.stack(
+            [_seated(T, two) for T, two in zip(d.T_object_flat, places, strict=True)]
+        )
+        outlines = [held.polyhedron.vertices[ends] for ends in d.vertices.T]
+    return {
+        "corners": nested_lists(corners.ravel()),
+        "places": nested_lists(places.ravel()),
+        "outlines": [nested_lists(loop) for loop in outlines],
+    }
+
+
+def stands_json(face: RegisteredFace, centres_mm: Array) -> list[list[float]]:
+    """Return the pose of every symbol on the object, the first three rows of 4 x 4 in turn."""
+    if face.placement is None:
+        return []
+    c, s = math.cos(-face.placement.rotation_rad), math.sin(-face.placement.rotation_rad)
+    stands = []
+    for x, y in centres_mm.tolist():
+        T = face.T_object_face if face.round is None else face.round.tangent(x, y)
+        T_plane_symbol = np.array([[c, -s, 0, x], [s, c, 0, y], [0, 0, 1, 0], [0, 0, 0, 1]])
+        stands.append(nested_lists((T @ T_plane_symbol)[:3].ravel(), 6))
+    return stands
+
+
+def nested_lists(values: Array, digits: int = DIGITS) -> Any:
+    """Return numbers as JSON has them."""
+    return np.round(values, digits).tolist()
+
+
+def _seated(T: Array, places: Array) -> Array:
+    return np.asarray(places @ T[:3, :2].T + T[:3, 3])
