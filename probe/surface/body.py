@@ -1,7 +1,7 @@
 """Surfaces that are closed bodies: their triangles, and the library that cuts them.
 
 Triangles (n, 3, 3) mm, counter-clockwise from outside <-> Manifold. Written parts are bodies;
-what the database says of a face, and what a printer's beads leave, are height maps.
+what the database says of a face, and what a printer's beads leave, are heights alone.
 """
 
 from __future__ import annotations
@@ -21,28 +21,20 @@ Array = NDArray[np.float64]
 
 
 class Solid(Protocol):
-    """A surface that is also known as a closed body."""
+    """A surface that may be known as a closed body, too."""
 
     @property
-    def solid_mm(self) -> Array:
-        """(n, 3, 3) corners of the triangles, counter-clockwise from outside, surface frame."""
+    def solid_mm(self) -> Array | None:
+        """(n, 3, 3) corners of the triangles, counter-clockwise from outside, surface frame.
+
+        None where what it rests on is heights alone.
+        """
         ...
 
 
-def body_of(surface: HeightMap) -> Array:
-    """Return the triangles (n, 3, 3) of a surface's body, mm, surface frame.
-
-    Raises
-    ------
-    SurfaceError
-        The surface is a height map alone.
-    """
+def body_of(surface: HeightMap) -> Array | None:
+    """Return the triangles (n, 3, 3) of a surface's body, mm, surface frame; None: no body."""
     body: Array | None = getattr(surface, "solid_mm", None)
-    if body is None:
-        raise SurfaceError(
-            "a closed body is needed; this surface is a height map",
-            fix="touch written files (--surfaces files), or take --engine own",
-        )
     return body
 
 
@@ -54,15 +46,16 @@ def manifold_of(triangles_mm: Array) -> Manifold:
     SurfaceError
         The triangles close no body.
     """
+    corners, index = np.unique(triangles_mm.reshape(-1, 3), axis=0, return_inverse=True)
+    return manifold_from(corners, index.reshape(-1, 3))
+
+
+def manifold_from(corners_mm: Array, triangles: NDArray[np.int64]) -> Manifold:
+    """Return a body of corners (n, 3) and triangles (m, 3); raises as `manifold_of`."""
     from manifold3d import Error, Manifold, Mesh
 
-    corners, index = np.unique(triangles_mm.reshape(-1, 3), axis=0, return_inverse=True)
-    body = Manifold(
-        Mesh(
-            vert_properties=corners.astype(np.float32),
-            tri_verts=index.reshape(-1, 3).astype(np.uint32),
-        )
-    )
+    vertices, index = corners_mm.astype(np.float32), triangles.astype(np.uint32)
+    body = Manifold(Mesh(vert_properties=vertices, tri_verts=index))
     if body.status() != Error.NoError:
         raise SurfaceError(
             f"the triangles close no body ({body.status().name})", fix="take a written part"

@@ -27,7 +27,6 @@ from recognizer.validation.surfaces import FOREIGN
 TOUCHES = "touches"  #: name of the series that is counted
 BLANK, STRANGE = "blank", "foreign"
 ON_FACES = ("face", "edge", "corner", "worn", COPY, NEAR, SMALL, SIDE)
-ON_PARTS = (*ON_FACES, SAME_PROFILE)  #: all that touch written parts
 #: What is touched: the written STL files, what a printer leaves of them, the registered faces.
 FILES, PRINTED, REGISTERED = SURFACES = ("files", "printed", "database")
 
@@ -74,11 +73,8 @@ class Campaign:
     shard: int = SHARING.shard  #: touches in a file: at most so many are lost with a run
 
 
-def parts_alone(campaign: Campaign, named: bool) -> Campaign:
-    """Return a campaign that touches parts alone, where it can touch nothing else.
-
-    Engines of closed bodies know written parts, prints are of parts of the set; neither knows
-    surfaces of no database.
+def touchable(campaign: Campaign, named: bool) -> Campaign:
+    """Return a campaign without the kinds that it cannot touch: prints are of parts of the set.
 
     Parameters
     ----------
@@ -90,29 +86,25 @@ def parts_alone(campaign: Campaign, named: bool) -> Campaign:
     Raises
     ------
     ValidationError
-        It asks for what cannot be touched so.
+        It asks for what cannot be touched so, or for an overlay that its engine does not know.
     """
-    bodies = engine_named(campaign.engine).bodies
-    if not bodies and campaign.surfaces != PRINTED:
-        return campaign
-    if bodies and (campaign.surfaces != FILES or campaign.overlay != "tab"):
-        known = {PRINTED: "prints, which are height maps", REGISTERED: "registered faces"}
-        what = "the pad" if campaign.overlay != "tab" else known[campaign.surfaces]
+    overlays = engine_named(campaign.engine).overlays
+    if campaign.overlay not in overlays:
         raise ValidationError(
-            f"engine {campaign.engine} touches closed bodies by tabs, not {what}",
-            fix="take --surfaces files and --overlay tab, or --engine own",
+            f"engine {campaign.engine} does not know the overlay {campaign.overlay}",
+            fix=f"take --overlay {' or '.join(overlays)}, or --engine own",
             place="--engine",
         )
-    allowed = ON_FACES if campaign.surfaces == PRINTED else ON_PARTS
-    other = [kind for kind, _ in campaign.kinds if kind not in allowed]
+    if campaign.surfaces != PRINTED:
+        return campaign
+    other = [kind for kind, _ in campaign.kinds if kind not in ON_FACES]
     if named and other:
-        who = f"engine {campaign.engine} touches" if bodies else "prints are"
         raise ValidationError(
-            f"{who} parts of the set, not {', '.join(other)}",
-            fix=f"name kinds among {', '.join(allowed)}, or take --engine own and --surfaces files",
+            f"prints are parts of the set, not {', '.join(other)}",
+            fix=f"name kinds among {', '.join(ON_FACES)}, or take --surfaces files",
             place="--kinds",
         )
-    kept = [(kind, share) for kind, share in campaign.kinds if kind in allowed]
+    kept = [(kind, share) for kind, share in campaign.kinds if kind in ON_FACES]
     total = sum(share for _, share in kept)
     return replace(campaign, kinds=tuple((kind, share / total) for kind, share in kept))
 

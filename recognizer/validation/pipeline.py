@@ -23,9 +23,9 @@ from recognizer.validation.campaign import (
     Campaign,
     kinds_of,
     levels_of,
-    parts_alone,
     series_of,
     shards_of,
+    touchable,
 )
 from recognizer.validation.draw import TouchPlan
 from recognizer.validation.errors import ValidationError
@@ -128,8 +128,7 @@ def validate(
     prints
         Folder of printed surfaces that runs share; `printed` in the folder if empty.
     engine
-        Of contact: `own`, or `mujoco` (extra `engines`), which touches written files alone and
-        draws no surfaces of no database.
+        Of contact: `own`, or `mujoco` (extra `engines`), which knows tabs alone.
     sensor_per
         `touch`: every touch is felt by another sensor; `run`: all by one, whose errors stay.
     study
@@ -249,7 +248,7 @@ def _campaign(options: CampaignOptions, known: Campaign | None) -> Campaign:
                 fix="add --surfaces printed",
                 place=option,
             )
-    return parts_alone(campaign, bool(options.kinds))
+    return touchable(campaign, bool(options.kinds))
 
 
 def _finish(record: RunRecord, folder: Path) -> dict[str, Any]:

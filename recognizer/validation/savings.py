@@ -97,12 +97,15 @@ def _levels(study: Study, reader: Reader) -> None:
 
 
 def _triangles(study: Study, plan: TouchPlan, reader: Reader) -> None:
-    """Triangles of the part that the engine of the run gets, if it takes bodies."""
-    part = engine_named(plan.engine).part
-    found = draw_touch(plan, 0, reader) if part else None
-    if part is None or found is None or found.scene is None:
+    """Triangles of the part that the engine of the run gets, if it takes meshes of parts."""
+    triangles = engine_named(plan.engine).triangles
+    found = draw_touch(plan, 0, reader) if triangles else None
+    if triangles is None or found is None or found.scene is None:
         return
-    needed, of = part(found.surface, reader.sensor, found.touch)
+    counted = triangles(found.surface, reader.sensor, found.touch)
+    if counted is None:
+        return
+    needed, of = counted
     _add(study, f"Triangles of the part that engine {plan.engine} gets: only those under the "
          "sensor", needed, of, "triangles", None, None)  # fmt: skip
 

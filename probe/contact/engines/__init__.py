@@ -2,7 +2,7 @@
 
 An engine takes a surface, a sensor, a touch and what is known of the tips, and gives the force
 on every tactel and the plate at rest. `own` is the ladder of `probe.contact`; `mujoco` asks
-MuJoCo's tactile sensor how deep each point of each tip stands in the written mesh.
+MuJoCo's tactile sensor how deep each point of each tip stands in a mesh of what is touched.
 
 A third one is a file beside these with a value `ENGINE`, and a line in `ENGINES`.
 """
@@ -22,7 +22,7 @@ from probe.sensor import SensorType
 from probe.surface.contract import HeightMap
 
 Press = Callable[[HeightMap, SensorType, Touch, Tips], Contact]
-Part = Callable[[HeightMap, SensorType, Touch], tuple[int, int]]
+Triangles = Callable[[HeightMap, SensorType, Touch], tuple[int, int] | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,8 +41,8 @@ ENGINES = {
     ),
     "mujoco": EngineEntry(
         "probe.contact.engines.mujoco",
-        "friction; and a tip that sinks deeper into a stroke than half the stroke's width is felt "
-        "as if it had slid off to the side",
+        "friction; a tip that sinks deeper into a stroke than half the stroke's width is felt as "
+        "if it had slid off to the side; and what is finer than 0.1 mm on a print",
     ),
 }
 
@@ -53,8 +53,8 @@ class Engine:
 
     press: Press
     points: int  #: on each tip, enough for it
-    bodies: bool  #: whether it touches closed bodies alone, not height maps
-    part: Part | None = None  #: triangles of the body that a touch needs, and all; None: no body
+    overlays: tuple[str, ...]  #: that it knows: tab, pad
+    triangles: Triangles | None = None  #: of the part that a touch needs, and all; None: no meshes
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
-"""MuJoCo's tactile sensor on the written mesh: an engine that shares no model with ours.
+"""MuJoCo's tactile sensor on what is touched: an engine that shares no model with ours.
 
-Solid + sensor + touch + tips -> Contact. MuJoCo holds the part as a signed distance field on an
-octree of fixed depth, so the part is cut to what lies under the sensor first; its `tactile`
+Surface + sensor + touch + tips -> Contact. MuJoCo holds the part as a signed distance field on an
+octree of fixed depth, made of what lies under the sensor alone (`under_sensor`); its `tactile`
 sensor says how deep every point of every tip stands in the part, along the shortest way out.
 Each point is a column of the overlay's elastomer (neo-Hookean, its share of the tip's area);
 the plate advances and tilts until forces and moments balance those of the touch and the wrist.
@@ -24,13 +24,13 @@ from numpy.typing import NDArray
 from encoded_objects.errors import require
 from probe.contact.contract import Contact, Touch
 from probe.contact.engines import Engine
-from probe.contact.heights import nothing_under
+from probe.contact.engines.under_sensor import UNDER, Mesh, mesh_under
 from probe.contact.neo_hooke import NeoHooke
 from probe.contact.plate import checked_load, load_of
 from probe.contact.tips import Tips, tip_points
 from probe.errors import ContactError
 from probe.sensor import SensorType
-from probe.surface.body import body_of, indexed_triangles, manifold_of
+from probe.surface.body import body_of
 from probe.surface.contract import HeightMap
 
 require("mujoco", extra="engines", purpose="engine mujoco")
@@ -42,8 +42,6 @@ Array = NDArray[np.float64]
 class MujocoSettings:
     """How finely the part is asked, and when the plate is at rest."""
 
-    around_mm: float = 5.0  #: of the part kept around the sensor's square: domes of 2 degrees tilt
-    deep_mm: float = 2.5  #: kept under the highest point: symbols of 1 mm and some of the wall
     tolerance: float = 1e-4  #: of the force; MuJoCo's distances are no better
     stiffer: float = 8.0  #: elastomer against the overlay's: 120 N press 0.5 mm deep, not 1 mm,
     #: since a distance field knows no depth beyond the half width of a stroke, 0.7 mm
@@ -55,12 +53,12 @@ class MujocoSettings:
 
 
 def press(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips) -> Contact:
-    """Press a sensor on a closed body.
+    """Press a sensor on a surface.
 
     Parameters
     ----------
     surface
-        Must be a `Solid`: a written part.
+        A written part, or heights alone, which are meshed first.
     sensor
         Any matrix; its overlay must be of tabs.
     touch
@@ -76,9 +74,10 @@ def press(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips) -> C
     Raises
     ------
     ContactError
-        No closed body, an overlay that is no tabs, nothing under the sensor, or no rest.
+        An overlay that is no tabs, nothing under the sensor, or no rest.
+    SurfaceError
+        The triangles of a part close no body.
     """
-    solid = body_of(surface)
     if sensor.overlay.kind != "tab":
         raise ContactError(
             f"engine mujoco knows tabs, the overlay is a {sensor.overlay.kind}",
@@ -91,7 +90,7 @@ def press(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips) -> C
         tilts = (touch.tilt_x_rad, touch.tilt_y_rad)
         return Contact(np.zeros(shape), math.inf, *tilts, "mujoco", 0)
     points, drop = tip_points(sensor, tips)
-    depths, top_mm = _scene(solid, sensor, touch, points, drop, settings)
+    depths, top_mm = _scene(mesh_under(surface, sensor, touch, UNDER), sensor, touch, points, drop)
     share = math.pi * sensor.overlay.tab_diameter_mm**2 / 4 / points.shape[1]
     modulus = settings.stiffer * sensor.overlay.young_mpa
     law = NeoHooke(modulus * share / sensor.overlay.height_mm, sensor.overlay.height_mm)
@@ -132,7 +131,7 @@ def _rest(
 
     lift = float(np.abs(unloaded).sum())
     plate = np.array([top_mm + lift, *unloaded])
-    plate[0] = _advance(balance, plate, lift + settings.deep_mm)
+    plate[0] = _advance(balance, plate, lift + UNDER.deep_mm)
     now = balance(plate)
     for step in range(1, settings.steps + 1):
         if np.abs(now.wrong_n).max() <= settings.tolerance * touch.force_n:
@@ -179,13 +178,12 @@ def _advance(balance: Callable[[Array], Balance], plate: Array, most_mm: float) 
 
 
 def _scene(
-    solid_mm: Array, sensor: SensorType, touch: Touch, points: Array, drop: Array,
-    settings: MujocoSettings,
-) -> tuple[Depths, float]:  # fmt: skip
+    part_mm: Mesh, sensor: SensorType, touch: Touch, points: Array, drop: Array
+) -> tuple[Depths, float]:
     """Build MuJoCo's model of the part under the sensor; return its depths and the top."""
     import mujoco
 
-    corners, faces = cut_under(solid_mm, sensor, touch, settings)
+    corners, faces = part_mm
     pad, fans = _pad(points.reshape(-1, 2), drop.ravel(), points.shape[1], sensor)
     spec = mujoco.MjSpec()
     spec.option.gravity = [0, 0, 0]
@@ -226,31 +224,6 @@ def _scene(
     return depths, float(corners[:, 2].max())
 
 
-def cut_under(
-    solid_mm: Array, sensor: SensorType, touch: Touch, settings: MujocoSettings | None = None
-) -> tuple[Array, NDArray[np.int64]]:
-    """Return what of a body lies under the sensor: corners (n, 3) mm and triangles (m, 3).
-
-    Raises
-    ------
-    ContactError
-        Nothing of it lies under the sensor.
-    SurfaceError
-        The triangles close no body.
-    """
-    from manifold3d import Manifold
-
-    given = settings or MujocoSettings()
-    reach = max(sensor.half_mm) + given.around_mm
-    top = float(solid_mm[:, :, 2].max())
-    box = Manifold.cube((2 * reach, 2 * reach, 2 * given.deep_mm), center=True)
-    box = box.rotate((0, 0, math.degrees(touch.theta_rad))).translate((touch.x_mm, touch.y_mm, top))
-    corners, triangles = indexed_triangles(manifold_of(solid_mm) ^ box)
-    if len(triangles) == 0:
-        raise nothing_under(touch)
-    return corners, triangles
-
-
 def _pad(
     at_mm: Array, drop_mm: Array, each: int, sensor: SensorType
 ) -> tuple[Array, NDArray[np.int64]]:
@@ -277,10 +250,10 @@ def _quaternion(turn: float, tilt_x: float, tilt_y: float) -> list[float]:
     return [w1 * c - y1 * y, x1 * c - z1 * y, w1 * y + y1 * c, x1 * y + z1 * c]
 
 
-def triangles_under(surface: HeightMap, sensor: SensorType, touch: Touch) -> tuple[int, int]:
+def triangles_under(surface: HeightMap, sensor: SensorType, touch: Touch) -> tuple[int, int] | None:
     """Return how many triangles of a body a touch needs, and how many the body has."""
-    solid = body_of(surface)
-    return len(cut_under(solid, sensor, touch)[1]), len(solid)
+    body = body_of(surface)
+    return None if body is None else (len(mesh_under(surface, sensor, touch, UNDER)[1]), len(body))
 
 
-ENGINE = Engine(press, points=7, bodies=True, part=triangles_under)
+ENGINE = Engine(press, points=7, overlays=("tab",), triangles=triangles_under)

@@ -41,9 +41,12 @@ class DistortedSurface:
         return highest
 
     @property
-    def solid_mm(self) -> Array:
+    def solid_mm(self) -> Array | None:
         """Return the body (n, 3, 3), scaled; its strokes are as wide as drawn."""
+        body = body_of(self.surface)
+        if body is None:
+            return None
         centre = np.array([*self.about_mm, 0.0])
         scales = np.array([1 + self.scale, 1 + self.scale, 1.0])
-        scaled: Array = (body_of(self.surface) - centre) * scales + centre
+        scaled: Array = (body - centre) * scales + centre
         return scaled

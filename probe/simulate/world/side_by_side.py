@@ -74,12 +74,15 @@ class SideBySide:
         return np.maximum(self.first.heights_mm(points_mm), second)
 
     @property
-    def solid_mm(self) -> Array:
+    def solid_mm(self) -> Array | None:
         """Return both bodies (n, 3, 3) as one."""
+        first, second = body_of(self.first), body_of(self.second)
+        if first is None or second is None:
+            return None
         c, s = math.cos(self.place.turn_rad), math.sin(self.place.turn_rad)
-        turned = body_of(self.second) @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        turned = second @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
         moved = turned + np.array([self.place.x_mm, self.place.y_mm, self.place.z_mm])
-        both = manifold_of(body_of(self.first)) + manifold_of(moved)
+        both = manifold_of(first) + manifold_of(moved)
         corners, triangles = indexed_triangles(both)
         return corners[triangles]
 

@@ -66,19 +66,20 @@ class WornAway:
         return heights
 
     @property
-    def solid_mm(self) -> Array:
+    def solid_mm(self) -> Array | None:
         """Return the body (n, 3, 3) without what stood above the face in these cells."""
         from manifold3d import Manifold, OpType
 
-        if len(self.centres_mm) == 0:
-            return body_of(self.surface)
+        body = body_of(self.surface)
+        if body is None or len(self.centres_mm) == 0:
+            return body
         side, top = self.pitch_mm, self.top_mm
         box = Manifold.cube((side, side, 2 * top)).translate((-side / 2, -side / 2, 0))
         box = box.rotate((0, 0, -math.degrees(self.rotation_rad)))
         places = np.column_stack([self.centres_mm, self.bases_mm]).tolist()
         boxes = [box.translate((x, y, z)) for x, y, z in places]
         gone = Manifold.batch_boolean(boxes, OpType.Add)
-        corners, triangles = indexed_triangles(manifold_of(body_of(self.surface)) - gone)
+        corners, triangles = indexed_triangles(manifold_of(body) - gone)
         return corners[triangles]
 
 

@@ -11,7 +11,8 @@ from scipy.optimize import brentq
 
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.engines import ENGINES, engine_named
-from probe.contact.engines.mujoco import MujocoSettings, cut_under
+from probe.contact.engines.mujoco import MujocoSettings
+from probe.contact.engines.under_sensor import UNDER, mesh_under
 from probe.contact.tips import Tips
 from probe.errors import ContactError, ProbeError
 from probe.sensor import Overlay, SensorType
@@ -30,9 +31,10 @@ def block(low, high):
     return corners[np.array(faces)]
 
 
-def plate_with_bars():
-    """Return a plate with two bars of 1.4 mm, 1 mm high, as one closed body."""
-    boxes = [((-30, -30, -5), (30, 30, 0)), ((-6, -4, -1), (-4.6, 4, 1)), ((1, 2, -1), (9, 3.4, 1))]
+def plate_with_bars(wide=0.0):
+    """Return a plate with two bars of 1.4 mm and more, 1 mm high, as one closed body."""
+    bars = [((-6 - wide, -4, -1), (-4.6, 4, 1)), ((1, 2, -1), (9, 3.4 + wide, 1))]
+    boxes = [((-30, -30, -5), (30, 30, 0)), *bars]
     size = [np.subtract(high, low) for low, high in boxes]
     solids = [Manifold.cube(s).translate(low) for s, (low, _) in zip(size, boxes, strict=True)]
     made = (solids[0] + solids[1] + solids[2]).to_mesh()
@@ -115,13 +117,35 @@ def test_both_engines_feel_the_same_symbol():
     assert other.forces_n.sum() == pytest.approx(own.forces_n.sum(), rel=1e-3)
 
 
+class Heights:
+    """A surface of which nothing but its heights is known."""
+
+    def __init__(self, surface):
+        self.surface, self.top_mm = surface, surface.top_mm
+
+    def heights_mm(self, points_mm):
+        return self.surface.heights_mm(points_mm)
+
+
 def test_only_what_lies_under_the_sensor_is_kept():
-    corners, faces = cut_under(block((-90, -90, -40), (90, 90, 0)), SENSOR, Touch(50, 0, 0, 1.0))
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    reach = 12.7 + MujocoSettings().around_mm
-    assert low == pytest.approx([50 - reach, -reach, -MujocoSettings().deep_mm], abs=1e-4)
-    assert high == pytest.approx([50 + reach, reach, 0], abs=1e-4)
-    assert len(faces) == 12
+    part = mesh(block((-90, -90, -40), (90, 90, 0)))
+    reach, deep = 12.7 + UNDER.around_mm, UNDER.deep_mm
+    # A body is cut; heights are closed by a floor deep enough for what is cut off.
+    for surface, under, count in ((part, deep, 12), (Heights(part), 2 * deep, 12)):
+        corners, faces = mesh_under(surface, SENSOR, Touch(50, 0, 0, 1.0), UNDER)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        assert low == pytest.approx([50 - reach, -reach, -under], abs=1e-4)
+        assert high == pytest.approx([50 + reach, reach, 0], abs=1e-4)
+        assert len(faces) == count
+
+
+def test_heights_alone_feel_as_their_body_does(press):
+    surface = mesh(plate_with_bars(wide=3.0))
+    touch = Touch(0.4, -0.3, 0.5, 10.0, 0.01, -0.01)
+    body, heights = (press(s, SENSOR, touch, TIPS) for s in (surface, Heights(surface)))
+    off = np.linalg.norm(heights.forces_n - body.forces_n) / np.linalg.norm(body.forces_n)
+    assert off < 0.1
+    assert heights.z_mm == pytest.approx(body.z_mm, abs=0.02)
 
 
 def test_no_force_is_no_contact(press):
@@ -131,19 +155,19 @@ def test_no_force_is_no_contact(press):
     assert found.z_mm == math.inf
 
 
-class Flat:
-    """A height map without a body."""
+class Void:
+    """Heights without any matter."""
 
     top_mm = 0.0
 
     def heights_mm(self, points_mm):
-        return np.zeros(len(points_mm))
+        return np.full(len(points_mm), -np.inf)
 
 
 @pytest.mark.parametrize(
     ("surface", "sensor", "touch", "says"),
     [
-        (Flat(), SENSOR, Touch(0, 0, 0, 10.0), "height map"),
+        (Void(), SENSOR, Touch(0, 0, 0, 10.0), "nothing under the sensor"),
         (None, SensorType(overlay=Overlay(kind="pad")), Touch(0, 0, 0, 10.0), "knows tabs"),
         (None, SENSOR, Touch(500, 0, 0, 10.0), "nothing under the sensor"),
         (None, SENSOR, Touch(0, 0, 0, -1.0), "must be finite"),

@@ -14,10 +14,10 @@ from recognizer.validation.campaign import (
     batches_of,
     kinds_of,
     levels_of,
-    parts_alone,
     plan_of,
     series_of,
     shards_of,
+    touchable,
 )
 from recognizer.validation.compare import BETTER, SAME, WORSE, _share, _size
 from recognizer.validation.errors import ValidationError
@@ -120,29 +120,25 @@ def test_kinds_come_in_their_shares_and_from_the_number_alone():
 
 
 @pytest.mark.parametrize("engine", ["own", "mujoco"])
-def test_prints_and_bodies_are_parts_of_the_set(engine):
-    campaign = Campaign(surfaces=PRINTED if engine == "own" else "files", engine=engine)
-    kept = dict(parts_alone(campaign, named=False).kinds)
+def test_prints_are_parts_of_the_set(engine):
+    campaign = Campaign(surfaces=PRINTED, engine=engine)
+    kept = dict(touchable(campaign, named=False).kinds)
     assert sum(kept.values()) == pytest.approx(1.0)
     assert kept["face"] / kept["edge"] == pytest.approx(5.5)
     assert not {"blank", "foreign"} & set(kept)
     with pytest.raises(ValidationError, match="not blank, foreign"):
-        parts_alone(campaign, named=True)
-    named = Campaign(surfaces=campaign.surfaces, engine=engine, kinds=(("edge", 1.0),))
-    assert parts_alone(named, named=True) == named
+        touchable(campaign, named=True)
+    named = Campaign(surfaces=PRINTED, engine=engine, kinds=(("edge", 1.0),))
+    assert touchable(named, named=True) == named
 
 
-def test_height_maps_and_the_pad_are_no_bodies():
-    for asked, said in (
-        (Campaign(surfaces=REGISTERED, engine="mujoco"), "registered faces"),
-        (Campaign(surfaces=PRINTED, engine="mujoco"), "prints, which are height maps"),
-        (Campaign(overlay="pad", engine="mujoco"), "the pad"),
-    ):
-        with pytest.raises(ValidationError, match=f"by tabs, not {said}"):
-            parts_alone(asked, named=False)
-    assert parts_alone(Campaign(surfaces=REGISTERED), named=True) == Campaign(surfaces=REGISTERED)
-    pad = Campaign(overlay="pad", surfaces=PRINTED)
-    assert parts_alone(pad, named=False).overlay == "pad"
+def test_an_engine_touches_everything_by_the_overlays_it_knows():
+    for surfaces in ("files", REGISTERED):
+        asked = Campaign(surfaces=surfaces, engine="mujoco")
+        assert touchable(asked, named=False) == asked
+    with pytest.raises(ValidationError, match="mujoco does not know the overlay pad"):
+        touchable(Campaign(overlay="pad", engine="mujoco"), named=False)
+    assert touchable(Campaign(overlay="pad"), named=True).overlay == "pad"
 
 
 @pytest.mark.parametrize("touches", [1, 24, 25, 999, 1000, 1001, 2530])
