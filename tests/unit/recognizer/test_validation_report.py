@@ -191,6 +191,7 @@ def test_worlds_of_several_runs_keep_their_order_commands_and_times():
     page = environment().get_template("worlds.html.j2").render(**found, pictures=drawn)
     assert page.count("half dead") == 2  # in the table, and in the picture of answers alone
     assert "--engine mujoco" in page
+    assert "2 wrong (low 2)." in page
     assert draw_errors([found["worlds"][1]]) == ""
 
 
