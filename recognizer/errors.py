@@ -6,7 +6,8 @@
     └── RecognizerError
         ├── LabError          the database holds nothing that can be read by touch
         ├── TouchError        an image that is none of the sensor's
-        └── AsBuiltError      touches that do not tell how a part was printed
+        ├── AsBuiltError      touches that do not tell how a part was printed
+        └── SensorStateError  a file that does not tell of a sensor, or tells of another one
 
 A touch that is not recognised is no error but a value with a reason (`recognition`).
 """
@@ -30,3 +31,7 @@ class TouchError(RecognizerError):
 
 class AsBuiltError(RecognizerError):
     """Touches that do not tell how a part was printed."""
+
+
+class SensorStateError(RecognizerError):
+    """A file that is no state of a sensor, or another sensor's."""

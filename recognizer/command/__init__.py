@@ -7,6 +7,7 @@
     app           options
     port          a port -> touches, the sensor, its calibration
     answers       touches -> answers, printed as they come
+    learning      the sensor, learned from the touches and kept
     in_base       the object in the robot's base
     report        answers as text and as JSON
     as_built      recognize-object as-built

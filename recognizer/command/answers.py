@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from encoded_objects.console.output import warning
 from probe.frame import Frame
 from recognizer.command.in_base import object_in_base
+from recognizer.command.learning import SensorLearning
 from recognizer.command.scanning import (
     Belief,
     Joints,
@@ -22,7 +23,6 @@ from recognizer.command.scanning import (
     touches_for,
 )
 from recognizer.touch.contacts import TouchImage
-from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import Recognition
 from recognizer.touch.robot import ObjectPose
 from recognizer.touch.source import TouchSource
@@ -52,6 +52,8 @@ class RecognizeOptions:
     as_json: bool
     scan: str = ""  #: joint or thesis; empty: every touch by itself
     joints_file: Path | None = None  #: angles of every touch
+    learn: Path | None = None  #: what is learned of the sensor, kept and read by
+    state: Path | None = None  #: the same, read by alone
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,12 +69,13 @@ class Answer:
 
 def answers_of(
     options: RecognizeOptions,
-    reader: Reader,
+    learning: SensorLearning,
     source: TouchSource,
     frames: Iterator[Frame],
     interrupted: Event,
 ) -> Iterator[Answer]:
     """Yield the answer of every touch as it comes; of a scan its answer at last."""
+    reader = learning.reader
     belief = belief_for(reader, options.scan) if options.scan else None
     most = options.most
     if options.port and not options.follow and most is None and belief is None:
@@ -87,6 +90,7 @@ def answers_of(
         if interrupted.is_set():  # what an interruption cuts short is no touch
             return
         own = by_touch[count - 1 : count]
+        reader = learning.take(touch)
         if belief is None:
             found = reader.read(touch.counts, calibration=source.calibration, seq=touch.seq)
         else:

@@ -69,6 +69,17 @@ def recognize(
                                   help="The sensor's calibration; the one that the recording "
                                        "names is found beside it."),
     ] = None,
+    learn: Annotated[
+        Path | None, typer.Option(metavar="FILE", show_default=False,
+                                  help="Learn the sensor from these touches (25 and more): "
+                                       "tactels that never answer, gains, where tips stand, "
+                                       "floating rows. Kept in FILE, which is read by from then "
+                                       "on, and goes on learning."),
+    ] = None,
+    state: Annotated[
+        Path | None, typer.Option("--sensor-state", metavar="FILE", show_default=False,
+                                  help="Read by what was learned of the sensor."),
+    ] = None,
     sensor: Annotated[
         int | None, typer.Option(metavar="0...7", min=0, max=7, show_default=False,
                                  help="Which of the probe's sensors to read at a port."),
@@ -118,6 +129,8 @@ def recognize(
         raise typer.BadParameter(f"--overlay {overlay}: give tab or pad")
     if method not in ("joint", "thesis"):
         raise typer.BadParameter(f"--method {method}: give joint or thesis")
+    if learn is not None and state is not None:
+        raise typer.BadParameter("--learn FILE reads by that file too; leave --sensor-state out")
     by_touch = joints if joints and Path(joints).is_file() else ""
     angles = _angles("" if by_touch else joints)
     scan = scan or method == "thesis"
@@ -134,7 +147,7 @@ def recognize(
                 most=most, overlay=overlay, calibration=calibration, sensor=sensor, live=live,
                 joints_deg=angles, joint_error_deg=joint_error, plot=plot, replace=replace,
                 as_json=as_json, scan=method if scan else "",
-                joints_file=Path(by_touch) if by_touch else None,
+                joints_file=Path(by_touch) if by_touch else None, learn=learn, state=state,
             )
         )  # fmt: skip
 

@@ -18,6 +18,7 @@ from probe.sensor import SensorType
 from recognizer.command import report
 from recognizer.command.answer_pictures import draw_answer, draw_answers, refuse_pictures
 from recognizer.command.answers import Answer, RecognizeOptions, answers_of
+from recognizer.command.learning import SensorLearning, learning_for
 from recognizer.command.port import listen, source_at
 from recognizer.command.scanning import touches_for
 from recognizer.touch.lab import Lab, open_lab
@@ -46,26 +47,27 @@ def recognize_touches(options: RecognizeOptions) -> int:
                 recording, SensorType(), overlay=options.overlay,
                 calibration=options.calibration, every=options.every,
             )  # fmt: skip
-            reader = _reader(lab, source)
-            return _print_answers(options, reader, source, recording.frames(), interrupted)
+            learning = _reader(options, lab, source)
+            learning.learn_from(source.touches(recording.frames(), learning.reader.settings))
+            return _print_answers(options, learning, source, recording.frames(), interrupted)
         source = source_at(
             options.port, overlay=options.overlay, calibration=options.calibration,
             every=options.every,
         )  # fmt: skip
-        reader = _reader(lab, source)  # before frames come
+        learning = _reader(options, lab, source)  # before frames come
         with listen(source, interrupted, options.sensor, options.calibration) as frames:
-            return _print_answers(options, reader, source, frames, interrupted)
+            return _print_answers(options, learning, source, frames, interrupted)
 
 
-def _reader(lab: Lab, source: TouchSource) -> Reader:
+def _reader(options: RecognizeOptions, lab: Lab, source: TouchSource) -> SensorLearning:
     if source.notice:
         warning(source.notice)
-    return Reader(lab, source.sensor)
+    return learning_for(Reader(lab, source.sensor), source, options.learn, options.state)
 
 
 def _print_answers(
     options: RecognizeOptions,
-    reader: Reader,
+    learning: SensorLearning,
     source: TouchSource,
     frames: Iterator[Frame],
     interrupted: Event,
@@ -76,6 +78,7 @@ def _print_answers(
     kept: list[Answer] = []
     read = answered = 0
     lines = options.as_json and options.follow
+    reader = learning.reader
     needed = touches_for(reader)
     if options.scan and needed == 1:
         message("one touch is enough for these symbols; a scan helps where parts are worn or cut")
@@ -84,12 +87,12 @@ def _print_answers(
         if options.as_json or not out.isatty():  # otherwise the answers show how far it is
             bar = stack.enter_context(progress_bar("reading", source.frames))
             frames = _show_count(frames, bar)
-        for answer in answers_of(options, reader, source, frames, interrupted):
+        for answer in answers_of(options, learning, source, frames, interrupted):
             read += 1
             answered = bool(answer.found) + (0 if options.scan else answered)
             if options.plot is not None:
                 if options.follow:
-                    draw_answer(reader, source, answer, options.plot)
+                    draw_answer(learning.reader, source, answer, options.plot)
                 else:
                     kept.append(answer)
             if not options.as_json:
@@ -106,8 +109,9 @@ def _print_answers(
                 out.flush()
             else:
                 values.append(entry)
+    learning.end()
     if options.plot is not None and kept:
-        draw_answers(reader, source, kept, options.plot, interrupted)
+        draw_answers(learning.reader, source, kept, options.plot, interrupted)
     if options.as_json and not lines:
         write_json(values)
     elif options.scan and read:

@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike
 
 from probe.calibration import Calibration, calibrate_image
 from probe.recording.read import Recording
-from recognizer.errors import TouchError
+from recognizer.errors import SensorStateError, TouchError
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import Recognition
+from recognizer.touch.sensor_state import SensorState
 from recognizer.touch.signal import Signal, signal_of
 from recognizer.touch.source import source_of
 
@@ -32,6 +33,8 @@ class Reader(PreparedLab):
         That feels; by default `fsr-16` with tabs.
     settings
         Every number that decides.
+    state
+        What is known of that very sensor, as `recognizer.sensor` learns it; None: nothing.
 
     Examples
     --------
@@ -55,6 +58,18 @@ class Reader(PreparedLab):
     >>> print(reader.read(np.zeros((16, 16))))
     not recognised: no contact; press the probe onto the object
     """
+
+    state: SensorState | None = None
+
+    def __post_init__(self) -> None:
+        shape = (self.sensor.rows, self.sensor.columns)
+        if self.state is not None and self.state.shape != shape:
+            raise SensorStateError(
+                f"what was learned of a sensor of {self.state.shape}, for one of {shape}",
+                fix="give what was learned of this sensor, or leave it out",
+                place=self.state.sensor,
+            )
+        PreparedLab.__post_init__(self)
 
     def read(
         self,
@@ -108,11 +123,19 @@ class Reader(PreparedLab):
                 fix="set them to 0, and trust to 0 there",
                 place=sensor.name,
             )
-        if calibration is None:
-            return signal_of(values, trust=known, settings=self.settings.signal)
-        found = calibrate_image(values, calibration)
-        good = np.where(found.bad, 0.0, 1.0) * (1.0 if known is None else known)
-        return signal_of(found.values, trust=good, newtons=True, settings=self.settings.signal)
+        newtons = calibration is not None
+        if calibration is not None:
+            found = calibrate_image(values, calibration)
+            values = found.values
+            known = np.where(found.bad, 0.0, 1.0) * (1.0 if known is None else known)
+        state = self.state
+        if state is not None:
+            values = state.correct(values, newtons=newtons)
+            known = np.where(state.masked, 0.0, 1.0) * (1.0 if known is None else known)
+        signal = signal_of(values, trust=known, newtons=newtons, settings=self.settings.signal)
+        if state is None:
+            return signal
+        return replace(signal, forces=state.level(signal.forces, newtons=newtons), state=state)
 
     def read_all(
         self,

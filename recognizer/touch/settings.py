@@ -17,6 +17,7 @@ class SignalSettings:
 
     contact_counts: float = 8.0  #: over the background by which the strongest tactels rise
     contact_n: float = 0.05  #: the same where readings are newtons
+    contact_sigmas: float = 7.0  #: the same where they are on another scale: deviations of noise
     strongest: int = 6  #: tactels that must; a spike is one
     background: float = 0.05  #: share of the tactels below the reading without force
     dead: float = 0.02  #: of the median row (column): one below it is dead ...

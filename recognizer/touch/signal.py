@@ -7,11 +7,13 @@ neighbours (spikes) and dead rows or columns are told from the image itself.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from recognizer.touch.sensor_state import SensorState
 from recognizer.touch.settings import DEFAULTS, SignalSettings
 
 Array = NDArray[np.float64]
@@ -25,6 +27,7 @@ class Signal:
     trust: Array  #: (rows, columns) 0 ... 1
     contact: bool  #: whether anything is touched
     newtons: bool  #: whether forces are in newtons
+    state: SensorState | None = None  #: of the sensor that felt them, as far as it was learned
 
 
 def signal_of(
@@ -48,7 +51,9 @@ def signal_of(
     newtons
         Whether the readings are newtons.
     settings
-        How far the strongest tactels must rise for a contact, and the like.
+        How far the strongest tactels must rise for a contact, and the like. Readings that are
+        no whole numbers are counts averaged, or on a scale of their own (0 ... 1): what rises out
+        of their own noise is a contact too.
     """
     known = np.ones(readings.shape) if trust is None else trust.astype(np.float64)
     good = readings[known > 0]
@@ -57,9 +62,36 @@ def signal_of(
     level = float(np.quantile(good, settings.background)) if floor is None else floor
     forces = np.maximum(readings - level, 0.0)
     rise = settings.contact_n if newtons else settings.contact_counts
+    if not (newtons or (good == np.rint(good)).all()):  # no counts: of a scale of their own
+        rise = min(rise, settings.contact_sigmas * noise_of(good))
     strongest = np.sort(forces[known > 0])[-settings.strongest :]
     alive = _live_mask(forces, known, settings)
     return Signal(forces, known * alive, bool(strongest[0] > rise), newtons)
+
+
+def noise_of(readings: Array) -> float:
+    """Return the standard deviation of readings (n,) of tactels that nothing presses.
+
+    Those are the ones about the densest readings, the mode of half samples; what lies below it
+    is noise alone. At least what rounding to the smallest step between two readings leaves.
+
+    References
+    ----------
+    T. Robertson and J. D. Cryer, an iterative procedure for estimating the mode.
+    """
+    found = np.sort(readings)
+    whole = found
+    while len(found) > 2:
+        half = (len(found) + 1) // 2
+        width = found[half - 1 :] - found[: len(found) - half + 1]
+        start = int(np.argmin(width))
+        found = found[start : start + half]
+    mode = float(found.mean())
+    below, at = mode - whole[whole < mode], int((whole == mode).sum())
+    steps = np.diff(whole)
+    step = float(steps[steps > 0].min()) if steps.any() else 0.0
+    square = float((below**2).sum()) / max(len(below) + at / 2, 1.0)
+    return math.sqrt(square + step**2 / 12)
 
 
 def _live_mask(forces: Array, known: Array, settings: SignalSettings) -> Array:

@@ -37,6 +37,7 @@ class TouchSource:
     frames: int | None = None  #: in all; None: nobody knows
     newest: bool = False  #: whether frames may be left out
     notice: str = ""  #: what a person should know
+    name: str = ""  #: of the sensor; empty: nobody knows
 
     def touches(
         self, frames: Iterable[Frame], settings: ReaderSettings = DEFAULTS
@@ -87,6 +88,7 @@ def source_of(
         together=1 if every else _frames_per_touch(origin, path),
         frames=len(recording),
         notice=notice,
+        name=origin.sensor,
     )
 
 

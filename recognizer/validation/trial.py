@@ -14,7 +14,6 @@ import numpy as np
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import Recognition
-from recognizer.touch.signal import signal_of
 from recognizer.validation.draw import DrawnTouch, TouchPlan, draw_touch
 from recognizer.validation.settings import JUDGING
 
@@ -52,7 +51,7 @@ def trial(plan: TouchPlan, number: int, reader: Reader) -> Trial:
     """Return what became of one touch."""
     found = draw_touch(plan, number, reader)
     start = time.process_time()
-    answer = recognise(reader, signal_of(found.counts.astype(np.float64)), number)
+    answer = recognise(reader, reader.signal(found.counts), number)
     return judge(plan, number, found, answer, time.process_time() - start)
 
 

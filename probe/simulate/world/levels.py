@@ -22,6 +22,8 @@ class Level:
     exponent: float = 1.0  #: film: conductance ~ force^exponent
     hysteresis: float = 0.0  #: film: reading on the way back over that on the way up, less 1
     dead: float = 0.0  #: share of the tactels that feel nothing, unknown to the reader
+    hot: float = 0.0  #: share of the tactels that show `hot_n`, whatever presses
+    hot_n: float = 2.0
     length_mm: float = 0.0  #: tips: spread of their lengths
     shift_mm: float = 0.0  #: tips: spread of their places, each way
     dome_mm: float = 0.0  #: tips: how far the rim lies below the middle
@@ -64,6 +66,8 @@ LEVELS = {
         replace(TYPICAL, name="dead-10", dead=0.10),
         replace(TYPICAL, name="dead-20", dead=0.20),
         replace(TYPICAL, name="dead-40", dead=0.40),
+        replace(TYPICAL, name="hot-5", hot=0.05),
+        replace(TYPICAL, name="gain-30", gain=0.30),
         replace(TYPICAL, name="hysteresis-15", hysteresis=0.15),
         replace(TYPICAL, name="hysteresis-40", hysteresis=0.40),
         replace(TYPICAL, name="saturated", load_ohm=2200.0),

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.circuit.fsr import Fsr, fsr_of
+from probe.circuit.settings import FILM
 from probe.contact.tips import Tips
 from probe.sensor import SensorType
 from probe.simulate.world.levels import Level
@@ -46,13 +47,15 @@ class SensorCopy:
         plain, none = fsr_of(rows, columns), np.zeros((rows, columns))
         dead = np.zeros(rows * columns, dtype=np.bool_)
         dead[self.failing[: round(level.dead * rows * columns)]] = True
+        hot = np.zeros(rows * columns)
+        hot[self.failing[len(dead) - round(level.hot * len(dead)) :]] = FILM.gain_s * level.hot_n
         return Fsr(
             gain_s=plain.gain_s * np.exp(level.gain * self.gains),
             exponent=level.exponent * plain.exponent,
             break_n=plain.break_n,
             preload_n=none,
             series_ohm=none,
-            stuck_s=none,
+            stuck_s=hot.reshape(rows, columns),
             dead=dead.reshape(rows, columns),
             hysteresis=level.hysteresis,
         )

@@ -48,6 +48,8 @@ def image_of_signal(
     The face is taken as flat; `bend_image` gives the same image of a round one.
     """
     points = sensor.centres_mm().reshape(-1, 2)
+    if signal.state is not None:
+        points = points + signal.state.aside_mm.reshape(-1, 2)
     return Image(
         points_mm=points,
         forces=signal.forces.reshape(-1).astype(np.float64),
@@ -71,8 +73,7 @@ def bend_image(
         By how much less than the bend says the face falls away, of each of the gains under
         which the image is seen; one for all of them.
     """
-    height = sensor.overlay.height_mm
-    points = sensor.centres_mm().reshape(-1, 2)
+    height, points = sensor.overlay.height_mm, image.points_mm
     symbol = image.pressing.symbol * height
     return replace(
         image,

@@ -1,13 +1,17 @@
 """Depths and forces by the law written out again, number by number."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from generator.database.registered import Bend
 from probe.sensor import SensorType
+from recognizer.touch.sensor_state import unknown_state
 from recognizer.touch.settings import ReaderSettings
+from recognizer.touch.signal import Signal
 from recognizer.touch.symbols.gain import (
     Image,
     bend_image,
@@ -255,7 +259,7 @@ def test_an_image_of_a_signal_has_a_row_for_each_tactel():
     sensor = SensorType()
     forces = np.arange(256.0).reshape(16, 16)
     trust = np.linspace(0, 1, 256).reshape(16, 16)
-    signal = SimpleNamespace(forces=forces, trust=trust, newtons=True)
+    signal = SimpleNamespace(forces=forces, trust=trust, newtons=True, state=None)
     found = image_of_signal(sensor, signal, 1.0, ReaderSettings())
     pitch = 1.5875
     assert found.points_mm.shape == (256, 2)
@@ -269,11 +273,26 @@ def test_an_image_of_a_signal_has_a_row_for_each_tactel():
     assert np.ptp(found.points_mm[:, 0]) == pytest.approx(15 * pitch)
 
 
+def test_tips_that_stand_aside_look_from_where_they_are():
+    sensor = SensorType()
+    aside = np.zeros((16, 16, 2))
+    aside[2, 5] = 0.1, -0.2
+    state = replace(unknown_state(sensor), aside_mm=aside)
+    plain = Signal(np.ones((16, 16)), np.ones((16, 16)), contact=True, newtons=False)
+    flat, known = (image_of_signal(sensor, replace(plain, state=one), 1.0) for one in (None, state))
+    moved = known.points_mm - flat.points_mm
+    np.testing.assert_allclose(moved[37], [0.1, -0.2], atol=1e-12)
+    assert np.count_nonzero(moved) == 2
+    bent = [bend_image(one, sensor, Bend(40.0, 0.0)).points_mm for one in (flat, known)]
+    assert np.abs(bent[1] - bent[0])[37].min() > 0.09
+    assert np.count_nonzero(bent[1] - bent[0]) == 2
+
+
 def test_a_round_face_falls_away_under_the_plate():
     sensor = SensorType()
     flat = image_of_signal(
         sensor,
-        SimpleNamespace(forces=np.ones((16, 16)), trust=np.ones((16, 16)), newtons=False),
+        Signal(np.ones((16, 16)), np.ones((16, 16)), contact=True, newtons=False),
         1.0, ReaderSettings(),
     )  # fmt: skip
     height = sensor.overlay.height_mm

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from recognizer.touch.settings import SignalSettings
-from recognizer.touch.signal import signal_of
+from recognizer.touch.signal import noise_of, signal_of
 
 
 def rows_of(*sums, turned=False):
@@ -146,3 +146,39 @@ def test_what_a_bad_tactel_reads_keeps_no_row_alive():
     found = signal_of(image, trust=trust, floor=0.0)
     assert not found.trust[4].any()
     assert found.trust[[0, 1, 2, 3, 5, 6, 7, 8]].all()
+
+
+@pytest.mark.parametrize("scale", [1 / 1023, 2.5 / 1023, 1e-6, 0.99])
+def test_a_contact_on_any_scale_is_what_rises_out_of_its_own_noise(scale):
+    rng = np.random.default_rng(8)
+    idle = np.rint(rng.normal(20.0, 1.0, (16, 16)))
+    touched = idle.copy()
+    touched[4:10, 4:10] += 200.0
+    few = idle.copy()
+    few[4, 4:9] += 200.0
+    assert signal_of(scale * touched).contact
+    assert not signal_of(scale * idle).contact
+    assert not signal_of(scale * few).contact  # five tactels are spikes
+
+
+def test_the_rise_on_any_scale_is_the_given_number_of_deviations():
+    image = 0.01 * np.random.default_rng(9).normal(0.0, 1.0, (16, 16))
+    level = float(np.quantile(image, 0.05))
+    image.ravel()[:6] = level + 0.08
+    noise = noise_of(image.ravel())
+    assert noise == pytest.approx(0.01, rel=0.2)
+    for sigmas, contact in ((0.079 / noise, True), (0.081 / noise, False)):
+        assert signal_of(image, settings=SignalSettings(contact_sigmas=sigmas)).contact is contact
+    high = SignalSettings(contact_sigmas=1e9)
+    assert not signal_of(image, settings=high).contact
+    assert signal_of(200 * image, settings=high).contact  # eight counts are a contact all the same
+
+
+def test_noise_is_that_of_tactels_that_nothing_presses():
+    rng = np.random.default_rng(10)
+    free, pressed = rng.normal(5.0, 0.5, 180), rng.uniform(20.0, 200.0, 76)
+    assert noise_of(np.r_[free, pressed]) == pytest.approx(0.5, rel=0.2)
+    assert noise_of(np.full(9, 3.0)) == 0.0
+    assert noise_of(np.array([0.0, 0.0, 1.0, 1.0, 1.0])) == pytest.approx(  # by hand: mode 1
+        np.sqrt(2 / 3.5 + 1 / 12)
+    )

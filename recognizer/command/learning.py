@@ -1,0 +1,108 @@
+"""`--learn FILE` and `--sensor-state FILE`: a sensor is learned while its touches are read.
+
+A recording is learned from before its touches are read; a port every `EVERY` touches, and at its
+end. What is known is kept in the file each time, whole or not at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from encoded_objects.console.output import message
+from encoded_objects.console.progress import progress_bar
+from recognizer.errors import SensorStateError
+from recognizer.touch.contacts import TouchImage
+from recognizer.touch.reader import Reader
+from recognizer.touch.source import TouchSource
+
+EVERY = 25  #: touches of a port after which the sensor is learned again
+MOST = 200  #: touches of a recording that are learned from
+
+
+@dataclass(slots=True)
+class SensorLearning:
+    """A reader, and what is being learned of its sensor."""
+
+    reader: Reader
+    source: TouchSource
+    path: Path | None  #: where it is kept; None: nothing is learned
+    waiting: list[TouchImage] = field(default_factory=list)  #: touches not learned from yet
+    done: bool = False  #: whether the touches were learned from already
+
+    def learn_from(self, touches: Iterable[TouchImage]) -> None:
+        """Learn from the touches of a recording, which are read afterwards."""
+        if self.path is None:
+            return
+        with progress_bar("touches", self.source.frames) as bar:
+            for touch in touches:
+                self.waiting.append(touch)
+                bar.show(touch.seq + touch.frames, f"{len(self.waiting):,} touches")
+                if len(self.waiting) >= MOST:
+                    break
+        self._learn()
+        self.done = True
+
+    def take(self, touch: TouchImage) -> Reader:
+        """Return the reader of a touch; learn from those before it where there are enough."""
+        if self.path is not None and not self.done:
+            if len(self.waiting) >= EVERY:
+                self._learn()
+            self.waiting.append(touch)
+        return self.reader
+
+    def end(self) -> None:
+        """Learn from the touches that are left."""
+        from recognizer.sensor.settings import LEARNING
+
+        if len(self.waiting) >= LEARNING.least:
+            self._learn()
+
+    def _learn(self) -> None:
+        from recognizer.sensor.file import write_state
+        from recognizer.sensor.learn import learn_sensor
+        from recognizer.sensor.words import state_words
+
+        if self.path is None:
+            return
+        images = [touch.counts for touch in self.waiting]
+        with progress_bar("learning the sensor", 1.0) as bar:
+            state = learn_sensor(
+                self.reader, images, calibration=self.source.calibration, name=self.source.name,
+                done=bar.show,
+            )  # fmt: skip
+        write_state(state, self.path)
+        message(f"learned of {state_words(state)}; kept in {self.path}")
+        self.reader = replace(self.reader, state=state)
+        self.waiting.clear()
+
+
+def learning_for(
+    reader: Reader, source: TouchSource, learn: Path | None, state: Path | None
+) -> SensorLearning:
+    """Return a reader that knows what was learned of its sensor, and may go on learning.
+
+    Parameters
+    ----------
+    learn
+        File to keep it in, and to begin with if it is there.
+    state
+        File to read by alone.
+
+    Raises
+    ------
+    SensorStateError
+        The file is no state of this sensor, or there is no folder for it.
+    """
+    known = state or (learn if learn is not None and learn.exists() else None)
+    if learn is not None and not learn.parent.is_dir():
+        raise SensorStateError(
+            f"there is no folder {learn.parent}", fix="make it first", place=str(learn)
+        )
+    if known is not None:
+        from recognizer.sensor.file import read_state
+
+        names = (source.name, reader.sensor.name) if source.name else ()
+        reader = replace(reader, state=read_state(known, sensors=names))
+    return SensorLearning(reader, source, learn)

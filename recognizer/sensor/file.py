@@ -1,0 +1,122 @@
+"""The state of a sensor in a file: JSON that a person can read, the same bytes for the same state.
+
+It stands beside the calibration. Dead and hot tactels are letters (`.` sound, `D`, `H`), a row a
+line, as in a calibration; numbers have seven digits. Written beside the file and moved over it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from encoded_objects.console.files import staged_file
+from recognizer.errors import SensorStateError
+from recognizer.touch.sensor_state import SensorState
+
+FORMAT = "tactile sensor state"
+VERSION = 1
+DIGITS = 7  #: significant digits of every number
+_ARRAYS = ("offset", "gain", "gain_deviation", "aside_mm", "aside_deviation_mm")
+
+
+def write_state(state: SensorState, path: str | os.PathLike[str]) -> None:
+    """Write a state, whole or not at all, over what is there.
+
+    Raises
+    ------
+    SensorStateError
+        The file cannot be written.
+    """
+    letters = np.where(state.hot, "H", np.where(state.dead, "D", "."))
+    document: dict[str, Any] = {
+        "format": FORMAT,
+        "version": VERSION,
+        "sensor": state.sensor,
+        "touches": state.touches,
+        "unit": "N" if state.newtons else "counts",
+        "floating": state.floating,
+        "drift": float(f"{state.drift:.{DIGITS}g}"),
+        "tactels": ["".join(row) for row in letters],
+    }
+    document |= {name: _round_digits(getattr(state, name).tolist()) for name in _ARRAYS}
+    lines = ",\n".join(f"  {json.dumps(key)}: {_text(value)}" for key, value in document.items())
+    try:
+        with staged_file(Path(path)) as staged:
+            staged.write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
+    except OSError as error:
+        raise SensorStateError(
+            f"cannot be written: {error.strerror}", fix="choose another folder", place=str(path)
+        ) from error
+
+
+def read_state(path: str | os.PathLike[str], *, sensors: tuple[str, ...] = ()) -> SensorState:
+    """Read a state.
+
+    Parameters
+    ----------
+    sensors
+        Names of the sensor that it shall serve, its own and its type's; not compared if none.
+
+    Raises
+    ------
+    SensorStateError
+        The file is none, of a newer version, damaged, or another sensor's.
+    """
+    place, again = str(path), "learn the sensor again: recognize-object --learn FILE"
+    try:
+        document = json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SensorStateError(
+            f"cannot be read: {error.strerror}", fix=again, place=place
+        ) from error
+    except ValueError as error:
+        raise SensorStateError(f"is no JSON: {error}", fix=again, place=place) from error
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise SensorStateError("is no state of a sensor", fix=again, place=place)
+    if document.get("version") != VERSION:
+        raise SensorStateError(
+            f"is of version {document.get('version')}, this program reads {VERSION}",
+            fix=f"update the program, or {again}", place=place,
+        )  # fmt: skip
+    try:
+        letters = np.array([list(row) for row in document["tactels"]])
+        if not np.isin(letters, [".", "D", "H"]).all():
+            raise ValueError("tactels are . D H")
+        state = SensorState(
+            sensor=str(document["sensor"]),
+            touches=int(document["touches"]),
+            newtons={"N": True, "counts": False}[document["unit"]],
+            dead=letters == "D",
+            hot=letters == "H",
+            floating=bool(document["floating"]),
+            drift=float(document["drift"]),
+            **{name: np.array(document[name], np.float64) for name in _ARRAYS},
+        )
+        if (state.gain <= 0).any():
+            raise ValueError("gains are above 0")
+    except (KeyError, TypeError, ValueError, SensorStateError) as error:
+        raise SensorStateError(f"is damaged: {error!r}", fix=again, place=place) from error
+    if sensors and state.sensor not in sensors:
+        raise SensorStateError(
+            f"is of sensor {state.sensor!r}, not of {sensors[0]!r}",
+            fix="give what was learned of this sensor, or another file to learn it anew",
+            place=place,
+        )
+    return state
+
+
+def _round_digits(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_round_digits(one) for one in value]
+    return float(f"{value:.{DIGITS}g}")
+
+
+def _text(value: Any) -> str:
+    """Return JSON, a row of an array a line."""
+    if not isinstance(value, list):
+        return json.dumps(value)
+    return "[\n" + ",\n".join(f"    {json.dumps(row)}" for row in value) + "\n  ]"

@@ -1,0 +1,257 @@
+"""A sensor is learned: dead and hot tactels, gains, tip places, floating rows, and its file."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from generator.pipeline import encode
+from generator.spec import read_specs
+from probe.circuit.network import effective_resistances
+from probe.contact.contract import Touch
+from probe.contact.engines.own import ENGINE
+from probe.contact.tips import Tips
+from probe.frame import frame_from
+from probe.recording.record import Recorder
+from probe.sensor import SensorType
+from probe.simulate.registered import registered_surface
+from recognizer.command import run
+from recognizer.errors import SensorStateError
+from recognizer.sensor.answering import answering_of
+from recognizer.sensor.file import read_state, write_state
+from recognizer.sensor.learn import learn_sensor
+from recognizer.sensor.settings import LEARNING
+from recognizer.sensor.words import state_entry, state_words
+from recognizer.touch.lab import open_lab
+from recognizer.touch.reader import Reader
+from recognizer.touch.sensor_state import invert_floating, unknown_state
+
+SENSOR = SensorType()
+DEAD = [(0, 0), (3, 4), (7, 15), (9, 9), (12, 2)]
+HOT = [(5, 11), (14, 6)]
+
+
+def pressed(n=40, seed=2):
+    """Readings of touches: half of the tactels pressed, at random."""
+    rng = np.random.default_rng(seed)
+    images = rng.uniform(60.0, 100.0, (n, 16, 16)) * (rng.random((n, 16, 16)) < 0.5)
+    for at in DEAD:
+        images[:, *at] = 0.0
+    for at in HOT:
+        images[:, *at] = 70.0
+    return images
+
+
+def test_a_tactel_that_never_rises_is_dead_and_one_that_never_falls_is_hot():
+    found = answering_of(pressed())
+    assert sorted(map(tuple, np.argwhere(found.dead).tolist())) == DEAD
+    assert sorted(map(tuple, np.argwhere(found.hot).tolist())) == HOT
+    assert not found.offset.any()
+
+
+def test_a_raised_tactel_that_still_answers_keeps_its_offset():
+    images = pressed()
+    images[:, 8, 3] += 50.0
+    found = answering_of(images)
+    assert not found.hot[8, 3]
+    assert not found.dead[8, 3]
+    assert found.offset[8, 3] == pytest.approx(50.0, rel=0.15)
+    assert np.count_nonzero(found.offset) == 1
+
+
+def test_nothing_is_said_of_few_touches_or_of_what_no_touch_loaded():
+    few = answering_of(pressed(LEARNING.least - 1))
+    assert not few.dead.any()
+    assert not few.hot.any()
+    enough = answering_of(pressed(LEARNING.least))
+    assert enough.dead[3, 4]
+    images = pressed()
+    images[:, :, 8:] = 0.0  # every touch hung over an edge
+    assert not answering_of(images).dead[:, 12:].any()
+
+
+def test_many_dead_tactels_are_found_among_each_other():
+    images = pressed(60)
+    gone = np.random.default_rng(5).random((16, 16)) < 0.4
+    images[:, gone] = 0.0
+    for at in HOT:
+        images[:, *at] = images[:, 1, 1]
+    found = answering_of(images)
+    live = ~gone
+    for at in (*DEAD, *HOT):
+        live[at] = False
+    assert found.dead[gone].mean() > 0.97
+    assert not found.dead[live].any()
+
+
+def test_a_floating_network_is_inverted_up_to_a_scale():
+    rng = np.random.default_rng(1)
+    g = np.where(rng.random((16, 16)) < 0.4, rng.uniform(0.3, 1.0, (16, 16)), 1e-3)
+    readings = 1000.0 / effective_resistances(g)
+    found = invert_floating(readings)
+    assert readings[g < 0.1].max() > 0.5 * readings.max()  # ghosts before
+    assert found == pytest.approx(1000.0 * g, rel=1e-3, abs=1e-2)
+    beyond = np.eye(16)
+    assert (invert_floating(beyond) >= 0).all()  # of no network
+
+
+def test_a_state_corrects_readings_of_its_unit_alone():
+    plain = unknown_state(SENSOR)
+    gain, offset = np.ones((16, 16)), np.zeros((16, 16))
+    gain[2, 3], offset[4, 5] = 2.0, 7.0
+    state = replace(plain, gain=gain, offset=offset)
+    readings = np.full((16, 16), 10.0)
+    assert state.correct(readings, newtons=False)[4, 5] == 3.0
+    assert state.correct(readings, newtons=True)[4, 5] == 10.0
+    assert state.level(readings, newtons=False)[2, 3] == 5.0
+    assert state.level(readings, newtons=True)[2, 3] == 10.0
+    with pytest.raises(ValueError, match="read-only"):
+        state.gain[0, 0] = 1.0
+    with pytest.raises(SensorStateError, match="gain of a sensor"):
+        replace(plain, gain=np.ones((4, 4)))
+
+
+def state_of(**changed):
+    rng = np.random.default_rng(3)
+    dead, hot = np.zeros((2, 16, 16), bool)
+    dead[1, 2], hot[3, 4] = True, True
+    return replace(
+        unknown_state(SENSOR, name="left finger"), touches=50, dead=dead, hot=hot,
+        gain=np.exp(rng.normal(0, 0.1, (16, 16))), aside_mm=rng.normal(0, 0.08, (16, 16, 2)),
+        aside_deviation_mm=np.full((16, 16, 2), 0.03), drift=-3.5, **changed,
+    )  # fmt: skip
+
+
+def test_a_state_is_read_as_it_was_written(tmp_path):
+    path, again = tmp_path / "left.json", tmp_path / "again.json"
+    state = state_of(floating=True)
+    write_state(state, path)
+    found = read_state(path, sensors=("left finger", "fsr-16"))
+    assert (found.sensor, found.touches, found.floating, found.drift) == (
+        "left finger", 50, True, -3.5)  # fmt: skip
+    assert np.array_equal(found.dead, state.dead)
+    assert np.array_equal(found.hot, state.hot)
+    assert found.aside_mm == pytest.approx(state.aside_mm, rel=1e-6)
+    write_state(found, again)
+    assert again.read_bytes() == path.read_bytes()
+    assert sorted(tmp_path.iterdir()) == [again, path]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"version": 2}, "version 2"),
+        ({"format": "x"}, "no state of a sensor"),
+        ({"unit": "kg"}, "damaged"),
+        ({"gain": [[1.0]]}, "damaged"),
+        ({"gain": [[0.0] * 16] * 16}, "damaged"),
+        ({"tactels": ["x" * 16] * 16}, "damaged"),
+        ({"sensor": "right finger"}, "not of 'left finger'"),
+    ],
+)
+def test_what_is_no_state_of_this_sensor_is_refused(tmp_path, change, words):
+    path = tmp_path / "left.json"
+    write_state(state_of(), path)
+    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    with pytest.raises(SensorStateError, match=words):
+        read_state(path, sensors=("left finger",))
+
+
+def test_files_that_are_none_are_refused(tmp_path):
+    with pytest.raises(SensorStateError, match="cannot be read"):
+        read_state(tmp_path / "none.json")
+    (tmp_path / "text.json").write_text("text")
+    with pytest.raises(SensorStateError, match="is no JSON"):
+        read_state(tmp_path / "text.json")
+    with pytest.raises(SensorStateError, match="cannot be written"):
+        write_state(state_of(), tmp_path / "no" / "folder.json")
+
+
+def test_a_person_is_told_what_was_learned():
+    words = state_words(state_of(floating=True))
+    for part in (
+        "left finger, 50 touches",
+        "1 of 256 tactels never answer",
+        "1 of 256 tactels read high",
+        "the network is inverted",
+        "0.08 mm aside",
+        "drifted by -3.5 counts",
+    ):
+        assert part in words
+    told = state_entry(state_of())
+    assert told["dead"].tolist() == [[1, 2]]
+    assert told["tips_known"] == 254
+    assert "too few" in state_words(unknown_state(SENSOR))
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory):
+    """A database with one object."""
+    folder = tmp_path_factory.mktemp("sensor")
+    (folder / "cube.yaml").write_text("{name: Cube, shape: {cube: 60 mm}}")
+    encode(read_specs([folder / "cube.yaml"]), folder=folder, formats=("stl",),
+           database=f"sqlite:///{folder / 'lab.db'}")  # fmt: skip
+    return folder
+
+
+@pytest.fixture(scope="module")
+def felt(lab):
+    """Counts of 24 places under tips that stand aside, some tactels dead; and the tips."""
+    rng = np.random.default_rng(6)
+    surface = registered_surface(f"{lab}/lab.db", "Cube", "F1").surface
+    tips = Tips(shifts_mm=rng.normal(0, 0.1, (16, 16, 2)), lengths_mm=np.zeros((16, 16)))
+    gain = np.exp(rng.normal(0, 0.15, (16, 16)))
+    images = []
+    for _ in range(24):
+        at = Touch(*rng.uniform(20, 40, 2), rng.uniform(-3, 3), rng.uniform(50, 90))
+        forces = ENGINE.press(surface, SENSOR, at, tips).forces_n
+        for place in DEAD:
+            forces[place] = 0.0
+        images.append(np.rint(8 + 150 * gain * forces + rng.normal(0, 1, (16, 16))).clip(0))
+    return images, tips, gain
+
+
+def test_touches_tell_gains_and_where_tips_stand(lab, felt):
+    images, tips, gain = felt
+    reader = Reader(open_lab(lab / "lab.db"))
+    shares = []
+    state = learn_sensor(reader, images, settings=replace(LEARNING, rounds=1), name="left",
+                         done=shares.append)  # fmt: skip
+    assert sorted(map(tuple, np.argwhere(state.masked).tolist())) == DEAD
+    live = ~state.dead
+    true = tips.shifts_mm[live] - tips.shifts_mm[live].mean(axis=0)
+    left = true - (state.aside_mm[live] - state.aside_mm[live].mean(axis=0))
+    assert np.sqrt((left**2).mean()) < 0.5 * np.sqrt((true**2).mean())
+    wrong = np.log(gain[live]) - np.log(state.gain[live])
+    assert np.std(wrong) < 0.4 * np.std(np.log(gain[live]))
+    assert (state.sensor, state.touches, state.floating) == ("left", 24, False)
+    assert (state.aside_deviation_mm[live] < 0.12).mean() > 0.8
+    assert shares[-1] == 1.0
+
+    signal = replace(reader, state=state).signal(images[0])
+    assert signal.state is state
+    assert not signal.trust[state.dead].any()
+    with pytest.raises(SensorStateError, match="for one of"):
+        Reader(reader.lab, SensorType(rows=8), state=state)
+
+
+def test_the_command_learns_and_keeps_and_reads_by_it(lab, felt, tmp_path, capsys):
+    images, _, _ = felt
+    with Recorder(tmp_path / "touches.h5", sensor="left") as recorder:
+        for seq, counts in enumerate(images[:16]):
+            recorder.append(frame_from(counts.astype(np.uint16), t_ns=seq, seq=seq))
+    words = [str(tmp_path / "touches.h5"), "--every", "--database", str(lab / "lab.db")]
+    kept = tmp_path / "left.json"
+    assert run([*words, "--learn", str(kept)]) == 0
+    told = capsys.readouterr().err
+    assert "learned of left, 16 touches: 5 of 256 tactels never answer" in told
+    assert read_state(kept).touches == 16
+    before = kept.read_bytes()
+    assert run([*words, "--touches", "1", "--sensor-state", str(kept)]) == 0
+    assert kept.read_bytes() == before
+    assert run([*words, "--sensor-state", str(kept), "--learn", str(kept)]) == 2
+    assert run([*words, "--learn", str(tmp_path / "no" / "left.json")]) == 2
+    write_state(replace(read_state(kept), sensor="right"), kept)
+    assert run([*words, "--sensor-state", str(kept)]) == 2
+    assert "is of sensor 'right', not of 'left'" in capsys.readouterr().err
