@@ -62,6 +62,11 @@ class SoftwareProbe:
         """The URL that opens this port again."""
         return self._url
 
+    @property
+    def streaming(self) -> bool:
+        """Whether frames were asked for."""
+        return self._streaming
+
     def write(self, data: bytes) -> None:
         """Obey the commands, one byte each."""
         for command in (data[i : i + 1] for i in range(len(data))):

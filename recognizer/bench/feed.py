@@ -34,6 +34,10 @@ class Feed(Protocol):
         """Return what happened since the last call."""
         ...
 
+    def rest(self, *, wanted: bool) -> None:
+        """Stop frames that nobody wants, or let them come again."""
+        ...
+
     def close(self) -> None:
         """Let go."""
         ...
@@ -57,6 +61,9 @@ class NoFeed:
         """Return nothing."""
         return []
 
+    def rest(self, *, wanted: bool) -> None:
+        """Do nothing."""
+
     def close(self) -> None:
         """Do nothing."""
 
@@ -72,7 +79,7 @@ class ProbeFeed:
         self._state, self._cause, self._fix = "waiting", "", ""
         self._heard_s = self._tried_s = -1e9
         self._counts = ClientStatistics()
-        self._closed = False
+        self._closed = self._resting = False
 
     @property
     def ident(self) -> IdentPacket | None:
@@ -83,6 +90,9 @@ class ProbeFeed:
         """Return the frames that wait; opens the port, or tries it again."""
         began_s = time.monotonic()
         frames: list[Frame] = []
+        if self._resting:
+            time.sleep(timeout_s)
+            return frames
         try:
             stream = self._opened(began_s)
             if stream is not None:
@@ -128,6 +138,20 @@ class ProbeFeed:
         self._sensor = sensor
         if self._stream is not None:
             self._stream.client.select_sensor(sensor)
+
+    def rest(self, *, wanted: bool) -> None:
+        """Let go of the port while nobody wants frames."""
+        if wanted or self._resting:
+            self._resting = not wanted
+            return
+        self._resting = True
+        self._tried_s = -1e9
+        if self._stream is not None:
+            self._counts = self._stream.client.statistics()
+            self._stream.__exit__(None, None, None)
+            self._stream = None
+        if self._state == "live":
+            self._state = "waiting"
 
     def close(self) -> None:
         """Let go of the port."""

@@ -57,6 +57,11 @@ class FrameHandler:
         self._newest: Frame | None = None
         self._recorder: Recorder | None = None
 
+    @property
+    def busy(self) -> bool:
+        """Whether frames are recorded or calibrated with."""
+        return self._recorder is not None or self.guide is not None
+
     def take(self, frames: list[Frame]) -> None:
         """Take frames in their order; the last one is shown and read."""
         for frame in frames:

@@ -109,6 +109,9 @@ class ReplayFeed:
         np.maximum.at(top, place, self.strength)
         return [round(float(v), 3) for v in top / max(float(top.max()), REPLAY.faint)]
 
+    def rest(self, *, wanted: bool) -> None:
+        """Do nothing: it plays on, and ends."""
+
     def close(self) -> None:
         """Pause."""
         with self._turn:

@@ -74,7 +74,8 @@ class SoftwareLine:
                 waiting = b""
             with suppress(BlockingIOError):
                 self._probe.write(os.read(self._near, LINE.at_once))
-            waiting += self._probe.read(LINE.wait_s)
+            asked = self._probe.streaming
+            waiting += self._probe.read(LINE.wait_s if asked else LINE.idle_s)
             with suppress(BlockingIOError):
                 waiting = waiting[os.write(self._near, waiting) :] if waiting else b""
             if len(waiting) > LINE.lost:  # nobody listens: as on a real line

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import ipaddress
 import os
 import re
 import secrets
 import signal
 import socket
 import sys
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
@@ -23,7 +25,9 @@ from recognizer.bench.broker import Broker
 from recognizer.bench.errors import BenchError
 from recognizer.bench.files import part_folder
 from recognizer.bench.guard import RequestGuard, access_rules, is_loopback
+from recognizer.bench.patience import PatientProtocol
 from recognizer.bench.session import Session
+from recognizer.bench.settings import PAGE
 
 SOFTWARE = ("touch:", "Simulated probe: click on the part")
 FIRMWARE = ("touch:?firmware=avr", "Simulated probe, through the firmware")
@@ -78,7 +82,8 @@ def serve(options: BenchOptions) -> int:
             RequestGuard(app_for(bench), access_rules(options.host, token)),
             log_level="warning", access_log=False, server_header=False,
             ws_max_size=4096, ws_per_message_deflate=False, ws_ping_interval=20.0,
-            timeout_graceful_shutdown=2, limit_concurrency=512,
+            timeout_graceful_shutdown=2, limit_concurrency=PAGE.connections,
+            http=PatientProtocol,
         )  # fmt: skip
         server = uvicorn.Server(config)
         sys.stdout.write(_address(options.host, line.getsockname()[1], token) + "\n")
@@ -144,5 +149,21 @@ def _open_socket(host: str, port: int) -> socket.socket:
 
 
 def _address(host: str, port: int, token: str) -> str:
-    shown = f"[{host}]" if ":" in host else host
+    shown = _reachable(host)
+    shown = f"[{shown}]" if ":" in shown else shown
     return f"open-bench: http://{shown}:{port}/" + (f"?token={token}" if token else "")
+
+
+def _reachable(host: str) -> str:
+    """Return an address that others can open, where a server listens on all of them."""
+    try:
+        if not ipaddress.ip_address(host).is_unspecified:
+            return host
+    except ValueError:  # a name
+        return host
+    six = ":" in host
+    family, anywhere = (socket.AF_INET6, "2001:db8::1") if six else (socket.AF_INET, "192.0.2.1")
+    with suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as line:
+        line.connect((anywhere, 9))  # chooses the way out; nothing is sent
+        return str(line.getsockname()[0])
+    return socket.gethostname()

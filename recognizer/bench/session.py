@@ -267,16 +267,19 @@ class Session:
     # What follows runs in the thread, or under its lock.
 
     def _run(self) -> None:
-        due_s = 0.0
+        due_s, wanted_s = 0.0, time.monotonic()
         while not self._stop.is_set():
             feed = self._feed
             frames = feed.take(SESSION.wait_s)
+            now_s = time.monotonic()
             with self._turn:
+                if self._broker.subscribers or self._frames.busy:
+                    wanted_s = now_s
+                feed.rest(wanted=now_s - wanted_s < SESSION.idle_s)
                 if feed is self._feed:
                     self._frames.take(frames)
                     for notice in feed.notices():
                         self._note(notice)
-                now_s = time.monotonic()
                 if now_s >= due_s:
                     due_s = now_s + SESSION.status_s
                     self._report()

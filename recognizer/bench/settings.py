@@ -37,6 +37,7 @@ class SessionSettings:
     notices: int = 40  #: that are kept for the page
     retry_s: float = 1.0  #: after a probe went away for good
     silent_s: float = 0.6  #: without a frame a probe is gone
+    idle_s: float = 5.0  #: without page, recording and calibration the probe is let go
     calibration_s: tuple[float, float] = (0.2, 60.0)  #: to read one load
 
 
@@ -75,6 +76,7 @@ class LineSettings:
     """The serial line of the simulated probe."""
 
     wait_s: float = 0.005  #: of the probe for its next frame, and so of a command for its answer
+    idle_s: float = 0.05  #: the same where no frames are wanted
     at_once: int = 4096  #: bytes read
     lost: int = 65536  #: bytes that wait for a reader; more are thrown away, as on a real line
 
@@ -84,6 +86,8 @@ class PageSettings:
     """What pages may ask of the live line, and how much they get."""
 
     pages: int = 64  #: open at once
+    connections: int = 900  #: open at once, below the files that a process may have open
+    silent_s: float = 5.0  #: that a connection may take for its first request
     message: int = 1024  #: bytes of a message from a page
     mosaic: int = 512  #: rows or columns of a mosaic that is sent; beyond, cells are left out
     listed: int = 200  #: files of a kind that are offered

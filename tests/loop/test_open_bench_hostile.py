@@ -90,3 +90,20 @@ def test_nonsense_on_the_live_line_ends_it(bench):
                 while time.monotonic() < end_s:
                     line.recv(timeout=PATIENCE_S)
             assert time.monotonic() < end_s
+
+
+def test_silent_connections_lock_nobody_out_and_are_let_go(bench):
+    host, port = bench.split("/")[2].split(":")
+    silent = []
+    try:
+        for _ in range(600):
+            silent.append(socket.create_connection((host, int(port)), timeout=PATIENCE_S))
+        assert httpx.get(f"{bench}api/bench", timeout=PATIENCE_S).status_code == 200
+        end_s = time.monotonic() + PATIENCE_S
+        for line in silent:
+            line.settimeout(max(0.1, end_s - time.monotonic()))
+            with suppress(ConnectionResetError):
+                assert line.recv(1) == b""  # the other side has closed it
+    finally:
+        for line in silent:
+            line.close()

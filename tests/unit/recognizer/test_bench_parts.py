@@ -20,6 +20,7 @@ from probe.sensor import SensorType
 from recognizer.bench.broker import Broker, Subscriber
 from recognizer.bench.calibration_guide import CalibrationGuide, forces_given
 from recognizer.bench.errors import BenchError, BusyError, UnknownError
+from recognizer.bench.feed import ProbeFeed
 from recognizer.bench.files import (
     checked_name,
     find_file,
@@ -394,3 +395,25 @@ def test_a_simulated_probe_as_asked():
     firmware, manner = parse_simulation("touch:?firmware=avr&rate=50&hold=1&noise=quiet&seed=3")
     assert firmware
     assert (manner.rate, manner.hold_s, manner.noise, manner.seed) == (50, 1, "quiet", 3)
+
+
+# -- what nobody looks at
+
+
+def test_a_probe_that_nobody_wants_is_let_go_and_comes_back():
+    feed = ProbeFeed("sim:?hz=100")
+    try:
+        while not feed.take(0.05):
+            pass
+        assert feed.as_json()["state"] == "live"
+        for _ in range(2):
+            feed.rest(wanted=False)
+        assert feed.take(0.01) == []
+        assert feed.as_json()["state"] == "waiting"
+        assert feed.as_json()["frames"] > 0
+        feed.rest(wanted=True)
+        while not feed.take(0.05):
+            pass
+        assert feed.as_json()["state"] == "live"
+    finally:
+        feed.close()
