@@ -33,6 +33,7 @@ from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import answer_at
 from recognizer.touch.recognition import (
     AMBIGUOUS,
+    BY_CHANCE,
     NOT_ENCODED,
     TOO_FEW,
     Recognition,
@@ -61,6 +62,16 @@ class LocatedComposite:
     fit: Fit  #: of the composite, with the pose of the last touch
     score: float  #: log-likelihood of all touches, nats
     explained: float = math.nan  #: share of the last image's variance; NaN: not asked
+
+    @property
+    def embossed(self) -> EmbossedArray:
+        """Array and style, as a hypothesis of one touch has it."""
+        return self.encoding
+
+    @property
+    def hypothesis(self) -> Hypothesis:
+        """The place, as a hypothesis of one touch has it."""
+        return self.place
 
     @property
     def index(self) -> tuple[int, int]:
@@ -185,6 +196,8 @@ def answer_scan(
         return answer
     arrays, settings = reader.lab.arrays, reader.settings
     doubt = expected_matches(arrays, best.encoding, best.fit, best.place, settings)
+    if doubt > settings.belief.doubt:
+        return refusal(seq, BY_CHANCE, margin=margin, runner_up=runner_up, doubt=doubt)
     return replace(answer, doubt=doubt)
 
 

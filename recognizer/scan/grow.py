@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,12 +24,14 @@ from recognizer.scan.lattice import (
     same_lattice,
     seed_lattice,
 )
-from recognizer.scan.mosaic.touch import PlacedTouch
+from recognizer.scan.mosaic.planar import relative_pose
+from recognizer.scan.mosaic.touch import PlacedTouch, planar_belief
 from recognizer.scan.settings import ScanSettings
 from recognizer.scan.views import (
     LatticeView,
     LatticeViews,
     TouchPoses,
+    expected_view,
     fits_of,
     is_unmeasured,
     round_views,
@@ -38,8 +40,10 @@ from recognizer.scan.views import (
     views_of,
     widest_mm,
 )
+from recognizer.touch.belief import VerifiedHypothesis
+from recognizer.touch.next_touch import PlaceHypothesis, propose_next
 from recognizer.touch.reader import Reader
-from recognizer.touch.recognise import recognise
+from recognizer.touch.recognise import recognise_with_rivals
 from recognizer.touch.recognition import (
     AMBIGUOUS,
     NO_CONTACT,
@@ -67,6 +71,7 @@ class ScanBelief:
     told: tuple[str | None, str | None] | None  #: object and face by a touch that agreed
     leading: LocatedComposite | None  #: the likeliest place, whether it is the answer or not
     recognition: Recognition  #: of the probe's pose at the last touch
+    begun: int = 0  #: how often a new belief began, because touches did not belong together
 
 
 def begin_scan(reader: Reader, settings: ScanSettings | None = None) -> ScanBelief:
@@ -103,7 +108,9 @@ def read_scan(
 def extend_scan(scan: ScanBelief, touch: PlacedTouch) -> ScanBelief:
     """Return a scan with one touch more.
 
-    A touch that feels nothing is answered by that reason and not kept.
+    A touch that feels nothing is answered by that reason and not kept. One that is answered by
+    itself, and does not lie where the others lead to expect it, begins a new belief: probe or
+    object have slipped, or another object lies there.
 
     Raises
     ------
@@ -112,53 +119,121 @@ def extend_scan(scan: ScanBelief, touch: PlacedTouch) -> ScanBelief:
     """
     reader, limits = scan.reader, scan.settings
     if not touch.signal.contact:
-        return replace(scan, recognition=refusal(touch.seq, NO_CONTACT))
+        return replace(scan, recognition=_no_contact(reader, touch))
     touches = (*scan.touches, replace(touch, decoded=None))
     finest = min(encoding.style.pitch_mm for encoding in reader.lab.arrays)
     by_hand = any(is_unmeasured(each, limits.loose * finest) for each in touches)
     touch_poses = stands_of(reader, touches, scan.touch_poses, limits)
-    shown, lattices, found, images = [], [], [], []
-    for k, (encoding, template, bank) in enumerate(reader.prepared):
-        image = _image(reader, touch, encoding.style.height_mm)
-        near = _expected_poses(scan.lattices[k][: limits.guided], touch_poses)
-        known = bool(scan.recognition) and scan.astray == 0
-        new = fits_of(
-            image, template, bank, reader, near, limits.clean, known=known, hard=scan.told is None
-        )
-        if encoding.radii_mm:
-            new = (*new, *round_views(image, template, bank, reader, encoding, near))
-        each = (*scan.views[k], tuple(v for v in new if v.fit.noise <= limits.noise))
-        sums = _composites(
-            views_of(each), touch_poses, scan.lattices[k], encoding.style.pitch_mm, limits
-        )
-        shown.append(each)
+    seen = _see_touch(scan, touch, touch_poses)
+    lattices: list[tuple[PlaneLattice, ...]] = []
+    found: list[LocatedComposite] = []
+    for k, (encoding, _, _) in enumerate(reader.prepared):
+        pitch = encoding.style.pitch_mm
+        sums = _composites(views_of(seen.views[k]), touch_poses, scan.lattices[k], pitch, limits)
         lattices.append(tuple(item.agreement.lattice for item in sums))
         found += locate_composites(encoding, sums, limits, reader.settings.hypotheses)
-        images.append(image)
     found = distinct_places(found)
-    answer = answer_scan(reader, found, limits, touch.seq, by_hand=by_hand)
-    agrees = bool(found) and bool(found[0].composite.agreement.chosen[-1] >= 0)
-    if answer:
-        found[0], agrees = _pose_last_touch(reader, images, found[0], touch_poses, limits)
+    answer, agrees = refusal(touch.seq, TOO_FEW), False
+    if found and (found[0].composite.agreement.chosen >= 0).sum() > 1:
         answer = answer_scan(reader, found, limits, touch.seq, by_hand=by_hand)
-    elif scan.told is None and _tells_alone(reader, shown):
-        alone = recognise(reader, touch.signal, touch.seq)
-        if alone and found and found[0].face == (alone.object, alone.face):
-            answer, agrees = alone, True
-    astray = 0 if agrees else scan.astray + 1
+        agrees = bool(found[0].composite.agreement.chosen[-1] >= 0)
+        if answer:
+            found[0], agrees = _pose_last_touch(reader, seen.images, found[0], touch_poses, limits)
+            answer = answer_scan(reader, found, limits, touch.seq, by_hand=by_hand)
+    alone = seen.alone
+    if alone and scan.touches and not _says_the_same(answer, alone, finest):
+        if scan.told is not None or not answer:
+            return _begin_anew(scan, touch)
+        alone = answer = refusal(touch.seq, AMBIGUOUS, margin=answer.margin)
+    if alone is not None and not answer and (alone or not scan.touches):
+        answer, agrees = alone, agrees or bool(alone)
+    astray = 0 if agrees or len(touches) == 1 else scan.astray + 1
+    if scan.told is not None and not by_hand and astray > limits.patience:
+        return _begin_anew(scan, *touches[-astray:])
     answer, told = _believable_answer(scan, answer, astray, 0 if by_hand else limits.patience)
+    rivals: Sequence[PlaceHypothesis] = found if agrees or not seen.rivals else seen.rivals
+    step = propose_next(reader, touch.signal, answer, rivals, _earlier(touch_poses))
     return ScanBelief(
         reader=reader,
         settings=limits,
         touches=touches,
         touch_poses=touch_poses,
-        views=tuple(shown),
+        views=seen.views,
         lattices=tuple(lattices),
         astray=astray,
         told=told,
         leading=found[0] if found else None,
-        recognition=answer,
+        recognition=replace(answer, next=step),
+        begun=scan.begun,
     )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _SeenTouch:
+    """What the last touch shows."""
+
+    images: list[Image]  #: of each encoding
+    views: tuple[tuple[tuple[LatticeView, ...], ...], ...]  #: as `ScanBelief.views`
+    alone: Recognition | None  #: by itself; None: it lies where it was expected, nobody asked
+    rivals: list[VerifiedHypothesis]  #: places that it may be by itself
+
+
+def _see_touch(scan: ScanBelief, touch: PlacedTouch, touch_poses: TouchPoses) -> _SeenTouch:
+    """Return what the last touch shows: what is expected of it, or what it says by itself."""
+    reader, limits = scan.reader, scan.settings
+    images = [_image(reader, touch, each.style.height_mm) for each in reader.lab.arrays]
+    near = [_expected_poses(each[: limits.guided], touch_poses) for each in scan.lattices]
+    new: list[tuple[LatticeView, ...]] = [() for _ in images]
+    if scan.recognition and scan.astray == 0:
+        for k, (_, template, _) in enumerate(reader.prepared):
+            new[k] = expected_view(images[k], template, reader, near[k], limits.clean)
+    alone: Recognition | None = None
+    rivals: list[VerifiedHypothesis] = []
+    if not any(new):
+        alone, rivals = recognise_with_rivals(reader, touch.signal, touch.seq)
+        for k, (encoding, template, bank) in enumerate(reader.prepared):
+            own = [one.fit for one in rivals if one.embossed is encoding and one.bend is None]
+            new[k] = fits_of(images[k], template, bank, reader, near[k], own)
+            if encoding.radii_mm:
+                more = round_views(images[k], template, bank, reader, encoding, near[k])
+                new[k] = (*new[k], *more)
+    views = tuple(
+        (*before, tuple(view for view in each if view.fit.noise <= limits.noise))
+        for before, each in zip(scan.views, new, strict=True)
+    )
+    return _SeenTouch(images, views, alone, rivals)
+
+
+def _no_contact(reader: Reader, touch: PlacedTouch) -> Recognition:
+    answer = refusal(touch.seq, NO_CONTACT)
+    return replace(answer, next=propose_next(reader, touch.signal, answer, ()))
+
+
+def _begin_anew(scan: ScanBelief, *touches: PlacedTouch) -> ScanBelief:
+    """Return a belief that rests on the last touches alone."""
+    anew = begin_scan(scan.reader, scan.settings)
+    first, *rest = touches
+    if first.believed is None:
+        alone = planar_belief(np.zeros(3), scan.settings.first)
+        first = replace(first, stepped=None, believed=alone)
+    anew = extend_scan(anew, first)
+    for touch in rest:
+        anew = extend_scan(anew, touch)
+    return replace(anew, begun=scan.begun + 1)
+
+
+def _says_the_same(answer: Recognition, alone: Recognition, pitch_mm: float) -> bool:
+    """Whether two answers name one place."""
+    if (answer.object, answer.face) != (alone.object, alone.face):
+        return False
+    away = math.hypot(answer.x_mm - alone.x_mm, answer.y_mm - alone.y_mm)
+    turn = abs(math.remainder(answer.theta_deg - alone.theta_deg, 360.0))
+    return away < pitch_mm / 2 and turn < 45.0
+
+
+def _earlier(touch_poses: TouchPoses) -> Array:
+    """Return (n - 1, 3) where earlier touches stand in the frame of the last one."""
+    return np.asarray(relative_pose(touch_poses.poses[-1], touch_poses.poses[:-1]))
 
 
 def _pose_last_touch(
@@ -200,20 +275,6 @@ def _believable_answer(
     if answer.covariance is not None and widest_mm(answer.covariance) > scan.settings.loose_mm:
         return refusal(answer.seq, TOO_FEW, margin=answer.margin), scan.told or named
     return answer, named
-
-
-def _tells_alone(reader: Reader, views: list[tuple[tuple[LatticeView, ...], ...]]) -> bool:
-    """Whether the last touch shows cells enough for an answer, if they were all clear."""
-    least = reader.settings.belief.surprise + reader.settings.belief.margin
-    for (encoding, _, _), each in zip(reader.prepared, views, strict=True):
-        options = math.log(encoding.array.order + 1)
-        cells = max(
-            (int((view.fit.seen >= reader.settings.belief.whole).sum()) for view in each[-1]),
-            default=0,
-        )
-        if cells * options > math.log(len(encoding.keys)) + least:
-            return True
-    return False
 
 
 def _image(reader: Reader, touch: PlacedTouch, height_mm: float) -> Image:

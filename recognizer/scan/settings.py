@@ -72,6 +72,7 @@ class LatticeViewSettings:
     most_mm: float = 3.0  #: the same, at most
     same_mm: float = 0.3  #: by which two fits of a touch are one
     same_rad: float = 0.03  #: the same, of their turns
+    most: int = 6  #: fits of a touch by itself that are views
 
 
 LATTICES, VIEWS = LatticeAgreementSettings(), LatticeViewSettings()

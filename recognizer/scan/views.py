@@ -104,16 +104,26 @@ def widest_mm(covariance: Array) -> float:
     return math.sqrt(float(np.linalg.eigvalsh(covariance[:2, :2])[-1]))
 
 
+def expected_view(
+    image: Image, template: ResponseTemplate, reader: Reader, near: Array, clean: float
+) -> tuple[LatticeView, ...]:
+    """Return the lattice at the first of the poses (k, 3) that touches before lead to expect.
+
+    None unless it explains the image so well (`clean`, noise) that nothing else need be looked for.
+    """
+    expected = _refine_near(image, template, reader.settings.first, near[:1], None)
+    if expected and expected[0].noise <= clean:
+        return (LatticeView(expected[0], led=True),)
+    return ()
+
+
 def fits_of(
     image: Image,
     template: ResponseTemplate,
     bank: Bank,
     reader: Reader,
     near: Array,
-    clean: float,
-    *,
-    known: bool,
-    hard: bool,
+    alone: Sequence[Fit],
 ) -> tuple[LatticeView, ...]:
     """Return the likeliest lattices of an image, and those that lie near given ones.
 
@@ -124,30 +134,30 @@ def fits_of(
     ----------
     near
         (k, 3) T_lattice_touch that other touches lead to expect.
-    clean
-        Noise of a fit with which nothing else is looked for.
-    known
-        Whether the first of `near` is where the answer of a moment ago says.
-    hard
-        Whether more may be spent on an image that the usual search does not explain.
+    alone
+        Fits of the touch read by itself, best first; none: they are looked for here.
     """
     settings = reader.settings.first
-    if known and len(near):
-        expected = _refine_near(image, template, settings, near[:1], None)
-        if expected and expected[0].noise <= clean:
-            return (LatticeView(expected[0], led=True),)
-    found = fit_lattices(image, template, bank, settings)
-    if hard and found and found[0].noise > clean:
-        found = fit_lattices(image, template, bank, reader.settings.thorough)
+    found = _distinct_fits(alone, template.pitch_mm) or fit_lattices(
+        image, template, bank, settings
+    )
     views = tuple(LatticeView(fit, led=False) for fit in found)
     rest = [
         pose for pose in near if not any(_same_as_fit(pose, f, template.pitch_mm) for f in found)
     ]
     for fit in _refine_near(image, template, settings, np.array(rest).reshape(-1, 3), found):
-        pose = np.array([fit.x_mm, fit.y_mm, fit.theta_rad])
-        if not any(_same_as_fit(pose, view.fit, template.pitch_mm) for view in views):
+        if not any(_same_as_fit(fit.pose[:3], view.fit, template.pitch_mm) for view in views):
             views = (*views, LatticeView(fit, led=True))
     return views
+
+
+def _distinct_fits(fits: Sequence[Fit], pitch_mm: float) -> tuple[Fit, ...]:
+    """Return fits, each lattice once."""
+    kept: list[Fit] = []
+    for fit in fits:
+        if not any(_same_as_fit(fit.pose[:3], other, pitch_mm) for other in kept):
+            kept.append(fit)
+    return tuple(kept[: VIEWS.most])
 
 
 def round_views(

@@ -20,6 +20,7 @@ from recognizer.touch.belief import VerifiedHypothesis, symbols_to_name
 from recognizer.touch.chance import expected_matches
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.locate import Hypothesis, under_centre
+from recognizer.touch.next_touch import propose_next
 from recognizer.touch.pose import face_covariance, face_pose, inside_mm, pose_on_object
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.recognition import (
@@ -40,39 +41,41 @@ from recognizer.touch.verify import verify_hypotheses
 
 
 def recognise(reader: PreparedLab, signal: Signal, seq: int = 0) -> Recognition:
-    """Return what one touch says."""
-    return recognise_with_hypothesis(reader, signal, seq)[0]
+    """Return what one touch says, and where to touch next if that is not enough."""
+    answer, found = recognise_with_rivals(reader, signal, seq)
+    return replace(answer, next=propose_next(reader, signal, answer, found))
 
 
 def recognise_with_hypothesis(
     reader: PreparedLab, signal: Signal, seq: int = 0
 ) -> tuple[Recognition, VerifiedHypothesis | None]:
     """Return what one touch says, and the hypothesis that was judged; None where there is none."""
-    answer, best = _answer_at_effort(reader, signal, seq)
-    if best is not None:
-        answer = _refuse_by_chance(reader, best.embossed, best.fit, best.hypothesis, answer)
-    return answer, best
+    answer, found = recognise_with_rivals(reader, signal, seq)
+    return answer, found[0] if found else None
 
 
-def _answer_at_effort(
-    reader: PreparedLab, signal: Signal, seq: int
-) -> tuple[Recognition, VerifiedHypothesis | None]:
-    """Return what the first try says, or the second where that is not enough."""
+def recognise_with_rivals(
+    reader: PreparedLab, signal: Signal, seq: int = 0
+) -> tuple[Recognition, list[VerifiedHypothesis]]:
+    """Return what the first try says, or the second where that is not enough; and all hypotheses.
+
+    The first of them is the one that was judged.
+    """
     if not signal.contact:
-        return refusal(seq, NO_CONTACT), None
+        return refusal(seq, NO_CONTACT), []
     settings, limits = reader.settings, reader.settings.belief
     first = verify_hypotheses(reader, signal, settings.first)
     answer, inliers = _answer(first, settings, seq)
     if answer and inliers >= limits.many_inliers:
-        return answer, first[0]
+        return _refuse_by_chance(reader, first[0], answer), first
     # Spend more where it is needed: no answer yet, or one that few cells speak for.
     second = verify_hypotheses(reader, signal, settings.thorough)
     final, inliers = _answer(second, settings, seq)
     if answer and final and not first[0].coincides(second[0]):
-        return refusal(seq, AMBIGUOUS, margin=0.0, runner_up=answer.runner_up), second[0]
+        return refusal(seq, AMBIGUOUS, margin=0.0, runner_up=answer.runner_up), second
     if final and inliers < limits.many_inliers:
         final = _refuse_few(limits, second[0].embossed, final, inliers)
-    return final, second[0] if second else None
+    return _refuse_by_chance(reader, second[0], final) if second else final, second
 
 
 def _answer(
@@ -127,17 +130,13 @@ def _refuse_few(
 
 
 def _refuse_by_chance(
-    reader: PreparedLab,
-    embossed: EmbossedArray,
-    fit: Fit,
-    hypothesis: Hypothesis,
-    answer: Recognition,
+    reader: PreparedLab, best: VerifiedHypothesis, answer: Recognition
 ) -> Recognition:
     """Return an answer with its doubt, or the refusal where that is too large."""
     if not answer:
         return answer
-    settings = reader.settings
-    doubt = expected_matches(reader.lab.arrays, embossed, fit, hypothesis, settings)
+    settings, arrays = reader.settings, reader.lab.arrays
+    doubt = expected_matches(arrays, best.embossed, best.fit, best.hypothesis, settings)
     if doubt <= settings.belief.doubt:
         return replace(answer, doubt=doubt)
     margin, runner_up = answer.margin, answer.runner_up

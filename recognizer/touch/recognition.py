@@ -9,7 +9,7 @@ they say where the probe stands beside the printed part, whose place is that of 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -44,6 +44,28 @@ class RunnerUp:
     index: tuple[int, int]
 
 
+@dataclass(frozen=True, slots=True)
+class NextTouch:
+    """Where a touch promises most, in the sensor's frame of this one.
+
+    Examples
+    --------
+    >>> print(NextTouch(7.1, -7.1, 0.0, 80.0, "towards the loaded part"))
+    7.1 mm along x, -7.1 mm along y, 80 N (towards the loaded part)
+    """
+
+    dx_mm: float  #: step of the sensor's centre
+    dy_mm: float
+    turn_deg: float  #: of the sensor, about z
+    force_n: float  #: to press with
+    why: str
+
+    def __str__(self) -> str:
+        step = f"{self.dx_mm:g} mm along x, {self.dy_mm:g} mm along y"
+        turn = f", turned by {self.turn_deg:g} degrees" if self.turn_deg else ""
+        return f"{step}{turn}, {self.force_n:g} N ({self.why})"
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Recognition:
     """What one touch, or several, say: true if it is an answer; prints as a line.
@@ -71,6 +93,7 @@ class Recognition:
     """Expected number of registered places that a foreign surface (other symbols than any that
     are registered) would match as well by chance; None where another reason refuses, and where the
     thesis's way is read."""
+    next: NextTouch | None = None  #: where it does not answer or is unsure
 
     def __bool__(self) -> bool:
         return self.object is not None
@@ -84,7 +107,8 @@ class Recognition:
             if self.doubt is not None and self.reason == BY_CHANCE:
                 others = f", as {places_by_chance(self.doubt)} would match"
             way_out = f"; {self.way_out}" if self.way_out else ""
-            return f"not recognised: {self.reason}{others}{way_out}"
+            step = f"; next: {self.next}" if self.next is not None else ""
+            return f"not recognised: {self.reason}{others}{way_out}{step}"
         alone = self.margin is None or math.isinf(self.margin)
         given = "" if math.isnan(self.spread_mm) else f" +- {self.spread_mm:.2f}"
         return (
@@ -144,6 +168,7 @@ class Recognition:
             "doubt": self.doubt,
             "scale": self.scale,
             "stroke_mm": self.stroke_mm,
+            "next": None if self.next is None else asdict(self.next),
         }
 
 

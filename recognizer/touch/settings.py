@@ -8,6 +8,7 @@ strong mismatch; `tests/bench/recognizer_times.py` shows error against time), no
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 
@@ -256,6 +257,38 @@ class RoundSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class NextSettings:
+    """Which steps are weighed, and what they are worth (`tests/campaigns/next_touch.py`)."""
+
+    lengths_mm: tuple[float, ...] = (4.0, 7.0, 10.0, 14.0)  #: of steps
+    directions: int = 16  #: of steps
+    turns_rad: tuple[float, ...] = (0.0, math.pi / 4)  #: a row of symbols fits along a diagonal
+    force_n: float = 80.0  #: at which touches are read best
+    strongest: int = 12  #: tactels that say how hard is pressed
+    faint: float = 0.08  #: share of that from which a tactel lies on something ...
+    least_counts: float = 16.0  #: ... and readings over the background: less is noise
+    least_n: float = 0.1  #: the same where readings are newtons
+    gap: int = 5  #: tactels, side of the square that closes gaps between strokes
+    clear_mm: float = 2.5  #: from where the face may end to the centre: nearer, the plate tips
+    points: int = 8  #: along each side of the sensor at which a view is asked
+    whole: float = 0.36  #: pitches within the rim at which a symbol's centre is seen whole
+    beyond: float = 0.85  #: trust in that a face goes on beyond the sensor's rim
+    novelty: float = 0.2  #: more that a symbol is worth which was not seen yet ...
+    novelty_inside: float = 0.5  #: ... where no edge is near: there another look tells as little
+    faces: int = 6  #: hypotheses that are asked, and ...
+    soft: float = 3.0  #: ... nats by which their weights fall to 1/e
+    by_face: float = 0.5  #: weight of what faces say against what the image says
+    agreed: float = 0.9  #: of the hypotheses' weight that must know a face under the centre
+    cost: float = 0.01  #: symbols that a mm of the way costs
+    turning: float = 1.5  #: symbols that a turn costs
+    whole_share: float = 0.85  #: of the sensor that lies on something; with less, an edge is near
+    soft_counts: float = 40.0  #: below which the strongest readings are weak
+    soft_n: float = 0.25  #: the same where readings are newtons
+    margin: float = 14.0  #: nats below which an answer had better be confirmed
+    doubt: float = 1e-3  #: places by chance above which it had
+
+
+@dataclass(frozen=True, slots=True)
 class PrintedSettings:
     """How a pose is corrected where it is known how the part was printed."""
 
@@ -293,6 +326,7 @@ class ReaderSettings:
     bends: BendSettings = field(default_factory=BendSettings)
     round: RoundSettings = field(default_factory=RoundSettings)
     printed: PrintedSettings = field(default_factory=PrintedSettings)
+    next: NextSettings = field(default_factory=NextSettings)
 
 
 #: As the reader is, if nothing else is asked for.

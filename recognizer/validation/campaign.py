@@ -21,6 +21,7 @@ from recognizer.touch.settings import DEFAULTS
 from recognizer.validation.draw import TouchPlan
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.made_kinds import COPY, NEAR, SAME_PROFILE, SIDE, SMALL
+from recognizer.validation.policy import ONE
 from recognizer.validation.settings import SHARING
 from recognizer.validation.surfaces import FOREIGN
 
@@ -69,6 +70,7 @@ class Campaign:
     faults: str = ""  #: of printed surfaces: what the machine does wrong
     engine: str = "own"  #: of contact
     sensor_per: str = "touch"  #: or `run`: how long the errors of a sensor stay the same
+    policy: str = ONE  #: or `next`: touches follow until one is answered
     study: int = 0  #: touches of every reader of `READERS`; 0: no study
     shard: int = SHARING.shard  #: touches in a file: at most so many are lost with a run
 
@@ -175,7 +177,8 @@ def plan_of(
         surface = strange[int(rng.integers(len(strange)))]
     plan = TouchPlan(database, campaign.seed, level, surface, files=campaign.surfaces == FILES,
                      prints=prints, engine=campaign.engine, sensor_per=campaign.sensor_per,
-                     labs=labs)  # fmt: skip
+                     labs=labs,
+                     policy=campaign.policy if series.name == TOUCHES else ONE)  # fmt: skip
     return kind, plan
 
 

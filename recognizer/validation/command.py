@@ -132,6 +132,11 @@ def touch_set(
         str, typer.Option(metavar="touch|run", show_default=False,
                           help="How long a sensor's errors stay the same; touch."),
     ] = "",
+    policy: Annotated[
+        str, typer.Option(metavar="one|next", show_default=False,
+                          help="next: where a touch is not answered, touch where the answer "
+                               "proposes, up to three times, read as one belief; one."),
+    ] = "",
     study: Annotated[
         int | None, typer.Option(min=0, show_default=False,
                                  help="Touches of each reader in the picture of error against run "
@@ -178,7 +183,7 @@ def touch_set(
                 specs or (), folder=folder, touches=touches, database=database, kinds=kinds,
                 levels=levels, overlay=overlay, surfaces=surfaces, print_profile=print_profile,
                 faults=faults, prints=prints or "", engine=engine, sensor_per=sensor_per,
-                study=study, shard=shard, seed=seed, jobs=processes, cluster=cluster,
+                policy=policy, study=study, shard=shard, seed=seed, jobs=processes, cluster=cluster,
                 resume=resume, progress=TouchProgress(bar),
             )  # fmt: skip
         _say(result, as_json=as_json)

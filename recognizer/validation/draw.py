@@ -7,6 +7,8 @@ can be repeated by its number, in any order and on any machine.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -26,7 +28,7 @@ from probe.simulate.world.side_by_side import SideBySide, lay_beside
 from probe.simulate.world.worn import wear_face, wear_part
 from probe.surface.contract import HeightMap
 from probe.surface.face import FaceSurface
-from recognizer.touch.lab import EmbossedArray
+from recognizer.touch.lab import EmbossedArray, EncodedFace
 from recognizer.touch.reader import Reader
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.made_kinds import SAME_PROFILE, SIDE, is_extra
@@ -60,6 +62,7 @@ class TouchPlan:
     engine: str = "own"  #: of contact, `probe.contact.engines`
     sensor_per: str = "touch"  #: or `run`: the errors of the sensor stay the same
     labs: tuple[str, ...] = ()  #: databases of other labs, of `same_profile`
+    policy: str = "one"  #: or `next`: touches follow until one is answered, `policy`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,6 +75,8 @@ class DrawnTouch:
     counts: NDArray[np.uint16]
     drawn_anew: tuple[str, ...] = ()  #: why, for each time that the plate did not come to rest
     beside: tuple[Scene, Touch] | None = None  #: another face under the sensor, its touch there
+    copy: SensorCopy | None = None  #: the sensor
+    elsewhere: Callable[[Touch], MetSurface] | None = None  #: what the same touch meets there
 
     def truth_of(self, object_name: str | None, face: str | None) -> tuple[Scene | None, Touch]:
         """Return the truth that an answer is compared with: of the face named, if it is there."""
@@ -85,8 +90,7 @@ class DrawnTouch:
 def draw_touch(plan: TouchPlan, number: int, reader: Reader) -> DrawnTouch:
     """Return what is touched in a trial, and the reading."""
     rng = np.random.default_rng([plan.seed, number])
-    level = level_of(plan)
-    ranges = _ranges(plan, level)
+    ranges = _ranges(plan, level_of(plan))
     copy = _copy_of_run(plan.seed, reader.sensor) if plan.sensor_per == "run" else None
     anew: list[str] = []
     arrays = [
@@ -103,16 +107,33 @@ def draw_touch(plan: TouchPlan, number: int, reader: Reader) -> DrawnTouch:
     encoding = arrays[int(rng.integers(len(arrays)))]
     while True:
         met = _meet(plan, encoding, ranges, rng)
+        drawn = copy or draw_copy(reader.sensor, rng)
         try:
-            counts, _ = read_sensor(
-                met.surface, reader.sensor, met.touch, level, rng, plan.engine,
-                datum_mm=_datum(met.face if level.scale else None), copy=copy,
-            )  # fmt: skip
+            return _read(plan, met, reader.sensor, rng, drawn, tuple(anew))
         except ContactError as error:
             anew.append(DRAWING.why_anew(error.cause))
-            continue
-        scene = None if plan.kind == SAME_PROFILE else met.face
-        return DrawnTouch(met.surface, scene, met.touch, counts, tuple(anew), met.beside)
+
+
+def draw_again(
+    plan: TouchPlan, before: DrawnTouch, touch: Touch, reader: Reader, rng: np.random.Generator
+) -> DrawnTouch:
+    """Return what the sensor of a touch reads of the same surface at another place.
+
+    Raises
+    ------
+    ContactError
+        The plate does not come to rest there.
+    """
+    if before.elsewhere is None or before.copy is None:
+        raise ValidationError("a touch that nobody drew", fix="draw it by draw_touch")
+    return _read(plan, before.elsewhere(touch), reader.sensor, rng, before.copy)
+
+
+def draw_tilt(plan: TouchPlan, touch: Touch, rng: np.random.Generator) -> Touch:
+    """Return a touch with another tilt of the wrist, as the plan draws it."""
+    tilt = _ranges(plan, level_of(plan)).tilt_rad * math.sqrt(rng.random())
+    towards = float(rng.uniform(-math.pi, math.pi))
+    return replace(touch, tilt_x_rad=tilt * math.cos(towards), tilt_y_rad=tilt * math.sin(towards))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,6 +144,21 @@ class MetSurface:
     touch: Touch
     face: Scene | None  #: None for a surface of no part
     beside: tuple[Scene, Touch] | None = None
+    elsewhere: Callable[[Touch], MetSurface] | None = None  #: the same, met by another touch
+
+
+def _read(
+    plan: TouchPlan, met: MetSurface, sensor: SensorType, rng: np.random.Generator,
+    copy: SensorCopy, anew: tuple[str, ...] = (),
+) -> DrawnTouch:  # fmt: skip
+    """Return what a sensor reads of what it meets."""
+    level = level_of(plan)
+    counts, _ = read_sensor(
+        met.surface, sensor, met.touch, level, rng, plan.engine,
+        datum_mm=_datum(met.face if level.scale else None), copy=copy,
+    )  # fmt: skip
+    scene = None if plan.kind == SAME_PROFILE else met.face
+    return DrawnTouch(met.surface, scene, met.touch, counts, anew, met.beside, copy, met.elsewhere)
 
 
 def _meet(
@@ -130,7 +166,8 @@ def _meet(
 ) -> MetSurface:
     """Draw what is touched and where."""
     if plan.kind in FOREIGN:
-        return MetSurface(FOREIGN[plan.kind](encoding, rng), _draw_anywhere(rng, ranges), None)
+        foreign = FOREIGN[plan.kind](encoding, rng)
+        return _met_at(lambda _: foreign, _draw_anywhere(rng, ranges), None)
     if plan.kind == SAME_PROFILE:
         lab = plan.labs[int(rng.integers(len(plan.labs)))]
         faces = _faces_of_lab(lab)
@@ -139,7 +176,7 @@ def _meet(
         touch = _draw_on_face(
             scene, plan.kind, _inradius_mm(lab, name, shown, plan.files), rng, ranges
         )
-        return MetSurface(scene.under(touch).surface, touch, scene)
+        return _met_at(lambda at: scene.under(at).surface, touch, scene)
     known = _by_name(encoding, plan.kind, plan.prints)
     face = encoding.face(known[int(rng.integers(len(known)))])
     scene = scene_of(plan.database, face.object, face.face, plan.files, plan.prints)
@@ -147,13 +184,37 @@ def _meet(
         return _lay_beside(plan, encoding, scene, ranges, rng)
     most = _inradius_mm(plan.database, face.object, face.face, plan.files, plan.prints)
     touch = _draw_on_face(scene, plan.kind, most, rng, ranges)
+    if plan.kind != "worn":
+        return _met_at(lambda at: scene.under(at).surface, touch, scene)
+    drawn, pitch = deepcopy(rng), encoding.style.pitch_mm
+    surface = _worn(plan, scene, face, pitch, touch, rng)
+
+    def met(at: Touch) -> MetSurface:  # other places of the face have lost the same symbols
+        return MetSurface(
+            _worn(plan, scene, face, pitch, at, deepcopy(drawn)), at, scene, elsewhere=met
+        )
+
+    return MetSurface(surface, touch, scene, elsewhere=met)
+
+
+def _met_at(
+    surface_at: Callable[[Touch], HeightMap], touch: Touch, face: Scene | None
+) -> MetSurface:
+    """Return what a touch meets of a surface that may depend on where it is touched."""
+    return MetSurface(
+        surface_at(touch), touch, face, elsewhere=lambda at: _met_at(surface_at, at, face)
+    )
+
+
+def _worn(
+    plan: TouchPlan, scene: Scene, face: EncodedFace, pitch_mm: float, touch: Touch,
+    rng: np.random.Generator,
+) -> HeightMap:  # fmt: skip
+    """Return a face of which a share of the symbols is gone."""
     surface = scene.under(touch).surface
-    if plan.kind == "worn" and isinstance(surface, FaceSurface):
-        surface = wear_face(surface, plan.worn, rng)
-    elif plan.kind == "worn":
-        at, turn, pitch = face.centres_mm, face.rotation_rad, encoding.style.pitch_mm
-        surface = wear_part(surface, at, turn, pitch, plan.worn, rng)
-    return MetSurface(surface, touch, scene)
+    if isinstance(surface, FaceSurface):
+        return wear_face(surface, plan.worn, rng)
+    return wear_part(surface, face.centres_mm, face.rotation_rad, pitch_mm, plan.worn, rng)
 
 
 def _lay_beside(
@@ -168,7 +229,11 @@ def _lay_beside(
     place, at = lay_beside(scene.region, second.region, rng)
     touch = replace(_draw_anywhere(rng, ranges), x_mm=float(at[0]), y_mm=float(at[1]))
     surface = SideBySide(scene.surface, second.surface, place)
-    return MetSurface(surface, touch, scene, (second, place.touch_inside(touch)))
+
+    def met(at: Touch) -> MetSurface:
+        return MetSurface(surface, at, scene, (second, place.touch_inside(at)), met)
+
+    return met(touch)
 
 
 @lru_cache(maxsize=8)

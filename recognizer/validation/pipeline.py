@@ -32,6 +32,7 @@ from recognizer.validation.errors import ValidationError
 from recognizer.validation.extremes import extremes
 from recognizer.validation.files import write_json, write_text
 from recognizer.validation.flat_faces import flat_objects
+from recognizer.validation.policy import POLICY_NAMES
 from recognizer.validation.precision import contact_study, decoder_study, reader_study
 from recognizer.validation.progress import TouchProgress
 from recognizer.validation.provenance import circumstances, judging_limits, provenance
@@ -75,6 +76,7 @@ class CampaignOptions:
     faults: str = ""
     engine: str = ""
     sensor_per: str = ""
+    policy: str = ""
     study: int | None = None
     shard: int | None = None
 
@@ -94,6 +96,7 @@ def validate(
     prints: str | Path = "",
     engine: str = "",
     sensor_per: str = "",
+    policy: str = "",
     study: int | None = None,
     shard: int | None = None,
     seed: int | None = None,
@@ -131,6 +134,9 @@ def validate(
         Of contact: `own`, or `mujoco` (extra `engines`), which knows tabs alone.
     sensor_per
         `touch`: every touch is felt by another sensor; `run`: all by one, whose errors stay.
+    policy
+        `one`: every touch by itself; `next`: where it is not answered, touches follow where the
+        answer proposes, up to three, read as one belief.
     study
         Touches of each reader in the picture of error against run time; 0: none.
     shard
@@ -166,7 +172,7 @@ def validate(
     named = [Path(spec) for spec in ([specs] if isinstance(specs, str | Path) else specs)]
     place, steps = Path(folder), progress or TouchProgress()
     options = CampaignOptions(touches, seed, kinds, levels, overlay, surfaces, print_profile,
-                              faults, engine, sensor_per, study, shard)  # fmt: skip
+                              faults, engine, sensor_per, policy, study, shard)  # fmt: skip
     known = resume and (place / RECORD).exists()
     campaign = _campaign(options, read_record(place).campaign if known else None)
     printed = campaign.surfaces == PRINTED
@@ -215,6 +221,7 @@ def _campaign(options: CampaignOptions, known: Campaign | None) -> Campaign:
         (options.surfaces, SURFACES, "--surfaces"),
         (options.engine, tuple(ENGINES), "--engine"),
         (options.sensor_per, ("touch", "run"), "--sensor-per"),
+        (options.policy, POLICY_NAMES, "--policy"),
     ):
         if given and given not in allowed:
             raise ValidationError(
@@ -235,6 +242,7 @@ def _campaign(options: CampaignOptions, known: Campaign | None) -> Campaign:
         faults=options.faults or base.faults,
         engine=options.engine or base.engine,
         sensor_per=options.sensor_per or base.sensor_per,
+        policy=options.policy or base.policy,
         study=study if options.study is None else options.study,
         shard=base.shard if options.shard is None else options.shard,
     )

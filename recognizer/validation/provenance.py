@@ -90,6 +90,8 @@ def command_of(record: RunRecord) -> str:
         words += ["--overlay", campaign.overlay]
     if campaign.engine != plain.engine:
         words += ["--engine", campaign.engine]
+    if campaign.policy != plain.policy:
+        words += ["--policy", campaign.policy]
     if campaign.sensor_per != plain.sensor_per:
         words += ["--sensor-per", campaign.sensor_per]
     if campaign.surfaces != plain.surfaces:

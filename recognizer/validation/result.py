@@ -63,6 +63,8 @@ class ValidationResult:
     fair_right: int  #: of these, how many are answered right
     bounds: tuple[ValidationBound, ...]
     folder: Path  #: with report.html, results.json and trials.parquet
+    faces: int = 0  #: touches of registered faces that were followed (policy `next`)
+    within: tuple[int, ...] = ()  #: of these, right at once, within two touches, within three
 
     def __str__(self) -> str:
         head = (
@@ -70,6 +72,9 @@ class ValidationResult:
             f"{self.rejected:,} rejected; pose {_size(self.rms_mm, 'mm')}, "
             f"{_size(self.rms_deg, 'degrees')} rms ({self.seconds:.1f} s)"
         )
+        if self.within:
+            shares = (f"{count:,} within {n}" for n, count in enumerate(self.within, start=1))
+            head += f"\n  right of {self.faces:,} touches of registered faces: {', '.join(shares)}"
         return "\n".join([head, *(f"  {bound.state}: {bound}" for bound in self.bounds)])
 
     @property
@@ -81,7 +86,8 @@ class ValidationResult:
         """Return what `validate-set --json` prints."""
         names = ("touches", "right", "wrong", "rejected", "rms_mm", "rms_deg", "seconds")
         values = {name: getattr(self, name) for name in names}
-        return values | {"folder": str(self.folder), "holds": self.holds}
+        within = {"faces": self.faces, "within": list(self.within)} if self.within else {}
+        return values | within | {"folder": str(self.folder), "holds": self.holds}
 
     def exit_code(self, fail_under: float | None) -> int:
         """Return 1 if a touch was answered wrong or too few were answered right, in percent."""
@@ -94,6 +100,7 @@ class ValidationResult:
 def result_from(results: dict[str, Any], seconds: float, folder: Path) -> ValidationResult:
     """Return what a run found, from its `results.json`."""
     totals, fair = results["totals"], results["enough"]
+    followed = results.get("policy", [{"touches": 0, "within": []}])[0]
     return ValidationResult(
         touches=totals["touches"],
         right=totals["right"],
@@ -106,6 +113,8 @@ def result_from(results: dict[str, Any], seconds: float, folder: Path) -> Valida
         fair_right=fair["right"],
         bounds=tuple(map(bound_from, results["verdict"])),
         folder=folder,
+        faces=followed["touches"],
+        within=tuple(share["count"] for share in followed["within"]),
     )
 
 

@@ -19,13 +19,15 @@ import numpy as np
 from recognizer.validation.bounds import HOLDS, state_of
 from recognizer.validation.campaign import Campaign
 from recognizer.validation.lines import Columns, Mask, face_is_bad, line_of
-from recognizer.validation.settings import LIMITS
+from recognizer.validation.policy import NEXT
+from recognizer.validation.settings import LIMITS, POLICIES
 from recognizer.validation.statistics import (
     calibration,
     inside_of,
     quantiles_of,
     rms,
     round_digits,
+    share_of,
 )
 from recognizer.validation.trial import REJECTED, RIGHT, WRONG
 from recognizer.validation.worlds import names_in, worlds_of
@@ -60,7 +62,8 @@ def results_of(rows: Columns, campaign: Mapping[str, Any] | None = None) -> dict
     fair = np.asarray(rows["enough"], bool)
     inside = kinds == "face"
     everything = np.ones(len(kinds), bool)
-    return {
+    policy = {"policy": _until_answered(rows, asked)} if asked.get("policy") == NEXT else {}
+    return policy | {
         "format": FORMAT,
         "totals": line_of(rows, everything),
         "enough": line_of(rows, fair),
@@ -92,6 +95,31 @@ def results_of(rows: Columns, campaign: Mapping[str, Any] | None = None) -> dict
         "margins": _margins(rows),
         "worst": _worst_touches(rows, fair),
     }
+
+
+def _until_answered(rows: Columns, asked: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return how many touches it took until one was answered right, by kind; all faces first."""
+    right = rows["verdict"] == RIGHT
+    registered = rows["object"] != ""
+    found = []
+    masks = [("all faces", registered)]
+    masks += [(kind, rows["kind"] == kind) for kind in names_in(rows["kind"], asked["kinds"])]
+    for kind, where in masks:
+        within = [
+            share_of(int((where & right & (rows["touches"] <= n)).sum()), int(where.sum()))
+            for n in range(1, POLICIES.most + 1)
+        ]
+        made = rows["touches"][where]
+        found.append(
+            {
+                "kind": kind,
+                "touches": int(where.sum()),
+                "within": within,
+                "wrong": int((where & (rows["verdict"] == WRONG)).sum()),
+                "made": round_digits(float(made.mean())) if len(made) else None,
+            }
+        )
+    return found
 
 
 _INSIDE = ("force_n", "tilt_deg")  # shown for touches inside faces; the others for whole faces

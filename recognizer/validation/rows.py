@@ -43,6 +43,7 @@ COLUMNS: dict[str, str | int] = {
     "chi2": 4,
     "margin": 4,
     "noise": 6,
+    "touches": "whole",  #: until one was answered, or all that were made
     "drawn_anew": "text",  #: why touches before it were none, ` | ` between; usually empty
 }
 

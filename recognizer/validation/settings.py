@@ -35,6 +35,18 @@ class DrawSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class PolicySettings:
+    """How touches follow each other where one is not enough."""
+
+    most: int = 3  #: touches until one is answered
+    off_mm: float = 0.3  #: standard deviation of an arm's step, along x and along y
+    off_rad: float = math.radians(0.2)  #: of its turn
+    force: float = 0.1  #: of the logarithm of the force
+    tries: int = 4  #: tilts of the wrist that are drawn until the plate finds a rest
+    stream: int = 7  #: of random numbers, apart from those that draw the first touch
+
+
+@dataclass(frozen=True, slots=True)
 class MakeSettings:
     """What is made for kinds of touches that need objects of their own."""
 
@@ -107,3 +119,4 @@ class SharingSettings:
 
 DRAWING, JUDGING, LIMITS = DrawSettings(), JudgeSettings(), AcceptanceLimits()
 STUDIES, SHARING, MAKING = StudySettings(), SharingSettings(), MakeSettings()
+POLICIES = PolicySettings()

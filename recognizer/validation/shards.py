@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 SHARDS, TIMES = "shards", "times"
-ADDED = ("drawn_anew",)  #: columns that runs of before may lack
+ADDED = ("drawn_anew", "touches")  #: columns that runs of before may lack
 GROUP = 100_000  #: rows that a file holds together
 
 

@@ -1,13 +1,14 @@
 """One trial: draw a touch, simulate it, read it, compare.
 
-TouchPlan + number -> Trial. The reader gets the counts alone.
+TouchPlan + number -> Trial. The reader gets the counts alone; of a plan whose policy is `next` also
+the steps between touches, and what became of the trial is what the last touch said.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +16,8 @@ from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import Recognition
 from recognizer.validation.draw import DrawnTouch, TouchPlan, draw_touch
-from recognizer.validation.settings import JUDGING
+from recognizer.validation.policy import NEXT, touch_until_answered
+from recognizer.validation.settings import JUDGING, POLICIES
 
 RIGHT, WRONG, REJECTED = "right", "wrong", "rejected"
 
@@ -45,14 +47,32 @@ class Trial:
     noise: float
     seconds: float  #: CPU, of reading
     drawn_anew: str = ""  #: why the touch was drawn again, each time; ` | ` between
+    touches: int = 1  #: until one was answered, or all that were made
 
 
 def trial(plan: TouchPlan, number: int, reader: Reader) -> Trial:
-    """Return what became of one touch."""
+    """Return what became of one touch, or of those that followed it."""
+    if plan.policy == NEXT:
+        return _trial_of_several(plan, number, reader)
     found = draw_touch(plan, number, reader)
     start = time.process_time()
     answer = recognise(reader, reader.signal(found.counts), number)
     return judge(plan, number, found, answer, time.process_time() - start)
+
+
+def _trial_of_several(plan: TouchPlan, number: int, reader: Reader) -> Trial:
+    """Return what became of touches until one was answered: the first one's place, the last's fate.
+
+    A touch that is not answered is of the place of the first.
+    """
+    made = list(touch_until_answered(plan, number, reader, POLICIES.most))
+    spent = sum(one.seconds for one in made)
+    first, last = (judge(plan, number, one.found, one.answer, spent) for one in (made[0], made[-1]))
+    return replace(
+        first, verdict=last.verdict, reason=last.reason, answer=last.answer,
+        error_mm=last.error_mm, error_deg=last.error_deg, chi2=last.chi2, margin=last.margin,
+        noise=last.noise, touches=len(made),
+    )  # fmt: skip
 
 
 def judge(

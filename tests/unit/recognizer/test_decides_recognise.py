@@ -94,6 +94,7 @@ def reads(small, lab, monkeypatch):
 
         monkeypatch.setattr(recognizer.touch.recognise, "verify_hypotheses", found)
         monkeypatch.setattr(recognizer.touch.recognise, "expected_matches", matches)
+        monkeypatch.setattr(recognizer.touch.recognise, "propose_next", lambda *_: None)
         answer, judged = recognise_with_hypothesis(READER, signal, 7)
         assert answer.seq == 7
         assert tries == [READER.settings.first, READER.settings.thorough][: len(tries)]

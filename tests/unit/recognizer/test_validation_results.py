@@ -67,6 +67,21 @@ def columns(rows, tmp_path):
     return columns_of(read_series(tmp_path, series))
 
 
+def test_touches_until_answered_are_counted_by_kind(tmp_path):
+    made = [("right", 1), ("right", 2), ("right", 2), ("right", 3), ("rejected", 3), ("wrong", 2)]
+    rows = [row(i, verdict, touches=n) for i, (verdict, n) in enumerate(made)]
+    rows += [row(6, kind="edge", touches=2), foreign(7, touches=3)]
+    held, asked = columns(rows, tmp_path), asdict(Campaign(policy="next"))
+    found = {line["kind"]: line for line in results_of(held, asked)["policy"]}
+    assert [share["count"] for share in found["all faces"]["within"]] == [1, 4, 5]
+    assert [share["of"] for share in found["all faces"]["within"]] == [7, 7, 7]
+    assert [share["count"] for share in found["face"]["within"]] == [1, 3, 4]
+    assert [share["count"] for share in found["edge"]["within"]] == [0, 1, 1]
+    assert found["face"]["wrong"] == 1
+    assert found["face"]["made"] == pytest.approx(13 / 6, abs=1e-4)
+    assert "policy" not in results_of(held)
+
+
 def test_counts_confusion_and_worst(tmp_path):
     rows = [row(i) for i in range(6)]
     rows += [
