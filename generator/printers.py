@@ -28,6 +28,7 @@ class Printer:
     edge_min_mm: float  #: least distance from a symbol's foot to a face edge, mm
     overhang_max_rad: float  #: steepest overhang, from the vertical, that needs no support
     nozzle_mm: float = 0.0  #: 0 of resin printers
+    density_kg_m3: float = 1240.0  #: of its plastic, printed solid: PLA, or a usual resin
 
     @property
     def first_layer_mm(self) -> float:
@@ -52,7 +53,7 @@ PRINTERS: dict[str, Printer] = {
         Printer("fdm-0.8", "filament, 0.8 mm nozzle, 0.4 mm layers", (250.0, 210.0), 0.4, 1.6, 1.6,
                 0.8, 1.6, math.radians(45), 0.8),
         Printer("resin", "resin, 0.05 mm pixels and layers", (140.0, 85.0), 0.05, 0.4, 0.3, 0.1,
-                0.3, math.radians(60)),
+                0.3, math.radians(60), 0.0, 1180.0),
     )
 }  # fmt: skip
 

@@ -1,8 +1,8 @@
 """Lengths and angles as people write them.
 
 `40`, `40 mm`, `4 cm`, `1.6 in` -> mm; `10`, `10 deg`, `0.17 rad` -> radians (a bare
-angle is in degrees). Values are rounded to 1e-9 mm and 1e-12 rad, so that the same
-length in two units is the same number.
+angle is in degrees); `1.24 g/cm3`, `1240` -> kg/m3. Values are rounded to 1e-9 mm and 1e-12 rad,
+so that the same length in two units is the same number.
 """
 
 from __future__ import annotations
@@ -25,7 +25,11 @@ RADIANS = {
     "deg": math.pi / 180, "degree": math.pi / 180, "degrees": math.pi / 180, "°": math.pi / 180,
     "rad": 1.0,
 }  # fmt: skip
-SHOWN_UNITS = {"a length": "mm, cm, m, um, in", "an angle": "deg, rad"}
+KG_M3 = {"kg/m3": 1.0, "kg/m^3": 1.0, "g/cm3": 1000.0, "g/cm^3": 1000.0, "g/cc": 1000.0}
+DENSITY_MAX_KG_M3 = 25_000.0
+SHOWN_UNITS = {
+    "a length": "mm, cm, m, um, in", "an angle": "deg, rad", "a density": "kg/m3, g/cm3",
+}  # fmt: skip
 _QUANTITY = re.compile(
     r"\s*(?P<number>[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]{1,4})?)\s*"
     r"(?P<unit>[^\s0-9.,+-][^\s]{0,40})?\s*\Z"
@@ -66,6 +70,18 @@ def coordinate_mm(value: Any) -> float:
 def angle_rad(value: Any) -> float:
     """Return an angle, radians."""
     return round(_number(value, RADIANS, "deg", "an angle", "10, 10 deg or 0.17 rad"), 12) + 0.0
+
+
+def density_kg_m3(value: Any) -> float:
+    """Return a density above zero, kg/m3."""
+    density = round(_number(value, KG_M3, "kg/m3", "a density", "1240 or 1.24 g/cm3"), 6)
+    if not 0 < density <= DENSITY_MAX_KG_M3:
+        raise refuse(
+            f"a density must be above 0 and at most {DENSITY_MAX_KG_M3:g} kg/m3, "
+            f"not {density:g} kg/m3",
+            "write, for example, 1.24 g/cm3",
+        )
+    return density
 
 
 def sides(value: Any) -> Any:
@@ -131,6 +147,7 @@ def _shorten(text: str) -> str:
 
 _LENGTH_TEXT = r"^\s*[0-9.]+([eE][-+]?[0-9]+)?\s*(mm|cm|m|um|in|inch|inches)?\s*$"
 _COORDINATE_TEXT = r"^\s*[-+]?[0-9.]+([eE][-+]?[0-9]+)?\s*(mm|cm|m|um|in|inch|inches)?\s*$"
+_DENSITY_TEXT = r"^\s*[0-9.]+([eE][-+]?[0-9]+)?\s*(kg/m\^?3|g/cm\^?3|g/cc)?\s*$"
 _ANGLE_TEXT = r"^\s*[-+]?[0-9.]+([eE][-+]?[0-9]+)?\s*(deg|degree|degrees|°|rad)?\s*$"
 
 
@@ -148,3 +165,6 @@ LengthOrZero = Annotated[
 ]
 Coordinate = Annotated[float, BeforeValidator(coordinate_mm), _schema({}, _COORDINATE_TEXT)]
 Angle = Annotated[float, BeforeValidator(angle_rad), _schema({}, _ANGLE_TEXT)]
+Density = Annotated[
+    float, BeforeValidator(density_kg_m3), _schema({"exclusiveMinimum": 0}, _DENSITY_TEXT)
+]

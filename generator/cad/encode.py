@@ -148,7 +148,8 @@ def encode(
     folder
         For the files; the spec's own or `out/NAME` if left out.
     formats
-        Of step, stl, 3mf, glb; the first three if left out, `()` for pictures alone.
+        Of step, stl, 3mf, glb, mjcf, urdf, sdf, usd; the first three if left out, `()` for
+        pictures alone.
     verify
         Read STEP and STL back by independent programs before anything is kept.
     replace

@@ -1,8 +1,9 @@
 """Parts -> files: everything that belongs to one object, staged to appear together.
 
 `NAME-F1.step`, `NAME-F1.stl`, ... one per part in its local origin; `NAME.3mf` and
-`NAME-prusaslicer.3mf` for each plate of the printer; `NAME.glb` assembled; `NAME.png`, the
-picture; `NAME-array.svg`, the faces on the array.
+`NAME-prusaslicer.3mf` for each plate of the printer; `NAME.glb` assembled; `NAME.xml`,
+`NAME.urdf`, `NAME.sdf` with their meshes and `NAME.usda` for robots; `NAME.png`, the picture;
+`NAME-array.svg`, the faces on the array.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from generator.export.atomic import StagedFile, Staging
 from generator.export.fit_check import FitReport, PanelFile, verify_fit
 from generator.export.glb import glb_bytes
 from generator.export.preview import preview_png
+from generator.export.robot.files import ROBOT_FORMATS, robot_files
+from generator.export.robot.model import robot_model
 from generator.export.slicer_settings import SlicerSettings, slicer_settings
 from generator.export.step import step_chunks
 from generator.export.stl import stl_chunks
@@ -29,7 +32,7 @@ from generator.pipeline.faces import FaceReport, face_reports
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress
 from generator.polyhedron import face_polygon
-from generator.solid import Part, emboss_whole, panels, prove_closed, triangles, volume
+from generator.solid import Mesh, Part, emboss_whole, panels, prove_closed, triangles, volume
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,9 +62,9 @@ def stage(
     plan, layout
         The object and its symbols.
     formats
-        Of step, stl, 3mf, glb; the pictures are always made.
+        Of step, stl, 3mf, glb, mjcf, urdf, sdf, usd; the pictures are always made.
     verify
-        Read STEP and STL back by independent programs before anything is kept.
+        Read files back by independent programs before anything is kept.
 
     Raises
     ------
@@ -117,6 +120,9 @@ def stage(
     if "glb" in formats:
         progress("writing the model", 0.8)
         staging.write(f"{spec.name}.glb", glb_bytes(spec.name, parts, meshes))
+    if not set(ROBOT_FORMATS).isdisjoint(formats):
+        progress("writing for robots", 0.82)
+        warnings += _stage_robot(plan, parts, meshes, formats, staging, verify=verify)
     progress("drawing", 0.85)
     size = np.ptp(plan.polyhedron.vertices, axis=0).tolist()
     faces = face_reports(plan, layout)
@@ -132,6 +138,30 @@ def settings_of(plan: ObjectPlan) -> SlicerSettings | None:
     panelled = spec.parts == "panels"
     change = spec.wall_mm if panelled and spec.colours > 1 else 0.0
     return slicer_settings(plan.printer, supports=not panelled, colour_change_mm=change)
+
+
+def _stage_robot(
+    plan: ObjectPlan,
+    parts: Sequence[Part],
+    meshes: Sequence[Mesh],
+    formats: Sequence[str],
+    staging: Staging,
+    *,
+    verify: bool,
+) -> tuple[str, ...]:
+    """Write what robots and simulators load; return what it lacks."""
+    spec = plan.spec
+    with errors_at(plan.located, "robot.collision, robot"):
+        model = robot_model(
+            spec.name, plan.polyhedron, parts, meshes, density_kg_m3=spec.density_kg_m3,
+            symbols_collide=spec.collision == "symbols",
+        )  # fmt: skip
+    written = [staging.write(name, content).staged for name, content in robot_files(model, formats)]
+    if verify:
+        from generator.export.robot.check import verify_robot  # loads what reads them
+
+        verify_robot(model, written)
+    return model.warnings
 
 
 def parts_of(plan: ObjectPlan, layout: Layout) -> tuple[tuple[Part, ...], tuple[str, ...]]:

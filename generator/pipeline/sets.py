@@ -22,6 +22,7 @@ from generator.database.read import read_layout, read_parts
 from generator.database.register import require_in_use
 from generator.database.transaction import read_transaction
 from generator.export.overview import can_draw
+from generator.export.robot.files import ROBOT_FORMATS
 from generator.pipeline.made import MadeObject, describe_object
 from generator.pipeline.make import Order, Product, make_at
 from generator.pipeline.parallel import Engines, Task, Workers
@@ -124,7 +125,12 @@ def _make(url: str, order: Order, place: ObjectPlacement) -> Product:
 
 
 def _intact_product(connection: Connection, order: Order) -> Product | None:
-    """Return the object if it is registered from the same spec and all its files stand."""
+    """Return the object if it is registered from the same spec and all its files stand.
+
+    What robots load is no part of a registered spec, so it is always written anew.
+    """
+    if not set(ROBOT_FORMATS).isdisjoint(order.formats):
+        return None
     plan, url = order.plan, connection.engine.url
     known = find_object(connection, plan.spec.name)
     if known is None or not known.same_spec(plan.meaning):

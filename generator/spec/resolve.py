@@ -127,6 +127,8 @@ def resolve(
         folder=Path(settings.output.folder or f"out/{_folder_name(settings.name)}"),
         database=settings.output.database or DATABASE,
         lab_key=settings.output.lab_key or "",
+        density_kg_m3=settings.robot.density or printer.density_kg_m3,
+        collision=settings.robot.collision,
     )
     if settings.copies == 1:
         return (spec,)

@@ -60,19 +60,22 @@ class ObjectSpec:
     wall_mm: float  #: thickness of panels
     gap_mm: float  #: between panels where they meet in the finished object
     printer: Printer
-    formats: tuple[str, ...]  #: of step, stl, 3mf, glb
+    formats: tuple[str, ...]  #: of step, stl, 3mf, glb, mjcf, urdf, sdf, usd
     folder: Path  #: for the files; relative to the current folder
     database: str  #: URL
     lab_key: str = ""  #: of the database, where the spec says it
     colours: int = 1  #: of the filament: 2 where it is changed for the symbols
+    density_kg_m3: float = 1240.0  #: of what is printed, for robots and simulators
+    collision: Literal["body", "symbols"] = "body"  #: what other bodies hit there
     array_key: str = ""  #: lab key that `encoding` was made from; empty: the published array
 
     @property
     def meaning(self) -> dict[str, Any]:
         """What a spec means, as plain values; equal specs mean the same object.
 
-        Comments, key order, units, names, folders, formats and the database do not count;
-        a default counts as if it had been written; a file counts by its content.
+        Comments, key order, units, names, folders, formats, the database and what robots are
+        told do not count; a default counts as if it had been written; a file counts by its
+        content.
         """
         gap = {} if self.gap_mm == GAP_MM else {"gap_mm": self.gap_mm}  # older specs had none
         style = {name: round(value, 9) for name, value in asdict(self.style).items()}

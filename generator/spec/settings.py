@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from encoded_objects.document.block import Block, PathText, whole_number
-from encoded_objects.document.quantity import Angle, Length, LengthOrZero, refuse
+from encoded_objects.document.quantity import Angle, Density, Length, LengthOrZero, refuse
 from generator.alphabet.known import ALPHABETS
 from generator.array.lab_key import read_lab_key
 from generator.errors import LabKeyError
@@ -30,7 +30,7 @@ COPIES_MAX = 1000
 SCHEMES = ("sqlite", "postgresql", "postgres", "postgresql+psycopg")  #: of databases
 
 ProfileName = Literal["one-touch", "thesis", "product", "large", "fine", "auto"]
-Format = Literal["step", "stl", "3mf", "glb"]
+Format = Literal["step", "stl", "3mf", "glb", "mjcf", "urdf", "sdf", "usd"]
 
 
 def version(value: Any) -> Any:
@@ -136,13 +136,22 @@ class Print(Block):
     """2: the filament is changed where the symbols begin (panels in PrusaSlicer)."""
 
 
+class Robot(Block):
+    """What robots and simulators are told of the object (formats mjcf, urdf, sdf, usd)."""
+
+    density: Density | None = None
+    """Of what is printed; the printer's plastic, all solid, if left out."""
+    collision: Literal["body", "symbols"] = "body"
+    """What other bodies hit: body, the plain shape as convex pieces; symbols, these too."""
+
+
 class Output(Block):
     """Where the result goes."""
 
     folder: PathText | None = None
     """Folder for the files, made if it is not there; out/NAME if left out."""
     formats: FormatList | None = None
-    """Files to write: step, stl, 3mf, glb; the first three if left out."""
+    """Files to write: step, stl, 3mf, glb, mjcf, urdf, sdf, usd; the first three if left out."""
     database: DatabaseUrl | None = None
     """Database that registers the cells: sqlite:///lab.db, postgresql://host/name."""
     lab_key: LabKey | None = None
@@ -165,6 +174,7 @@ class Defaults(Block):
     shows more places."""
     symbols: Symbols = Symbols()
     print: Print = Print()
+    robot: Robot = Robot()
     copies: Copies = 1
     """Copies with cells of their own, so that two of them are told apart."""
     output: Output = Output()

@@ -39,9 +39,13 @@ name: {name}
 #   gap: 0.14 mm         # between panels in the finished object
 #   printer: fdm-0.4     # encode-object printers lists them
 
+# robot:                 # what mjcf, urdf, sdf and usd files say
+#   density: 1.24 g/cm3
+#   collision: body      # body (the plain shape as convex pieces) | symbols (these too)
+
 # output:
 #   folder: out/{folder}
-#   formats: [step, stl, 3mf]        # and glb
+#   formats: [step, stl, 3mf]        # and glb, mjcf, urdf, sdf, usd
 #   database: sqlite:///lab.db       # or postgresql://host/name
 """
 

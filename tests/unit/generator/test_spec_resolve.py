@@ -218,10 +218,10 @@ def test_fixtures():
 
 
 def test_full_fixture_names_every_setting():
-    from generator.spec.settings import ObjectSettings, Output, Print, Symbols
+    from generator.spec.settings import ObjectSettings, Output, Print, Robot, Symbols
 
     text = (FIXTURES / "specs/full.yaml").read_text()
-    blocks = (ObjectSettings, Symbols, Print, Output)
+    blocks = (ObjectSettings, Symbols, Print, Robot, Output)
     missing = {name for block in blocks for name in block.model_fields if f"{name}:" not in text}
     assert missing == set()
     one_touch = read_specs([FIXTURES / "cube.yaml"])[0].spec

@@ -95,7 +95,8 @@ def test_options():
         format_option("step,stel,dwg")
     assert str(caught.value) == (
         "--format: error: unknown format 'stel'\n  fix: did you mean 'stl'?\n\n"
-        "--format: error: unknown format 'dwg'\n  fix: choose from step,stl,3mf,glb"
+        "--format: error: unknown format 'dwg'\n  fix: choose from step,stl,3mf,glb,mjcf,"
+        "urdf,sdf,usd"
     )
     with pytest.raises(SpecError, match="no format is named"):
         format_option(" , ")

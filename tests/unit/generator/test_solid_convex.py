@@ -1,0 +1,104 @@
+"""Convex pieces and inertia, against shapes whose pieces and moments are known by hand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from manifold3d import Manifold
+
+from generator.errors import SolidError
+from generator.export.robot.text import numbers, quaternion, roll_pitch_yaw
+from generator.solid.convex import ConvexSettings, convex_pieces
+from generator.solid.inertia import inertia_of
+
+
+def mesh_of(body: Manifold):
+    mesh = body.to_mesh64()
+    return np.array(mesh.vert_properties), np.array(mesh.tri_verts, np.int64)
+
+
+def volumes(found):
+    return [inertia_of(points[index]).volume for points, index in found.pieces]
+
+
+def box(x, y, z, at=(0, 0, 0)):
+    return Manifold.cube((x, y, z)).translate(at)
+
+
+def test_a_convex_body_is_its_own_piece():
+    found = convex_pieces(*mesh_of(box(3, 4, 5)))
+    assert volumes(found) == pytest.approx([60])
+    assert found.depth_mm == 0
+
+
+def test_a_channel_comes_apart_in_three_boxes():
+    """The two sides meet nothing but the floor: no membrane holds them together."""
+    found = convex_pieces(*mesh_of(box(10, 10, 10) - box(10, 4, 5, (0, 3, 5))))
+    assert volumes(found) == pytest.approx([500, 150, 150], rel=1e-6)
+    assert found.depth_mm == 0
+
+
+def test_bodies_apart_are_pieces_of_their_own():
+    found = convex_pieces(*mesh_of(box(2, 2, 2) + box(3, 3, 3, (9, 0, 0))))
+    assert volumes(found) == pytest.approx([27, 8])
+
+
+def test_a_ring_is_cut_until_no_piece_stands_out_far():
+    ring = Manifold.cylinder(10, 20, circular_segments=48)
+    ring -= Manifold.cylinder(10, 15, circular_segments=48)
+    for depth in (2.0, 0.5):
+        found = convex_pieces(*mesh_of(ring), ConvexSettings(depth_mm=depth))
+        assert found.depth_mm <= depth
+        assert ring.volume() < sum(volumes(found)) < ring.volume() * (1 + depth / 5)
+    coarse = convex_pieces(*mesh_of(ring), ConvexSettings(most=3))
+    assert 3 <= len(coarse.pieces) <= 4  # the last cut may leave more than two
+    assert coarse.depth_mm > 2
+
+
+def test_slivers_are_left_out():
+    found = convex_pieces(*mesh_of(box(10, 10, 10) + box(10, 0.01, 3, (0, 10, 0))))
+    assert len(convex_pieces(*mesh_of(box(9, 9, 0.01))).pieces) == 1  # never nothing
+    assert min(volumes(found)) > 1
+
+
+def test_triangles_that_close_no_body_are_refused():
+    points, index = mesh_of(box(1, 1, 1))
+    with pytest.raises(SolidError, match="close no body"):
+        convex_pieces(points, index[1:])
+
+
+def test_inertia_of_a_box_off_the_origin():
+    points, index = mesh_of(box(2, 4, 6, (100, -50, 7)))
+    found = inertia_of(points[index])
+    assert found.volume == pytest.approx(48)
+    assert found.centre == pytest.approx([101, -48, 10])
+    expected = 48 / 12 * np.diag([16 + 36, 4 + 36, 4 + 16])
+    assert np.abs(found.tensor - expected).max() < 1e-9
+
+
+def test_inertia_of_a_turned_box_has_products():
+    points, index = mesh_of(box(2, 4, 6).rotate((0, 0, 30)))
+    c, s = math.cos(math.pi / 6), math.sin(math.pi / 6)
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    expected = turn @ np.diag([208.0, 160.0, 80.0]) @ turn.T
+    assert np.abs(inertia_of(points[index]).tensor - expected).max() < 1e-9
+
+
+@pytest.mark.parametrize("pitch", [0.0, 0.4, math.pi / 2, -math.pi / 2, 1.5])
+def test_rotations_as_angles_and_quaternions(pitch):
+    from scipy.spatial.transform import Rotation
+
+    for roll in (0.0, 0.7, -2.0, math.pi):
+        for yaw in (0.0, 1.1, -3.0):
+            R = Rotation.from_euler("xyz", [roll, pitch, yaw]).as_matrix()
+            again = Rotation.from_euler("xyz", roll_pitch_yaw(R)).as_matrix()
+            assert np.abs(again - R).max() < 1e-12
+            w, x, y, z = quaternion(R)
+            assert w >= 0
+            assert np.abs(Rotation.from_quat([x, y, z, w]).as_matrix() - R).max() < 1e-12
+
+
+def test_numbers_are_short_and_zero_has_no_sign():
+    assert numbers([0.03, -0.0, 1e-18, -2.5e-7, 1 / 3]) == "0.03 0 0 -2.5e-07 0.333333333333333"
