@@ -73,6 +73,10 @@ def encode(
         bool, typer.Option("--verify", help="Read every file back and prove it (needs the cad and "
                                             "mesh extras)."),
     ] = False,
+    slice_plates: Annotated[
+        bool, typer.Option("--slice", help="Slice the plates with PrusaSlicer: time and filament "
+                                           "on the build sheet."),
+    ] = False,
     replace: Annotated[
         bool, typer.Option("--replace", help="Allow a changed spec under a registered name."),
     ] = False,
@@ -116,7 +120,8 @@ def encode(
         if print_profile or print_faults:
             raise typer.BadParameter("print profile and faults need --printed-check")
         _make(specs, folder, formats, database, lab_key=lab_key, dry_run=dry_run,
-              verify=verify, replace=replace, jobs=jobs, as_json=as_json)  # fmt: skip
+              verify=verify, slice_plates=slice_plates, replace=replace, jobs=jobs,
+              as_json=as_json)  # fmt: skip
         return 0
 
     return action
@@ -131,6 +136,7 @@ def _make(
     lab_key: str,
     dry_run: bool,
     verify: bool,
+    slice_plates: bool,
     replace: bool,
     jobs: int | None,
     as_json: bool,
@@ -156,6 +162,7 @@ def _make(
             lab_key=lab_key,
             dry_run=dry_run,
             verify=verify,
+            slice_plates=slice_plates,
             replace=replace,
             progress=lambda what, share: bar.show(share, label=what),
             jobs=jobs,

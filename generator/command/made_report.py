@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from encoded_objects.console import output
+from generator.command.next_step import next_step
 from generator.command.promise_report import face_values, promise_lines
 from generator.database.url import without_password
 from generator.pipeline import Encoded, MadeObject
@@ -35,7 +36,7 @@ def print_made(result: Encoded, *, dry_run: bool, as_json: bool) -> None:
     output.write(
         f"\n{array}; registered in {without_password(result.database)} ({result.seconds:.1f} s)"
     )
-    if following := _next_step(result.objects):
+    if following := next_step(result):
         output.write(following)
 
 
@@ -83,19 +84,6 @@ def _file_list(folder: Path, files: tuple[Path, ...]) -> str:
         names[0] if len(names) == 1 else f"{len(names)} {kind.lstrip('.')} ({names[0]}, ...)"
         for kind, names in kinds.items()
     )
-
-
-def _next_step(objects: tuple[MadeObject, ...]) -> str:
-    """Return what a person does next: look, and print."""
-    files = [file for made in objects for file in made.files]
-    picture = next((file for file in files if file.suffix == ".png"), None)
-    printable = next((f for suffix in (".3mf", ".stl") for f in files if f.suffix == suffix), None)
-    steps = [f"open {picture}"] if picture else []
-    if printable:
-        twin = printable.with_name(f"{printable.stem}-prusaslicer.3mf")
-        name = f"{printable} (in PrusaSlicer {twin.name})" if twin in files else str(printable)
-        steps.append(f"print {name} as it lies, symbols up, 100 % scale")
-    return "next: " + ", then ".join(steps) if steps else ""
 
 
 def _count(count: int, thing: str) -> str:

@@ -44,6 +44,7 @@ def encode(
     lab_key: str = "",
     dry_run: bool = False,
     verify: bool = False,
+    slice_plates: bool = False,
     replace: bool = False,
     jobs: int | None = None,
     progress: Progress = no_progress,
@@ -67,6 +68,8 @@ def encode(
     verify
         Read STEP and STL back through the CAD kernel and the mesh library before anything
         is kept; needs the extras `cad` and `mesh`.
+    slice_plates
+        Slice the plates with the installed PrusaSlicer: time and filament on the build sheet.
     replace
         Allow a changed spec under a registered name; its old cells become free.
     jobs
@@ -106,13 +109,19 @@ def encode(
             made, used = _rehearse(connection, plans, replace, rest)
     else:
         orders = [
-            Order(plan, _folder(plan, folder, len(plans)), _formats(plan, formats), verify, replace)
+            Order(
+                plan, _folder(plan, folder, len(plans)), _formats(plan, formats), verify, replace,
+                slice_plates and len(plans) == 1,
+            )
             for plan in plans
-        ]
+        ]  # fmt: skip
         if len(orders) == 1:
             made = [make_under_lock(engine, orders[0], rest).made]
         else:
-            made, files = make_set(engine, url, orders, set_folder(orders, folder), jobs, rest)
+            made, files = make_set(
+                engine, url, orders, set_folder(orders, folder), jobs, rest,
+                slice_plates=slice_plates,
+            )  # fmt: skip
         with read_transaction(engine) as connection:
             used = occupancy(connection, plans[0].array).used
     array = plans[0].array

@@ -3,7 +3,7 @@
 `NAME-F1.step`, `NAME-F1.stl`, ... one per part in its local origin; `NAME.3mf` and
 `NAME-prusaslicer.3mf` for each plate of the printer; `NAME.glb` assembled; `NAME.xml`,
 `NAME.urdf`, `NAME.sdf` with their meshes and `NAME.usda` for robots; `NAME.png`, the picture;
-`NAME-array.svg`, the faces on the array.
+`NAME-build.html`, the build sheet; `NAME-array.svg`, the faces on the array.
 """
 
 from __future__ import annotations
@@ -31,7 +31,9 @@ from generator.pipeline.blame import errors_at
 from generator.pipeline.faces import FaceReport, face_reports
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress
+from generator.pipeline.sheet import SheetPlate, build_sheet
 from generator.polyhedron import face_polygon
+from generator.printed.sliced_plate import slice_plate
 from generator.solid import Mesh, Part, emboss_whole, panels, prove_closed, triangles, volume
 
 
@@ -53,6 +55,7 @@ def stage(
     staging: Staging,
     *,
     verify: bool,
+    slice_plates: bool = False,
     progress: Progress,
 ) -> StagedObject:
     """Build the parts of an object and write all its files into the staging folder.
@@ -65,6 +68,8 @@ def stage(
         Of step, stl, 3mf, glb, mjcf, urdf, sdf, usd; the pictures are always made.
     verify
         Read files back by independent programs before anything is kept.
+    slice_plates
+        Ask PrusaSlicer what printing takes, for the build sheet.
 
     Raises
     ------
@@ -105,13 +110,19 @@ def stage(
     if verify and len(panel_files) > 1:
         progress("putting the panels together", 0.7)
         fit = verify_fit(panel_files, spec.gap_mm)
+    on_sheet: list[SheetPlate] = []
     if "3mf" in formats:
         progress("arranging the bed", 0.7)
         plates = print_files(spec.name, parts, plan.printer.bed_mm, settings_of(plan))
         for number, plate in enumerate(plates, 1):
             suffix = f"-plate-{number}" if len(plates) > 1 else ""
             staging.write(f"{spec.name}{suffix}.3mf", plate.content)
-            staging.write(f"{spec.name}{suffix}-prusaslicer.3mf", plate.prusaslicer)
+            twin = staging.write(f"{spec.name}{suffix}-prusaslicer.3mf", plate.prusaslicer)
+            cost = None
+            if slice_plates:
+                progress(f"slicing plate {number}", 0.7)
+                cost = slice_plate(twin.staged)
+            on_sheet.append(SheetPlate(f"{spec.name}{suffix}.3mf", plate.plate, cost))
         large = [str(n) for n, plate in enumerate(plates, 1) if not plate.plate.fits]
         if large:
             width, depth = plan.printer.bed_mm
@@ -128,6 +139,8 @@ def stage(
     faces = face_reports(plan, layout)
     shares = {face.name: face.promise.at_once for face in faces if face.promise is not None}
     staging.write(f"{spec.name}.png", preview_png(spec.name, size, parts, meshes, shares))
+    page = build_sheet(plan, layout, parts, on_sheet)
+    staging.write(f"{spec.name}-build.html", page.encode())
     staging.write(f"{spec.name}-array.svg", _array_picture(plan, layout).encode())
     return StagedObject(tuple(registered), len(parts), warnings, faces, fit)
 

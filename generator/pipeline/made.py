@@ -9,6 +9,7 @@ from generator.array.touches import touches_needed
 from generator.export.fit_check import FitReport
 from generator.layout.placement import Layout
 from generator.pipeline.faces import FaceReport
+from generator.pipeline.overhang import overhang_of
 from generator.pipeline.plan import ObjectPlan
 
 
@@ -28,6 +29,7 @@ class MadeObject:
     touches: int = 1  #: about so many that overlap name a place; 1: no scan is needed
     face_reports: tuple[FaceReport, ...] = ()  #: of what was made or would be, face by face
     fit: FitReport | None = None  #: how its panels fit, where they were verified
+    lying: str | None = None  #: of a whole body: what is on the bed, what hangs over
 
     @property
     def folder(self) -> Path | None:
@@ -106,6 +108,7 @@ def describe_object(
         reused=reused,
         skipped=skipped,
         fit=fit,
+        lying=str(overhang_of(plan, layout)) if plan.spec.parts == "whole" else None,
         touches=touches_needed(
             plan.array.order, plan.array.rows * plan.array.columns, plan.spec.style.pitch_mm
         ),

@@ -36,6 +36,7 @@ class Order:
     formats: tuple[str, ...]
     verify: bool = False
     replace: bool = False
+    slice_plates: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +81,9 @@ def _stage(
     order: Order, place: ObjectPlacement, staging: Staging, progress: Progress
 ) -> StagedObject:
     return stage(
-        order.plan, place.layout, order.formats, staging, verify=order.verify, progress=progress
-    )
+        order.plan, place.layout, order.formats, staging, verify=order.verify,
+        slice_plates=order.slice_plates, progress=progress,
+    )  # fmt: skip
 
 
 def _register(

@@ -1,13 +1,15 @@
 """A set on the printer's bed: plates, a labelled overview, a packing list.
 
 Objects with their layouts -> `SET-plate-1.3mf`, `SET-plate-1-prusaslicer.3mf`, ...,
-`SET-overview.pdf`, `SET-packing.csv`. Objects for one printer share its plates. The packing list
-is made each time; where it is what stands there already, and all plates are there, they stay.
+`SET-build.html`, `SET-overview.pdf`, `SET-packing.csv`. Objects for one printer share its
+plates. The packing list is made each time; where it is what stands there already, and all plates
+are there, they stay.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,13 +18,18 @@ from generator.export.atomic import Staging
 from generator.export.bed import Plate, arrange_plates
 from generator.export.overview import can_draw, overview_pdf
 from generator.export.packing import PackedPart, packing_csv
+from generator.export.sheet.drawing import draw_boxes
+from generator.export.sheet.page import sheet_html
+from generator.export.sheet.values import BuildSheet
 from generator.export.slicer_settings import SlicerSettings
 from generator.export.threemf import PrintFile, print_file
+from generator.layout.object_code import object_code
 from generator.layout.placement import Layout
 from generator.pipeline.files import parts_of, settings_of
 from generator.pipeline.parallel import Task, Workers
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress, part_of_progress
+from generator.printed.sliced_plate import PlateCost, slice_plate
 from generator.printers import Printer
 from generator.solid import Part, box
 
@@ -57,9 +64,20 @@ class _SetPlate:
 
 
 def write_set(
-    objects: Sequence[SetObject], folder: Path, workers: Workers, progress: Progress
+    objects: Sequence[SetObject],
+    sheets: Sequence[Path],
+    folder: Path,
+    workers: Workers,
+    progress: Progress,
+    *,
+    slice_plates: bool = False,
 ) -> tuple[Path, ...]:
     """Write the files of a set; return their paths.
+
+    Parameters
+    ----------
+    sheets
+        The build sheet of each object.
 
     Raises
     ------
@@ -83,9 +101,10 @@ def write_set(
         if with_models
     ]
     overview = [f"{name}-overview.pdf"] if can_draw() else []
-    names = [f"{name}-packing.csv", *overview, *models]
-    if _same_files(folder, names, listed):
+    names = [f"{name}-packing.csv", f"{name}-build.html", *overview, *models]
+    if not slice_plates and _same_files(folder, names, listed):
         return tuple(folder / each for each in names)
+    costs: list[PlateCost | None] = [None] * len(plates)
     with Staging(folder) as staging:
         if with_models:
             contents = workers.done(
@@ -97,7 +116,13 @@ def write_set(
             )
             for number, content in enumerate(contents, 1):
                 staging.write(f"{name}-plate-{number}.3mf", content.content)
-                staging.write(f"{name}-plate-{number}-prusaslicer.3mf", content.prusaslicer)
+                file = f"{name}-plate-{number}-prusaslicer.3mf"
+                twin = staging.write(file, content.prusaslicer)
+                if slice_plates:
+                    progress(f"slicing plate {number}", 0.9)
+                    costs[number - 1] = slice_plate(twin.staged)
+        page = _set_sheet(name, objects, sheets, folder, plates, costs)
+        staging.write(f"{name}-build.html", page.encode())
         if overview:
             progress("drawing the overview", 0.9)
             beds = [plate.printer.bed_mm for plate in plates]
@@ -105,6 +130,58 @@ def write_set(
         staging.write(f"{name}-packing.csv", listed)  # last: it says that the others are there
         staging.commit()
     return tuple(folder / each for each in names)
+
+
+def _set_sheet(
+    name: str,
+    objects: Sequence[SetObject],
+    sheets: Sequence[Path],
+    folder: Path,
+    plates: Sequence[_SetPlate],
+    costs: Sequence[PlateCost | None],
+) -> str:
+    """Return the build sheet of a set: its plates, and the objects with their codes."""
+    drawings, lying = [], [list[str]() for _ in objects]
+    for number, (plate, cost) in enumerate(zip(plates, costs, strict=True), 1):
+        held = sorted({plate.parts[place.part].number for place in plate.plate.places})
+        for one in held:
+            lying[one].append(str(number))
+        what = f"{plate.printer.name}, {plate.printer.layer_mm:g} mm layers: " + ", ".join(
+            objects[one].plan.spec.name for one in held
+        )
+        drawings.append(
+            (
+                f"{name}-plate-{number}.3mf",
+                what + (f"; {cost}" if cost else ""),
+                draw_boxes(
+                    [(p.name, p.size_mm[:2]) for p in plate.parts],
+                    plate.plate,
+                    plate.printer.bed_mm,
+                ),
+            )
+        )
+    listed = tuple(
+        (
+            one.plan.spec.name,
+            object_code(one.layout, one.plan.array.rows, one.plan.array.columns),
+            ", ".join(on),
+            Path(os.path.relpath(sheet, folder)).as_posix(),
+        )
+        for one, sheet, on in zip(objects, sheets, lying, strict=True)
+    )
+    parts = sum(len(plate.plate.places) for plate in plates)
+    facts = [("objects", str(len(objects))), ("parts", str(parts)), ("plates", str(len(plates)))]
+    if plates and all(cost is not None for cost in costs):
+        minutes = sum(cost.minutes for cost in costs if cost)
+        grams = sum(cost.filament_g for cost in costs if cost)
+        facts.append(("printing", f"{minutes // 60} h {minutes % 60} min, {grams:.0f} g"))
+    note = (
+        "Every back names its object, or bears the object's short code: sort the parts by object "
+        "before anything is glued."
+    )
+    return sheet_html(
+        BuildSheet(name, tuple(facts), tuple(drawings), notes=(note,), objects=listed)
+    )
 
 
 def _name(objects: Sequence[SetObject]) -> str:

@@ -38,6 +38,8 @@ def make_set(
     folder: Path,
     jobs: int | None,
     progress: Progress,
+    *,
+    slice_plates: bool = False,
 ) -> tuple[list[MadeObject], tuple[Path, ...]]:
     """Make the objects of a set and what belongs to it as a whole.
 
@@ -51,6 +53,8 @@ def make_set(
         For plates, overview and packing list.
     jobs
         Processes; None for one on each processor, if there is enough to do.
+    slice_plates
+        Ask PrusaSlicer what printing takes, for the build sheet.
 
     Returns
     -------
@@ -81,7 +85,9 @@ def make_set(
     Engines.keep(url, engine)
     with Workers(jobs) as workers:
         found = workers.done(tasks, part_of_progress(progress, 0.1, 0.8))
-        return _write_whole(orders, products, numbers, found, folder, workers, progress)
+        return _write_whole(
+            orders, products, numbers, found, folder, workers, progress, slice_plates=slice_plates
+        )
 
 
 def _write_whole(
@@ -92,6 +98,8 @@ def _write_whole(
     folder: Path,
     workers: Workers,
     progress: Progress,
+    *,
+    slice_plates: bool,
 ) -> tuple[list[MadeObject], tuple[Path, ...]]:
     """Write what belongs to the set as a whole; return its objects in order and its files."""
     for number, product in zip(numbers, found, strict=True):
@@ -101,7 +109,11 @@ def _write_whole(
         SetObject(order.plan, product.placed.layout, order.formats)
         for order, product in zip(orders, done, strict=True)
     ]
-    files = write_set(objects, folder, workers, part_of_progress(progress, 0.8, 1.0))
+    sheets = [order.folder / f"{order.plan.spec.name}-build.html" for order in orders]
+    files = write_set(
+        objects, sheets, folder, workers, part_of_progress(progress, 0.8, 1.0),
+        slice_plates=slice_plates,
+    )  # fmt: skip
     made = [product.made for product in done]
     if not can_draw():
         notice = f"the set has no overview: matplotlib is not installed; {install_line('report')}"
@@ -146,7 +158,7 @@ def _intact_product(connection: Connection, order: Order) -> Product | None:
     if any(state.state != "ok" or state.path.parent != here for state in states):
         return None
     files += [state.path for state in states]
-    others = [f"{stem}.png", f"{stem}-array.svg"]
+    others = [f"{stem}.png", f"{stem}-build.html", f"{stem}-array.svg"]
     if "glb" in order.formats:
         others.append(f"{stem}.glb")
     if "3mf" in order.formats:

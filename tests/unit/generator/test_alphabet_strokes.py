@@ -7,8 +7,10 @@ import pytest
 from generator.alphabet import ALPHABETS, Counts, Glyph, alphabet_from, alphabet_named, counts
 from generator.alphabet.figures import FIGURES, figures_of, in_figures
 from generator.alphabet.known import line
+from generator.alphabet.outline import engrave
 from generator.alphabet.strokes import same_shape, turn_glyph
 from generator.errors import AlphabetError
+from generator.solid.settings import EMBOSS
 
 L, E, F, C = (2, 1), (3, 3), (3, 2), (2, 2)
 
@@ -110,3 +112,11 @@ def test_names_are_written_in_capitals_or_not_at_all():
     every = "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.+()"
     assert in_figures(every.lower()) == every == "".join(FIGURES[k].name for k in figures_of(every))
     assert [in_figures(text) for text in ("Bügel 1", "a:b", "\u7acb")] == ["BUGEL 1", None, None]
+
+
+@pytest.mark.parametrize("figure", FIGURES, ids=lambda figure: figure.name)
+def test_every_figure_is_engraved_in_every_size(figure):
+    for size in EMBOSS.mark_sizes:
+        for stroke in (0.4, 0.8, 1.6):
+            depth = EMBOSS.mark_depth * stroke
+            assert engrave(figure, size * stroke, stroke, depth).z_mm == (0.0, -depth)

@@ -105,7 +105,7 @@ def test_result_says_what_was_made_and_what_to_do_next(capsys):
     assert text.startswith("Cube: made; 6 faces, ")
     assert f"out{os.sep}cube{os.sep}  " in text
     assert "registered in sqlite:///lab.db" in text
-    assert "next: open out/cube/Cube.png, then print out/cube/Cube.3mf" in text
+    assert "next: open out/cube/Cube-build.html, then print out/cube/Cube.3mf" in text
     assert run([name]) == 0
     assert capsys.readouterr().out.startswith("Cube: registered before, same cells; 6 faces")
 

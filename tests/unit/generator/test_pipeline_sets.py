@@ -94,7 +94,7 @@ def test_the_next_run_makes_only_what_is_missing_or_changed(there):
     assert digests(there / "out") == before
 
 
-@pytest.mark.parametrize("lost", ["A-array.svg", "A-F1.stl"])
+@pytest.mark.parametrize("lost", ["A-array.svg", "A-build.html", "A-F1.stl"])
 def test_an_object_without_one_of_its_files_is_not_skipped(there, lost):
     (there / "out" / "A" / lost).unlink()
     again = run(there, jobs=1, formats=("stl", "3mf"))
@@ -119,7 +119,7 @@ def test_every_part_has_a_place_of_its_own_on_its_printers_bed(once):
     assert [row["part"] for row in listed[:6]] == [f"A-F{k}" for k in range(1, 7)]
     assert {row["printer"] for row in listed if row["object"] == "C"} == {"fdm-0.25"}
     plates = {row["plate"]: row["printer"] for row in listed}
-    names = {"lab-set-packing.csv", "lab-set-overview.pdf"}
+    names = {"lab-set-packing.csv", "lab-set-build.html", "lab-set-overview.pdf"}
     for plate in plates:
         names |= {f"lab-set-plate-{plate}.3mf", f"lab-set-plate-{plate}-prusaslicer.3mf"}
         boxes = np.array(

@@ -1,0 +1,197 @@
+"""The build sheet of an object: its parts, plates, gluing and check, from what was made.
+
+Plan + layout + parts + plates -> `NAME-build.html`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.export.bed import Plate
+from generator.export.sheet.drawing import draw_back, draw_front, draw_plate, draw_step, is_panel
+from generator.export.sheet.page import sheet_html
+from generator.export.sheet.values import BuildSheet, Check, GlueStep, PartCard, Rows
+from generator.layout.object_code import object_code
+from generator.layout.placement import FaceLayout, Layout
+from generator.pipeline.overhang import overhang_of
+from generator.pipeline.plan import ObjectPlan
+from generator.polyhedron import face_polygon
+from generator.polyhedron.assembly import AssemblyStep, assembly_order, telling_faces
+from generator.polyhedron.frame import face_frame
+from generator.printed.sliced_plate import PlateCost
+from generator.solid import Part, box, volume
+
+Floats = NDArray[np.float64]
+
+PLA_G_CM3 = 1.24
+PICTURES_MAX = 60  # steps of gluing that are drawn
+
+
+@dataclass(frozen=True, slots=True)
+class SheetPlate:
+    """One plate: its files, what lies where, and what printing costs where that is known."""
+
+    file: str
+    plate: Plate
+    cost: PlateCost | None = None
+
+
+def build_sheet(
+    plan: ObjectPlan, layout: Layout, parts: Sequence[Part], plates: Sequence[SheetPlate]
+) -> str:
+    """Return the page of one object."""
+    panelled = is_panel(parts[0])
+    code = object_code(layout, plan.array.rows, plan.array.columns)
+    sheet = BuildSheet(
+        title=plan.spec.name,
+        facts=_facts(plan, layout, code, parts, plates),
+        files=tuple(
+            (
+                plate.file,
+                f"{len(plate.plate.places)} part{'s' * (len(plate.plate.places) != 1)}"
+                + (f"; {plate.cost}" if plate.cost else ""),
+                draw_plate(parts, plate.plate, plan.printer.bed_mm),
+            )
+            for plate in plates
+        ),
+        cards=tuple(_card(plan, part, face) for face, part in enumerate(parts)) if panelled else (),
+        steps=_steps(plan) if panelled else (),
+        checks=_checks(plan, layout),
+    )
+    return sheet_html(sheet)
+
+
+def _facts(
+    plan: ObjectPlan,
+    layout: Layout,
+    code: str,
+    parts: Sequence[Part],
+    plates: Sequence[SheetPlate],
+) -> Rows:
+    spec, printer = plan.spec, plan.printer
+    solid_cm3 = sum(volume(part) for part in parts) / 1000
+    layers = f"{printer.layer_mm:g} mm, the first {printer.first_layer_mm:g} mm"
+    lies = "every panel on its back, symbols up; no supports"
+    if not is_panel(parts[0]):
+        lies = str(overhang_of(plan, layout))
+    rows = [
+        ("short code", code),
+        ("printer", f"{printer.name}: {printer.description}"),
+        ("layers", layers),
+        ("lies", lies),
+        ("scale", "100 %"),
+    ]
+    if spec.colours > 1 and is_panel(parts[0]):
+        rows.append(("colours", f"2: change the filament at {spec.wall_mm:g} mm"))
+    if printer.nozzle_mm:
+        rows.append(
+            ("material", f"PLA, {solid_cm3:.0f} cm3 in all; {solid_cm3 * PLA_G_CM3:.0f} g if solid")
+        )
+    else:
+        rows.append(("material", f"resin, {solid_cm3:.0f} ml in all"))
+    costs = [plate.cost for plate in plates if plate.cost is not None]
+    if len(costs) == len(plates):
+        minutes = sum(cost.minutes for cost in costs)
+        grams = sum(cost.filament_g for cost in costs)
+        rows.append(("printing", f"{minutes // 60} h {minutes % 60} min, {grams:.0f} g of PLA"))
+    return tuple(rows)
+
+
+def _card(plan: ObjectPlan, part: Part, face: int) -> PartCard:
+    polyhedron = plan.polyhedron
+    inverse = np.linalg.inv(part.T_object_part)
+    edges = []
+    for number, edge in enumerate(polyhedron.edges):
+        if face in (edge.left, edge.right):
+            ends = polyhedron.vertices[[edge.start, edge.end]]
+            edges.append((str(number + 1), (ends @ inverse[:3, :3].T + inverse[:3, 3])[:, :2]))
+    lines = [one.names[0].rpartition(" figure")[0] for one in part.embossings if one.face is None]
+    mark = " / ".join(line for line in lines if not line.isdecimal())
+    x, y, z = np.ptp(np.array(box(part)), axis=0).tolist()
+    size = f"{x:.1f} x {y:.1f} x {z:.1f} mm, {part.symbols} symbols"
+    return PartCard(part.name, mark or "no mark", size, draw_front(part, edges), draw_back(part))
+
+
+def _steps(plan: ObjectPlan) -> tuple[GlueStep, ...]:
+    polyhedron = plan.polyhedron
+    order = assembly_order(polyhedron)
+    names = [face.name for face in polyhedron.faces]
+    polygons = [
+        [polyhedron.vertices[list(loop)] for loop in face.loops] for face in polyhedron.faces
+    ]
+    kinds = [0] * len(names)
+    down = face_frame(polyhedron, order[0].face)[:3, 2]
+    found = []
+    for step in order:
+        kinds[step.face] = 2
+        normal = face_frame(polyhedron, step.face)[:3, 2]
+        drawing = ""
+        if len(order) <= PICTURES_MAX:
+            drawing = draw_step(polygons, kinds, names, _eye(down, normal))
+        found.append(GlueStep(_step_text(plan, step, names), drawing))
+        kinds[step.face] = 1
+    return tuple(found)
+
+
+def _step_text(plan: ObjectPlan, step: AssemblyStep, names: Sequence[str]) -> str:
+    name = names[step.face]
+    if not step.edges:
+        return f"Lay {name} on the table, symbols down."
+    others: dict[int, list[str]] = {}
+    for number in step.edges:
+        edge = plan.polyhedron.edges[number]
+        other = edge.left if edge.right == step.face else edge.right
+        others.setdefault(other, []).append(str(number + 1))
+    where = ", ".join(f"{names[face]} along {' and '.join(n)}" for face, n in others.items())
+    return f"Glue {name} to {where}."
+
+
+def _eye(down: Floats, normal: Floats) -> Floats:
+    """Return the view on an object that lies with `down` down: on a new face from in front."""
+    up = -down
+    side = normal - (normal @ up) * up
+    if np.linalg.norm(side) < 1e-6:
+        side = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
+    side = side / np.linalg.norm(side)
+    across = np.cross(up, side)
+    eye = 0.75 * side + 0.45 * across + 0.6 * up
+    eye = eye / np.linalg.norm(eye)
+    right = np.cross(up, eye)
+    right = right / np.linalg.norm(right)
+    return np.stack([right, np.cross(eye, right), eye])
+
+
+def _checks(plan: ObjectPlan, layout: Layout) -> tuple[Check, ...]:
+    round_faces = {surface.carrier for surface in plan.polyhedron.surfaces}
+    by_face = {
+        face.face: face
+        for face in layout.faces
+        if len(face.labels) and face.face not in round_faces | plan.blank_faces
+    }
+    numbers = {
+        (edge.start, edge.end): number + 1 for number, edge in enumerate(plan.polyhedron.edges)
+    }
+    found = []
+    for face in telling_faces(plan.polyhedron, sorted(by_face)):
+        name = plan.polyhedron.faces[face].name
+        loop = plan.polyhedron.faces[face].loops[0]
+        first = numbers.get((loop[0], loop[1])) or numbers[loop[1], loop[0]]
+        where = f"{name} in the middle"
+        answer = f"{plan.spec.name}, {name}, near cell {_middle_cell(plan, by_face[face])}"
+        if plan.spec.parts == "panels":
+            where += f", the sensor's lower side along edge {first}"
+            answer += ", turned by 0 degrees"
+        found.append(Check(where, answer))
+    return tuple(found)
+
+
+def _middle_cell(plan: ObjectPlan, face: FaceLayout) -> str:
+    """Return row and column of the symbol nearest to the middle of a face."""
+    outline = face_polygon(plan.polyhedron, face.face)[0]
+    middle = (outline.min(axis=0) + outline.max(axis=0)) / 2
+    nearest = int(np.argmin(np.round(((face.centres_mm - middle) ** 2).sum(axis=1), 6)))
+    return f"[{face.rows[nearest]}, {face.columns[nearest]}]"
