@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import json
 import struct
 import time
+from importlib import resources
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -401,10 +404,9 @@ def test_a_simulated_probe_as_asked():
 
 
 def test_a_probe_that_nobody_wants_is_let_go_and_comes_back():
-    feed = ProbeFeed("sim:?hz=100")
+    feed = ProbeFeed("sim:?rate=100")
     try:
-        while not feed.take(0.05):
-            pass
+        assert any(feed.take(0.05) for _ in range(200))
         assert feed.as_json()["state"] == "live"
         for _ in range(2):
             feed.rest(wanted=False)
@@ -412,8 +414,26 @@ def test_a_probe_that_nobody_wants_is_let_go_and_comes_back():
         assert feed.as_json()["state"] == "waiting"
         assert feed.as_json()["frames"] > 0
         feed.rest(wanted=True)
-        while not feed.take(0.05):
-            pass
+        assert any(feed.take(0.05) for _ in range(200))
         assert feed.as_json()["state"] == "live"
     finally:
         feed.close()
+
+
+# -- the page's files
+
+
+def test_the_page_is_built_of_its_sources():
+    bench = Path(str(resources.files("recognizer.bench")))
+    built = json.loads((bench / "static" / "built.json").read_text())
+    web, static = bench / "web", bench / "static"
+    named = {name: web / name for name in ("package-lock.json", "build.mjs")}
+    named |= {path.name: path for path in (web / "src").iterdir()}
+    for there, files in (
+        ("sources", named),
+        ("page", {path.name: path for path in static.iterdir() if path.name != "built.json"}),
+    ):
+        found = {
+            name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in files.items()
+        }
+        assert found == built[there], "npm ci && npm run build in recognizer/bench/web"
