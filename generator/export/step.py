@@ -1,4 +1,4 @@
-"""Part -> STEP text (AP214, mm), without a CAD kernel.
+"""Parts -> STEP text (AP214, mm), without a CAD kernel: one part, or panels as an assembly.
 
 Every symbol outline of an embossing is written once as a template of entities and stamped
 for each symbol, so that writing costs little more than copying. The text comes in pieces
@@ -13,12 +13,13 @@ ISO 10303-21 (text), -42 (geometry and topology), -46 (colour), -214 (applicatio
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.export.colours import SYMBOL_RGB
+from generator.export.colours import BODY_RGB, RGB, SYMBOL_RGB
 from generator.export.fixed_text import decimal_numbers, decimal_width, pad, stamp
 from generator.export.step_entities import (
     PLACES,
@@ -34,6 +35,8 @@ from generator.solid.emboss import turn
 from generator.solid.part import Embossing, Part
 
 _CHUNK_BYTES = 4_000_000
+_ASSEMBLY_ENTITIES = 40  # for each part, besides its own
+_FOOTER = b"ENDSEC;\nEND-ISO-10303-21;\n"
 _TIME_STAMP = "1970-01-01T00:00:00"
 
 
@@ -53,8 +56,60 @@ def step_chunks(part: Part) -> Iterator[bytes]:
     name = step_string(part.name)
     entities = Entities(_entities_at_most(part))
     yield _header(name)
-    units, origin = _units(entities), _origin(entities)
-    style = _style(entities)
+    shared = _shared(entities)
+    yield from _write_part(part, entities, shared, "")
+    yield _FOOTER
+
+
+def assembly_chunks(name: str, parts: Sequence[Part]) -> Iterator[bytes]:
+    """Yield the STEP text of an assembly: each part a product, placed by its `T_object_part`.
+
+    Parameters
+    ----------
+    name
+        Of the object.
+    parts
+        Closed parts, each in its own frame, mm.
+    """
+    entities = Entities(sum(map(_entities_at_most, parts)) + _ASSEMBLY_ENTITIES * len(parts))
+    yield _header(step_string(name))
+    shared = _shared(entities)
+    body = _style(entities, BODY_RGB)
+    held = []
+    for part in parts:
+        product = yield from _write_part(part, entities, shared, body)
+        held.append((part, product))
+    _assembly(entities, step_string(name), shared, held)
+    yield entities.taken()
+    yield _FOOTER
+
+
+@dataclass(frozen=True, slots=True)
+class _Shared:
+    """What all parts of a file refer to."""
+
+    units: str
+    origin: str
+    symbols: str  #: style of symbols
+
+
+@dataclass(frozen=True, slots=True)
+class _Product:
+    """References to a product."""
+
+    definition: str
+    shape: str
+
+
+def _shared(entities: Entities) -> _Shared:
+    return _Shared(_units(entities), _origin(entities), _style(entities, SYMBOL_RGB))
+
+
+def _write_part(
+    part: Part, entities: Entities, shared: _Shared, body_style: str
+) -> Generator[bytes, None, _Product]:
+    """Write one part and the product that it is the shape of."""
+    name, units, style = step_string(part.name), shared.units, shared.symbols
     body = _StepBody(part, entities)
     shell: list[NDArray[np.int64]] = []
     coloured: list[NDArray[np.int64]] = []
@@ -67,16 +122,18 @@ def step_chunks(part: Part) -> Iterator[bytes]:
     yield f"#{number}=CLOSED_SHELL('',(\n".encode("ascii")
     yield from numbers_listed(np.concatenate(shell), entities.width)
     yield b"));\n"
-    _product(
-        entities, name, entities.add(f"MANIFOLD_SOLID_BREP('{name}',#{number})"), units, origin
-    )
+    solid = entities.add(f"MANIFOLD_SOLID_BREP('{name}',#{number})")
+    if body_style:
+        coloured.append(np.array([entities.next]))
+        entities.add(f"STYLED_ITEM('',({body_style}),{solid})")
+    product = _product(entities, name, solid, units, shared.origin)
     yield entities.taken()
     if any(map(len, coloured)):
         head = f"#{entities.reserve(1)}=MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION"
         yield f"{head}('',(\n".encode("ascii")
         yield from numbers_listed(np.concatenate(coloured), entities.width)
         yield f"),{units});\n".encode("ascii")
-    yield b"ENDSEC;\nEND-ISO-10303-21;\n"
+    return product
 
 
 def _header(name: str) -> bytes:
@@ -111,9 +168,9 @@ def _origin(entities: Entities) -> str:
     )
 
 
-def _style(entities: Entities) -> str:
-    """Write the colour of symbols; return the style that its faces refer to."""
-    rgb = ",".join(f"{value / 255:.6f}" for value in SYMBOL_RGB)
+def _style(entities: Entities, colour_rgb: RGB) -> str:
+    """Write a colour; return the style that faces of that colour refer to."""
+    rgb = ",".join(f"{value / 255:.6f}" for value in colour_rgb)
     colour = entities.add(f"COLOUR_RGB('',{rgb})")
     fill = entities.add(f"FILL_AREA_STYLE_COLOUR('',{colour})")
     area = entities.add(f"FILL_AREA_STYLE('',({fill}))")
@@ -246,10 +303,16 @@ def _wrapped_colour(
     return np.array(numbers, np.int64)
 
 
-def _product(entities: Entities, name: str, solid: str, units: str, origin: str) -> None:
+def _product(entities: Entities, name: str, solid: str, units: str, origin: str) -> _Product:
     """Write the product that the solid is the shape of."""
     add = entities.add
     shape = add(f"ADVANCED_BREP_SHAPE_REPRESENTATION('{name}',({origin},{solid}),{units})")
+    return _product_of(entities, name, shape)
+
+
+def _product_of(entities: Entities, name: str, shape: str) -> _Product:
+    """Write the product that a representation is the shape of."""
+    add = entities.add
     application = add("APPLICATION_CONTEXT('automotive design')")
     add(
         "APPLICATION_PROTOCOL_DEFINITION('international standard','automotive_design',"
@@ -263,6 +326,38 @@ def _product(entities: Entities, name: str, solid: str, units: str, origin: str)
     definition = add(f"PRODUCT_DEFINITION('design','',{formation},{design})")
     definition_shape = add(f"PRODUCT_DEFINITION_SHAPE('','',{definition})")
     add(f"SHAPE_DEFINITION_REPRESENTATION({definition_shape},{shape})")
+    return _Product(definition, shape)
+
+
+def _assembly(
+    entities: Entities, name: str, shared: _Shared, held: Sequence[tuple[Part, _Product]]
+) -> None:
+    """Write the product that holds all parts, each where it belongs (ISO 10303-44, -43)."""
+    add = entities.add
+    places = [_placement(entities, part.T_object_part) for part, _ in held]
+    items = reference_list([shared.origin, *places])
+    whole_shape = add(f"SHAPE_REPRESENTATION('{name}',({items}),{shared.units})")
+    whole = _product_of(entities, name, whole_shape)
+    for number, ((part, product), place) in enumerate(zip(held, places, strict=True), 1):
+        own = step_string(part.name)
+        use = add(
+            f"NEXT_ASSEMBLY_USAGE_OCCURRENCE('{number}','{own}','',{whole.definition},"
+            f"{product.definition},$)"
+        )
+        of_use = add(f"PRODUCT_DEFINITION_SHAPE('','',{use})")
+        motion = add(f"ITEM_DEFINED_TRANSFORMATION('','',{shared.origin},{place})")
+        relation = add(
+            f"(REPRESENTATION_RELATIONSHIP('','',{product.shape},{whole_shape})"
+            f"REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION({motion})"
+            "SHAPE_REPRESENTATION_RELATIONSHIP())"
+        )
+        add(f"CONTEXT_DEPENDENT_SHAPE_REPRESENTATION({relation},{of_use})")
+
+
+def _placement(entities: Entities, T: NDArray[np.float64]) -> str:
+    point = entities.add(f"CARTESIAN_POINT('',{triple(np.round(T[:3, 3], PLACES), PLACES)})")
+    z, x = entities.direction(T[:3, 2]), entities.direction(T[:3, 0])
+    return entities.add(f"AXIS2_PLACEMENT_3D('',{point},{z},{x})")
 
 
 def _entities_at_most(part: Part) -> int:

@@ -1,6 +1,7 @@
 """Parts -> files: everything that belongs to one object, staged to appear together.
 
-`NAME-F1.step`, `NAME-F1.stl`, ... one per part in its local origin; `NAME.3mf` and
+`NAME-F1.step`, `NAME-F1.stl`, ... one per part in its local origin; `NAME.step`, the panels as an
+assembly; `NAME.3mf` and
 `NAME-prusaslicer.3mf` for each plate of the printer; `NAME.glb` assembled; `NAME.xml`,
 `NAME.urdf`, `NAME.sdf` with their meshes and `NAME.usda` for robots; `NAME.png`, the picture;
 `NAME-build.html`, the build sheet; `NAME-array.svg`, the faces on the array.
@@ -22,7 +23,7 @@ from generator.export.preview import preview_png
 from generator.export.robot.files import ROBOT_FORMATS, robot_files
 from generator.export.robot.model import robot_model
 from generator.export.slicer_settings import SlicerSettings, slicer_settings
-from generator.export.step import step_chunks
+from generator.export.step import assembly_chunks, step_chunks
 from generator.export.stl import stl_chunks
 from generator.export.threemf import print_files
 from generator.layout.object_code import object_code
@@ -106,6 +107,9 @@ def stage(
                 step=step.staged if step else None,
                 stl=stl.staged if stl else None,
             )
+    if "step" in formats and len(parts) > 1:
+        progress("writing the assembly", 0.7)
+        staging.write(f"{spec.name}.step", assembly_chunks(spec.name, parts))
     fit = None
     if verify and len(panel_files) > 1:
         progress("putting the panels together", 0.7)

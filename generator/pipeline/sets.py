@@ -159,6 +159,8 @@ def _intact_product(connection: Connection, order: Order) -> Product | None:
         return None
     files += [state.path for state in states]
     others = [f"{stem}.png", f"{stem}-build.html", f"{stem}-array.svg"]
+    if "step" in order.formats and len({state.part.name for state in states}) > 1:
+        others.append(f"{stem}.step")
     if "glb" in order.formats:
         others.append(f"{stem}.glb")
     if "3mf" in order.formats:
