@@ -4,13 +4,14 @@
 
     EncodedObjectsError       exit code 2
     └── ProbeError
-        ├── FrameError        an image that is not 16x16 readings
+        ├── FrameError        an image that is no matrix of readings
         ├── PortError         exit code 3: no such device, busy, gone, or not our probe
         ├── RecordingError    a file that is no recording, damaged, or of a newer format
         ├── CalibrationError  too few loads, loads that do not determine the law
         ├── SurfaceError      a mesh or a face that gives no height map
         ├── ContactError      a scene without an equilibrium, or out of a model's range
         ├── CircuitError      a network that cannot be read or inverted as asked
+        ├── SensorTypeError   probe.sensor_types: no such type, or a file that tells none
         └── PoseError         wrist or arm outside its range, or near a singularity
 
 Every error says what was given, what is allowed, and the way out (`fix`).
@@ -26,7 +27,7 @@ class ProbeError(EncodedObjectsError):
 
 
 class FrameError(ProbeError):
-    """An image that is not 16x16 readings of the ADC's range."""
+    """An image that is no matrix of readings of the ADC's range."""
 
 
 class PortError(ProbeError):

@@ -14,13 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from probe.errors import FrameError
 
-ROWS, COLUMNS = 16, 16
 WRIST = 4  #: transducers of the wrist
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """A 16x16 image with its time, number, wrist readings and, where known, its pose.
+    """An image with its time, number, wrist readings and, where known, its pose.
 
     Examples
     --------
@@ -30,7 +29,7 @@ class Frame:
     ((16, 16), 'uint16', 0, None)
     """
 
-    counts: NDArray[np.uint16]  #: (16, 16) ADC counts
+    counts: NDArray[np.uint16]  #: (rows, columns) counts, of ADC or of the sensor type's unit
     t_ns: int  #: ns; of the device since it started, unwrapped
     seq: int  #: number of the frame, unwrapped; a gap means lost frames
     wrist: NDArray[np.uint16]  #: (4,) ADC counts of the wrist's transducers
@@ -50,7 +49,7 @@ def frame_from(
     Parameters
     ----------
     counts
-        (16, 16) whole numbers 0 ... 65535.
+        (rows, columns) whole numbers 0 ... 65535.
     t_ns, seq
         Time (ns) and number, both unwrapped.
     wrist
@@ -63,7 +62,7 @@ def frame_from(
     FrameError
         When a shape is wrong, or a value is no count.
     """
-    image = _counts(counts, (ROWS, COLUMNS), "image")
+    image = _counts(counts, None, "image")
     given = _counts(np.zeros(WRIST, np.uint16) if wrist is None else wrist, (WRIST,), "wrist")
     return Frame(image, int(t_ns), int(seq), given, None if pose is None else _pose(pose))
 
@@ -75,11 +74,13 @@ def median_filter(image: NDArray[Any]) -> NDArray[Any]:
     return filtered
 
 
-def _counts(values: ArrayLike, shape: tuple[int, ...], name: str) -> NDArray[np.uint16]:
+def _counts(values: ArrayLike, shape: tuple[int, ...] | None, name: str) -> NDArray[np.uint16]:
+    """Check readings of a shape; without one, those of any matrix."""
     array = np.asarray(values)
-    if array.shape != shape:
+    if array.shape != shape and (shape is not None or array.ndim != 2 or array.size == 0):
+        wanted = "(rows, columns)" if shape is None else shape
         raise FrameError(
-            f"the {name} has shape {array.shape}, it must be {shape}",
+            f"the {name} has shape {array.shape}, it must be {wanted}",
             fix="give one reading per tactel, rows from the top",
         )
     if not np.issubdtype(array.dtype, np.number) or not np.isfinite(array).all():

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from probe.client.settings import CLIENT
 from probe.frame import Frame
-from probe.protocol import BYTE_FRAME_BYTES, FRAME_BYTES, FramePacket, IdentPacket, Packet
+from probe.protocol import FramePacket, IdentPacket, Packet, frame_bytes
 
 _NUMBERS, _TIMES = 1 << 16, 1 << 32
 
@@ -90,7 +90,8 @@ class FrameOrder:
         """Let go of the held frame; return it, and how many packets failed after it."""
         held, failed = self._held, self._failed
         if held is not None:
-            size = BYTE_FRAME_BYTES if held.byte_wide else FRAME_BYTES
+            rows, columns = held.counts.shape
+            size = frame_bytes((rows, columns), byte_wide=held.byte_wide)
             failed = max(failed, round(self._failed_bytes / size))
         self._held, self._failed, self._failed_bytes = None, 0, 0
         return held, failed

@@ -1,10 +1,11 @@
-"""`probe-sensor`: list, info, calibrate, record, replay, export, simulate, live.
+"""`probe-sensor`: list, info, types, calibrate, record, replay, export, simulate, live.
 
 ::
 
     app            which command: the modules below register themselves there
     options        options that several commands share
     devices        list, info           described    what info says
+    types          types
     record         record               recorded     the work
     replay         replay
     files          export, import, repair   exported   tables, arrays, pictures

@@ -5,10 +5,10 @@ from __future__ import annotations
 import typer
 
 from encoded_objects.console import application
-from probe.command import calibrate, devices, files, live, record, replay, simulate
+from probe.command import calibrate, devices, files, live, record, replay, simulate, types
 from probe.command.options import Json
 
-HELP = """Read, record, calibrate and simulate a 16x16 force sensor.
+HELP = """Read, record, calibrate and simulate a tactile sensor.
 
 Try it without one: [bold]probe-sensor live sim:[/]
 """
@@ -19,6 +19,7 @@ interrupted.
 app = application(help=HELP, epilog=EPILOG)
 app.command(name="list")(devices.list_)
 app.command()(devices.info)
+app.command()(types.types)
 app.command()(live.live)
 app.command()(record.record)
 app.command()(replay.replay)

@@ -8,7 +8,16 @@ from typing import Annotated
 import typer
 
 from encoded_objects.console import Action, application
-from probe.command.options import URLS, Calibrated, Json, Output, Replace, SelectedSensor, Url
+from probe.command.options import (
+    URLS,
+    Calibrated,
+    Json,
+    Output,
+    Replace,
+    SelectedSensor,
+    Typed,
+    Url,
+)
 
 BOARD = "none"
 
@@ -41,6 +50,7 @@ def bias(
     ],
     sensor: SelectedSensor = None,
     seconds: Annotated[float, typer.Option(min=0.2, help="How long to read a port.")] = 2.0,
+    sensor_type: Typed = "",
     calibration: Calibrated = None,
     as_json: Json = False,
 ) -> Action:  # fmt: skip
@@ -52,7 +62,8 @@ def bias(
     def action() -> int:
         from probe.command.calibrated import report_bias
 
-        return report_bias(source, sensor, seconds, calibration, as_json=as_json)
+        return report_bias(source, sensor, seconds, calibration, sensor_type=sensor_type,
+                           as_json=as_json)  # fmt: skip
 
     return action
 
@@ -64,11 +75,12 @@ def loads(
                                   help="Recordings of steady loads, even over the sensor, with "
                                        "the whole force; 0 is the unloaded one. Or a table with "
                                        "columns recording, newtons and, for a load on a part of "
-                                       "the sensor, footprint: a file of 16x16 shares."),
+                                       "the sensor, footprint: a file of shares, a line a row."),
     ],
     output: Output,
     board: Board = BOARD,
     sensor: SensorName = "",
+    sensor_type: Typed = "",
     made: Made = "",
     replace: Replace = False,
     as_json: Json = False,
@@ -81,8 +93,8 @@ def loads(
 
         listed = loads_given(given)
         return calibrate_loads(
-            listed, output, board_from(board), sensor=sensor, made=made, replace=replace,
-            as_json=as_json,
+            listed, output, board_from(board), sensor=sensor, sensor_type=sensor_type,
+            made=made, replace=replace, as_json=as_json,
         )  # fmt: skip
 
     return action
@@ -103,6 +115,7 @@ def port(
     ] = None,
     seconds: Annotated[float, typer.Option(min=0.2, help="How long each load is read.")] = 3.0,
     select: SelectedSensor = None,
+    sensor_type: Typed = "",
     board: Board = BOARD,
     made: Made = "",
     replace: Replace = False,
@@ -120,7 +133,7 @@ def port(
             raise typer.BadParameter(f"--newtons {newtons}: give numbers, as 20,60,180") from None
         return guide(
             url, output, forces, folder or output.with_suffix(""), seconds, select,
-            board_from(board), made=made, replace=replace, as_json=as_json,
+            board_from(board), sensor_type=sensor_type, made=made, replace=replace, as_json=as_json,
         )  # fmt: skip
 
     return action

@@ -29,8 +29,6 @@ from probe.command.loads import LoadRecording
 from probe.errors import CalibrationError, CircuitError
 from probe.recording.read import Recording
 
-_FULL = 1023
-
 
 def report_bias(
     source: str,
@@ -38,12 +36,13 @@ def report_bias(
     seconds: float,
     calibration: Path | None,
     *,
+    sensor_type: str = "",
     as_json: bool,
 ) -> int:
     """Say what an unloaded sensor reads; returns the exit code."""
-    counts, name = frames_of(source, sensor, seconds)
+    counts, name, kind = frames_of(source, sensor, seconds, sensor_type)
     rest = average_frames(counts, source)
-    high = raised_tactels(rest, _FULL, ConditionThresholds())
+    high = raised_tactels(rest, kind.full, ConditionThresholds())
     values: dict[str, Any] = {
         "source": source,
         "sensor": name,
@@ -82,6 +81,7 @@ def calibrate_loads(
     board: Electronics | None,
     *,
     sensor: str = "",
+    sensor_type: str = "",
     made: str = "",
     replace: bool = False,
     as_json: bool = False,
@@ -102,13 +102,20 @@ def calibrate_loads(
                                fix="add one with 0 N: rest.h5=0")  # fmt: skip
     name = sensor or _one_sensor(given)
     counts = np.concatenate([_counts(load) for load in rest])
+    kind = Recording(rest[0].recording).sensor_type(sensor_type)
+    even = kind.present().astype(np.float64) if kind.missing else None
     loads = [
-        even_load(_counts(load), load.newtons, load.footprint, f"{load.newtons:g} N")
+        even_load(
+            _counts(load),
+            load.newtons,
+            even if load.footprint is None else load.footprint,
+            f"{load.newtons:g} N",
+        )
         for load in given
         if load.newtons > 0
     ]
     when = made or datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
-    found = calibration_from(counts, loads, sensor=name, made=when, board=board)
+    found = calibration_from(counts, loads, sensor=name, made=when, board=board, full=kind.full)
     digest = write_calibration(found, output)
     values, lines = describe_laws(found, digest, str(output))
     if as_json:

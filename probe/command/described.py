@@ -12,12 +12,17 @@ from numpy.typing import NDArray
 from encoded_objects.console.output import count_of
 from probe.client.stream import Stream, name_of
 from probe.command.settings import COMMAND
+from probe.port.typed import typed_port
+from probe.recording.read import Recording
+from probe.sensor import SensorType
 
 Described = tuple[dict[str, Any], dict[str, str]]
 """What `--json` prints, and what people read."""
 
 
-def describe_probe(url: str, sensor: int | None, seconds: float) -> Described:
+def describe_probe(
+    url: str, sensor: int | None, seconds: float, sensor_type: str = ""
+) -> Described:
     """Listen to a probe for a while.
 
     Raises
@@ -25,15 +30,17 @@ def describe_probe(url: str, sensor: int | None, seconds: float) -> Described:
     PortError
         When it is not there, or no probe.
     """
-    peak, saturated, full, heard = 0, 0, 1023, False
-    with Stream(url, sensor=sensor) as stream:
+    peak, heard = 0, False
+    shape: tuple[int, ...] = ()
+    port, kind = typed_port(url, sensor_type)
+    with Stream(port, sensor=sensor) as stream:
         until_s = time.monotonic() + seconds
         while not stream.ended:
             for frame in stream.take(0.1):
                 if not heard:
                     heard, until_s = True, time.monotonic() + seconds
                 peak = max(peak, int(frame.counts.max()))
-                saturated += int((frame.counts >= full).sum())
+                shape = frame.counts.shape
             if heard and time.monotonic() > until_s:
                 stream.client.ask_device()
                 stream.take(COMMAND.answer_s)
@@ -46,6 +53,8 @@ def describe_probe(url: str, sensor: int | None, seconds: float) -> Described:
     values = {
         "url": url,
         "sensor": name_of(ident, url),
+        "shape": list(shape),
+        "sensor_type": None if kind is None else kind.name,
         "ident": None if ident is None else asdict(ident),
         "client": asdict(counts),
         "device": None if device is None else asdict(device),
@@ -62,6 +71,8 @@ def describe_probe(url: str, sensor: int | None, seconds: float) -> Described:
             f"{ident.sensor} of 0 ... {ident.sensors - 1}, {ident.rows}x{ident.columns}, "
             f"{ident.bits} bits{settling}"
         )
+    if kind is not None:
+        lines["sensor type"] = kind.name
     lines["rate"] = f"{counts.rate:.1f} frames a second"
     lines["heard"] = (
         f"{count_of(counts.frames, 'frame')}, lost {counts.lost}, failed checks {counts.failed}, "
@@ -77,7 +88,7 @@ def describe_probe(url: str, sensor: int | None, seconds: float) -> Described:
     return values, lines | ({"notice": notices[-1]} if notices else {})
 
 
-def describe_recording(name: str) -> Described:
+def describe_recording(name: str, sensor_type: str = "") -> Described:
     """Read a recording through.
 
     Raises
@@ -85,9 +96,8 @@ def describe_recording(name: str) -> Described:
     RecordingError
         When it is none, damaged, or not closed.
     """
-    from probe.recording.read import Recording
-
     held = Recording(name)
+    kind = _type_of(held, sensor_type)
     seq: list[NDArray[np.int64]] = [np.empty(0, np.int64)]
     t_ns: list[NDArray[np.int64]] = [np.empty(0, np.int64)]
     peak = poses = 0
@@ -105,6 +115,8 @@ def describe_recording(name: str) -> Described:
         "frames": len(held),
         **gaps,
         "sensor": origin.sensor,
+        "sensor_type": kind,
+        "shape": list(held.shape),
         "calibration": origin.calibration,
         "units": origin.units,
         "peak": peak,
@@ -120,6 +132,7 @@ def describe_recording(name: str) -> Described:
         "gaps": f"{gaps['gaps']}, {gaps['lost']} frames lost; longest pause "
         f"{1000 * gaps['longest_pause_s']:.1f} ms; restarts {gaps['restarts']}",
         "sensor": origin.sensor or "not named",
+        "sensor type": f"{kind or 'not told'}, {held.shape[0]}x{held.shape[1]}",
         "calibration": origin.calibration or "none",
         "peak": f"{peak} {origin.units}",
         "poses": f"of {count_of(poses, 'frame')}",
@@ -143,6 +156,13 @@ def describe_calibration(name: str) -> Described:
 
     held = read_calibration(name)
     return describe_laws(held, calibration_hash(held), name)
+
+
+def _type_of(held: Recording, asked: str) -> str:
+    """Return the name of a recording's sensor type; empty where nothing tells."""
+    if asked or held.origin.sensor_type or held.shape == SensorType().shape:
+        return held.sensor_type(asked).name
+    return ""
 
 
 def _gaps(seq: NDArray[np.int64], t_ns: NDArray[np.int64]) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from encoded_objects.console import Action
-from probe.command.options import URLS, Json, SelectedSensor
+from probe.command.options import URLS, Json, SelectedSensor, Typed
 
 ALWAYS = {
     "sim:": "a moving pattern, 100 frames a second",
@@ -54,6 +54,7 @@ def info(
                             help=f"A port ({URLS}), a recording, or a calibration."),
     ],
     sensor: SelectedSensor = None,
+    sensor_type: Typed = "",
     seconds: Annotated[float, typer.Option(min=0.1, help="How long to listen to a probe.")] = 1.0,
     as_json: Json = False,
 ) -> Action:  # fmt: skip
@@ -66,11 +67,11 @@ def info(
 
         values: dict[str, Any]
         if is_url(what) or what.startswith("/dev/"):
-            values, lines = described.describe_probe(what, sensor, seconds)
+            values, lines = described.describe_probe(what, sensor, seconds, sensor_type)
         elif what.endswith(".json"):
             values, lines = described.describe_calibration(what)
         else:
-            values, lines = described.describe_recording(what)
+            values, lines = described.describe_recording(what, sensor_type)
         if as_json:
             output.write_json(values)
         else:

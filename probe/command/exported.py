@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,6 +36,7 @@ def export_files(
     png: Path | None,
     view: PictureView,
     *,
+    sensor_type: str,
     calibration: Path | None,
     pad_mm: float | None,
     live: bool,
@@ -62,11 +64,15 @@ def export_files(
     if png is not None:
         require("matplotlib", extra="report", purpose="--png")
     recording = Recording(path, live=live)
+    sensor = None
+    if png is not None or pad_mm is not None:  # tables and arrays are as they are
+        sensor = recording.sensor_type(sensor_type)
     known = None if calibration is None else calibration_for(calibration, recording)
+    pad = None if pad_mm is None or sensor is None else _pad(sensor, pad_mm)
     if png is not None:
-        _picture(recording, png, view, known, pad_mm)
+        _picture(recording, png, view, known, pad, sensor)
     if npy is not None:
-        _array(recording, npy, known, pad_mm)
+        _array(recording, npy, known, pad)
     if csv is not None:
         from probe.recording.table import export_csv
 
@@ -107,7 +113,8 @@ def _picture(
     out: Path,
     view: PictureView,
     known: Calibration | None,
-    pad_mm: float | None,
+    pad: SensorType | None,
+    sensor: SensorType | None,
 ) -> None:
     from probe.plot.frame import frame_picture
 
@@ -121,33 +128,37 @@ def _picture(
     first = recording.block(0, 1)
     image, unit = block.counts[0].astype(np.float64), recording.origin.units
     if known is not None:
-        image, unit = _newtons(block.counts, known, pad_mm)[0], "N"
+        image, unit = _newtons(block.counts, known, pad)[0], "N"
     if view.median:
         image = median_filter(image)
     title = f"frame {view.frame}, {(block.t_ns[0] - first.t_ns[0]) * 1e-9:.3f} s"
     if view.median:
         title += ", median of 3x3"
     with staged_file(out) as draft:
-        frame_picture(image, draft, unit=unit, title=title, azimuth_deg=view.azimuth_deg,
-                      elevation_deg=view.elevation_deg)  # fmt: skip
+        frame_picture(image, draft, unit=unit, title=title, sensor=sensor,
+                      azimuth_deg=view.azimuth_deg, elevation_deg=view.elevation_deg)  # fmt: skip
+
+
+def _pad(sensor: SensorType, height_mm: float) -> SensorType:
+    """Return a sensor under a pad of a thickness."""
+    return dataclasses.replace(sensor, overlay=Overlay(kind="pad", height_mm=height_mm))
 
 
 def _newtons(
-    counts: NDArray[np.uint16], known: Calibration, pad_mm: float | None
+    counts: NDArray[np.uint16], known: Calibration, pad: SensorType | None
 ) -> NDArray[np.float64]:
     """Return the forces (n, rows, columns) on the tactels, or on top of a pad over them."""
     read = calibrate_image(counts, known)
-    if pad_mm is None:
+    if pad is None:
         return read.values
     from probe.contact.deblur import deblur
 
-    sensor = SensorType(overlay=Overlay(kind="pad", height_mm=pad_mm))
     noise_n = float(np.sqrt(np.mean(np.square(read.sigma[np.isfinite(read.sigma)]))))
-    return np.array([deblur(image, sensor, noise_n=noise_n).forces_n for image in read.values])
+    return np.array([deblur(image, pad, noise_n=noise_n).forces_n for image in read.values])
 
 
 def _array(
-    recording: Recording, out: Path, known: Calibration | None, pad_mm: float | None
+    recording: Recording, out: Path, known: Calibration | None, pad: SensorType | None
 ) -> None:
     shape = (len(recording), *recording.block(0, 0).counts.shape[1:])
     with staged_file(out) as draft, open(draft, "wb") as file:
@@ -155,5 +166,5 @@ def _array(
         header = {"descr": dtype.str, "fortran_order": False, "shape": shape}
         np.lib.format.write_array_header_1_0(file, header)
         for block in recording.blocks():
-            values = block.counts if known is None else _newtons(block.counts, known, pad_mm)
+            values = block.counts if known is None else _newtons(block.counts, known, pad)
             file.write(np.ascontiguousarray(values, dtype).tobytes())

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from encoded_objects.console import Action
-from probe.command.options import Calibrated, Json, Output, Recording, Replace
+from probe.command.options import Calibrated, Json, Output, Recording, Replace, Typed
 
 Target = Path | None
 
@@ -17,11 +17,11 @@ def export(
     recording: Recording,
     csv: Annotated[
         Target, typer.Option(metavar="OUT", show_default=False,
-                             help="A table: seq, t_ns, 256 readings, wrist, pose; counts."),
+                             help="A table: seq, t_ns, readings, wrist, pose; counts."),
     ] = None,
     npy: Annotated[
         Target, typer.Option(metavar="OUT", show_default=False,
-                             help="The images as a NumPy array (N, 16, 16)."),
+                             help="The images as a NumPy array (N, rows, columns)."),
     ] = None,
     png: Annotated[
         Target, typer.Option(metavar="OUT", show_default=False,
@@ -35,6 +35,7 @@ def export(
         float, typer.Option(help="--png: from where the surface is seen, degrees."),
     ] = -60.0,
     elevation: Annotated[float, typer.Option(help="--png: and from how high, degrees.")] = 40.0,
+    sensor_type: Typed = "",
     calibration: Calibrated = None,
     deblur: Annotated[
         float | None, typer.Option(metavar="MM", min=0.1, show_default=False,
@@ -60,8 +61,8 @@ def export(
             raise typer.BadParameter("--deblur needs newtons: give --calibration")
         view = PictureView(frame, median, azimuth, elevation)
         return export_files(
-            recording, csv, npy, png, view, calibration=calibration, pad_mm=deblur, live=live,
-            replace=replace, as_json=as_json,
+            recording, csv, npy, png, view, sensor_type=sensor_type, calibration=calibration,
+            pad_mm=deblur, live=live, replace=replace, as_json=as_json,
         )  # fmt: skip
 
     return action
@@ -70,7 +71,8 @@ def export(
 def import_(
     array: Annotated[
         Path, typer.Argument(metavar="FILE", show_default=False,
-                             help=".npy, .npz, .mat or HDF5 with images (N, 16, 16)."),
+                             help=".npy, .npz, .mat or HDF5 with images (N, rows, columns), .csv "
+                                  "with an image a line, or a folder of grey pictures."),
     ],
     output: Output,
     dataset: Annotated[
@@ -79,6 +81,7 @@ def import_(
     ] = None,
     rate: Annotated[float, typer.Option(help="Frames a second: an array tells no time.")] = 220.0,
     sensor: Annotated[str, typer.Option(help="Name of the sensor.", show_default=False)] = "",
+    sensor_type: Typed = "",
     replace: Replace = False,
     as_json: Json = False,
 ) -> Action:  # fmt: skip
@@ -91,7 +94,7 @@ def import_(
 
         check_output(output, replace=replace)
         made = import_array(array, output, dataset=dataset, rate_hz=rate, sensor=sensor,
-                            replace=replace)  # fmt: skip
+                            sensor_type=sensor_type, replace=replace)  # fmt: skip
         more = dict(made.origin.more)
         values = {"file": str(output), "frames": len(made), "units": made.origin.units, **more}
         if as_json:

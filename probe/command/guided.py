@@ -25,7 +25,10 @@ from probe.command.listen import Counts
 from probe.command.loads import LoadRecording, write_list
 from probe.errors import CalibrationError, PortError
 from probe.frame import Frame
+from probe.port.typed import typed_port
 from probe.recording.record import Recorder
+from probe.sensor import SensorType
+from probe.sensor_types import choose_sensor_type
 
 LIST = "loads.csv"
 
@@ -39,6 +42,7 @@ class CalibrationBench:
     folder: Path
     seconds: float
     sensor: str
+    sensor_type: SensorType | None
 
 
 def guide(
@@ -50,6 +54,7 @@ def guide(
     sensor: int | None,
     board: Electronics | None,
     *,
+    sensor_type: str,
     made: str,
     replace: bool,
     as_json: bool,
@@ -66,8 +71,9 @@ def guide(
     refuse_taken(output, ".json", replace=replace)
     folder.mkdir(parents=True, exist_ok=True)
     refuse_taken(folder / LIST, ".csv", replace=replace)
-    with Stream(url, sensor=sensor) as stream:
-        bench = CalibrationBench(url, stream, folder, seconds, name_of(stream.ident(), url))
+    port, kind = typed_port(url, sensor_type)
+    with Stream(port, sensor=sensor) as stream:
+        bench = CalibrationBench(url, stream, folder, seconds, name_of(stream.ident(), url), kind)
         message(f"{bench.sensor or url}; recordings go to {folder}")
         given: list[LoadRecording] = []
         rest: Counts | None = None
@@ -78,7 +84,8 @@ def guide(
         while True:
             write_list(folder / LIST, given)
             try:
-                return calibrate_loads(given, output, board, sensor=bench.sensor, made=made,
+                return calibrate_loads(given, output, board, sensor=bench.sensor,
+                                       sensor_type=sensor_type, made=made,
                                        replace=replace, as_json=as_json)  # fmt: skip
             except CalibrationError as error:
                 message(f"not yet: {error.cause}\n  {error.fix}")
@@ -115,7 +122,9 @@ def _record_load(bench: CalibrationBench, path: Path) -> Counts:
             message(f"     {notice}")
     if not frames:
         raise PortError("no frame came", fix="see probe-sensor info", place=bench.url)
-    with Recorder(path, sensor=bench.sensor, replace=True) as recorder:
+    rows, columns = frames[0].counts.shape
+    kind = choose_sensor_type(bench.sensor_type, "", (rows, columns), bench.url)
+    with Recorder(path, sensor=bench.sensor, sensor_type=kind, replace=True) as recorder:
         for frame in frames:
             recorder.append(frame)
     return np.stack([frame.counts for frame in frames])

@@ -9,36 +9,45 @@ from encoded_objects.console.interruption import interruption
 from encoded_objects.console.output import message
 from probe.client.stream import Stream, name_of
 from probe.errors import PortError
-from probe.frame import COLUMNS, ROWS
+from probe.port.typed import typed_port
 from probe.port.url import is_url
+from probe.recording.layout import FrameBlock
 from probe.recording.read import Recording
+from probe.sensor import SensorType
+from probe.sensor_types import choose_sensor_type
 
 Counts = NDArray[np.uint16]
 
 
-def frames_of(source: str, sensor: int | None, seconds: float) -> tuple[Counts, str]:
-    """Return counts (N, 16, 16) of a port or a recording, and the sensor's name.
+def frames_of(
+    source: str, sensor: int | None, seconds: float, sensor_type: str = ""
+) -> tuple[Counts, str, SensorType]:
+    """Return counts (N, rows, columns) of a port or a recording, and its sensor: name and type.
 
     Raises
     ------
     PortError, RecordingError
         When it is not there, or gives no frame.
+    SensorTypeError
+        No such type, or one of another shape.
     """
     if not is_url(source):
         recording = Recording(source)
-        return recording.block().counts, recording.origin.sensor
+        return recording.block().counts, recording.origin.sensor, recording.sensor_type(sensor_type)
 
-    with interruption() as interrupted, Stream(source, sensor=sensor) as stream:
+    port, kind = typed_port(source, sensor_type)
+    with interruption() as interrupted, Stream(port, sensor=sensor) as stream:
         counts = _listen(stream, seconds)
         if interrupted.is_set():
             raise KeyboardInterrupt
         if not len(counts):
             raise PortError("no frame came", fix="see probe-sensor info", place=source)
-        return counts, name_of(stream.ident(), source)
+        kind = choose_sensor_type(kind, "", counts.shape[1:], source)
+        return counts, name_of(stream.ident(), source), kind
 
 
 def _listen(stream: Stream, seconds: float) -> Counts:
-    """Return the counts of the next seconds of a probe (device time), (N, 16, 16)."""
+    """Return the counts of the next seconds of a probe (device time), (N, rows, columns)."""
     images: list[Counts] = []
     began_ns: int | None = None
     while not stream.ended:
@@ -50,4 +59,4 @@ def _listen(stream: Stream, seconds: float) -> Counts:
             if frame.t_ns - began_ns > seconds * 1e9:
                 return np.stack(images)
             images.append(frame.counts)
-    return np.stack(images) if images else np.empty((0, ROWS, COLUMNS), np.uint16)
+    return np.stack(images) if images else FrameBlock.empty().counts

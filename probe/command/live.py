@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from encoded_objects.console import Action
-from probe.command.options import Calibrated, SelectedSensor, Url
+from probe.command.options import Calibrated, SelectedSensor, Typed, Url
 
 EPILOG = """Keys: q quit, space pause, 0 ... 7 sensor, b bias on and off, m median filter, s save \
 the image, r start and stop a recording. Without a terminal: a line a second.
@@ -18,6 +18,7 @@ the image, r start and stop a recording. Without a terminal: a line a second.
 def live(
     url: Url,
     sensor: SelectedSensor = None,
+    sensor_type: Typed = "",
     calibration: Calibrated = None,
     folder: Annotated[
         Path, typer.Option(metavar="DIR", help="Where images and recordings are saved."),
@@ -34,7 +35,7 @@ def live(
     def action() -> int:
         from probe.command.live_loop import watch
 
-        return watch(url, sensor=sensor, calibration=calibration, folder=folder, seconds=seconds,
-                     as_json=as_json)  # fmt: skip
+        return watch(url, sensor=sensor, sensor_type=sensor_type, calibration=calibration,
+                     folder=folder, seconds=seconds, as_json=as_json)  # fmt: skip
 
     return action

@@ -21,12 +21,14 @@ from probe.command.keys import KeyReader, keys
 from probe.command.live_state import LiveState
 from probe.command.live_view import line_of, render_frame
 from probe.command.settings import COMMAND
+from probe.port.typed import typed_port
 
 
 def watch(
     url: str,
     *,
     sensor: int | None,
+    sensor_type: str,
     calibration: Path | None,
     folder: Path,
     seconds: float | None,
@@ -40,10 +42,13 @@ def watch(
         When the probe is not there, or went away for good.
     CalibrationError
         When the calibration is none, or another sensor's.
+    SensorTypeError
+        No such type, or frames of another shape.
     """
     known = None if calibration is None else read_calibration(calibration)
-    state = LiveState(url, folder, known)
-    with interruption() as interrupted, Stream(url, sensor=sensor) as stream:
+    port, kind = typed_port(url, sensor_type)
+    state = LiveState(url, folder, known, kind)
+    with interruption() as interrupted, Stream(port, sensor=sensor) as stream:
         try:
             if known is not None and calibration is not None:
                 read_calibration(calibration, sensor=name_of(stream.ident(), url) or None)

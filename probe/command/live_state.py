@@ -21,6 +21,8 @@ from probe.command.settings import COMMAND
 from probe.frame import Frame, median_filter
 from probe.recording.names import next_free
 from probe.recording.record import Recorder
+from probe.sensor import SensorType
+from probe.sensor_types import choose_sensor_type
 
 Image = NDArray[np.float64]
 
@@ -34,6 +36,7 @@ class LiveState:
     url: str
     folder: Path
     calibration: Calibration | None = None
+    sensor: SensorType | None = None  #: None: as the first frame tells
     frame: Frame | None = None  #: newest
     paused: bool = False
     median: bool = False
@@ -60,7 +63,12 @@ class LiveState:
         ------
         RecordingError
             When the disk is full; the recording is closed.
+        SensorTypeError
+            When the first frame is of another shape than the type.
         """
+        if frames and self.frame is None:
+            rows, columns = frames[0].counts.shape
+            self.sensor = choose_sensor_type(self.sensor, "", (rows, columns), self.url)
         for frame in frames:
             if self.recorder is not None:
                 self.recorder.append(frame)
@@ -72,7 +80,7 @@ class LiveState:
             self.frame = frames[-1]
 
     def image(self) -> Image | None:
-        """Return what is shown, (16, 16); None before the first frame."""
+        """Return what is shown, (rows, columns); None before the first frame."""
         if self.frame is None:
             return None
         if self.calibration is not None:
@@ -108,7 +116,8 @@ class LiveState:
         known = self.calibration
         path = next_free(self.folder, "live", ".h5")
         self.recorder = Recorder(
-            path, sensor=sensor, calibration=calibration_hash(known) if known else "",
+            path, sensor=sensor, sensor_type=self.sensor,
+            calibration=calibration_hash(known) if known else "",
             attributes={"url": self.url},
         )  # fmt: skip
         self.notice = f"recording {path.name}"
@@ -139,7 +148,7 @@ class LiveState:
             title += ", less bias"
         array = picture.with_suffix(".npy")
         with staged_file(picture) as draft:
-            frame_picture(image, draft, unit=self.unit, title=title)
+            frame_picture(image, draft, unit=self.unit, title=title, sensor=self.sensor)
         with staged_file(array) as draft:
             np.save(draft, self.frame.counts)
         self.notice = f"saved {picture.name} and .npy"

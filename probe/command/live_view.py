@@ -22,7 +22,7 @@ from probe.command.live_state import LiveState
 from probe.protocol import IdentPacket
 
 LEVELS = 64
-LOW = 22  #: lines, from here on a tactel is two characters
+AROUND = 6  #: lines of the view beside those of the image; in fewer a tactel is half a character
 KEYS = "q quit  space pause  0-7 sensor  b bias  m median  s save  r record"
 #: black, violet, red, orange, pale yellow: rises in brightness, also without hue
 _ANCHORS = ((8, 6, 16), (74, 12, 107), (165, 44, 96), (237, 105, 37), (251, 180, 26),
@@ -72,7 +72,8 @@ def render_frame(
     if image is None:
         blocks = [[Segment("waiting for frames ...")]]
     else:
-        blocks = heat_map(image / state.scale, small=height < LOW, colours=colours)
+        small = height < len(image) + AROUND
+        blocks = heat_map(image / state.scale, small=small, colours=colours)
     numbers = _numbers(state, image, counts, ident)[: max(height - 5, 4)]
     wide = max(sum(len(part.text) for part in line) for line in blocks)
     lines = [_head(state)]
@@ -96,6 +97,8 @@ def heat_map(share: NDArray[np.float64], *, small: bool, colours: bool) -> list[
     colours
         Characters of rising weight otherwise, of the larger of two rows where it is small.
     """
+    if small and len(share) % 2:
+        share = np.pad(share, ((0, 1), (0, 0)))
     if not colours:
         shades = np.clip((share * len(SHADES)).astype(int), 0, len(SHADES) - 1)
         wide, rows = (1, np.maximum(shades[::2], shades[1::2])) if small else (2, shades)

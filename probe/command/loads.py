@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.errors import CalibrationError
-from probe.frame import COLUMNS, ROWS
 
 COLUMNS_OF_LIST = ("recording", "newtons", "footprint")
 
@@ -107,12 +106,7 @@ def _footprint(path: Path) -> NDArray[np.float64]:
         shares = np.loadtxt(path, delimiter=",", ndmin=2)
     except (OSError, ValueError) as error:
         raise CalibrationError(
-            f"cannot be read: {error}", fix="give 16 lines of 16 numbers with commas between",
+            f"cannot be read: {error}", fix="give a line a row of numbers with commas between",
             place=str(path),
         ) from error  # fmt: skip
-    if shares.shape != (ROWS, COLUMNS):
-        raise CalibrationError(
-            f"has {shares.shape[0]} lines of {shares.shape[1]} numbers",
-            fix=f"give {ROWS} lines of {COLUMNS}, row 0 first", place=str(path),
-        )  # fmt: skip
     return shares

@@ -14,6 +14,7 @@ from probe.command.options import (
     Output,
     Replace,
     SelectedSensor,
+    Typed,
     Url,
 )
 
@@ -30,6 +31,7 @@ def record(
     ] = None,
     sensor: SelectedSensor = None,
     bits: Bits = None,
+    sensor_type: Typed = "",
     calibration: Calibrated = None,
     replace: Replace = False,
     as_json: Json = False,
@@ -41,8 +43,8 @@ def record(
 
         limits = RecordingLimits(seconds, frames)
         return record_port(
-            url, output, limits, sensor=sensor, bits=bits, calibration=calibration,
-            replace=replace, as_json=as_json,
+            url, output, limits, sensor=sensor, bits=bits, sensor_type=sensor_type,
+            calibration=calibration, replace=replace, as_json=as_json,
         )  # fmt: skip
 
     return action

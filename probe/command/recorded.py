@@ -17,8 +17,10 @@ from probe.client.stream import Stream, name_of
 from probe.command.settings import COMMAND
 from probe.errors import PortError, ProbeError, RecordingError
 from probe.frame import Frame
+from probe.port.typed import typed_port
 from probe.recording.names import check_name
 from probe.recording.record import Recorder
+from probe.sensor_types import choose_sensor_type
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +47,7 @@ def record_port(
     *,
     sensor: int | None,
     bits: int | None,
+    sensor_type: str,
     calibration: Path | None,
     replace: bool,
     as_json: bool,
@@ -59,10 +62,13 @@ def record_port(
         When the file cannot be written.
     CalibrationError
         When the calibration is none, or another sensor's.
+    SensorTypeError
+        No such type, or frames of another shape.
     """
     check_output(output, replace=replace)
     known = None if calibration is None else read_calibration(calibration)
-    with interruption() as interrupted, Stream(url, sensor=sensor, bits=bits) as stream:
+    port, kind = typed_port(url, sensor_type)
+    with interruption() as interrupted, Stream(port, sensor=sensor, bits=bits) as stream:
         first = _first(stream, interrupted)
         if not first:
             if interrupted.is_set():
@@ -70,9 +76,12 @@ def record_port(
                 return INTERRUPTED
             raise PortError("it ended before a frame came", fix="see whether it holds frames",
                             place=url)  # fmt: skip
+        rows, columns = first[0].counts.shape
+        kind = choose_sensor_type(kind, "", (rows, columns), url)
         name = _sensor(stream, url, known, calibration)
         recorder = Recorder(
-            output, sensor=name, calibration=calibration_hash(known) if known else "",
+            output, sensor=name, sensor_type=kind,
+            calibration=calibration_hash(known) if known else "",
             attributes={"url": url}, replace=replace,
         )  # fmt: skip
         try:

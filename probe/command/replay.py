@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from encoded_objects.console import Action
-from probe.command.options import Calibrated, Recording
+from probe.command.options import Calibrated, Recording, Typed
 
 if TYPE_CHECKING:
     from probe.frame import Frame
@@ -20,6 +20,7 @@ def replay(
         float, typer.Option(min=0.0, help="1: as it came; 0: as fast as it is read."),
     ] = 1.0,
     loop: Annotated[bool, typer.Option("--loop", help="Again and again, until Ctrl-C.")] = False,
+    sensor_type: Typed = "",
     calibration: Calibrated = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="One JSON object a frame, each on a line."),
@@ -32,13 +33,13 @@ def replay(
 
         from probe.recording.read import Recording
 
-        Recording(recording)  # a wrong file is told as such
+        Recording(recording).sensor_type(sensor_type)  # a wrong file is told as such
         url = f"file:{recording}?speed={speed:g}" + ("&loop=1" if loop else "")
         if sys.stdout.isatty() and not as_json:
             from probe.command.live_loop import watch
 
-            return watch(url, sensor=None, calibration=calibration, folder=Path(), seconds=None,
-                         as_json=False)  # fmt: skip
+            return watch(url, sensor=None, sensor_type=sensor_type, calibration=calibration,
+                         folder=Path(), seconds=None, as_json=False)  # fmt: skip
         if calibration is not None:
             raise typer.BadParameter("frames are piped as counts; --calibration is for a terminal")
         return _pipe(url, as_json=as_json)
@@ -59,16 +60,18 @@ def _pipe(url: str, *, as_json: bool) -> int:
         while not stream.ended and not interrupted.is_set():
             frames = stream.take(0.1)
             if frames and first and not as_json:
-                sys.stdout.write(_head())
+                sys.stdout.write(_head(frames[0]))
             first = first and not frames
             sys.stdout.write("".join(_line(frame, as_json=as_json) for frame in frames))
             sys.stdout.flush()
         return INTERRUPTED if interrupted.is_set() else 0
 
 
-def _head() -> str:
-    readings = ",".join(f"r{r}c{c}" for r in range(16) for c in range(16))
-    return f"seq,t_ns,{readings},wrist0,wrist1,wrist2,wrist3\n"
+def _head(frame: Frame) -> str:
+    from probe.recording.table import table_header
+
+    rows, columns = frame.counts.shape
+    return ",".join(table_header((rows, columns))) + "\n"
 
 
 def _line(frame: Frame, *, as_json: bool) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from encoded_objects.console import Action
-from probe.command.options import Json, Replace
+from probe.command.options import Json, Replace, Typed
 
 if TYPE_CHECKING:
     from probe.simulate.scan import ScanKind
@@ -45,7 +45,11 @@ def simulate(
     tilt_y: Annotated[
         float | None, typer.Option(show_default=False, help="The same about y."),
     ] = None,
-    overlay: Annotated[str, typer.Option(metavar="tab|pad", help="Elastic overlay.")] = "tab",
+    sensor_type: Typed = "",
+    overlay: Annotated[
+        str, typer.Option(metavar="tab|pad", show_default=False,
+                          help="Elastic overlay; that of the sensor type."),
+    ] = "",
     accuracy: Annotated[
         str, typer.Option(help="auto, a level of the contact model (footprint, tabs, layer, "
                                "elements), or the largest error, as 0.01."),
@@ -86,7 +90,7 @@ def simulate(
         from probe.command.simulated import check_outputs, simulate_touches
         from probe.simulate.simulated_probe import SimulatedProbe, TouchOptions
 
-        if overlay not in ("tab", "pad"):
+        if overlay not in ("", "tab", "pad"):
             raise typer.BadParameter(f"--overlay {overlay}: give tab or pad")
         if noise not in ("typical", "quiet"):
             raise typer.BadParameter(f"--noise {noise}: give typical or quiet")
@@ -96,7 +100,7 @@ def simulate(
         kind = cast("ScanKind | None", scan)
         options = TouchOptions(x, y, theta, force, tilt_x, tilt_y, touches, frames, seed, kind)
         probe = SimulatedProbe(
-            target, options, accuracy=accuracy, overlay="pad" if overlay == "pad" else "tab",
+            target, options, sensor_type=sensor_type, overlay=overlay, accuracy=accuracy,
             noise="quiet" if noise == "quiet" else "typical",
         )  # fmt: skip
         return simulate_touches(probe, output=output, png=png, truth=truth, as_json=as_json)

@@ -4,6 +4,7 @@ Levels, from cheap to dear:
 
     tab overlay    footprint < tabs-7 < tabs-19 < tabs-61
     pad overlay    footprint < layer-2 < layer-4 < layer-8 < layer-16; elements by name alone
+    gel            gel
 
 What each level errs by and costs is measured by `tests/bench/contact_precision.py` on
 several indenters against finer references, and kept in `precision.json`. The error of an
@@ -33,6 +34,7 @@ Accuracy = str | float
 LEVELS: dict[str, tuple[str, ...]] = {
     "tab": ("footprint", "tabs-7", "tabs-19", "tabs-61"),
     "pad": ("footprint", "layer-2", "layer-4", "layer-8", "layer-16", "elements"),
+    "gel": ("gel",),
 }
 DEFAULTS = {"tabs": "tabs-19", "layer": "layer-4"}  #: a name without its fineness
 
@@ -99,6 +101,12 @@ def level_for(sensor: SensorType, accuracy: Accuracy = "auto") -> str:
                 fix=f"take auto, an error such as 0.01, or {', '.join(LEVELS[kind])}",
             )
         return level
+    if accuracy == "auto" and len(LEVELS[kind]) == 1:
+        return LEVELS[kind][0]
+    if kind not in table():
+        raise ContactError(
+            f"the error of a {kind}'s levels is not known", fix=f"take auto, or {LEVELS[kind][0]}"
+        )
     error = CONTACT.auto_error if accuracy == "auto" else float(accuracy)
     known = [line for line in table()[kind] if line.error <= error]
     if not known:
@@ -162,9 +170,16 @@ def _elements(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
     return elements(surface, sensor, touch)
 
 
+def _gel(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
+    from probe.contact.gel import gel
+
+    return gel(surface, sensor, touch)
+
+
 MODELS: dict[str, Callable[[HeightMap, SensorType, Touch], Contact]] = {
     "footprint": _footprint,
     **{f"tabs-{points}": partial(_tabs, points) for points in (7, 19, 61)},
     **{f"layer-{cells}": partial(_layer, cells) for cells in (2, 4, 8, 16)},
     "elements": _elements,
+    "gel": _gel,
 }

@@ -183,6 +183,15 @@ class UnilateralSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class GelSettings:
+    """Imprints in a gel."""
+
+    fine: int = 4  #: places along a pixel at which the surface is asked
+    tolerance: float = 1e-3  #: of the deepest place: by which the membrane may still move
+    most: int = 400  #: iterations of the membrane
+
+
+@dataclass(frozen=True, slots=True)
 class DeblurSettings:
     """Taking the blur of a layer out of an image."""
 
@@ -206,4 +215,5 @@ DESCENT = DescentSettings()
 ELEMENTS = ElementSettings()
 ELEMENT_SIGHT = ElementSightSettings()
 UNILATERAL = UnilateralSettings()
+GEL = GelSettings()
 DEBLUR = DeblurSettings()

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from probe.errors import PortError
-from probe.frame import COLUMNS, ROWS, WRIST
+from probe.frame import WRIST
 
 SENSORS = 8
+ROWS, COLUMNS = 16, 16  #: of the boards that the firmware runs on
 FULL_MV = 5000.0  #: reference of the ADC
 REMEMBERED = 4096  #: scans
 

@@ -34,18 +34,22 @@ def open_serial(address: Address) -> Port:
         When it is not there, busy, forbidden, or cannot run at this baud rate.
     """
     refuse_unknown(address, ("baud",))
-    baud = number(address, "baud", PORT.baud, least=1)
+    return open_line(address, int(number(address, "baud", PORT.baud, least=1)))
+
+
+def open_line(address: Address, baud: int) -> SerialLine:
+    """Open and lock the line that an address names, at a speed; see `open_serial`."""
     try:
         line = serial.Serial(
             address.target,
-            int(baud),
+            baud,
             timeout=0,
             write_timeout=PORT.write_timeout_s,
             exclusive=True,
         )
         line.reset_input_buffer()
     except (OSError, ValueError) as failed:  # pyserial's own error is an OSError
-        raise _explain_refusal(address, failed) from failed
+        raise _explain_refusal(address, failed, baud) from failed
     with suppress(OSError, ValueError):  # a pty or a CDC device has no such mode
         line.set_low_latency_mode(True)
     return SerialLine(address.url, line)
@@ -94,7 +98,7 @@ class SerialLine:
         return PortError("the device went away", fix="plug it in again", place=self._url)
 
 
-def _explain_refusal(address: Address, failed: Exception) -> PortError:
+def _explain_refusal(address: Address, failed: Exception, baud: int) -> PortError:
     device, number_ = Path(address.target), getattr(failed, "errno", None)
     if not device.exists():
         there = ", ".join(entry.url for entry in list_ports()) or "none"
@@ -106,7 +110,7 @@ def _explain_refusal(address: Address, failed: Exception) -> PortError:
         cause = f"{device} is in use by another programme"
         fix = f"close it; fuser {device} names it"
     elif isinstance(failed, ValueError):
-        cause = f"{device} cannot run at {address.options.get('baud', PORT.baud)} baud"
+        cause = f"{device} cannot run at {baud} baud"
         fix = "take 500000, 1000000 or 2000000, as the firmware was built"
     else:
         cause, fix = f"{device} cannot be opened: {failed}", "give the device of a serial line"

@@ -16,9 +16,14 @@ class PortSettings:
     late_s: float = 0.5  #: a reader later than that makes the device wait
     step_ns: int = 500_000_000  #: longest time between frames that needs no announcement
     rate_hz: float = 100.0  #: frames of a simulated probe
+    marked_images: int = 4  #: markers an image apart by which it is known where images begin
+    pause_least_s: float = 0.5e-3  #: quiet line that counts as a pause between images
+    pauses: int = 8  #: the last ones that are remembered
     pattern_s: float = 4.0  #: one round of the test pattern
     pattern_steps: int = 400  #: images of one round
     finger: float = 1.6  #: radius of a finger, tactels
+    way_x: float = 5 / 16  #: share of the columns that a finger goes to either side ...
+    way_y: float = 4 / 16  #: ... and of the rows
 
 
 PORT = PortSettings()

@@ -19,11 +19,13 @@ from probe.port.pattern import moving_pattern
 from probe.port.settings import PORT
 from probe.port.software import SoftwareProbe
 from probe.protocol import IdentPacket
+from probe.sensor import SensorType
+from probe.sensor_types import choose_sensor_type
 
 if TYPE_CHECKING:
     from probe.port.emulated import EmulatedProbe
 
-FULL_MV, FULL_COUNTS = 5000.0, 1023
+FULL_MV = 5000.0
 
 
 def open_simulation(address: Address) -> Port:
@@ -41,17 +43,25 @@ def open_simulation(address: Address) -> Port:
             f"there is no firmware {firmware!r} to emulate", fix="write firmware=avr",
             place=address.url,
         )  # fmt: skip
-    frames = _frames(address, rate)
+    sensor = choose_sensor_type(address.options.get("sensor_type"), "", None, address.url)
+    if firmware and sensor.shape != SensorType().shape:
+        raise PortError(
+            f"the firmware reads {SensorType().rows} x {SensorType().columns} tactels, not "
+            f"{sensor.rows} x {sensor.columns}",
+            fix="leave firmware=avr out", place=address.url,
+        )  # fmt: skip
+    frames = _frames(address, rate, sensor)
     if firmware:
         return EmulatedPort(address.url, frames, rate)
-    ident = IdentPacket(seq=0, t_us=0, settling_us=0.0, baud=0, name="sim")
+    ident = IdentPacket(seq=0, t_us=0, bits=max(sensor.bits, 10), settling_us=0.0, baud=0,
+                        name="sim", rows=sensor.rows, columns=sensor.columns)  # fmt: skip
     return SoftwareProbe(address.url, frames, ident)
 
 
-def _frames(address: Address, rate: float) -> Iterator[Frame]:
+def _frames(address: Address, rate: float, sensor: SensorType) -> Iterator[Frame]:
     if not address.target:
-        refuse_unknown(address, ("rate", "firmware"))
-        return moving_pattern(rate)
+        refuse_unknown(address, ("rate", "firmware", "sensor_type"))
+        return moving_pattern(rate, sensor)
     from probe.simulate.source import frames_of
 
     options = {k: v for k, v in address.options.items() if k != "firmware"}
@@ -106,7 +116,7 @@ class EmulatedPort:
     def _show(self, probe: EmulatedProbe, frames: Iterator[Frame], period_s: float) -> None:
         try:
             for frame in frames:
-                probe.show(frame.counts * (FULL_MV / FULL_COUNTS))
+                probe.show(frame.counts * (FULL_MV / SensorType().full))
                 if self._closed.wait(period_s):
                     return
             self._ended = EOFError()

@@ -2,6 +2,7 @@
 
 =========================================  ===================================================
 serial:///dev/ttyACM0?baud=1000000         a probe on a serial line
+flexitac:///dev/ttyUSB0                    a FlexiTac board, by its own protocol
 sim:?rate=100                              a moving pattern from a probe in software
 sim:part.stl, sim:lab.db#Cube/face         touches of a part, by `probe.simulate.source`
 sim:...?firmware=avr                       the same images through the firmware on an
@@ -30,9 +31,12 @@ EXAMPLES = "serial:///dev/ttyACM0?baud=1000000, sim: or file:recording.h5"
 #: scheme: what opens it, and what its URL has to name
 SCHEMES = {
     "serial": ("probe.port.serial_line:open_serial", "device"),
+    "flexitac": ("probe.port.flexitac:open_flexitac", "device"),
     "sim": ("probe.port.simulated:open_simulation", ""),
     "file": ("probe.port.recorded:open_recording", "recording"),
 }
+
+USUAL_TYPES = {"flexitac": "flexitac-16x32"}  #: scheme: sensor type, where it is of one
 
 
 def open_port(url: str) -> Port:

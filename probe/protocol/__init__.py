@@ -2,8 +2,7 @@
 
 from probe.protocol.command import Command, bits_command, sensor_command
 from probe.protocol.packet import (
-    BYTE_FRAME_BYTES,
-    FRAME_BYTES,
+    LONGEST,
     VERSION,
     Damage,
     FramePacket,
@@ -12,12 +11,12 @@ from probe.protocol.packet import (
     StatisticsPacket,
     decode,
     encode,
+    frame_bytes,
 )
 from probe.protocol.splitter import Splitter
 
 __all__ = [
-    "BYTE_FRAME_BYTES",
-    "FRAME_BYTES",
+    "LONGEST",
     "VERSION",
     "Command",
     "Damage",
@@ -29,5 +28,6 @@ __all__ = [
     "bits_command",
     "decode",
     "encode",
+    "frame_bytes",
     "sensor_command",
 ]

@@ -4,15 +4,18 @@ Little endian: type u8, version u8, seq u16, t_us u32, body, CRC u16 over all be
 COBS over that, then one zero byte. The CRC is CRC-16-CCITT with initial value 0xFFFF (check
 value of "123456789": 0x29B1).
 
-====  ==========  ====================================================================  =====
-type  packet      body                                                                  bytes
-====  ==========  ====================================================================  =====
-F     frame       256 x u16 counts, row 0 first; 4 x u16 wrist                            530
-B     frame       256 x u8 counts; 4 x u16 wrist                                          274
+====  ==========  ==============================================================================
+type  packet      body
+====  ==========  ==============================================================================
+F     frame       u8: rows, columns; counts u16, row 0 first; 4 x u16 wrist
+B     frame       the same with counts u8
 I     ident       u8: rows, columns, bits, sensors, sensor, firmware (2), settling/0.25 us;
-                  u16: kbaud, boot; name, 8 characters                                     30
-S     statistics  frames u32, transmit waits u32, receive errors u16, uptime ms u32        24
-====  ==========  ====================================================================  =====
+                  u16: kbaud, boot; name, 8 characters
+S     statistics  frames u32, transmit waits u32, receive errors u16, uptime ms u32
+====  ==========  ==============================================================================
+
+That is version 2, which is written. Version 1 is read as well: its frames tell no rows and
+columns, they are 16x16 (530 and 274 bytes with header and check sum).
 
 A block that is no whole packet is no error but a `Damage`: on a real line it is expected.
 The packet after Cheshire and Baker, "Consistent overhead byte stuffing", 1999.
@@ -30,24 +33,20 @@ from cobs import cobs
 from numpy.typing import NDArray
 
 from probe.errors import FrameError
-from probe.frame import COLUMNS, ROWS, WRIST
+from probe.frame import WRIST
 
-VERSION = 1
+VERSION = 2
 WRIST_BITS = 10  #: the wrist is read with at least so many bits, whatever the tactels are
-TACTELS = ROWS * COLUMNS
-FRAME_BYTES, BYTE_FRAME_BYTES = 534, 277  #: of frames on the wire, at most
+LINES_MAX = 255  #: rows or columns
+FIRST_SHAPE = (16, 16)  #: of the frames of version 1
 
 _HEADER = struct.Struct("<BBHI")
 _CRC = struct.Struct("<H")
 _IDENT = struct.Struct("<8B2H8s")
 _STATISTICS = struct.Struct("<IIHI")
 _FRAME, _BYTES, _IDENT_TYPE, _STATISTICS_TYPE = b"FBIS"
-_BODY = {
-    _FRAME: 2 * TACTELS + 2 * WRIST,
-    _BYTES: TACTELS + 2 * WRIST,
-    _IDENT_TYPE: _IDENT.size,
-    _STATISTICS_TYPE: _STATISTICS.size,
-}
+_SHAPE = struct.Struct("<BB")
+_BODY = {_IDENT_TYPE: _IDENT.size, _STATISTICS_TYPE: _STATISTICS.size}
 
 
 class Damage(Enum):
@@ -67,7 +66,7 @@ class FramePacket:
 
     seq: int  #: 0 ... 65535, wraps
     t_us: int  #: us, device time, wraps at 2^32
-    counts: NDArray[np.uint16]  #: (16, 16) row 0 first
+    counts: NDArray[np.uint16]  #: (rows, columns) row 0 first
     wrist: NDArray[np.uint16]  #: (4,)
     byte_wide: bool = False  #: sent with 8 bits a tactel
 
@@ -86,8 +85,8 @@ class IdentPacket:
     baud: int = 1_000_000
     boot: int = 0  #: counts the device's starts
     name: str = "probe"  #: at most 8 characters of ASCII
-    rows: int = ROWS
-    columns: int = COLUMNS
+    rows: int = 16
+    columns: int = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +102,25 @@ class StatisticsPacket:
 
 
 Packet = FramePacket | IdentPacket | StatisticsPacket
+
+
+def _frame_body(shape: tuple[int, int], byte_wide: bool) -> int:
+    return shape[0] * shape[1] * (1 if byte_wide else 2) + 2 * WRIST
+
+
+def frame_bytes(shape: tuple[int, int], *, byte_wide: bool = False) -> int:
+    """Return the bytes of a frame on the wire, at most: with check sum, stuffing and delimiter.
+
+    Examples
+    --------
+    >>> frame_bytes((16, 16)), frame_bytes((16, 16), byte_wide=True)
+    (536, 279)
+    """
+    payload = _HEADER.size + _SHAPE.size + _frame_body(shape, byte_wide) + _CRC.size
+    return payload + payload // 254 + 2
+
+
+LONGEST = frame_bytes((LINES_MAX, LINES_MAX))  #: bytes of a packet, at most
 
 
 def encode(packet: Packet) -> bytes:
@@ -141,16 +159,14 @@ def decode(block: bytes, bits: int = 10) -> Packet | Damage:
     if crc_hqx(payload[:-2], 0xFFFF) != payload[-2] + (payload[-1] << 8):
         return Damage.CHECK
     kind, version, seq, t_us = _HEADER.unpack_from(payload)
-    if version != VERSION:
+    if version not in (1, VERSION):
         return Damage.VERSION
+    if kind in (_FRAME, _BYTES):
+        return _decode_frame(seq, t_us, payload, bits, first=version == 1, byte_wide=kind == _BYTES)
     if kind not in _BODY:
         return Damage.TYPE
     if len(payload) != _HEADER.size + _BODY[kind] + _CRC.size:
         return Damage.LENGTH
-    if kind == _FRAME:
-        return _frame(seq, t_us, payload, bits)
-    if kind == _BYTES:
-        return _byte_frame(seq, t_us, payload, bits)
     if kind == _IDENT_TYPE:
         return _decode_ident(seq, t_us, payload)
     return StatisticsPacket(seq, t_us, *_STATISTICS.unpack_from(payload, _HEADER.size))
@@ -159,13 +175,14 @@ def decode(block: bytes, bits: int = 10) -> Packet | Damage:
 def _body(packet: Packet) -> tuple[int, bytes]:
     if isinstance(packet, FramePacket):
         wrist = packet.wrist.astype("<u2").tobytes()
+        shape = _SHAPE.pack(*packet.counts.shape)
         if not packet.byte_wide:
-            return _FRAME, packet.counts.astype("<u2").tobytes() + wrist
+            return _FRAME, shape + packet.counts.astype("<u2").tobytes() + wrist
         if (packet.counts > 255).any():
             raise FrameError(
                 f"a reading of {packet.counts.max()} does not fit 8 bits", fix="send 10 bits"
             )
-        return _BYTES, packet.counts.astype(np.uint8).tobytes() + wrist
+        return _BYTES, shape + packet.counts.astype(np.uint8).tobytes() + wrist
     if isinstance(packet, IdentPacket):
         fields = (packet.rows, packet.columns, packet.bits, packet.sensors, packet.sensor)
         settling, kbaud = round(packet.settling_us * 4), packet.baud // 1000
@@ -177,27 +194,35 @@ def _body(packet: Packet) -> tuple[int, bytes]:
     return _STATISTICS_TYPE, _STATISTICS.pack(*counted)
 
 
-def _frame(seq: int, t_us: int, payload: bytes, bits: int) -> FramePacket | Damage:
+def _decode_frame(
+    seq: int, t_us: int, payload: bytes, bits: int, *, first: bool, byte_wide: bool
+) -> FramePacket | Damage:
+    """Return a frame; `first`: of version 1."""
+    start = _HEADER.size if first else _HEADER.size + _SHAPE.size
+    if len(payload) < start + _CRC.size:
+        return Damage.LENGTH
+    rows, columns = FIRST_SHAPE if first else _SHAPE.unpack_from(payload, _HEADER.size)
+    if len(payload) != start + _frame_body((rows, columns), byte_wide) + _CRC.size:
+        return Damage.LENGTH
+    if not rows * columns:
+        return Damage.VALUE
     # Views of immutable bytes: read-only, and nothing is copied.
-    readings = np.frombuffer(payload, "<u2", TACTELS + WRIST, _HEADER.size)
-    if int(readings.max()) >> max(bits, WRIST_BITS):
+    tactels, width = rows * columns, 1 if byte_wide else 2
+    counts = np.frombuffer(payload, "u1" if byte_wide else "<u2", tactels, start)
+    wrist = np.frombuffer(payload, "<u2", WRIST, start + width * tactels)
+    limit = max(bits, WRIST_BITS)
+    if int(wrist.max()) >> limit or (not byte_wide and int(counts.max()) >> limit):
         return Damage.VALUE
-    return FramePacket(seq, t_us, readings[:TACTELS].reshape(ROWS, COLUMNS), readings[TACTELS:])
-
-
-def _byte_frame(seq: int, t_us: int, payload: bytes, bits: int) -> FramePacket | Damage:
-    counts = np.frombuffer(payload, np.uint8, TACTELS, _HEADER.size).astype(np.uint16)
-    wrist = np.frombuffer(payload, "<u2", WRIST, _HEADER.size + TACTELS)
-    if int(wrist.max()) >> max(bits, WRIST_BITS):
-        return Damage.VALUE
-    counts.setflags(write=False)
-    return FramePacket(seq, t_us, counts.reshape(ROWS, COLUMNS), wrist, byte_wide=True)
+    if byte_wide:
+        counts = counts.astype(np.uint16)
+        counts.setflags(write=False)
+    return FramePacket(seq, t_us, counts.reshape(rows, columns), wrist, byte_wide)
 
 
 def _decode_ident(seq: int, t_us: int, payload: bytes) -> IdentPacket | Damage:
     fields = _IDENT.unpack_from(payload, _HEADER.size)
     rows, columns, bits, sensors, sensor, major, minor, settling, kbaud, boot, name = fields
-    sane = (rows, columns) == (ROWS, COLUMNS) and 8 <= bits <= 16 and sensor < sensors
+    sane = rows * columns > 0 and 8 <= bits <= 16 and sensor < sensors
     if not sane or not name.isascii() or not name.decode("ascii").isprintable():
         return Damage.VALUE
     return IdentPacket(
@@ -210,5 +235,7 @@ def _decode_ident(seq: int, t_us: int, payload: bytes) -> IdentPacket | Damage:
         settling_us=settling / 4,
         baud=kbaud * 1000,
         boot=boot,
+        rows=rows,
+        columns=columns,
         name=name.decode("ascii").rstrip(),
     )

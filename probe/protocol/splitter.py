@@ -7,8 +7,9 @@ a whole packet. What stands before the first delimiter may be the tail of a pack
 
 from __future__ import annotations
 
+from probe.protocol.packet import LONGEST
+
 DELIMITER = b"\0"
-LONGEST = 4096  #: bytes that are kept of a block; the longest packet is 533 bytes
 
 
 class Splitter:

@@ -4,7 +4,7 @@
     read          file or series -> frames, lazily
     repair        what a killed writer or a bad copy left -> a recording
     table         recording -> CSV
-    imported      .npy, .npz, .mat, any HDF5 array (N, 16, 16) -> recording
+    imported      .npy, .npz, .mat, HDF5, CSV or a folder of images -> recording
       arrays        where the images stand in such a file
     layout, names                    datasets and attributes, file names
     write, lock                      one file while it is written, and who writes it

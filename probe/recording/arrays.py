@@ -18,13 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.errors import RecordingError
-from probe.frame import COLUMNS, ROWS
 from probe.recording.opened import explain_errors, open_recording
 
 if TYPE_CHECKING:
     import h5py
-
-_IMAGE = (ROWS, COLUMNS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,24 +33,23 @@ class FileArray:
     dtype: np.dtype[Any]
     part: Callable[[tuple[slice, ...]], NDArray[Any]]  #: read some of it
 
-    @property
-    def frames(self) -> int | None:
-        """How many images it holds; None if it holds other things."""
+    def frames(self, image: tuple[int, int]) -> int | None:
+        """Return how many images of that shape it holds; None if it holds other things."""
         if self.dtype.kind not in "biuf":
             return None
-        if self.shape == _IMAGE:
+        if self.shape == image:
             return 1
-        if len(self.shape) == 3 and self.shape[1:] == _IMAGE:
+        if len(self.shape) == 3 and self.shape[1:] == image:
             return self.shape[0]
-        if len(self.shape) == 3 and self.shape[:2] == _IMAGE:
+        if len(self.shape) == 3 and self.shape[:2] == image:
             return self.shape[2]
         return None
 
-    def images(self, start: int, stop: int) -> NDArray[Any]:
-        """Return images `start` ... `stop` - 1, (n, 16, 16)."""
-        if self.shape == _IMAGE:
+    def images(self, image: tuple[int, int], start: int, stop: int) -> NDArray[Any]:
+        """Return images `start` ... `stop` - 1, (n, rows, columns)."""
+        if self.shape == image:
             return self.part((slice(None), slice(None)))[None][start:stop]
-        if self.shape[1:] == _IMAGE:
+        if self.shape[1:] == image:
             return self.part((slice(start, stop), slice(None), slice(None)))
         return np.moveaxis(self.part((slice(None), slice(None), slice(start, stop))), 2, 0)
 
@@ -91,7 +87,7 @@ def _numpy(path: Path) -> list[FileArray]:
             raise
         raise RecordingError(
             "it holds objects, or it is damaged",
-            fix="save a plain array of numbers (N, 16, 16)",
+            fix="save a plain array of numbers (N, rows, columns)",
             place=str(path),
         ) from error
 

@@ -27,7 +27,7 @@ from probe.recording.opened import explain_errors, open_recording
 if TYPE_CHECKING:
     import h5py
 
-_IMPORT = "import the array that holds the images (N, 16, 16)"
+_IMPORT = "import the array that holds the images (N, rows, columns)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +39,7 @@ class CheckedFile:
     tool_version: str
     piece: int  #: number in its series
     frames: int  #: that are there with everything that belongs to them
+    shape: tuple[int, int]  #: rows and columns of its images
     even: bool  #: all datasets have that length
     poses: bool  #: there is a dataset of poses
 
@@ -78,12 +79,14 @@ def check_open_file(file: h5py.File, path: Path) -> CheckedFile:
         raise RecordingError(
             f"it has no dataset /frames, but {others}", fix=_IMPORT, place=str(path)
         )
-    lengths = [_length(file, path, name) for name in names]
+    shapes = {name: _shape_of(file, path, name) for name in names}
+    lengths = [shape[0] for shape in shapes.values()]
     ours = {name: attributes.pop(name, None) for name in _OURS} if own else {}
     origin = RecordingOrigin(
         str(attributes.pop("sensor", "")),
         str(attributes.pop("calibration", "")),
         str(attributes.pop("units", "counts")),
+        str(attributes.pop("sensor_type", "")),
         MappingProxyType(attributes),
     )
     return CheckedFile(
@@ -92,6 +95,7 @@ def check_open_file(file: h5py.File, path: Path) -> CheckedFile:
         tool_version=str(ours.get("tool_version", "")),
         piece=int(ours.get("piece") or 1),
         frames=min(lengths),
+        shape=(shapes["frames"][1], shapes["frames"][2]),
         even=len(set(lengths)) == 1,
         poses="pose" in names,
     )
@@ -138,8 +142,8 @@ _MEANT = {
 _OURS = ("format", "format_version", "tool_version", "piece")
 
 
-def _length(file: h5py.File, path: Path, name: str) -> int:
-    """Return the length of a dataset that has the right shape."""
+def _shape_of(file: h5py.File, path: Path, name: str) -> tuple[int, ...]:
+    """Return the shape of a dataset, whose entries have the right one."""
     import h5py
 
     shape = DATASETS[name][0]
@@ -148,9 +152,13 @@ def _length(file: h5py.File, path: Path, name: str) -> int:
         is_array = isinstance(found, h5py.Dataset) and found.shape is not None
         has = f"{found.dtype} {found.shape}" if is_array else "no array"
         right = is_array and found.dtype.kind in "iuf" and found.ndim == 1 + len(shape)
-        if right and found.shape[1:] == shape:
-            return len(found)
-    wanted = ", ".join(["N", *map(str, shape)])
+        if right and all(
+            n == wanted or (wanted < 0 < n)
+            for n, wanted in zip(found.shape[1:], shape, strict=True)
+        ):
+            return tuple(map(int, found.shape))
+    lengths = iter(("rows", "columns"))
+    wanted = ", ".join(["N", *(str(n) if n >= 0 else next(lengths) for n in shape)])
     raise RecordingError(
         f"/{name} must hold numbers ({wanted}), it is {has}", fix=_IMPORT, place=str(path)
     )

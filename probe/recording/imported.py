@@ -1,14 +1,16 @@
 """Others' images -> a recording of counts.
 
-Whole numbers 0 ... 65535 are taken as they are. Anything else (forces, voltages, values with
-the bias removed) is scaled: value = scale_offset + scale * count, with the largest value at
-65535, and zero at zero unless there are negative values. Both numbers stand in the attributes,
-and `units` says "scaled".
+Whole numbers 0 ... 65535 are taken as they are. Other values of a sensor type that says what
+one count is (depth in mm, force in N) are counted in that unit, below 0 as 0. Anything else
+(voltages, values with the bias removed) is scaled: value = scale_offset + scale * count, with
+the largest value at 65535, and zero at zero unless there are negative values. Both numbers stand
+in the attributes, and `units` says "scaled".
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -22,8 +24,11 @@ from probe.frame import WRIST
 from probe.recording.arrays import FileArray, arrays_of
 from probe.recording.layout import NOMINAL_HZ, FrameBlock, RecordingOrigin
 from probe.recording.names import check_name, final_name, part_of, unless_it_fails
+from probe.recording.pictures import folder_array, table_array
 from probe.recording.read import Recording
 from probe.recording.write import FileWriter
+from probe.sensor import SensorType
+from probe.sensor_types import choose_sensor_type, sensor_type_text
 
 _AT_ONCE: Final = 1024  #: images read at a time
 _FULL: Final = 65535
@@ -44,6 +49,7 @@ def import_array(
     dataset: str | None = None,
     rate_hz: float = NOMINAL_HZ,
     sensor: str = "",
+    sensor_type: str | SensorType | None = None,
     calibration: str = "",
     replace: bool = False,
 ) -> Recording:
@@ -52,8 +58,9 @@ def import_array(
     Parameters
     ----------
     path
-        A .npy, .npz, .mat or HDF5 file with an array (N, 16, 16), (16, 16, N) or (16, 16);
-        if N is 16, the first axis is taken for time.
+        A .npy, .npz, .mat or HDF5 file with an array (N, rows, columns), (rows, columns, N) or
+        (rows, columns), the first axis taken for time where both would do; a table (.csv) or a
+        folder of pictures, see `pictures`.
     out
         The recording to be made.
     dataset
@@ -62,6 +69,8 @@ def import_array(
         Frames per second; the array does not tell.
     sensor, calibration
         What the recording shall say about its origin.
+    sensor_type
+        A type, its name or file: whose images they are; `fsr-16` if not given.
     replace
         Let it take the place of an older recording of that name.
 
@@ -75,30 +84,47 @@ def import_array(
     check_name(out, replace=replace)
     if not (np.isfinite(rate_hz) and rate_hz > 0):
         raise RecordingError(f"a rate of {rate_hz:g} Hz", fix="give frames per second above 0")
-    with arrays_of(path) as arrays:
-        found = _choose_array(path, arrays, dataset)
-        scale = _scale(path, found)
+    kind = choose_sensor_type(sensor_type, "", None, str(path))
+    with _arrays_at(path, kind.shape) as arrays:
+        found = _choose_array(path, arrays, dataset, kind)
+        scale = _scale(path, found, kind)
         more: dict[str, Any] = {"imported_from": path.name, "imported_array": found.name}
         if scale:
             more |= {"scale": scale.scale, "scale_offset": scale.offset}
-        units = "scaled" if scale else "counts"
-        origin = RecordingOrigin(sensor, calibration, units, MappingProxyType(more))
+        units = "counts" if scale is None or scale.scale == kind.unit else "scaled"
+        told = sensor_type_text(kind)
+        origin = RecordingOrigin(sensor, calibration, units, told, MappingProxyType(more))
         with unless_it_fails(part_of(out)) as part, FileWriter(part, origin) as writer:
-            for first, images in _images(found):
+            for first, images in _images(found, kind.shape):
                 writer.write(_block(images, first, scale, 1e9 / rate_hz))
     final_name(part, out, [], last=True, replace=replace)
     return Recording(out)
 
 
-def _choose_array(path: Path, arrays: list[FileArray], name: str | None) -> FileArray:
+@contextmanager
+def _arrays_at(path: Path, image: tuple[int, int]) -> Iterator[list[FileArray]]:
+    """Open whatever holds images: a folder of pictures, a table, a file of arrays."""
+    if path.is_dir():
+        yield [folder_array(path, image)]
+    elif path.suffix.lower() == ".csv":
+        yield [table_array(path, image)]
+    else:
+        with arrays_of(path) as arrays:
+            yield arrays
+
+
+def _choose_array(
+    path: Path, arrays: list[FileArray], name: str | None, kind: SensorType
+) -> FileArray:
     """Return the array that was asked for, or the only one that may be meant."""
-    images = [found for found in arrays if found.frames is not None]
+    images = [found for found in arrays if found.frames(kind.shape) is not None]
     named = [found for found in images if found.name == (name or "frames").strip("/")]
     if named or (name is None and len(images) == 1):
         return (named or images)[0]
     here = ", ".join(f"{found.name} {found.shape}" for found in (images or arrays)) or "nothing"
     if not images:
-        cause, fix = f"no array of images (N, 16, 16) in it, but {here}", "reshape it first"
+        cause = f"no array of images (N, {kind.rows}, {kind.columns}) in it, but {here}"
+        fix = "give the --sensor-type whose images they are, or reshape it first"
     elif name is None:
         cause, fix = f"several arrays of images in it: {here}", "say which by --dataset NAME"
     else:
@@ -106,16 +132,16 @@ def _choose_array(path: Path, arrays: list[FileArray], name: str | None) -> File
     raise RecordingError(cause, fix=fix, place=str(path))
 
 
-def _images(found: FileArray) -> Iterator[tuple[int, NDArray[Any]]]:
-    frames = found.frames or 0
+def _images(found: FileArray, image: tuple[int, int]) -> Iterator[tuple[int, NDArray[Any]]]:
+    frames = found.frames(image) or 0
     for first in range(0, frames, _AT_ONCE):
-        yield first, found.images(first, min(first + _AT_ONCE, frames))
+        yield first, found.images(image, first, min(first + _AT_ONCE, frames))
 
 
-def _scale(path: Path, found: FileArray) -> Scale | None:
+def _scale(path: Path, found: FileArray, kind: SensorType) -> Scale | None:
     """Return how the values become counts; None if they are counts."""
     least, most, whole = 0.0, 0.0, True
-    for first, images in _images(found):
+    for first, images in _images(found, kind.shape):
         bad = ~np.isfinite(images)
         if bad.any():
             raise RecordingError(
@@ -128,6 +154,8 @@ def _scale(path: Path, found: FileArray) -> Scale | None:
         whole = whole and (images.dtype.kind != "f" or bool((images == np.floor(images)).all()))
     if whole and least >= 0 and most <= _FULL:
         return None
+    if kind.value != "counts" and most <= _FULL * kind.unit:
+        return Scale(0.0, kind.unit)
     scale = most / _FULL - least / _FULL
     if scale < np.finfo(np.float64).tiny:
         raise RecordingError(

@@ -2,16 +2,18 @@
 
 ::
 
-    /frames  u16 (N, 16, 16)   ADC counts, row 0 on top
+    /frames  u16 (N, rows, columns)   counts, row 0 on top
     /t_ns    i64 (N,)          device time, unwrapped, ns
     /seq     i64 (N,)          number of the frame, unwrapped
     /wrist   u16 (N, 4)        ADC counts of the wrist's transducers
     /pose    f64 (N, 4, 4)     T_base_sensor, mm; NaN where not known (dataset optional)
 
-    attributes: format, format_version, tool_version, sensor, calibration (hash; empty: none),
-    units, piece (number in a series, from 1), and what the writer adds
+    attributes: format, format_version, tool_version, sensor, sensor_type (as YAML; none in
+    recordings of old), calibration (hash; empty: none), units, piece (number in a series,
+    from 1), and what the writer adds
 
-Only /frames is needed to be read: any HDF5 file with counts (N, 16, 16) there is a recording.
+Only /frames is needed to be read: any HDF5 file with counts
+(N, rows, columns) there is a recording.
 Without /seq frames are numbered from 0, without /t_ns they come at 220 frames a second.
 All datasets are chunked and compressed by shuffle and deflate, which every HDF5 library
 reads, in the file format of HDF5 1.10, the first one that can be read while written.
@@ -27,17 +29,18 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.frame import COLUMNS, ROWS, WRIST, Frame
+from probe.frame import WRIST, Frame
+from probe.sensor import SensorType
 
 FORMAT: Final = "tactile recording"
 FORMAT_VERSION: Final = 1
 NOMINAL_HZ: Final = 220.0  #: of the frames of a file that tells no time
 CHUNK: Final = 64  #: frames that are compressed together, and written at a time when they come fast
 
-#: name: shape of one entry, type in the file
+#: name: shape of one entry (-1: any length), type in the file
 DATASETS: Final[Mapping[str, tuple[tuple[int, ...], np.dtype[Any]]]] = MappingProxyType(
     {
-        "frames": ((ROWS, COLUMNS), np.dtype("<u2")),
+        "frames": ((-1, -1), np.dtype("<u2")),
         "t_ns": ((), np.dtype("<i8")),
         "seq": ((), np.dtype("<i8")),
         "wrist": ((WRIST,), np.dtype("<u2")),
@@ -54,6 +57,7 @@ class RecordingOrigin:
     sensor: str = ""  #: ident of the probe, or what was simulated
     calibration: str = ""  #: hash of the calibration file; empty: none
     units: str = "counts"
+    sensor_type: str = ""  #: as YAML, `probe.sensor_types`; empty: not told
     more: MappingProxyType[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
 
@@ -61,7 +65,7 @@ class RecordingOrigin:
 class FrameBlock:
     """Consecutive frames of a recording; arrays are read-only."""
 
-    counts: NDArray[np.uint16]  #: (n, 16, 16)
+    counts: NDArray[np.uint16]  #: (n, rows, columns)
     t_ns: NDArray[np.int64]  #: (n,)
     seq: NDArray[np.int64]  #: (n,)
     wrist: NDArray[np.uint16]  #: (n, 4)
@@ -71,9 +75,9 @@ class FrameBlock:
         return len(self.counts)
 
     @classmethod
-    def empty(cls) -> FrameBlock:
+    def empty(cls, shape: tuple[int, int] = SensorType().shape) -> FrameBlock:
         """Return a block without frames."""
-        images, readings = np.empty((0, ROWS, COLUMNS), np.uint16), np.empty((0, WRIST), np.uint16)
+        images, readings = np.empty((0, *shape), np.uint16), np.empty((0, WRIST), np.uint16)
         return cls(images, np.empty(0, np.int64), np.empty(0, np.int64), readings, None)
 
     def datasets(self) -> dict[str, NDArray[Any] | None]:

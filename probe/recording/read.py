@@ -1,4 +1,4 @@
-"""A recording, or any HDF5 file with /frames (N, 16, 16), -> frames, a block at a time.
+"""A recording, or any HDF5 file with /frames (N, rows, columns), -> frames, a block at a time.
 
 Nothing is held open between two calls, and no more than a block is in memory: a recording
 of an hour is read in the memory of a second.
@@ -13,11 +13,14 @@ from typing import Final
 
 import numpy as np
 
+from probe.errors import RecordingError
 from probe.frame import Frame
 from probe.recording.checked import check_recording, read_block
 from probe.recording.layout import FrameBlock, RecordingOrigin
 from probe.recording.names import part_of, series_of
 from probe.recording.opened import is_blank, open_recording
+from probe.sensor import SensorType
+from probe.sensor_types import choose_sensor_type
 
 _AT_ONCE: Final = 256  #: frames read at a time
 
@@ -67,6 +70,7 @@ class Recording:
     live: bool = field(default=False, kw_only=True)
     files: tuple[File, ...] = field(init=False, repr=False)
     origin: RecordingOrigin = field(init=False, repr=False)  #: of the first file
+    shape: tuple[int, int] = field(init=False, repr=False)  #: rows and columns of its images
     tool_version: str = field(init=False, repr=False)  #: that wrote it; empty: not this programme
 
     def __post_init__(self) -> None:
@@ -75,9 +79,17 @@ class Recording:
             for name in _files_of(Path(self.path), self.live)
         ]
         _, first = looks[0]
+        for name, seen in looks:
+            if seen.shape != first.shape:
+                raise RecordingError(
+                    f"its images are of {seen.shape}, those of {looks[0][0].name} of {first.shape}",
+                    fix="read the two by themselves",
+                    place=str(name),
+                )
         files = tuple(File(name, seen.frames, seen.poses) for name, seen in looks)
         object.__setattr__(self, "files", files)
         object.__setattr__(self, "origin", first.origin)
+        object.__setattr__(self, "shape", first.shape)
         object.__setattr__(self, "tool_version", first.tool_version)
 
     def __str__(self) -> str:
@@ -111,7 +123,17 @@ class Recording:
 
     def block(self, start: int = 0, stop: int | None = None) -> FrameBlock:
         """Return frames `start` ... `stop` - 1 at once."""
-        return _join_blocks(list(self.blocks(start, stop)))
+        return _join_blocks(list(self.blocks(start, stop)), self.shape)
+
+    def sensor_type(self, asked: str | SensorType | None = None) -> SensorType:
+        """Return the type of sensor that made it: the one asked for, else the one it tells.
+
+        Raises
+        ------
+        SensorTypeError
+            No such type, one of another shape, or nothing tells.
+        """
+        return choose_sensor_type(asked, self.origin.sensor_type, self.shape, str(self.path))
 
     def frames(self, start: int = 0, stop: int | None = None) -> Iterator[Frame]:
         """Yield frames `start` ... `stop` - 1."""
@@ -136,9 +158,9 @@ def _files_of(path: Path, live: bool) -> list[Path]:
     return series or [path]
 
 
-def _join_blocks(blocks: list[FrameBlock]) -> FrameBlock:
+def _join_blocks(blocks: list[FrameBlock], shape: tuple[int, int]) -> FrameBlock:
     if len(blocks) < 2:
-        return blocks[0] if blocks else FrameBlock.empty()
+        return blocks[0] if blocks else FrameBlock.empty(shape)
     pose = None
     if any(block.pose is not None for block in blocks):
         pose = np.concatenate(

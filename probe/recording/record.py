@@ -21,6 +21,8 @@ from probe.frame import Frame
 from probe.recording.layout import CHUNK, FrameBlock, RecordingOrigin
 from probe.recording.names import check_name, final_name, part_of
 from probe.recording.write import FileWriter
+from probe.sensor import SensorType
+from probe.sensor_types import sensor_type_text
 
 _NO_POSE: Final = np.full((4, 4), np.nan)
 
@@ -36,6 +38,8 @@ class Recorder(Closing):
         in `touch.part.h5`, readable with `live`.
     sensor
         Ident of the probe.
+    sensor_type
+        Of the frames; None where nobody knows.
     calibration
         Hash of the calibration that belongs to the sensor; empty if there is none.
     units
@@ -70,6 +74,7 @@ class Recorder(Closing):
         path: Path | str,
         *,
         sensor: str = "",
+        sensor_type: SensorType | None = None,
         calibration: str = "",
         units: str = "counts",
         attributes: Mapping[str, Any] | None = None,
@@ -81,8 +86,13 @@ class Recorder(Closing):
         self.files: list[Path] = []  #: closed files, in order
         self.frames = 0  #: handed in so far
         self._origin = RecordingOrigin(
-            sensor, calibration, units, MappingProxyType(dict(attributes or {}))
+            sensor,
+            calibration,
+            units,
+            "" if sensor_type is None else sensor_type_text(sensor_type),
+            MappingProxyType(dict(attributes or {})),
         )
+        self._shape = None if sensor_type is None else sensor_type.shape
         self._flush_ns = flush_s * 1e9
         self._roll_over_ns = roll_over_s * 1e9
         self._replace = replace
@@ -97,10 +107,11 @@ class Recorder(Closing):
         Raises
         ------
         RecordingError
-            The recording is closed, or the disk is full; then it has been closed with all
-            frames so far, this one included.
+            The recording is closed, the frame is of another shape than those before, or the
+            disk is full; then it has been closed with all frames so far, this one included.
         """
         self._open_writer()
+        self._check_shape(frame)
         if self._piece_began_ns is None:
             self._piece_began_ns = frame.t_ns
         elif not 0 <= frame.t_ns - self._piece_began_ns < self._roll_over_ns:
@@ -134,6 +145,18 @@ class Recorder(Closing):
             return
         self.flush()
         self._finish(last=True)
+
+    def _check_shape(self, frame: Frame) -> None:
+        """Refuse a frame that is not of the shape of the sensor type, or of the frames before."""
+        rows, columns = frame.counts.shape
+        self._shape = self._shape or (rows, columns)
+        if frame.counts.shape != self._shape:
+            raise RecordingError(
+                f"a frame of {rows} x {columns} readings in a recording of {self._shape[0]} x "
+                f"{self._shape[1]}",
+                fix="give the --sensor-type of the sensor, one recording for each",
+                place=str(self.path),
+            )
 
     def _open_writer(self) -> FileWriter:
         if self._writer is None:

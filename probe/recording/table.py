@@ -1,6 +1,6 @@
 """A recording -> a table (CSV): a row a frame.
 
-Columns: seq, t_ns, r0c0 ... r15c15 (row 0 on top), wrist0 ... wrist3, and where a pose is
+Columns: seq, t_ns, r0c0, r0c1, ... (row 0 on top), wrist0 ... wrist3, and where a pose is
 known in any frame p00 ... p33, T_base_sensor by rows (mm), empty in the frames without.
 """
 
@@ -12,7 +12,7 @@ from typing import TextIO
 
 import numpy as np
 
-from probe.frame import COLUMNS, ROWS, WRIST
+from probe.frame import WRIST
 from probe.recording.layout import FrameBlock
 from probe.recording.opened import explain_errors
 from probe.recording.read import Recording
@@ -50,16 +50,20 @@ def export_csv(path: Path | str, out: Path | str, *, live: bool = False) -> int:
 def write_csv(recording: Recording, stream: TextIO) -> None:
     """Write the table of a recording to a stream."""
     poses = any(file.poses for file in recording.files)
-    stream.write(",".join(_header(poses)) + "\n")
+    stream.write(",".join(_header(recording.shape, poses)) + "\n")
     for block in recording.blocks():
         stream.write("".join(line + "\n" for line in _lines(block, poses)))
 
 
-def _header(poses: bool) -> list[str]:
-    images = [f"r{r}c{c}" for r in range(ROWS) for c in range(COLUMNS)]
-    wrist = [f"wrist{i}" for i in range(WRIST)]
+def table_header(shape: tuple[int, int]) -> list[str]:
+    """Return the names of the columns of a table without poses."""
+    images = [f"r{r}c{c}" for r in range(shape[0]) for c in range(shape[1])]
+    return ["seq", "t_ns", *images, *(f"wrist{i}" for i in range(WRIST))]
+
+
+def _header(shape: tuple[int, int], poses: bool) -> list[str]:
     pose = [f"p{r}{c}" for r in range(4) for c in range(4)] if poses else []
-    return ["seq", "t_ns", *images, *wrist, *pose]
+    return [*table_header(shape), *pose]
 
 
 def _lines(block: FrameBlock, poses: bool) -> list[str]:

@@ -89,10 +89,10 @@ class FileWriter(Closing):
         """
         first, end = self.frames, self.frames + len(block)
         if not self._sets:
-            self._start(block.pose is not None)
+            self._start(block.counts.shape[1:], poses=block.pose is not None)
         with explain_errors(self.path, "write"):
             if len(block) > CHUNK:
-                self._reserve(len(block) * 1024)
+                self._reserve(len(block) * (512 + block.counts[0].nbytes))
             values = block.datasets()
             for name, dataset in self._sets.items():
                 dataset.resize(end, axis=0)
@@ -107,7 +107,7 @@ class FileWriter(Closing):
         if self._descriptor < 0:
             return
         if not self._sets:
-            self._start(poses=False)
+            self._start(FrameBlock.empty().counts.shape[1:], poses=False)
         with explain_errors(self.path, "close"):
             self._file.close()
             head = superblock_of(self.path)
@@ -117,10 +117,11 @@ class FileWriter(Closing):
         os.close(self._descriptor)
         self._descriptor = -1
 
-    def _start(self, poses: bool) -> None:
+    def _start(self, image: tuple[int, ...], *, poses: bool) -> None:
         """Make the datasets, and the file readable from now on."""
         self.poses = poses
-        for name, (shape, dtype) in DATASETS.items():
+        for name, (usual, dtype) in DATASETS.items():
+            shape = image if name == "frames" else usual
             if poses or name not in OPTIONAL:
                 self._sets[name] = self._file.create_dataset(
                     name,
@@ -170,4 +171,5 @@ def _attributes(origin: RecordingOrigin, piece: int) -> dict[str, Any]:
         "calibration": origin.calibration,
         "units": origin.units,
         "piece": piece,
+        **({"sensor_type": origin.sensor_type} if origin.sensor_type else {}),
     }

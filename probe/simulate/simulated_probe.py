@@ -20,13 +20,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.console.files import staged_file
-from probe.circuit import QUIET, Electronics, Noise, fsr_of, read_counts
 from probe.contact.contract import Contact, Touch
 from probe.contact.press import accuracy_of, level_for, press
 from probe.errors import SurfaceError
 from probe.frame import Frame, frame_from
 from probe.recording.record import Recorder
-from probe.sensor import Overlay, SensorType
+from probe.sensor import SensorType
+from probe.sensor_types import choose_sensor_type
+from probe.simulate.readout import readout_of
 from probe.simulate.scan import ScanKind, ScanPath, scan_path
 from probe.simulate.scene import Scene
 from probe.simulate.settings import SIMULATED_SCAN
@@ -127,8 +128,10 @@ class SimulatedProbe:
         registered face, `lab.db#Cube/F1`, or `washer`.
     options
         Which touches.
+    sensor_type
+        What touches: a type, its name or file; `fsr-16` if not given.
     overlay
-        tab or pad.
+        tab or pad instead of the type's own overlay.
     accuracy
         auto, a level of the contact model (footprint, tabs, layer, elements), or the largest
         error of an image, as "0.01".
@@ -147,7 +150,8 @@ class SimulatedProbe:
 
     target: str
     options: TouchOptions = field(default_factory=TouchOptions)
-    overlay: Literal["tab", "pad"] = field(default="tab", kw_only=True)
+    sensor_type: str | SensorType | None = field(default=None, kw_only=True)
+    overlay: str = field(default="", kw_only=True)
     accuracy: str = field(default="auto", kw_only=True)
     noise: Literal["typical", "quiet"] = field(default="typical", kw_only=True)
     sensor: SensorType = field(init=False)
@@ -157,12 +161,15 @@ class SimulatedProbe:
 
     def __post_init__(self) -> None:
         for name, given, known in (
-            ("overlay", self.overlay, ("tab", "pad")), ("noise", self.noise, ("typical", "quiet")),
+            ("overlay", self.overlay, ("tab", "pad", "")),
+            ("noise", self.noise, ("typical", "quiet")),
         ):  # fmt: skip
             if given not in known:
-                raise SurfaceError(f"{name} {given!r}", fix=f"give {' or '.join(known)}")
-        sensor = SensorType(overlay=Overlay(kind=self.overlay))
+                raise SurfaceError(f"{name} {given!r}", fix=f"give {known[0]} or {known[1]}")
+        chosen = choose_sensor_type(self.sensor_type, "", None, self.target)
+        sensor = chosen.with_overlay(self.overlay)
         object.__setattr__(self, "sensor", sensor)
+        object.__setattr__(self, "overlay", sensor.overlay.kind)
         object.__setattr__(self, "level", level_for(sensor, accuracy_of(self.accuracy)))
         object.__setattr__(self, "scene", surface_of(self.target))
         object.__setattr__(self, "path", self._scan_path())
@@ -180,8 +187,7 @@ class SimulatedProbe:
             A touch has no equilibrium.
         """
         options, sensor = self.options, self.sensor
-        board = Electronics(noise=QUIET if self.noise == "quiet" else Noise())
-        fsr = fsr_of(sensor.rows, sensor.columns)
+        readout = readout_of(sensor, quiet=self.noise == "quiet")
         for i in range(len(self)):
             rng = np.random.default_rng([options.seed, i])
             touch = options.draw(self.scene, rng) if self.path is None else self.path.touches[i]
@@ -194,9 +200,9 @@ class SimulatedProbe:
                 wrist = self.path.wrist_counts(i, contact)
             state, frames = None, []
             for beat in range(options.frames):
-                counts, state = read_counts(contact.forces_n, board, fsr, state, rng)
+                counts, state = readout.read(contact.forces_n, state, rng)
                 seq = i * options.frames + beat
-                t_ns = round(seq * board.frame_s * 1e9)
+                t_ns = round(seq * readout.board.frame_s * 1e9)
                 frames.append(frame_from(counts, t_ns=t_ns, seq=seq, wrist=wrist, pose=believed))
             yield SimulatedTouch(met, touch, contact, tuple(frames), true)
 
@@ -215,7 +221,13 @@ class SimulatedProbe:
         sensor = f"simulated/{self.overlay}"
         with (
             staged_file(out) as draft,
-            Recorder(draft, sensor=sensor, attributes=attributes, roll_over_s=math.inf) as writer,
+            Recorder(
+                draft,
+                sensor=sensor,
+                sensor_type=self.sensor,
+                attributes=attributes,
+                roll_over_s=math.inf,
+            ) as writer,
         ):
             yield writer
 
@@ -227,7 +239,8 @@ class SimulatedProbe:
             scan = {"scan": self.options.scan, "T_base_object": None if T is None else T.tolist()}
         return {
             "target": self.target, "object": self.scene.object_name or None,
-            "face": self.scene.face or None, "overlay": self.overlay, "level": self.level,
+            "face": self.scene.face or None, "sensor_type": self.sensor.name,
+            "overlay": self.overlay, "level": self.level,
             "seed": self.options.seed, "frames_per_touch": self.options.frames,
             **scan, "touches": touches,
         }  # fmt: skip

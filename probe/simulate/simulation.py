@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from probe.frame import Frame
 from probe.recording.names import check_name
+from probe.sensor import SensorType
 from probe.simulate.scan import ScanKind
 from probe.simulate.simulated_probe import SimulatedProbe, SimulatedTouch, TouchOptions
 
@@ -75,7 +76,8 @@ def simulate(
     scan: ScanKind | None = None,
     frames: int = 1,
     seed: int = 0,
-    overlay: Literal["tab", "pad"] = "tab",
+    sensor_type: str | SensorType | None = None,
+    overlay: str = "",
     accuracy: str = "auto",
     noise: Literal["typical", "quiet"] = "typical",
 ) -> Simulation:
@@ -83,7 +85,7 @@ def simulate(
 
     Parameters
     ----------
-    target, overlay, accuracy, noise
+    target, sensor_type, overlay, accuracy, noise
         See `SimulatedProbe`.
     x, y
         Place of the sensor's centre, mm, frame of the face: origin at its first vertex, x
@@ -118,5 +120,7 @@ def simulate(
     ((16, 16), 80.0)
     """
     options = TouchOptions(x, y, theta, force, tilt_x, tilt_y, touches, frames, seed, scan)
-    probe = SimulatedProbe(target, options, overlay=overlay, accuracy=accuracy, noise=noise)
+    probe = SimulatedProbe(
+        target, options, sensor_type=sensor_type, overlay=overlay, accuracy=accuracy, noise=noise
+    )
     return Simulation(probe, tuple(probe.touches()))

@@ -11,7 +11,8 @@ by a step in a random direction. Options, all optional:
     step        mm from touch to touch while wandering, 5
     period      s from touch to touch, 2
     rate        frames per second, 100
-    overlay     tab or pad: tab
+    sensor_type name or file of the sensor: fsr-16
+    overlay     tab or pad: that of the type
     accuracy    auto, a level, or the largest error of an image: auto
     noise       typical or quiet: typical
     seed        whole number, 0
@@ -26,12 +27,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.circuit import QUIET, Electronics, Noise, fsr_of, read_counts
 from probe.contact.contract import Touch
 from probe.contact.press import Accuracy, accuracy_of, level_for, press
 from probe.errors import ContactError, SurfaceError
 from probe.frame import Frame, frame_from
-from probe.sensor import Overlay, SensorType
+from probe.sensor import SensorType
+from probe.sensor_types import choose_sensor_type
+from probe.simulate.readout import SensorReadout, readout_of
 from probe.simulate.scene import Scene
 from probe.simulate.settings import SIMULATED_PORT
 from probe.simulate.target import surface_of
@@ -41,7 +43,8 @@ Image = NDArray[np.float64]
 DOWN, HELD, UP = 0.15, 0.65, 0.80  #: shares of a period: full force, begin to lift, off
 _DEFAULTS = {"force": 80.0, "tilt": 0.0, "step": 5.0, "period": 2.0, "rate": 100.0, "seed": 0.0}
 _CHOICES = {"overlay": ("tab", "pad"), "noise": ("typical", "quiet")}
-NAMES = ("x", "y", "theta", *_DEFAULTS, *_CHOICES, "accuracy")
+_WORDS = ("accuracy", "sensor_type")
+NAMES = ("x", "y", "theta", *_DEFAULTS, *_CHOICES, *_WORDS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +53,7 @@ class MotionOptions:
 
     numbers: dict[str, float]  #: x, y and theta only where given
     sensor: SensorType
-    electronics: Electronics
+    readout: SensorReadout
     accuracy: Accuracy
 
 
@@ -97,14 +100,15 @@ def options_of(values: Mapping[str, str], *, place: str = "") -> MotionOptions:
             raise SurfaceError(
                 f"{name}={text!r}", fix=f"write {' or '.join(_CHOICES[name])}", place=place
             )
-        if name not in _CHOICES and name != "accuracy":
+        if name not in _CHOICES and name not in _WORDS:
             numbers[name] = _number(name, text, place)
-    sensor = SensorType(overlay=Overlay(kind="pad" if values.get("overlay") == "pad" else "tab"))
-    noise = QUIET if values.get("noise") == "quiet" else Noise()
-    electronics = Electronics(noise=noise, frame_s=1 / numbers["rate"])
+    chosen = choose_sensor_type(values.get("sensor_type"), "", None, place)
+    sensor = chosen.with_overlay(values.get("overlay", ""))
+    quiet = values.get("noise") == "quiet"
+    readout = readout_of(sensor, quiet=quiet, frame_s=1 / numbers["rate"])
     accuracy = accuracy_of(values.get("accuracy", "auto"))
     level_for(sensor, accuracy)
-    return MotionOptions(numbers, sensor, electronics, accuracy)
+    return MotionOptions(numbers, sensor, readout, accuracy)
 
 
 def _number(name: str, text: str, place: str) -> float:
@@ -122,7 +126,7 @@ def _number(name: str, text: str, place: str) -> float:
 def _frames(scene: Scene, options: MotionOptions) -> Iterator[Frame]:
     numbers = options.numbers
     rng = np.random.default_rng(int(numbers["seed"]))
-    fsr, state = fsr_of(options.sensor.rows, options.sensor.columns), None
+    state = None
     beats = max(1, round(numbers["period"] * numbers["rate"]))
     seq = 0
     for touch in _random_walk(scene, options, rng):
@@ -131,7 +135,7 @@ def _frames(scene: Scene, options: MotionOptions) -> Iterator[Frame]:
             share = round(load(beat / beats) * SIMULATED_PORT.levels) / SIMULATED_PORT.levels
             if share not in images:
                 images[share] = _press_forces(scene, options, touch, share)
-            counts, state = read_counts(images[share], options.electronics, fsr, state, rng)
+            counts, state = options.readout.read(images[share], state, rng)
             yield frame_from(counts, t_ns=round(seq * 1e9 / numbers["rate"]), seq=seq)
             seq += 1
 

@@ -61,7 +61,15 @@ def bench(
                      help="Where printed parts may be downloaded from; the database's folder by "
                           "default."),
     ] = None,
-    overlay: Annotated[str, typer.Option(help="Of the sensor: tab or pad.")] = "tab",
+    sensor_type: Annotated[
+        str, typer.Option("--sensor-type", metavar="NAME|FILE", show_default=False,
+                          help="Type of the sensor: a name that probe-sensor types lists, or a "
+                               "file; fsr-16 by default."),
+    ] = "",
+    overlay: Annotated[
+        str, typer.Option(metavar="tab|pad", show_default=False,
+                          help="Elastic overlay; that of the sensor type."),
+    ] = "",
 ) -> Action:  # fmt: skip
     """Serve the bench."""
 
@@ -69,7 +77,9 @@ def bench(
         require("fastapi", "uvicorn", "websockets", extra="bench", purpose="open-bench")
         from recognizer.bench.serve import BenchOptions, serve
 
-        return serve(BenchOptions(port, database, web_port, host, token, folder, parts, overlay))
+        return serve(
+            BenchOptions(port, database, web_port, host, token, folder, parts, overlay, sensor_type)
+        )
 
     return action
 

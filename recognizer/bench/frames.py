@@ -55,6 +55,7 @@ class FrameHandler:
         self._sensor, self._broker, self._recognition = sensor, broker, recognition
         self._note = note
         self._newest: Frame | None = None
+        self._told_shape: tuple[int, int] | None = None  # of frames that are not shown
         self._recorder: Recorder | None = None
 
     @property
@@ -64,6 +65,16 @@ class FrameHandler:
 
     def take(self, frames: list[Frame]) -> None:
         """Take frames in their order; the last one is shown and read."""
+        known = [frame for frame in frames if frame.counts.shape == self._sensor.shape]
+        if len(known) < len(frames):
+            rows, columns = frames[-1].counts.shape
+            if self._told_shape != (rows, columns):
+                self._told_shape = rows, columns
+                self._note(
+                    f"frames of {rows} x {columns} readings are not shown: this bench is for "
+                    f"{self._sensor.name}; start it with their --sensor-type"
+                )
+            frames = known
         for frame in frames:
             if self._recorder is not None:
                 self._record(self._recorder, frame)
@@ -107,7 +118,7 @@ class FrameHandler:
         known = self.state.calibration
         path = next_free(folder, "touch", ".h5")
         self._recorder = Recorder(
-            path, sensor=sensor_name, attributes={"url": url},
+            path, sensor=sensor_name, sensor_type=self._sensor, attributes={"url": url},
             calibration=calibration_hash(known) if known else "",
         )  # fmt: skip
         self._note(f"recording {path.name}")

@@ -2,7 +2,7 @@
 
 frame    "F", unit (0 counts, 1 N), filter (its number), 0, seq u32, device time f64 (s),
          received f64 (ms since 1970, the server's clock), largest f32, sum f32 of the readings
-         over their bias; from byte 32 on 256 values f32, row 0 on top
+         over their bias; from byte 32 on a value f32 for each tactel, row 0 on top
 mosaic   "M", 0, 0, 0, rows u32, columns u32, touches u32, step f32 (mm), corner x and y f32 (mm,
          of the upper left cell), largest f32; from byte 32 on rows x columns u8: 0 not felt,
          1 ... 255 from 0 to the largest
@@ -31,7 +31,7 @@ _MOSAIC = struct.Struct("<cBBBIIIffff")
 class FrameMessage:
     """A frame for the pages; each filter is computed when the first page asks for it."""
 
-    readings: Array  #: (16, 16) counts or N
+    readings: Array  #: (rows, columns) counts or N
     sensor: SensorType
     bias: Array | None
     newtons: bool

@@ -15,11 +15,12 @@ from itertools import count
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.circuit import QUIET, Electronics, FilmState, Noise, fsr_of, read_counts
+from probe.circuit import FilmState
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.frame import Frame, frame_from
 from probe.sensor import SensorType
+from probe.simulate.readout import readout_of
 from probe.simulate.scene import Scene
 from recognizer.bench.errors import BenchError
 from recognizer.bench.settings import PRESS
@@ -42,9 +43,8 @@ class PressSequence:
 
     def __init__(self, sensor: SensorType, manner: SimulationSettings) -> None:
         self.sensor, self.manner = sensor, manner
-        noise = QUIET if manner.noise == "quiet" else Noise()
-        self._board = Electronics(noise=noise, frame_s=1 / manner.rate)
-        self._rest = np.zeros((sensor.rows, sensor.columns))
+        self._readout = readout_of(sensor, quiet=manner.noise == "quiet", frame_s=1 / manner.rate)
+        self._rest = np.zeros(sensor.shape)
         self._turn = threading.Lock()
         self._coming: list[tuple[int, Array]] = []  #: beats to stay at these forces
         self._now = self._rest
@@ -90,10 +90,9 @@ class PressSequence:
     def frames(self) -> Iterator[Frame]:
         """Yield frames without end, numbered and timed from 0."""
         rng = np.random.default_rng(self.manner.seed)
-        fsr = fsr_of(self.sensor.rows, self.sensor.columns)
         state: FilmState | None = None
         for seq in count():
-            counts, state = read_counts(self._beat(), self._board, fsr, state, rng)
+            counts, state = self._readout.read(self._beat(), state, rng)
             yield frame_from(counts, t_ns=round(seq * 1e9 / self.manner.rate), seq=seq)
 
     def _beats(self, seconds: float) -> int:

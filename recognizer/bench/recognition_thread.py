@@ -122,7 +122,7 @@ class RecognitionThread:
         self._broker.publish("reader", {"state": state, **more})
 
     def _look(self, pending: PendingFrame) -> None:
-        signal = _signal(pending)
+        signal = _signal(pending, self.sensor)
         now_s = time.monotonic()
         contact = signal.contact and not pending.load
         phase = self._watch.phase(signal.forces, contact=contact, now_s=now_s)
@@ -183,13 +183,13 @@ class RecognitionThread:
         return mosaic_message(mosaic.image, len(mosaic))
 
 
-def _signal(pending: PendingFrame) -> Signal:
+def _signal(pending: PendingFrame, sensor: SensorType) -> Signal:
     counts: NDArray[np.float64] = pending.frame.counts.astype(np.float64)
     if pending.calibration is None:
-        return signal_of(counts)
+        return signal_of(counts, sensor=sensor)
     try:
         found = calibrate_image(counts, pending.calibration)
     except ProbeError:  # another sensor's readings: beyond the board's range
-        return signal_of(counts)
+        return signal_of(counts, sensor=sensor)
     trust = 1.0 - found.bad.astype(np.float64)
-    return signal_of(found.values, trust=trust, floor=0.0, newtons=True)
+    return signal_of(found.values, trust=trust, floor=0.0, newtons=True, sensor=sensor)

@@ -19,7 +19,7 @@ import uvicorn
 from generator.database import DatabaseError
 from generator.database.open import database_exists
 from probe.errors import ProbeError
-from probe.sensor import Overlay, SensorType
+from probe.sensor_types import choose_sensor_type
 from recognizer.bench.app import BenchContext, app_for
 from recognizer.bench.broker import Broker
 from recognizer.bench.errors import BenchError
@@ -47,7 +47,8 @@ class BenchOptions:
     token: str
     folder: Path
     parts: Path | None
-    overlay: str
+    overlay: str = ""
+    sensor_type: str = ""
 
 
 def serve(options: BenchOptions) -> int:
@@ -58,19 +59,20 @@ def serve(options: BenchOptions) -> int:
     BenchError, DatabaseError, ProbeError
         When an option cannot be met.
     """
-    if options.overlay not in ("tab", "pad"):
+    if options.overlay not in ("", "tab", "pad"):
         raise BenchError(f"an overlay {options.overlay!r}", fix="give tab or pad")
     if options.token and not _TOKEN.fullmatch(options.token):
         raise BenchError(
             "this token can be guessed, or cannot stand in an address",
             fix="give 12 or more of letters, digits, - and _, or none: one is made",
         )
+    chosen = choose_sensor_type(options.sensor_type, "", None, "--sensor-type")
+    sensor = chosen.with_overlay(options.overlay)
     database = _database(options.database)
     token = options.token or ("" if is_loopback(options.host) else secrets.token_urlsafe(18))
     line = _open_socket(options.host, options.web_port)
     before = signal.signal(signal.SIGTERM, _end)
     broker = Broker()
-    sensor = SensorType(overlay=Overlay(kind="pad" if options.overlay == "pad" else "tab"))
     session = Session(database, options.folder, sensor, broker)
     try:
         _begin(session, options.port)

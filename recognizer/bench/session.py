@@ -84,8 +84,8 @@ class Session:
 
         Raises
         ------
-        BenchError, PortError, RecordingError
-            When the URL cannot be read, or names no recording.
+        BenchError, PortError, RecordingError, SensorTypeError
+            When the URL cannot be read, names no recording, or one of another sensor type.
         """
         with self._turn:
             self._leave()
@@ -94,7 +94,9 @@ class Session:
                 self._feed = ProbeFeed(self.simulation.url, sensor)
             elif url.startswith("file:"):
                 target = address_of(url).target
-                self._feed = ReplayFeed(url, Recording(target))
+                recording = Recording(target)
+                recording.sensor_type(self.sensor)  # of another shape: refused
+                self._feed = ReplayFeed(url, recording)
             elif url:
                 address_of(url)
                 self._feed = ProbeFeed(url, sensor)

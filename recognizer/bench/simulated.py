@@ -19,7 +19,7 @@ from urllib.parse import parse_qsl
 from probe.contact.contract import Touch
 from probe.errors import ProbeError
 from probe.port.emulated import emulated_probe
-from probe.port.simulated import FULL_COUNTS, FULL_MV
+from probe.port.simulated import FULL_MV
 from probe.sensor import SensorType
 from probe.simulate.registered import registered_object, registered_surface
 from probe.simulate.scene import Scene
@@ -57,6 +57,7 @@ class TouchProbe:
         self.database = database
         self.firmware = firmware
         self._presses = PressSequence(sensor, manner)
+        self._full = sensor.full
         self._scenes: OrderedDict[tuple[str, str], Scene] = OrderedDict()
         self._last: tuple[str, str, float, float, float, float] | None = None
         self._turn = threading.Lock()
@@ -163,7 +164,7 @@ class TouchProbe:
         period_s = 1 / self._presses.manner.rate
         for frame in self._presses.frames():
             try:
-                self._emulator.show(frame.counts * (FULL_MV / FULL_COUNTS))
+                self._emulator.show(frame.counts * (FULL_MV / self._full))
             except ProbeError:  # the emulator ended; its port is gone, and whoever reads it told
                 return
             if self._closed.wait(period_s):

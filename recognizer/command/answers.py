@@ -41,6 +41,7 @@ class RecognizeOptions:
     follow: bool
     every: bool
     most: int | None
+    sensor_type: str
     overlay: str
     calibration: Path | None
     sensor: int | None

@@ -10,7 +10,7 @@ import typer
 
 HELP = """Say which object was touched, which face, where, and how sure.
 
-RECORDING is any HDF5 file with /frames (N, 16, 16). Try it without a probe: \
+RECORDING is any HDF5 file with /frames (N, rows, columns). Try it without a probe: \
 [bold]probe-sensor simulate lab.db#Cube/F1 -o touch.h5[/], then \
 [bold]recognize-object touch.h5[/]. How a part came out of the printer: \
 [bold]recognize-object as-built --help[/].
@@ -60,9 +60,15 @@ def recognize(
         int | None, typer.Option("--touches", metavar="N", min=1, show_default=False,
                                  help="End after so many touches."),
     ] = None,
+    sensor_type: Annotated[
+        str, typer.Option("--sensor-type", metavar="NAME|FILE", show_default=False,
+                          help="Type of the sensor: a name that probe-sensor types lists, or a "
+                               "file; as recording or port tells, fsr-16 by default."),
+    ] = "",
     overlay: Annotated[
         str, typer.Option(metavar="tab|pad", show_default=False,
-                          help="Elastic overlay; as recording or port tell, tab by default."),
+                          help="Elastic overlay; as recording or port tell, that of the type by "
+                               "default."),
     ] = "",
     calibration: Annotated[
         Path | None, typer.Option(metavar="FILE", show_default=False,
@@ -144,7 +150,8 @@ def recognize(
         return recognize_touches(
             RecognizeOptions(
                 recording=recording, port=port, database=database, follow=follow, every=every,
-                most=most, overlay=overlay, calibration=calibration, sensor=sensor, live=live,
+                most=most, sensor_type=sensor_type, overlay=overlay, calibration=calibration,
+                sensor=sensor, live=live,
                 joints_deg=angles, joint_error_deg=joint_error, plot=plot, replace=replace,
                 as_json=as_json, scan=method if scan else "",
                 joints_file=Path(by_touch) if by_touch else None, learn=learn, state=state,

@@ -48,6 +48,11 @@ def as_built(
     material: Annotated[
         str, typer.Option(metavar="NAME", help="What the part is printed of, as PLA."),
     ] = "",
+    sensor_type: Annotated[
+        str, typer.Option("--sensor-type", metavar="NAME|FILE", show_default=False,
+                          help="Type of the sensor: a name that probe-sensor types lists, or a "
+                               "file; as the recording tells, fsr-16 by default."),
+    ] = "",
     overlay: Annotated[
         str, typer.Option(metavar="tab|pad", show_default=False,
                           help="Elastic overlay; as the recording tells, tab by default."),
@@ -68,7 +73,7 @@ def as_built(
     def action() -> int:
         from encoded_objects.console.output import message, write, write_json
 
-        felt = _feel(recording, database, overlay, calibration)
+        felt = _feel(recording, database, sensor_type, overlay, calibration)
         prints, too_few = _estimate(felt, database, material)
         for words in too_few:
             message(words)
@@ -94,13 +99,12 @@ def as_built(
 
 
 def _feel(
-    recording: Path, database: str, overlay: str, calibration: Path | None
+    recording: Path, database: str, sensor_type: str, overlay: str, calibration: Path | None
 ) -> tuple[FeltPrint, ...]:
     """Return how the touches of a recording felt the print."""
     from encoded_objects.console.output import warning
     from encoded_objects.console.progress import progress_bar
     from probe.recording.read import Recording
-    from probe.sensor import SensorType
     from recognizer.as_built.settings import settings_for_prints
     from recognizer.as_built.touches import feel_prints
     from recognizer.touch.lab import open_lab
@@ -109,7 +113,7 @@ def _feel(
 
     lab = open_lab(database)
     opened = Recording(recording)
-    source = source_of(opened, SensorType(), overlay=overlay, calibration=calibration)
+    source = source_of(opened, sensor_type, overlay=overlay, calibration=calibration)
     if source.notice:
         warning(source.notice)
     reader = Reader(lab, source.sensor, settings_for_prints())

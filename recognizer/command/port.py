@@ -12,15 +12,18 @@ from encoded_objects.console.output import message
 from probe.calibration import read_calibration
 from probe.client.stream import Stream, name_of
 from probe.frame import Frame
+from probe.port.typed import typed_port
 from probe.port.url import address_of
 from probe.recording.read import Recording
 from probe.sensor import SensorType
-from recognizer.touch.source import TouchSource, source_of, with_overlay
+from recognizer.touch.source import TouchSource, source_of
 
 SLICE_S = 0.1  #: how long frames are waited for before an interruption is looked for
 
 
-def source_at(url: str, *, overlay: str, calibration: Path | None, every: bool) -> TouchSource:
+def source_at(
+    url: str, *, sensor_type: str, overlay: str, calibration: Path | None, every: bool
+) -> TouchSource:
     """Return what a port will give.
 
     Raises
@@ -36,12 +39,14 @@ def source_at(url: str, *, overlay: str, calibration: Path | None, every: bool) 
     if address.scheme == "file":
         recording = Recording(Path(address.target))
         source = source_of(
-            recording, SensorType(), overlay=overlay, calibration=calibration, every=every
+            recording, sensor_type, overlay=overlay, calibration=calibration, every=every
         )
         return replace(source, place=url, frames=None)
+    place, known = typed_port(url, sensor_type)
+    sensor = known or SensorType()
     return TouchSource(
-        place=url,
-        sensor=with_overlay(SensorType(), overlay or address.options.get("overlay", "")),
+        place=place,
+        sensor=sensor.with_overlay(overlay or address.options.get("overlay", "")),
         calibration=None if calibration is None else read_calibration(calibration),
         together=int(every),
         newest=every,

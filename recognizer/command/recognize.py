@@ -14,7 +14,6 @@ from encoded_objects.console.output import message, warning, write_json
 from encoded_objects.console.progress import ProgressBar, progress_bar
 from probe.frame import Frame
 from probe.recording.read import Recording
-from probe.sensor import SensorType
 from recognizer.command import report
 from recognizer.command.answer_pictures import draw_answer, draw_answers, refuse_pictures
 from recognizer.command.answers import Answer, RecognizeOptions, answers_of
@@ -44,15 +43,15 @@ def recognize_touches(options: RecognizeOptions) -> int:
         if options.recording is not None:
             recording = Recording(options.recording, live=options.live)
             source = source_of(
-                recording, SensorType(), overlay=options.overlay,
+                recording, options.sensor_type, overlay=options.overlay,
                 calibration=options.calibration, every=options.every,
             )  # fmt: skip
             learning = _reader(options, lab, source)
             learning.learn_from(source.touches(recording.frames(), learning.reader.settings))
             return _print_answers(options, learning, source, recording.frames(), interrupted)
         source = source_at(
-            options.port, overlay=options.overlay, calibration=options.calibration,
-            every=options.every,
+            options.port, sensor_type=options.sensor_type, overlay=options.overlay,
+            calibration=options.calibration, every=options.every,
         )  # fmt: skip
         learning = _reader(options, lab, source)  # before frames come
         with listen(source, interrupted, options.sensor, options.calibration) as frames:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.frame import Frame
+from probe.sensor import SensorType
 from recognizer.touch.settings import DEFAULTS, ContactSettings, ReaderSettings
 from recognizer.touch.signal import signal_of
 
@@ -51,6 +52,7 @@ def cut_touches(
     frames: Iterable[Frame],
     settings: ReaderSettings = DEFAULTS,
     trust: Array | None = None,
+    sensor: SensorType | None = None,
 ) -> Iterator[TouchImage]:
     """Yield the touches of a film, each as soon as it is told.
 
@@ -62,10 +64,13 @@ def cut_touches(
         When something is touched, and when frames are one touch.
     trust
         (rows, columns) 0 for bad tactels of a calibration.
+    sensor
+        Type of the sensor; as `fsr-16` if not given.
     """
     contact = _Contact(settings.contacts)
     for frame in frames:
-        signal = signal_of(frame.counts.astype(np.float64), trust=trust, settings=settings.signal)
+        counts = frame.counts.astype(np.float64)
+        signal = signal_of(counts, trust=trust, sensor=sensor, settings=settings.signal)
         if signal.contact:
             image = signal.forces * signal.trust
             yield from contact.take(_ContactFrame(frame, image, float(image.sum())))

@@ -16,7 +16,7 @@ from recognizer.errors import SensorStateError, TouchError
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import Recognition
-from recognizer.touch.sensor_state import SensorState
+from recognizer.touch.sensor_state import SensorState, invert_floating
 from recognizer.touch.signal import Signal, signal_of
 from recognizer.touch.source import source_of
 
@@ -114,7 +114,7 @@ class Reader(PreparedLab):
             wrong = values.shape if known is None or values.shape != shape else known.shape
             raise TouchError(
                 f"an image of shape {wrong}, of a sensor with {shape[0]} rows, {shape[1]} columns",
-                fix="make the reader for that sensor: Reader(lab, SensorType(rows=...))",
+                fix="give its --sensor-type; in Python Reader(lab, sensor_type_named(...))",
                 place=sensor.name,
             )
         if not np.isfinite(values).all():
@@ -129,10 +129,14 @@ class Reader(PreparedLab):
             values = found.values
             known = np.where(found.bad, 0.0, 1.0) * (1.0 if known is None else known)
         state = self.state
+        if sensor.wiring == "floating" and not newtons and not (state and state.floating):
+            values = invert_floating(values)
         if state is not None:
             values = state.correct(values, newtons=newtons)
             known = np.where(state.masked, 0.0, 1.0) * (1.0 if known is None else known)
-        signal = signal_of(values, trust=known, newtons=newtons, settings=self.settings.signal)
+        signal = signal_of(
+            values, trust=known, newtons=newtons, sensor=sensor, settings=self.settings.signal
+        )
         if state is None:
             return signal
         return replace(signal, forces=state.level(signal.forces, newtons=newtons), state=state)
@@ -146,7 +150,7 @@ class Reader(PreparedLab):
     ) -> Iterator[Recognition]:
         """Yield what the touches of a recording say, as `recognize-object` does.
 
-        A recording that tells which overlay it was felt through is read by that.
+        A recording that tells which sensor type and overlay felt it is read by that.
 
         Parameters
         ----------
@@ -166,7 +170,8 @@ class Reader(PreparedLab):
         """
         opened = recording if isinstance(recording, Recording) else Recording(recording)
         given = None if calibration is None else Path(calibration)
-        source = source_of(opened, self.sensor, calibration=given, every=every)
+        known = None if opened.origin.sensor_type else self.sensor
+        source = source_of(opened, known, calibration=given, every=every)
         if source.notice:
             warnings.warn(source.notice, stacklevel=2)
         reader = self if source.sensor == self.sensor else replace(self, sensor=source.sensor)

@@ -17,6 +17,7 @@ class SignalSettings:
     """What of a frame is contact, background, or a dead line."""
 
     contact_counts: float = 8.0  #: over the background by which the strongest tactels rise
+    quiet_sigmas: float = 6.0  #: and standard deviations of the type's noise, where that is more
     contact_n: float = 0.05  #: the same where readings are newtons
     contact_sigmas: float = 7.0  #: the same where they are on another scale: deviations of noise
     strongest: int = 6  #: tactels that must; a spike is one
@@ -58,6 +59,7 @@ class TemplateSettings:
     cross_talk: float = 0.12  #: of a reading that neighbours get; twice that at the far end
     low: float = 0.7  #: exponents between which the slope by the force law's is taken
     high: float = 1.1
+    gel_peak: float = 100.0  #: percentile of a gel's imprints that counts as 1
     pad_peak: float = 98.0  #: percentile of a pad's responses that counts as 1
     pad_fine: int = 20  #: tactels to a pitch when a pad is pressed
     pad_cells: int = 2  #: pitches pressed: half a cell beyond the one that is kept, each side

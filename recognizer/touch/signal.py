@@ -8,11 +8,12 @@ neighbours (spikes) and dead rows or columns are told from the image itself.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from probe.sensor import SensorType
 from recognizer.touch.sensor_state import SensorState
 from recognizer.touch.settings import DEFAULTS, SignalSettings
 
@@ -36,6 +37,7 @@ def signal_of(
     trust: Array | None = None,
     floor: float | None = None,
     newtons: bool = False,
+    sensor: SensorType | None = None,
     settings: SignalSettings = DEFAULTS.signal,
 ) -> Signal:
     """Return the signal of one image.
@@ -50,17 +52,26 @@ def signal_of(
         Reading without force; by default what the lowest of the tactels read.
     newtons
         Whether the readings are newtons.
+    sensor
+        Type of the sensor: where it has tactels, its bits, noise and law; as of `fsr-16` if not
+        given.
     settings
         How far the strongest tactels must rise for a contact, and the like. Readings that are
         no whole numbers are counts averaged, or on a scale of their own (0 ... 1): what rises out
         of their own noise is a contact too.
     """
     known = np.ones(readings.shape) if trust is None else trust.astype(np.float64)
+    if sensor is not None:
+        settings = signal_limits(sensor, settings)
+        if sensor.missing:
+            known = known * sensor.present()
     good = readings[known > 0]
     if good.size == 0:
         return Signal(np.zeros(readings.shape), known, contact=False, newtons=newtons)
     level = float(np.quantile(good, settings.background)) if floor is None else floor
     forces = np.maximum(readings - level, 0.0)
+    if sensor is not None and sensor.exponent != 1.0 and not newtons:
+        forces = forces ** (1.0 / sensor.exponent)
     rise = settings.contact_n if newtons else settings.contact_counts
     if not (newtons or (good == np.rint(good)).all()):  # no counts: of a scale of their own
         rise = min(rise, settings.contact_sigmas * noise_of(good))
@@ -92,6 +103,19 @@ def noise_of(readings: Array) -> float:
     step = float(steps[steps > 0].min()) if steps.any() else 0.0
     square = float((below**2).sum()) / max(len(below) + at / 2, 1.0)
     return math.sqrt(square + step**2 / 12)
+
+
+def signal_limits(sensor: SensorType, settings: SignalSettings = DEFAULTS.signal) -> SignalSettings:
+    """Return the settings for a type: a contact rises by as much of its full scale, or its noise.
+
+    Examples
+    --------
+    >>> signal_limits(SensorType()) == SignalSettings()
+    True
+    """
+    share = sensor.full / SensorType().full
+    rise = max(settings.contact_counts * share, settings.quiet_sigmas * sensor.noise)
+    return replace(settings, contact_counts=float(rise ** (1.0 / sensor.exponent)))
 
 
 def _live_mask(forces: Array, known: Array, settings: SignalSettings) -> Array:

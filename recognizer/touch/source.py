@@ -1,14 +1,14 @@
 """A recording -> touches, with the sensor that felt them and its calibration.
 
-The overlay is what is asked for, else what the recording tells, else the sensor's own. A
-calibration that a recording names by its hash is looked for beside it; without one counts are
-read as they are.
+The sensor is what is asked for, else what the recording tells, else the usual one; so is the
+overlay. A calibration that a recording names by its hash is looked for beside it; without one
+counts are read as they are.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from probe.errors import CalibrationError, RecordingError
 from probe.frame import Frame
 from probe.recording.layout import RecordingOrigin
 from probe.recording.read import Recording
-from probe.sensor import Overlay, SensorType
+from probe.sensor import SensorType
 from recognizer.touch.contacts import TouchImage, cut_touches, every_frame
 from recognizer.touch.settings import DEFAULTS, ReaderSettings
 
@@ -47,12 +47,12 @@ class TouchSource:
             return every_frame(frames, self.together)
         known = self.calibration
         trust = None if known is None else np.where(known.bad, 0.0, 1.0)
-        return cut_touches(frames, settings, trust)
+        return cut_touches(frames, settings, trust, self.sensor)
 
 
 def source_of(
     recording: Recording,
-    sensor: SensorType,
+    sensor: SensorType | str | None = None,
     *,
     overlay: str = "",
     calibration: Path | None = None,
@@ -63,7 +63,8 @@ def source_of(
     Parameters
     ----------
     sensor
-        That is taken to have felt it, but for the overlay if the recording tells another.
+        Type, its name or file, that is taken to have felt it; None: the one that it tells. The
+        overlay is the recording's where it tells another.
     overlay
         `tab` or `pad`, whatever the recording tells; empty: as it tells.
     calibration
@@ -75,6 +76,8 @@ def source_of(
     ------
     RecordingError
         It says what makes no sense.
+    SensorTypeError
+        No such type, one of another shape, or nothing tells.
     CalibrationError
         The calibration is none, or another one than the recording names.
     """
@@ -83,22 +86,13 @@ def source_of(
     told = str(origin.more.get("overlay", "")) or origin.sensor.rpartition("/")[2]
     return TouchSource(
         place=str(path),
-        sensor=with_overlay(sensor, overlay or told),
+        sensor=recording.sensor_type(sensor).with_overlay(overlay or told),
         calibration=known,
         together=1 if every else _frames_per_touch(origin, path),
         frames=len(recording),
         notice=notice,
         name=origin.sensor,
     )
-
-
-def with_overlay(sensor: SensorType, kind: str) -> SensorType:
-    """Return a sensor with tabs or a pad; as it is if `kind` names neither."""
-    if kind == sensor.overlay.kind:
-        return sensor
-    if kind == "tab":
-        return replace(sensor, overlay=Overlay(kind="tab"))
-    return replace(sensor, overlay=Overlay(kind="pad")) if kind == "pad" else sensor
 
 
 def _frames_per_touch(origin: RecordingOrigin, path: Path) -> int:

@@ -100,8 +100,14 @@ def touch_set(
         str, typer.Option("--levels", "--noise", metavar="LIST", show_default=False,
                           help=f"Sensors and prints, and their shares: {', '.join(LEVELS)}."),
     ] = "",
+    sensor_type: Annotated[
+        str, typer.Option("--sensor-type", metavar="NAME|FILE", show_default=False,
+                          help="What touches: a name that probe-sensor types lists, or a file; "
+                               "fsr-16. Forces are for its area."),
+    ] = "",
     overlay: Annotated[
-        str, typer.Option(metavar="tab|pad", show_default=False, help="Elastic overlay; tab."),
+        str, typer.Option(metavar="tab|pad", show_default=False,
+                          help="Elastic overlay; that of the sensor type."),
     ] = "",
     surfaces: Annotated[
         str, typer.Option(metavar="files|printed|database", show_default=False,
@@ -181,7 +187,8 @@ def touch_set(
         with progress_bar("making the set") as bar:
             result = validate(
                 specs or (), folder=folder, touches=touches, database=database, kinds=kinds,
-                levels=levels, overlay=overlay, surfaces=surfaces, print_profile=print_profile,
+                levels=levels, sensor_type=sensor_type or None, overlay=overlay,
+                surfaces=surfaces, print_profile=print_profile,
                 faults=faults, prints=prints or "", engine=engine, sensor_per=sensor_per,
                 policy=policy, study=study, shard=shard, seed=seed, jobs=processes, cluster=cluster,
                 resume=resume, progress=TouchProgress(bar),

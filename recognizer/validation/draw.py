@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from probe.contact.contract import Touch
 from probe.errors import ContactError
-from probe.sensor import Overlay, SensorType
+from probe.sensor import SensorType
+from probe.sensor_types import choose_sensor_type
 from probe.simulate.registered import registered_object, registered_objects, registered_surface
 from probe.simulate.scene import Scene
 from probe.simulate.touch import TouchRanges, random_touches
@@ -90,7 +91,7 @@ class DrawnTouch:
 def draw_touch(plan: TouchPlan, number: int, reader: Reader) -> DrawnTouch:
     """Return what is touched in a trial, and the reading."""
     rng = np.random.default_rng([plan.seed, number])
-    ranges = _ranges(plan, level_of(plan))
+    ranges = _ranges(plan, level_of(plan), reader.sensor)
     copy = _copy_of_run(plan.seed, reader.sensor) if plan.sensor_per == "run" else None
     anew: list[str] = []
     arrays = [
@@ -131,7 +132,7 @@ def draw_again(
 
 def draw_tilt(plan: TouchPlan, touch: Touch, rng: np.random.Generator) -> Touch:
     """Return a touch with another tilt of the wrist, as the plan draws it."""
-    tilt = _ranges(plan, level_of(plan)).tilt_rad * math.sqrt(rng.random())
+    tilt = _ranges(plan, level_of(plan), reader.sensor).tilt_rad * math.sqrt(rng.random())
     towards = float(rng.uniform(-math.pi, math.pi))
     return replace(touch, tilt_x_rad=tilt * math.cos(towards), tilt_y_rad=tilt * math.sin(towards))
 
@@ -247,10 +248,15 @@ def _faces_of_lab(database: str) -> list[tuple[str, str]]:
     ]
 
 
-def _ranges(plan: TouchPlan, level: Level) -> TouchRanges:
-    """Return forces and tilts of a plan, or those of a level that has its own."""
+def _ranges(plan: TouchPlan, level: Level, sensor: SensorType) -> TouchRanges:
+    """Return forces and tilts of a plan, or those of a level that has its own.
+
+    Forces are those on `fsr-16`; another sensor is pressed as hard for its area.
+    """
     tilt = plan.tilt_rad if level.tilt_rad is None else level.tilt_rad
-    return TouchRanges(force_n=level.force_n or plan.force_n, tilt_rad=tilt)
+    share = math.prod(sensor.half_mm) / math.prod(SensorType().half_mm)
+    low, high = level.force_n or plan.force_n
+    return TouchRanges(force_n=(low * share, high * share), tilt_rad=tilt)
 
 
 def _datum(scene: Scene | None) -> tuple[float, float]:
@@ -355,6 +361,6 @@ def _draw_anywhere(rng: np.random.Generator, ranges: TouchRanges) -> Touch:
     )
 
 
-def sensor_of(overlay: str) -> SensorType:
-    """Return the usual sensor with a tab or a pad overlay."""
-    return SensorType(overlay=Overlay(kind="pad" if overlay == "pad" else "tab"))
+def sensor_of(sensor_type: str, overlay: str) -> SensorType:
+    """Return the sensor type of a campaign, given as YAML, with the overlay that it names."""
+    return choose_sensor_type(None, sensor_type, None, "--sensor-type").with_overlay(overlay)

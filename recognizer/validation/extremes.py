@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from probe.simulate.world.extremes import FINITE, SCENES, press_scene
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
-from recognizer.touch.signal import signal_of
 from recognizer.validation.statistics import round_digits
 
 NO_ANSWER = "no answer"
@@ -58,7 +57,7 @@ def read_images(reader: Reader) -> Iterator[dict[str, Any]]:
     """Show the reader strange images; yield what came of each, and whether it passes."""
     shape = (reader.sensor.rows, reader.sensor.columns)
     for name, image in _images(shape):
-        answer = recognise(reader, signal_of(image))
+        answer = recognise(reader, reader.signal(image))
         outcome = FINITE if answer else NO_ANSWER
         told = f"{answer.object}/{answer.face}" if answer else answer.reason
         yield {

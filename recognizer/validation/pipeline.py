@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 
 from probe.contact.engines import ENGINES
+from probe.sensor import SensorType
+from probe.sensor_types import choose_sensor_type, sensor_type_text
 from recognizer.validation.campaign import (
     FILES,
     PRINTED,
@@ -27,7 +29,7 @@ from recognizer.validation.campaign import (
     shards_of,
     touchable,
 )
-from recognizer.validation.draw import TouchPlan
+from recognizer.validation.draw import TouchPlan, sensor_of
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.extremes import extremes
 from recognizer.validation.files import write_json, write_text
@@ -70,6 +72,7 @@ class CampaignOptions:
     seed: int | None = None
     kinds: str = ""
     levels: str = ""
+    sensor_type: str = ""
     overlay: str = ""
     surfaces: str = ""
     print_profile: str = ""
@@ -89,6 +92,7 @@ def validate(
     database: str = "",
     kinds: str = "",
     levels: str = "",
+    sensor_type: str | SensorType | None = None,
     overlay: str = "",
     surfaces: str = "",
     print_profile: str = "",
@@ -119,8 +123,10 @@ def validate(
         Where the set is registered; `lab.db` in the folder if empty.
     kinds, levels
         Shares of the kinds of touches ("face=3,edge") and of the levels of noise.
+    sensor_type
+        What touches: a type, its name or file; `fsr-16` if not given.
     overlay
-        `tab` or `pad`; tabs if empty.
+        `tab` or `pad` instead of the type's own overlay.
     surfaces
         `files`: the written STL files are touched; `printed`: what PrusaSlicer's G-code leaves of
         them; `database`: the registered faces.
@@ -171,7 +177,9 @@ def validate(
     begun, start = datetime.now(UTC), time.monotonic()
     named = [Path(spec) for spec in ([specs] if isinstance(specs, str | Path) else specs)]
     place, steps = Path(folder), progress or TouchProgress()
-    options = CampaignOptions(touches, seed, kinds, levels, overlay, surfaces, print_profile,
+    kind = choose_sensor_type(sensor_type, "", None, "--sensor-type")
+    text = "" if sensor_type is None or kind == SensorType() else sensor_type_text(kind)
+    options = CampaignOptions(touches, seed, kinds, levels, text, overlay, surfaces, print_profile,
                               faults, engine, sensor_per, policy, study, shard)  # fmt: skip
     known = resume and (place / RECORD).exists()
     campaign = _campaign(options, read_record(place).campaign if known else None)
@@ -228,6 +236,7 @@ def _campaign(options: CampaignOptions, known: Campaign | None) -> Campaign:
                 f"'{given}' is not known", fix=f"give {' or '.join(allowed)}", place=option
             )
     base = known or Campaign()
+    own = sensor_of(options.sensor_type, "").overlay.kind if options.sensor_type else ""
     touches = base.touches if options.touches is None else options.touches
     study = base.study if known else STUDIES.touches_of(touches)
     campaign = replace(
@@ -236,7 +245,8 @@ def _campaign(options: CampaignOptions, known: Campaign | None) -> Campaign:
         seed=base.seed if options.seed is None else options.seed,
         kinds=kinds_of(options.kinds) if options.kinds else base.kinds,
         levels=levels_of(options.levels) if options.levels else base.levels,
-        overlay=options.overlay or base.overlay,
+        sensor_type=options.sensor_type or base.sensor_type,
+        overlay=options.overlay or own or base.overlay,
         surfaces=options.surfaces or base.surfaces,
         print_profile=options.print_profile or base.print_profile,
         faults=options.faults or base.faults,

@@ -16,6 +16,7 @@ from typing import Any
 
 from probe.contact.engines import engine_named
 from probe.contact.press import level_for
+from probe.sensor_types.read import sensor_type_named, shipped_names
 from probe.simulate.world.levels import LEVELS
 from recognizer.validation.campaign import KINDS, LEVEL_SHARES, Campaign, Shares
 from recognizer.validation.draw import TouchPlan, sensor_of
@@ -51,8 +52,8 @@ def provenance(record: RunRecord, database: str) -> dict[str, Any]:
 
 def _contact(campaign: Campaign) -> str:
     """Return which engine pressed, and how finely."""
-    if campaign.overlay == "pad":
-        return "layer"
+    if campaign.overlay != "tab":
+        return "layer" if campaign.overlay == "pad" else campaign.overlay
     points = engine_named(campaign.engine).points
     engine = "tabs" if campaign.engine == "own" else campaign.engine
     return f"{engine}, {points} points a tab"
@@ -60,8 +61,8 @@ def _contact(campaign: Campaign) -> str:
 
 def contact_level(campaign: Campaign) -> str:
     """Return the name of the contact model's level as the tables of its error have it."""
-    if campaign.overlay == "pad":
-        return level_for(sensor_of(campaign.overlay))
+    if campaign.overlay != "tab":
+        return level_for(sensor_of(campaign.sensor_type, campaign.overlay))
     name = "tabs" if campaign.engine == "own" else campaign.engine
     return f"{name}-{engine_named(campaign.engine).points}"
 
@@ -86,7 +87,11 @@ def command_of(record: RunRecord) -> str:
         words += ["--kinds", _shares(campaign.kinds)]
     if campaign.levels != LEVEL_SHARES:
         words += ["--levels", _shares(campaign.levels)]
-    if campaign.overlay != plain.overlay:
+    sensor = sensor_of(campaign.sensor_type, "")
+    if campaign.sensor_type:
+        shipped = sensor.name in shipped_names() and sensor_type_named(sensor.name) == sensor
+        words += ["--sensor-type", sensor.name if shipped else f"{sensor.name}.yaml"]
+    if campaign.overlay != sensor.overlay.kind:
         words += ["--overlay", campaign.overlay]
     if campaign.engine != plain.engine:
         words += ["--engine", campaign.engine]

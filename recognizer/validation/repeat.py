@@ -17,7 +17,6 @@ from generator.alphabet import Alphabet
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import Recognition
-from recognizer.touch.signal import signal_of
 from recognizer.touch.symbols.fit import Fit, fit_lattices
 from recognizer.touch.symbols.gain import image_of_signal
 from recognizer.validation.campaign import plan_of, series_of
@@ -77,7 +76,7 @@ def repeat_touch(folder: Path, number: int, plot: Path | None) -> dict[str, Any]
     reader = prepare_reader(work)
     kind, plan = plan_of(record.campaign, series, work.database, number, work.labs, work.prints)
     found = draw_touch(plan, number, reader)
-    answer = recognise(reader, signal_of(found.counts.astype(np.float64)), number)
+    answer = recognise(reader, reader.signal(found.counts), number)
     trial = judge(plan, number, found, answer, 0.0)
     row = row_of(trial, kind, symbols_in_view(reader.lab, reader.sensor, trial))
     row = {name: _or_none(value) for name, value in row.items()}
@@ -123,7 +122,7 @@ def _draw_counts(axis: Axes, found: DrawnTouch, reader: Reader) -> None:
 def _draw_fit(axis: Axes, found: DrawnTouch, reader: Reader) -> None:
     """Draw the likeliest lattice and its symbols over the counts."""
     axis.imshow(found.counts, extent=_extent(reader), cmap="Greys")
-    signal = signal_of(found.counts.astype(np.float64))
+    signal = reader.signal(found.counts)
     best: tuple[float, Fit, Alphabet, float] | None = None
     for encoding, template, bank in reader.prepared if signal.contact else ():
         height_mm = encoding.style.height_mm

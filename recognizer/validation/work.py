@@ -86,7 +86,9 @@ def prepare_reader(work: Work) -> Reader:
             f"a worker sees another set under {work.database}",
             fix="let all machines share the folder, or give a PostgreSQL database",
         )
-    return Reader(open_lab(work.database), sensor_of(work.campaign.overlay))
+    return Reader(
+        open_lab(work.database), sensor_of(work.campaign.sensor_type, work.campaign.overlay)
+    )
 
 
 @lru_cache(maxsize=1)

@@ -77,7 +77,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=9)
     parser.add_argument("--png")
     options = parser.parse_args()
-    reader = Reader(open_lab(options.database), sensor_of("tab"))
+    reader = Reader(open_lab(options.database), sensor_of("", "tab"))
     points = {}
     for level in ("typical", "mismatch"):
         plan = TouchPlan(options.database, options.seed, level)

@@ -31,7 +31,7 @@ def several(job: tuple[TouchPlan, str, range]) -> list[Trial]:
     plan, overlay, numbers = job
     key = (plan.database, overlay)
     if key not in READERS:
-        READERS[key] = Reader(open_lab(plan.database), sensor_of(overlay))
+        READERS[key] = Reader(open_lab(plan.database), sensor_of("", overlay))
     return [trial(plan, number, READERS[key]) for number in numbers]
 
 

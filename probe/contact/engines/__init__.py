@@ -53,7 +53,7 @@ class Engine:
 
     press: Press
     points: int  #: on each tip, enough for it
-    overlays: tuple[str, ...]  #: that it knows: tab, pad
+    overlays: tuple[str, ...]  #: that it knows: tab, pad, gel
     triangles: Triangles | None = None  #: of the part that a touch needs, and all; None: no meshes
 
 

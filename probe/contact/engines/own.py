@@ -18,4 +18,4 @@ def press(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips) -> C
     return ladder.press(surface, sensor, touch)
 
 
-ENGINE = Engine(press, points=19, overlays=("tab", "pad"))
+ENGINE = Engine(press, points=19, overlays=("tab", "pad", "gel"))

@@ -20,6 +20,7 @@ from probe.contact.engines import Engine, engine_named
 from probe.contact.tips import Tips
 from probe.sensor import SensorType
 from probe.simulate.world.distorted import DistortedSurface
+from probe.simulate.world.gel import read_gel
 from probe.simulate.world.levels import Level
 from probe.simulate.world.mounting import mount
 from probe.simulate.world.sensor_copy import SensorCopy, draw_copy
@@ -33,8 +34,8 @@ class ReadoutSettings:
     """What all levels share: the board, and how a hand comes down, rocks and slides."""
 
     counts_per_n: float = 150.0  #: of a tactel under small forces, unless the supply is too low
-    full: int = 1023  #: counts, 10 bits
     bias: float = 8.0  #: counts of an unloaded tactel
+    bits: int = 10  #: of the readings that these counts are of; of other widths in proportion
     peak: float = 1.4  #: force before a film with hysteresis is read, of the force when it is
     slide_step_mm: float = 0.5  #: places along a slide are at most so far apart
 
@@ -80,10 +81,12 @@ def read_sensor(
     sensor_copy = copy or draw_copy(sensor, rng)
     if level.wider_mm > 0 or level.scale != 0:
         surface = DistortedSurface(surface, level.wider_mm, level.scale, datum_mm)
+    if sensor.value == "depth":
+        return read_gel(surface, sensor, touch, level, rng, sensor_copy)
     contacts = engine_named(engine)
     tips = sensor_copy.tips(sensor, level, contacts.points)
     forces, contact = _slid(contacts, surface, sensor, touch, tips, level, rng)
-    film, state = sensor_copy.film(level), None
+    film, state = sensor_copy.film(sensor, level), None
     if level.hysteresis > 0:
         rocked = replace(touch, force_n=READOUT.peak * touch.force_n,
                          tilt_x_rad=-touch.tilt_x_rad, tilt_y_rad=-touch.tilt_y_rad)  # fmt: skip
@@ -91,9 +94,10 @@ def read_sensor(
         _, state = conductances(film, _heard(before, level))
     conductance, _ = conductances(film, _heard(forces, level), state)
     share = loaded_columns(conductance, sensor_copy.floating_rows(level), level.load_ohm)
-    offered = READOUT.full * _amplification(level.load_ohm) * _bleed_rows(share, level.bleed)
-    noise = READOUT.counts_per_n * level.noise_n * rng.standard_normal(forces.shape)
-    counts = np.clip(np.rint(READOUT.bias + offered + noise), 0, READOUT.full)
+    coarse = sensor.full / ((1 << READOUT.bits) - 1)
+    offered = sensor.full * _amplification(level.load_ohm) * _bleed_rows(share, level.bleed)
+    noise = coarse * READOUT.counts_per_n * level.noise_n * rng.standard_normal(forces.shape)
+    counts = np.clip(np.rint(coarse * READOUT.bias + offered + noise), 0, sensor.full)
     return mount(counts.astype(np.uint16), level.mounting), contact
 
 
@@ -134,4 +138,5 @@ def _bleed_rows(share: Array, bleed: float) -> Array:
 
 def _amplification(load_ohm: float) -> float:
     """Return supply over full scale: small forces read alike, but the supply stays within range."""
-    return max(1.0, READOUT.counts_per_n / (READOUT.full * load_ohm * FILM.gain_s))
+    full = (1 << READOUT.bits) - 1
+    return max(1.0, READOUT.counts_per_n / (full * load_ohm * FILM.gain_s))

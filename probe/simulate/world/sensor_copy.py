@@ -41,24 +41,29 @@ class SensorCopy:
             shifts_mm=level.shift_mm * self.shifts,
         )
 
-    def film(self, level: Level) -> Fsr:
+    def film(self, sensor: SensorType, level: Level) -> Fsr:
         """Return the law of every tactel of this copy at a level."""
         rows, columns = self.gains.shape
         plain, none = fsr_of(rows, columns), np.zeros((rows, columns))
-        dead = np.zeros(rows * columns, dtype=np.bool_)
-        dead[self.failing[: round(level.dead * rows * columns)]] = True
-        hot = np.zeros(rows * columns)
-        hot[self.failing[len(dead) - round(level.hot * len(dead)) :]] = FILM.gain_s * level.hot_n
+        dead = self.dead(level) | ~sensor.present()
+        hot = np.zeros(dead.size)
+        hot[self.failing[dead.size - round(level.hot * dead.size) :]] = FILM.gain_s * level.hot_n
         return Fsr(
             gain_s=plain.gain_s * np.exp(level.gain * self.gains),
-            exponent=level.exponent * plain.exponent,
+            exponent=level.exponent * sensor.exponent * plain.exponent,
             break_n=plain.break_n,
             preload_n=none,
             series_ohm=none,
             stuck_s=hot.reshape(rows, columns),
-            dead=dead.reshape(rows, columns),
+            dead=dead,
             hysteresis=level.hysteresis,
         )
+
+    def dead(self, level: Level) -> NDArray[np.bool_]:
+        """Return which tactels feel nothing (rows, columns) at a level."""
+        dead = np.zeros(self.gains.size, dtype=np.bool_)
+        dead[self.failing[: round(level.dead * self.gains.size)]] = True
+        return dead.reshape(self.gains.shape)
 
     def floating_rows(self, level: Level) -> NDArray[np.bool_]:
         """Return which rows float (rows,) at a level."""

@@ -6,7 +6,8 @@ the symbol's axes (x along the array's columns, y against its rows), mm.
 
 A tab feels the share of its tip that the plateau covers, and a little more than that share
 because a partly covered tip bulges into the open side; what a pad feels is pressed once by
-the layer model (`pad`). Responses are kept as
+the layer model (`pad`); a pixel of a gel sees the mean of the imprint, which membrane and optics
+blur. Responses are kept as
 psi(y) = log(1 + 3 y) / log 4, in which gain errors and noise have about one size. Three
 things are fitted with the rest, to first order: how much wider than asked the strokes are
 printed, how far tactels hear their neighbours, and an exponent, for a force law that is not
@@ -80,7 +81,7 @@ def template_of(
         settings.step_mm, settings.cross_talk, settings.low, settings.high
     )  # fmt: skip
     pad = sensor.overlay.kind == "pad"
-    felt = _pad_responses if pad else _tab_responses
+    felt = _RESPONSES[sensor.overlay.kind]
     half = style.pitch_mm / 2 if pad else _reach_mm(alphabet, style, sensor)
     steps = math.ceil(half / step) + (0 if pad else 1)
     axis = np.asarray((np.arange(2 * steps + 1) - steps) * step, np.float64)
@@ -151,6 +152,32 @@ def _pad_responses(
     return np.asarray(tactels / np.percentile(tactels, settings.pad_peak))
 
 
+def _gel_responses(
+    alphabet: Alphabet,
+    style: SymbolStyle,
+    sensor: SensorType,
+    axis: Array,
+    settings: TemplateSettings,
+) -> Array:
+    """Return the responses (order, n, n) of the pixels of a gel."""
+    from scipy.ndimage import gaussian_filter, uniform_filter
+
+    x, y = np.meshgrid(axis, axis)
+    reach, step = alphabet.reach * style.pitch_mm, settings.step_mm
+    blur = math.hypot(sensor.overlay.blur_mm, sensor.overlay.membrane_mm) / step
+
+    def seen(strokes: Array) -> Array:
+        presence = _presence(_distance(strokes * reach, x, y), style, settings)
+        imprint = gaussian_filter(presence, blur, mode="constant")
+        return np.asarray(uniform_filter(imprint, round(sensor.pitch_mm / step), mode="constant"))
+
+    found = np.stack([seen(np.array(glyph.strokes, float)) for glyph in alphabet.glyphs])
+    return np.asarray(np.minimum(found / np.percentile(found, settings.gel_peak), 1.0))
+
+
+_RESPONSES = {"tab": _tab_responses, "pad": _pad_responses, "gel": _gel_responses}
+
+
 def _with_cross_talk(felt: Array, share: float, sensor: SensorType, step: float) -> Array:
     """Return responses of tactels that hear a share of what stands one tactel away, all around."""
     from scipy.signal import fftconvolve
@@ -181,7 +208,11 @@ def _presence(distance: Array, style: SymbolStyle, settings: TemplateSettings) -
 def _reach_mm(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType) -> float:
     """Return how far from its centre a symbol is felt."""
     strokes = alphabet.reach * style.pitch_mm + style.stroke_mm / 2 + style.draft_mm
-    return strokes + sensor.overlay.tab_diameter_mm / 2 + sensor.pitch_mm
+    overlay = sensor.overlay
+    if overlay.kind == "gel":
+        blur = math.hypot(overlay.blur_mm, overlay.membrane_mm)
+        return strokes + sensor.pitch_mm / 2 + 2.5 * blur
+    return strokes + overlay.tab_diameter_mm / 2 + sensor.pitch_mm
 
 
 def _disc(radius: float, step: float) -> Array:

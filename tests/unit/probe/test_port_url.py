@@ -43,14 +43,14 @@ def test_urls_are_read(url, target, options):
     [
         ("/dev/ttyACM0", "write serial:///dev/ttyACM0"),
         ("touch.h5", "write file:touch.h5"),
-        ("http://probe", "must begin with serial:, sim: or file:"),
+        ("http://probe", "must begin with serial:, flexitac:, sim: or file:"),
         ("serial:", "names no device"),
         ("file:?speed=1", "names no recording"),
         ("sim:?rate", "options 'rate' cannot be read"),
         ("sim:?rate=fast", "rate='fast' is no number from 0.1"),
         ("sim:?rate=0", "rate='0' is no number from 0.1"),
         ("sim:?rate=inf", "is no number"),
-        ("sim:?bits=8", "sim: has no option bits; its options are rate, firmware"),
+        ("sim:?bits=8", "sim: has no option bits; its options are rate, firmware, sensor_type"),
         ("sim:?firmware=arm", "no firmware 'arm'"),
         ("file:touch.h5?rate=1", "its options are speed, loop"),
         ("file:touch.h5?speed=-1", "no number from 0"),
@@ -127,7 +127,7 @@ def test_a_second_client_is_refused(line):
 def test_without_permission_the_group_is_named(tmp_path):
     device = tmp_path / "ttyACM0"
     device.touch()
-    refused = _explain_refusal(address_of(f"serial://{device}"), OSError(errno.EACCES, "no"))
+    refused = _explain_refusal(address_of(f"serial://{device}"), OSError(errno.EACCES, "no"), 9600)
     assert f"no permission to open {device}" in refused.cause
     assert "usermod -a -G" in refused.fix
 

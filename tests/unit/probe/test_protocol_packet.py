@@ -9,6 +9,7 @@ from cobs import cobs
 
 from probe.errors import FrameError, PortError
 from probe.protocol import (
+    LONGEST,
     Command,
     Damage,
     FramePacket,
@@ -17,6 +18,7 @@ from probe.protocol import (
     bits_command,
     decode,
     encode,
+    frame_bytes,
     sensor_command,
 )
 
@@ -39,12 +41,50 @@ def test_frame_bytes_are_those_of_the_format():
     assert block.count(0) == 1
     assert block[-1] == 0
     payload = cobs.decode(block[:-1])
-    assert len(payload) == 530
-    assert payload[:8] == bytes.fromhex("46 01 34 12 ef cd ab 89")
-    assert payload[8:14] == bytes.fromhex("0000 0400 0800")  # row 0 first
-    assert payload[8 + 2 * 16 : 8 + 2 * 16 + 2] == bytes.fromhex("4000")  # row 1 begins: 64
-    assert payload[520:528] == bytes.fromhex("0000 0100 0002 ff03")
-    assert payload[528:] == struct.pack("<H", crc_hqx(payload[:528], 0xFFFF))
+    assert len(payload) == 532
+    assert payload[:8] == bytes.fromhex("46 02 34 12 ef cd ab 89")
+    assert payload[8:10] == bytes([16, 16])
+    assert payload[10:16] == bytes.fromhex("0000 0400 0800")  # row 0 first
+    assert payload[10 + 2 * 16 : 10 + 2 * 16 + 2] == bytes.fromhex("4000")  # row 1 begins: 64
+    assert payload[522:530] == bytes.fromhex("0000 0100 0002 ff03")
+    assert payload[530:] == struct.pack("<H", crc_hqx(payload[:530], 0xFFFF))
+
+
+@pytest.mark.parametrize("shape", [(12, 32), (32, 12), (1, 2), (8, 8), (255, 255)])
+@pytest.mark.parametrize("byte_wide", [False, True])
+def test_frames_tell_their_rows_and_columns(shape, byte_wide):
+    counts = (np.arange(shape[0] * shape[1]) % 251).astype(np.uint16).reshape(shape)
+    block = encode(FramePacket(3, 4, counts, WRIST, byte_wide))
+    assert len(block) <= frame_bytes(shape, byte_wide=byte_wide) <= LONGEST
+    back = decode(block[:-1])
+    assert isinstance(back, FramePacket)
+    assert back.byte_wide == byte_wide
+    assert np.array_equal(back.counts, counts)
+    assert np.array_equal(back.wrist, WRIST)
+
+
+def test_frames_of_version_1_are_read():
+    head = struct.pack("<BBHI", ord("F"), 1, 7, 9)
+    back = decode(wire(head + COUNTS.tobytes() + WRIST.tobytes()))
+    assert isinstance(back, FramePacket)
+    assert (back.seq, back.t_us, back.byte_wide) == (7, 9, False)
+    assert np.array_equal(back.counts, COUNTS)
+    assert np.array_equal(back.wrist, WRIST)
+    head = struct.pack("<BBHI", ord("B"), 1, 7, 9)
+    back = decode(wire(head + (COUNTS // 4).astype(np.uint8).tobytes() + WRIST.tobytes()))
+    assert isinstance(back, FramePacket)
+    assert back.byte_wide
+    assert np.array_equal(back.counts, COUNTS // 4)
+
+
+def test_frames_whose_length_does_not_fit_their_shape_are_refused():
+    head = struct.pack("<BBHI", ord("B"), 2, 0, 0)
+    body = bytes(12 * 32) + WRIST.tobytes()
+    assert isinstance(decode(wire(head + bytes([12, 32]) + body)), FramePacket)
+    assert decode(wire(head + bytes([12, 31]) + body)) is Damage.LENGTH
+    assert decode(wire(head + bytes([0, 32]) + WRIST.tobytes())) is Damage.VALUE
+    assert decode(wire(head)) is Damage.LENGTH
+    assert decode(wire(struct.pack("<BBHI", ord("F"), 1, 0, 0) + body)) is Damage.LENGTH
 
 
 def test_frames_come_back_read_only():
@@ -60,7 +100,7 @@ def test_frames_come_back_read_only():
 def test_byte_frames_are_half_as_long():
     packet = FramePacket(7, 9, COUNTS // 4, WRIST, byte_wide=True)
     block = encode(packet)[:-1]
-    assert len(cobs.decode(block)) == 274
+    assert len(cobs.decode(block)) == 276
     back = decode(block)
     assert isinstance(back, FramePacket)
     assert back.byte_wide
@@ -75,14 +115,14 @@ def test_ident_bytes_are_those_of_the_format():
         name="fsr",
     )  # fmt: skip
     body = bytes([16, 16, 8, 8, 3, 1, 4, 41]) + struct.pack("<HH", 500, 258) + b"fsr     "
-    assert encode(ident)[:-1] == wire(struct.pack("<BBHI", ord("I"), 1, 1, 2) + body)
+    assert encode(ident)[:-1] == wire(struct.pack("<BBHI", ord("I"), 2, 1, 2) + body)
     assert decode(encode(ident)[:-1]) == ident
 
 
 def test_statistics_bytes_are_those_of_the_format():
     statistics = StatisticsPacket(5, 6, 70_000, 8, 9, 123_456)
     body = struct.pack("<IIHI", 70_000, 8, 9, 123_456)
-    assert encode(statistics)[:-1] == wire(struct.pack("<BBHI", ord("S"), 1, 5, 6) + body)
+    assert encode(statistics)[:-1] == wire(struct.pack("<BBHI", ord("S"), 2, 5, 6) + body)
     assert decode(encode(statistics)[:-1]) == statistics
 
 
@@ -108,10 +148,10 @@ IDENT = bytes([16, 16, 10, 8, 0, 1, 0, 40]) + struct.pack("<HH", 1000, 0) + b"pr
         (b"\x05ab", Damage.STUFFING),
         (cobs.encode(b"short"), Damage.LENGTH),
         (cobs.encode(HEADER + IDENT + b"\x00\x00"), Damage.CHECK),
-        (wire(b"I\x02" + HEADER[2:] + IDENT), Damage.VERSION),
+        (wire(b"I\x03" + HEADER[2:] + IDENT), Damage.VERSION),
         (wire(b"Q" + HEADER[1:] + IDENT), Damage.TYPE),
         (wire(HEADER + IDENT + b"\x00"), Damage.LENGTH),
-        (wire(HEADER + bytes([8]) + IDENT[1:]), Damage.VALUE),  # rows
+        (wire(HEADER + bytes([0]) + IDENT[1:]), Damage.VALUE),  # rows
         (wire(HEADER + IDENT[:2] + bytes([7]) + IDENT[3:]), Damage.VALUE),  # bits
         (wire(HEADER + IDENT[:4] + bytes([8]) + IDENT[5:]), Damage.VALUE),  # selected sensor
         (wire(HEADER + IDENT[:-1] + b"\xff"), Damage.VALUE),  # name

@@ -52,7 +52,7 @@ def test_what_is_no_recording_is_told_apart(tmp_path):
     refused(tmp_path / "text.h5", "no HDF5 file")
     refused(foreign(tmp_path / "a.h5"), "no dataset /frames, but nothing")
     refused(foreign(tmp_path / "b.h5", data=COUNTS, more=1), "/frames, but data, more; import")
-    refused(foreign(tmp_path / "c.h5", frames=np.zeros((5, 32, 32))), r"\(5, 32, 32\); import")
+    refused(foreign(tmp_path / "c.h5", frames=np.zeros((5, 32))), r"\(5, 32\); import")
     refused(foreign(tmp_path / "d.h5", frames=["a"]), "must hold numbers")
     refused(foreign(tmp_path / "e.h5", frames=COUNTS, t_ns=np.zeros((3, 3))), "/t_ns must hold")
     with h5py.File(tmp_path / "f.h5", "w") as file:

@@ -173,7 +173,7 @@ def test_a_part_is_left_until_all_its_faces_are_there(whole: str, tmp_path: Path
 
 
 def test_touches_of_prints_are_of_printed_faces_and_right(panels: str, listing: str) -> None:
-    reader = Reader(open_lab(panels), sensor_of("tab"))
+    reader = Reader(open_lab(panels), sensor_of("", "tab"))
     plan = TouchPlan(panels, 3, "typical", files=True, prints=listing)
     found = [trial(plan, number, reader) for number in range(4)]
     assert [(t.object, t.face, t.verdict) for t in found] == [("Cube", "F3", RIGHT)] * 4
@@ -196,7 +196,7 @@ def test_other_faces_than_those_of_the_lab_are_refused(
 ) -> None:
     values = json.loads(Path(listing).read_text())
     (tmp_path / "other.json").write_text(json.dumps(values | {"faces": {"Ball": {"F1": "a"}}}))
-    reader = Reader(open_lab(panels), sensor_of("tab"))
+    reader = Reader(open_lab(panels), sensor_of("", "tab"))
     with pytest.raises(ValidationError, match="no face for touches of kind face was printed"):
         draw_touch(TouchPlan(panels, prints=str(tmp_path / "other.json")), 0, reader)
 

@@ -1,0 +1,150 @@
+"""Level "gel": a soft layer behind a membrane, pressed by a rigid plate on the wrist.
+
+Surface + sensor + touch -> depth of the imprint under each pixel, as the force of the gel there.
+The gel is a bed of springs, E / height, on which the plate comes to rest (`plate`). Its surface
+follows what is pressed into it, but a membrane bridges beside it: the imprint is the least
+w >= d, d the depth of the surface under the plate, with
+
+    w - l^2 laplace(w) = 0  where w > d,
+
+an obstacle problem (l the membrane's way), solved by projection on a grid finer than the pixels.
+Optics and matching blur it; a pixel sees its mean. What the membrane carries is left out of the
+rest. Depth = force / (E / height) / pixel^2. mm, N.
+
+References
+----------
+R. Glowinski, "Numerical methods for nonlinear variational problems", 1984, ch. II: projection.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.contact.contract import Contact, Touch
+from probe.contact.heights import heights_at, nothing_under
+from probe.contact.neo_hooke import Linear
+from probe.contact.plate import checked_load, load_of, rest
+from probe.contact.settings import CONTACT, GEL
+from probe.errors import ContactError
+from probe.sensor import SensorType
+from probe.surface.contract import HeightMap
+
+Array = NDArray[np.float64]
+
+
+def gel(surface: HeightMap, sensor: SensorType, touch: Touch) -> Contact:
+    """Press a gel on a surface.
+
+    Parameters
+    ----------
+    surface
+        Heights in the surface frame.
+    sensor
+        Its overlay must be a gel.
+    touch
+        Pose, force and wrist. No force gives an exactly zero image.
+
+    Returns
+    -------
+    Contact
+        Force of the gel at each pixel, proportional to the depth of the imprint
+        (`depths_mm`); the plate at rest.
+
+    Raises
+    ------
+    ContactError
+        Another overlay, nothing under the sensor, a plate that tips, a gel pressed through.
+    """
+    if sensor.overlay.kind != "gel":
+        raise ContactError(
+            f"a {sensor.overlay.kind} overlay is no gel", fix="take the levels of that overlay"
+        )
+    load = load_of(touch)
+    checked_load(load)
+    if touch.force_n == 0:
+        none = np.zeros(sensor.shape)
+        return Contact(none, math.inf, touch.tilt_x_rad, touch.tilt_y_rad, "gel", iterations=0)
+    step = sensor.pitch_mm / GEL.fine
+    points = _grid(sensor, step)
+    heights = heights_at(surface, touch, points)
+    if heights.max(initial=-math.inf) == -math.inf:
+        raise nothing_under(touch)
+    law = Linear(_bed_n_mm3(sensor) * step**2)
+    found = rest(points.reshape(-1, 2), heights.ravel(), law, load)
+    tilt = max(abs(found.pose.tilt_x_rad), abs(found.pose.tilt_y_rad))
+    depth = heights - found.pose.heights_mm(points)
+    if tilt > CONTACT.steepest_rad or depth.max() > sensor.overlay.height_mm:
+        raise ContactError(
+            f"the plate tips or presses the gel through: {math.degrees(tilt):.3g} degrees, "
+            f"{depth.max():.3g} mm of {sensor.overlay.height_mm:g} mm",
+            fix="press with less force, or nearer to the middle of the face",
+        )
+    imprint, iterations = bridge(np.maximum(depth, 0.0), sensor.overlay.membrane_mm / step)
+    pixels = _blur(imprint, sensor.overlay.blur_mm / step)
+    pixels = pixels.reshape(sensor.rows, GEL.fine, sensor.columns, GEL.fine).mean(axis=(1, 3))
+    return Contact(
+        pixels * (_bed_n_mm3(sensor) * sensor.pitch_mm**2),
+        found.pose.z_mm,
+        found.pose.tilt_x_rad,
+        found.pose.tilt_y_rad,
+        "gel",
+        found.iterations + iterations,
+    )
+
+
+def depths_mm(sensor: SensorType, forces_n: Array) -> Array:
+    """Return the depth of the imprint (rows, columns) behind the forces of a gel's pixels."""
+    depth: Array = forces_n / (_bed_n_mm3(sensor) * sensor.pitch_mm**2)
+    return depth
+
+
+def bridge(depth_mm: Array, way: float) -> tuple[Array, int]:
+    """Return the least imprint over a depth that a membrane can follow, and the iterations.
+
+    Parameters
+    ----------
+    depth_mm
+        (n, m) 0 or more; nothing is pressed beyond it.
+    way
+        Over which the membrane bridges, steps of the grid.
+    """
+    if way == 0:
+        return depth_mm, 0
+    pull = way * way
+    padded = np.pad(depth_mm, 1)
+    inside = padded[1:-1, 1:-1]
+    tolerance = GEL.tolerance * float(depth_mm.max())
+    number = 0
+    while number < GEL.most:
+        number += 1
+        beside = padded[:-2, 1:-1] + padded[2:, 1:-1] + padded[1:-1, :-2] + padded[1:-1, 2:]
+        after = np.maximum(depth_mm, beside * (pull / (1 + 4 * pull)))
+        change = float(np.abs(after - inside).max())
+        inside[:] = after
+        if change <= tolerance:
+            break
+    return inside.copy(), number
+
+
+def _grid(sensor: SensorType, step: float) -> Array:
+    """Return the places (n, m, 2) at which the surface is asked."""
+    rows, columns = sensor.rows * GEL.fine, sensor.columns * GEL.fine
+    x = (np.arange(columns) - (columns - 1) / 2) * step
+    y = ((rows - 1) / 2 - np.arange(rows)) * step
+    return np.stack(np.meshgrid(x, y), axis=-1)
+
+
+def _blur(values: Array, deviation: float) -> Array:
+    if deviation == 0:
+        return values
+    from scipy.ndimage import gaussian_filter
+
+    return np.asarray(gaussian_filter(values, deviation, mode="nearest"))
+
+
+def _bed_n_mm3(sensor: SensorType) -> float:
+    """Return the stiffness of the bed of springs, N / mm^3."""
+    return sensor.overlay.young_mpa / sensor.overlay.height_mm

@@ -1,0 +1,187 @@
+"""What a file of a sensor type may say: names, defaults, descriptions. Lengths in mm.
+
+These models are the source of the JSON schema.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+from encoded_objects.document.block import Block, whole_number
+from encoded_objects.document.quantity import Length, LengthOrZero, refuse
+from probe.sensor import Overlay, OverlayKind, SensorType, Value, Wiring
+
+LINES_MAX = 255  #: rows or columns: a packet tells them by a byte each
+_NAME = re.compile(r"[a-z0-9][a-z0-9._-]{0,59}\Z")
+_LINES = re.compile(r"\s*([0-9]{1,4})\s*(?:-\s*([0-9]{1,4})\s*)?\Z")
+_PLAIN, _USUAL = SensorType(), Overlay()
+
+
+def _type_name(value: Any) -> str:
+    if not isinstance(value, str) or not _NAME.match(value):
+        raise refuse(
+            f"{value!r} is no name for a sensor type",
+            "use small letters, digits and - _ . as in flexitac-12x32",
+        )
+    return value
+
+
+def _range_of_lines(value: Any) -> tuple[int, int]:
+    """Return the first and the last line of `3` or `0-5`."""
+    match = _LINES.match(str(value)) if isinstance(value, str | int) else None
+    if match is None or isinstance(value, bool):
+        raise refuse(f"{value!r} is no line or range of lines", "write 3, or 0-5 for a range")
+    first, last = int(match[1]), int(match[2] or match[1])
+    if last < first:
+        raise refuse(f"the range {value} runs backwards", f"write {last}-{first}")
+    return first, last
+
+
+def _number(low: float, high: float, what: str) -> BeforeValidator:
+    def check(value: Any) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise refuse(f"{what} must be a number", f"write a number above {low:g}")
+        if not low < value <= high:
+            raise refuse(
+                f"{what} must be above {low:g} and at most {high:g}, not {value:g}",
+                "write a number within these bounds",
+            )
+        return float(value)
+
+    return BeforeValidator(check)
+
+
+_Lines = Annotated[int, whole_number(2, LINES_MAX, "rows and columns")]
+_Range = Annotated[
+    tuple[int, int],
+    BeforeValidator(_range_of_lines),
+    Field(json_schema_extra={"type": "string", "pattern": r"^[0-9]+(-[0-9]+)?$"}),
+]
+
+
+class OverlaySettings(Block):
+    """What stands between the sensor and the object."""
+
+    kind: OverlayKind = _USUAL.kind
+    """Separate tabs, one pad, or a gel behind a membrane."""
+    height: Length = _USUAL.height_mm
+    """Of a tab; thickness of pad or gel. mm."""
+    tip: Length = _USUAL.tab_diameter_mm
+    """Diameter of a tab's tip, mm."""
+    young: Annotated[float, _number(0, 1e4, "young")] = _USUAL.young_mpa
+    """Young's modulus at small strain, MPa."""
+    poisson: Annotated[float, _number(0, 0.5, "poisson")] = _USUAL.poisson
+    """Poisson's ratio."""
+    membrane: LengthOrZero = _USUAL.membrane_mm
+    """Of a gel: way over which the membrane bridges beside a stroke, mm."""
+    blur: LengthOrZero = _USUAL.blur_mm
+    """Of a gel: standard deviation of the blur of optics and matching, mm."""
+
+    def overlay(self) -> Overlay:
+        """Return the overlay."""
+        return Overlay(
+            self.kind, self.height, self.tip, self.young, self.poisson, self.membrane, self.blur
+        )
+
+
+class MissingSettings(Block):
+    """Places without a tactel: where these rows and columns cross."""
+
+    rows: _Range
+    """A row, or a range as 0-5; from 0, top row first."""
+    columns: _Range
+    """A column, or a range; from 0, left column first."""
+
+
+class SensorTypeSettings(Block):
+    """A sensor type."""
+
+    version: Literal[1] = 1
+    """Of this format."""
+    name: Annotated[str, BeforeValidator(_type_name)]
+    """As messages and recordings call it."""
+    rows: _Lines
+    """Rows of the matrix, the top one first."""
+    columns: _Lines
+    """Columns, the left one first, seen through the sensor's back."""
+    pitch: Length
+    """From tactel to tactel, both ways, mm."""
+    overlay: OverlaySettings = OverlaySettings()
+    """What stands between the sensor and the object."""
+    value: Value = _PLAIN.value
+    """What a reading is: ADC counts, conductance, force, or depth of the imprint."""
+    unit: Annotated[float, _number(0, 1e6, "unit")] = _PLAIN.unit
+    """Of one count: S of conductance, N of force, mm of depth."""
+    bits: Annotated[int, whole_number(4, 16, "bits")] = _PLAIN.bits
+    """Of a reading."""
+    exponent: Annotated[float, _number(0.2, 3.0, "exponent")] = _PLAIN.exponent
+    """Law: a reading grows with force (depth) to this power."""
+    wiring: Wiring = _PLAIN.wiring
+    """Of the rows that are not read: at ground, floating, or columns held at 0 V."""
+    noise: Annotated[float, _number(0, 1e4, "noise")] = _PLAIN.noise
+    """Standard deviation of a tactel at rest, counts."""
+    missing: list[MissingSettings] = Field(default_factory=list)
+    """Places without a tactel."""
+
+    def faults(self) -> list[tuple[tuple[str | int, ...], str, str]]:
+        """Return what does not fit together: the place of the setting, the cause, the way out."""
+        found: list[tuple[tuple[str | int, ...], str, str]] = [
+            (
+                ("missing", number),
+                (
+                    f"a missing tactel in row {place.rows[1]}, column {place.columns[1]}; the "
+                    f"matrix has rows 0 ... {self.rows - 1} and columns 0 ... {self.columns - 1}"
+                ),
+                "count rows and columns from 0",
+            )
+            for number, place in enumerate(self.missing)
+            if place.rows[1] >= self.rows or place.columns[1] >= self.columns
+        ]
+        if (self.value == "depth") != (self.overlay.kind == "gel"):
+            place = ("value",) if self.value == "depth" else ("overlay", "kind")
+            found.append(
+                (
+                    place,
+                    f"value {self.value} with a {self.overlay.kind} overlay",
+                    (
+                        "a gel shows depth, tabs and pads do not: write both or neither of "
+                        "value: depth and overlay: {kind: gel}"
+                    ),
+                )
+            )
+        return found
+
+    def sensor_type(self) -> SensorType:
+        """Return the type."""
+        missing = {
+            (row, column)
+            for place in self.missing
+            for row in range(place.rows[0], place.rows[1] + 1)
+            for column in range(place.columns[0], place.columns[1] + 1)
+        }
+        return SensorType(
+            rows=self.rows,
+            columns=self.columns,
+            pitch_mm=self.pitch,
+            overlay=self.overlay.overlay(),
+            name=self.name,
+            value=self.value,
+            unit=self.unit,
+            bits=self.bits,
+            exponent=self.exponent,
+            wiring=self.wiring,
+            noise=self.noise,
+            missing=tuple(sorted(missing)),
+        )
+
+
+def sensor_type_schema() -> dict[str, Any]:
+    """Return the JSON schema (draft 2020-12) of a file of a sensor type."""
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "sensor type",
+        **SensorTypeSettings.model_json_schema(),
+    }
