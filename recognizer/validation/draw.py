@@ -132,7 +132,7 @@ def draw_again(
 
 def draw_tilt(plan: TouchPlan, touch: Touch, rng: np.random.Generator) -> Touch:
     """Return a touch with another tilt of the wrist, as the plan draws it."""
-    tilt = _ranges(plan, level_of(plan), reader.sensor).tilt_rad * math.sqrt(rng.random())
+    tilt = _ranges(plan, level_of(plan), SensorType()).tilt_rad * math.sqrt(rng.random())
     towards = float(rng.uniform(-math.pi, math.pi))
     return replace(touch, tilt_x_rad=tilt * math.cos(towards), tilt_y_rad=tilt * math.sin(towards))
 
