@@ -1,4 +1,4 @@
-"""A recording -> table, array, picture; each file whole or not there."""
+"""A recording -> table, array, picture, messages; each file whole or not there."""
 
 from __future__ import annotations
 
@@ -29,11 +29,19 @@ class PictureView:
     elevation_deg: float = 40.0
 
 
+@dataclass(frozen=True, slots=True)
+class Outputs:
+    """The files that are asked for."""
+
+    csv: Path | None = None
+    npy: Path | None = None
+    png: Path | None = None
+    mcap: Path | None = None
+
+
 def export_files(
     path: Path,
-    csv: Path | None,
-    npy: Path | None,
-    png: Path | None,
+    wanted: Outputs,
     view: PictureView,
     *,
     sensor_type: str,
@@ -57,7 +65,8 @@ def export_files(
         When a file is there already.
     """
     outputs = []
-    for out, suffix in ((csv, ".csv"), (npy, ".npy"), (png, ".png")):
+    csv, npy, png, mcap = wanted.csv, wanted.npy, wanted.png, wanted.mcap
+    for out, suffix in ((csv, ".csv"), (npy, ".npy"), (png, ".png"), (mcap, ".mcap")):
         if out is not None:
             refuse_taken(out, suffix, replace=replace)
             outputs.append(out)
@@ -77,6 +86,11 @@ def export_files(
         from probe.recording.table import export_csv
 
         export_csv(path, csv, live=live)
+    if mcap is not None:
+        from probe.recording.mcap import export_mcap
+
+        with staged_file(mcap) as draft:
+            export_mcap(recording, draft)
     if as_json:
         names = [str(out) for out in outputs]
         write_json({"file": str(path), "frames": len(recording), "written": names})

@@ -27,6 +27,10 @@ def export(
         Target, typer.Option(metavar="OUT", show_default=False,
                              help="One image as heat map and as surface, see --frame."),
     ] = None,
+    mcap: Annotated[
+        Target, typer.Option(metavar="OUT", show_default=False,
+                             help="ROS 2 messages, whole: images, poses, wrist (docs/robot.md)."),
+    ] = None,
     frame: Annotated[int, typer.Option(min=0, help="Which image --png shows, from 0.")] = 0,
     median: Annotated[
         bool, typer.Option("--median", help="--png: median of each 3x3 neighbourhood."),
@@ -48,20 +52,23 @@ def export(
     replace: Replace = False,
     as_json: Json = False,
 ) -> Action:  # fmt: skip
-    """Write a recording as a table, as an array, or one of its images as a picture."""
+    """Write a recording as a table, an array, ROS 2 messages, or an image of it as a picture."""
 
     def action() -> int:
-        from probe.command.exported import PictureView, export_files
+        from probe.command.exported import Outputs, PictureView, export_files
 
-        if csv is None and npy is None and png is None:
-            raise typer.BadParameter("nothing to write: give --csv, --npy or --png")
-        if calibration is not None and csv is not None:
-            raise typer.BadParameter("--csv holds counts; --calibration is for --npy and --png")
+        if csv is None and npy is None and png is None and mcap is None:
+            raise typer.BadParameter("nothing to write: give --csv, --npy, --png or --mcap")
+        if calibration is not None and (csv is not None or mcap is not None):
+            raise typer.BadParameter(
+                "--csv and --mcap hold counts; --calibration is for --npy and --png"
+            )
         if deblur is not None and calibration is None:
             raise typer.BadParameter("--deblur needs newtons: give --calibration")
         view = PictureView(frame, median, azimuth, elevation)
         return export_files(
-            recording, csv, npy, png, view, sensor_type=sensor_type, calibration=calibration,
+            recording, Outputs(csv, npy, png, mcap), view, sensor_type=sensor_type,
+            calibration=calibration,
             pad_mm=deblur, live=live, replace=replace, as_json=as_json,
         )  # fmt: skip
 
@@ -72,7 +79,8 @@ def import_(
     array: Annotated[
         Path, typer.Argument(metavar="FILE", show_default=False,
                              help=".npy, .npz, .mat or HDF5 with images (N, rows, columns), .csv "
-                                  "with an image a line, or a folder of grey pictures."),
+                                  "with an image a line, a folder of grey pictures, or .mcap with "
+                                  "sensor_msgs/Image."),
     ],
     output: Output,
     dataset: Annotated[
@@ -93,8 +101,13 @@ def import_(
         from probe.recording.imported import import_array
 
         check_output(output, replace=replace)
-        made = import_array(array, output, dataset=dataset, rate_hz=rate, sensor=sensor,
-                            sensor_type=sensor_type, replace=replace)  # fmt: skip
+        if array.suffix.lower() == ".mcap":
+            from probe.recording.mcap import import_mcap
+
+            made = import_mcap(array, output, sensor_type=sensor_type, replace=replace)
+        else:
+            made = import_array(array, output, dataset=dataset, rate_hz=rate, sensor=sensor,
+                                sensor_type=sensor_type, replace=replace)  # fmt: skip
         more = dict(made.origin.more)
         values = {"file": str(output), "frames": len(made), "units": made.origin.units, **more}
         if as_json:

@@ -129,7 +129,7 @@ class Recorder(Closing):
         writer = self._open_writer()
         if not self._waiting:
             return
-        block, self._waiting = _block(self._waiting), []
+        block, self._waiting = block_of(self._waiting), []
         if block.pose is not None and writer.frames and not writer.poses:
             writer = self._roll_over()  # this file has no place for poses
         before = writer.frames
@@ -192,9 +192,10 @@ class Recorder(Closing):
         ) from error
 
 
-def _block(frames: list[Frame]) -> FrameBlock:
+def block_of(frames: list[Frame], *, poses: bool = False) -> FrameBlock:
+    """Return frames as a block; with a place for poses if any has one, or if asked for."""
     pose = None
-    if any(frame.pose is not None for frame in frames):
+    if poses or any(frame.pose is not None for frame in frames):
         pose = np.stack([_NO_POSE if frame.pose is None else frame.pose for frame in frames])
     return FrameBlock(
         np.stack([frame.counts for frame in frames]),

@@ -108,8 +108,13 @@ def recognize(
                                        "array, and the object with the probe on it. Several "
                                        "touches: PNG-SEQ; --follow: the newest."),
     ] = None,
+    mcap: Annotated[
+        Path | None, typer.Option(metavar="OUT", show_default=False,
+                                  help="Keep images and answers as ROS 2 messages, poses with "
+                                       "covariance among them (docs/robot.md)."),
+    ] = None,
     replace: Annotated[
-        bool, typer.Option("--replace", help="Replace pictures that are there."),
+        bool, typer.Option("--replace", help="Replace files that are there."),
     ] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="One JSON list on stdout; with --follow one object a "
@@ -155,6 +160,7 @@ def recognize(
                 joints_deg=angles, joint_error_deg=joint_error, plot=plot, replace=replace,
                 as_json=as_json, scan=method if scan else "",
                 joints_file=Path(by_touch) if by_touch else None, learn=learn, state=state,
+                mcap=mcap,
             )
         )  # fmt: skip
 

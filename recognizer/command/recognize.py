@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from threading import Event
 from typing import Any
@@ -13,6 +13,7 @@ from encoded_objects.console.interruption import interruption
 from encoded_objects.console.output import message, warning, write_json
 from encoded_objects.console.progress import ProgressBar, progress_bar
 from probe.frame import Frame
+from probe.recording.layout import RecordingOrigin
 from probe.recording.read import Recording
 from recognizer.command import report
 from recognizer.command.answer_pictures import draw_answer, draw_answers, refuse_pictures
@@ -20,6 +21,7 @@ from recognizer.command.answers import Answer, RecognizeOptions, answers_of
 from recognizer.command.learning import SensorLearning, learning_for
 from recognizer.command.port import listen, source_at
 from recognizer.command.scanning import touches_for
+from recognizer.command.sinks import AnswerSink, sinks_for
 from recognizer.touch.lab import Lab, open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import NO_CONTACT
@@ -48,14 +50,17 @@ def recognize_touches(options: RecognizeOptions) -> int:
             )  # fmt: skip
             learning = _reader(options, lab, source)
             learning.learn_from(source.touches(recording.frames(), learning.reader.settings))
-            return _print_answers(options, learning, source, recording.frames(), interrupted)
+            return _print_answers(
+                options, learning, source, recording.frames(), interrupted, recording.origin
+            )
         source = source_at(
             options.port, sensor_type=options.sensor_type, overlay=options.overlay,
             calibration=options.calibration, every=options.every,
         )  # fmt: skip
         learning = _reader(options, lab, source)  # before frames come
         with listen(source, interrupted, options.sensor, options.calibration) as frames:
-            return _print_answers(options, learning, source, frames, interrupted)
+            origin = RecordingOrigin(sensor=options.port)
+            return _print_answers(options, learning, source, frames, interrupted, origin)
 
 
 def _reader(options: RecognizeOptions, lab: Lab, source: TouchSource) -> SensorLearning:
@@ -70,6 +75,7 @@ def _print_answers(
     source: TouchSource,
     frames: Iterator[Frame],
     interrupted: Event,
+    origin: RecordingOrigin,
 ) -> int:
     """Answer and print all touches; returns the exit code."""
     out = sys.stdout  # a bar would take it for its terminal
@@ -86,7 +92,11 @@ def _print_answers(
         if options.as_json or not out.isatty():  # otherwise the answers show how far it is
             bar = stack.enter_context(progress_bar("reading", source.frames))
             frames = _show_count(frames, bar)
+        sinks = [stack.enter_context(sink) for sink in sinks_for(options, origin)]
+        frames = _hand_on(frames, sinks)
         for answer in answers_of(options, learning, source, frames, interrupted):
+            for sink in sinks:
+                sink.answer(answer)
             read += 1
             answered = bool(answer.found) + (0 if options.scan else answered)
             if options.plot is not None:
@@ -142,4 +152,11 @@ def _sentence(answer: Answer, needed: int) -> str:
 def _show_count(frames: Iterator[Frame], bar: ProgressBar) -> Iterator[Frame]:
     for number, frame in enumerate(frames, start=1):
         bar.show(number, f"{number:,} frames")
+        yield frame
+
+
+def _hand_on(frames: Iterator[Frame], sinks: Sequence[AnswerSink]) -> Iterator[Frame]:
+    for frame in frames:
+        for sink in sinks:
+            sink.frame(frame)
         yield frame

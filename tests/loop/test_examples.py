@@ -67,6 +67,13 @@ def test_follow_port(tmp_path):
     assert "Cube/F1" in said_by("follow_port.py", tmp_path)
 
 
+def test_ros2_node(tmp_path):
+    said = said_by("ros2_node.py", tmp_path)
+    x, y, z = (float(n) for n in re.findall(r"'[xyz]': ([-\d.e]+)", said))
+    assert said.startswith("Cube ")
+    assert (x**2 + y**2 + z**2) ** 0.5 < 0.02  # the origin is the middle of the face, in metres
+
+
 def test_scan(tmp_path):
     assert said_by("scan.py", tmp_path).splitlines()[-1].endswith("touches: Plate")
 

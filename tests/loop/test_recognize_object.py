@@ -105,3 +105,36 @@ def test_a_recording_is_played_as_a_port(asked):
     assert code == 0
     assert out.startswith("0: Cube/F3 at (")
     assert asked(recognize_object, "played.h5") == (code, out)
+
+
+def test_images_and_answers_are_kept_as_ros_messages(asked, lab):
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+
+    words = ("lab.db#Cube/F2", "--touches", 3, "--frames", 6, "--seed", 5, "-o", "kept.h5")
+    assert asked(probe_sensor, "simulate", *words)[0] == 0
+    words = ("kept.h5", "--json", "--mcap", "kept.mcap")
+    code, said = asked(recognize_object, *words)
+    assert code == 0
+    answers = json.loads(said)
+    assert asked(recognize_object, *words)[0] == 2  # the file is there
+    with AnyReader(
+        [lab / "kept.mcap"], default_typestore=get_typestore(Stores.ROS2_HUMBLE)
+    ) as reader:
+        seen = [
+            (connection.topic, reader.deserialize(raw, connection.msgtype))
+            for connection, _, raw in reader.messages()
+        ]
+    told = [message for topic, message in seen if topic == "/touch/answer"]
+    assert [json.loads(message.json)["T_object_probe"] for message in told] == [
+        answer["T_object_probe"] for answer in answers
+    ]
+    placed = {m.header.stamp.sec * 10**9 + m.header.stamp.nanosec: m for t, m in seen
+              if t == "/touch/object"}  # fmt: skip
+    for answer in (answer for answer in answers if answer["object"]):
+        message = placed.pop(answer["t_ns"])
+        T = np.linalg.inv(answer["T_object_probe"])
+        at = message.pose.pose.position
+        assert np.allclose([at.x, at.y, at.z], T[:3, 3] / 1000, atol=1e-12)
+    assert not placed
+    assert [topic for topic, _ in seen].count("/touch/image") == 18

@@ -115,7 +115,7 @@ def test_the_version(asked):
         (["info", "sim:", "--sensor", "8"], "'--sensor': Input should be less"),
         (["replay", "x.h5", "--speed", "fast"], "'--speed': Input should be a valid number"),
         (["replay", "x.h5", "--speed", "nan"], "'--speed': Input should be greater"),
-        (["export", "x.h5"], "nothing to write: give --csv, --npy or --png"),
+        (["export", "x.h5"], "nothing to write: give --csv, --npy, --png or --mcap"),
         (["calibrate", "port", "sim:", "-o", "a.json", "--newtons", "1,b"], "--newtons 1,b"),
         (["fly"], "No such command 'fly'"),
     ],
@@ -329,7 +329,7 @@ def test_export_in_newtons(asked, bench, tmp_path):
         in error_of(asked(*words[:3], tmp_path / "c.npy", *words[4:], "--deblur", "8"))[1]
     )
     _, err = error_of(asked(*words[:2], "--csv", tmp_path / "a.csv", *words[4:]))
-    assert "--csv holds counts" in err
+    assert "--csv and --mcap hold counts" in err
 
 
 def test_a_picture_of_a_frame_that_is_not_there(asked, bench, tmp_path):

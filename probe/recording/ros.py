@@ -1,0 +1,139 @@
+"""Frames as ROS 2 messages: plain values under the field names of the message definitions.
+
+Images are `sensor_msgs/Image` (32FC1, counts as 32-bit floats, which hold them exactly), poses
+`geometry_msgs/PoseStamped` in metres. What no message of ROS holds without loss stands in
+`encoded_objects_msgs/TouchFrame`, what a touch says in `encoded_objects_msgs/Recognition`. The
+values fit any writer that takes dictionaries, and rclpy's `set_message_fields`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from probe.frame import Frame
+
+IMAGE: Final = "sensor_msgs/msg/Image"
+POSE: Final = "geometry_msgs/msg/PoseStamped"
+POSE_WITH_COVARIANCE: Final = "geometry_msgs/msg/PoseWithCovarianceStamped"
+TOUCH_FRAME: Final = "encoded_objects_msgs/msg/TouchFrame"
+RECOGNITION: Final = "encoded_objects_msgs/msg/Recognition"
+SENSOR_FRAME: Final = "sensor"  #: frame_id: x right, y up, z away from the object
+BASE_FRAME: Final = "base"  #: frame_id of the robot's base
+
+_LINE = "=" * 80 + "\n"
+_HEADER = (
+    f"{_LINE}MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n"
+    f"{_LINE}MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+)
+_POSE = (
+    f"{_LINE}MSG: geometry_msgs/Pose\nPoint position\nQuaternion orientation\n"
+    f"{_LINE}MSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n"
+    f"{_LINE}MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n"
+)
+#: type -> definition, with those of its parts
+DEFINITIONS: Final[dict[str, str]] = {
+    IMAGE: (
+        "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\n"
+        "uint8 is_bigendian\nuint32 step\nuint8[] data\n" + _HEADER
+    ),
+    POSE: "std_msgs/Header header\ngeometry_msgs/Pose pose\n" + _HEADER + _POSE,
+    POSE_WITH_COVARIANCE: (
+        "std_msgs/Header header\ngeometry_msgs/PoseWithCovariance pose\n"
+        + _HEADER
+        + f"{_LINE}MSG: geometry_msgs/PoseWithCovariance\nPose pose\nfloat64[36] covariance\n"
+        + _POSE
+    ),
+    TOUCH_FRAME: (
+        "# What a frame of a tactile probe holds beside its image.\n"
+        "int64 t_ns           # device time, unwrapped, ns\n"
+        "int64 seq            # number of the frame, unwrapped; a gap means lost frames\n"
+        "uint16[] wrist       # ADC counts of the wrist's transducers\n"
+        "bool has_pose\n"
+        "float64[16] pose     # T_base_sensor by rows, mm\n"
+    ),
+    RECOGNITION: (
+        "# What a touch says.\n"
+        "int64 t_ns          # device time of the touch, ns\n"
+        "int64 seq           # number of its first frame\n"
+        "string object       # empty: not recognised\n"
+        "string face\n"
+        "int32 row           # of the array's cell under the sensor's centre; -1: none\n"
+        "int32 column\n"
+        "float64 margin      # nats to the runner-up; NaN: not known\n"
+        "float64 doubt       # expected number of places that fit by chance; NaN: not known\n"
+        "string reason       # why not\n"
+        "string json         # the whole answer, as recognize-object --json prints it\n"
+    ),
+}
+
+
+def image_message(frame: Frame) -> dict[str, Any]:
+    """Return the `sensor_msgs/Image` of a frame."""
+    rows, columns = frame.counts.shape
+    return {
+        "header": header(frame.t_ns, SENSOR_FRAME),
+        "height": rows,
+        "width": columns,
+        "encoding": "32FC1",
+        "is_bigendian": 0,
+        "step": 4 * columns,
+        "data": frame.counts.astype("<f4").tobytes(),
+    }
+
+
+def frame_message(frame: Frame) -> dict[str, Any]:
+    """Return the `TouchFrame` of a frame."""
+    pose = np.zeros(16) if frame.pose is None else frame.pose.ravel()
+    return {
+        "t_ns": frame.t_ns,
+        "seq": frame.seq,
+        "wrist": frame.wrist.tolist(),
+        "has_pose": frame.pose is not None,
+        "pose": pose.tolist(),
+    }
+
+
+def pose_message(T: ArrayLike, t_ns: int, frame_id: str) -> dict[str, Any]:
+    """Return the `geometry_msgs/PoseStamped` of a pose (4, 4), mm."""
+    return {"header": header(t_ns, frame_id), "pose": pose_fields(np.asarray(T, np.float64))}
+
+
+def covariance_message(
+    T: ArrayLike, covariance: ArrayLike, t_ns: int, frame_id: str
+) -> dict[str, Any]:
+    """Return the `geometry_msgs/PoseWithCovarianceStamped` of a pose.
+
+    Parameters
+    ----------
+    T
+        (4, 4), mm.
+    covariance
+        (6, 6) of (x, y, z, rx, ry, rz), axes of the frame that the pose is given in, mm and rad.
+    t_ns, frame_id
+        When, and that frame.
+    """
+    metres = np.diag([1e-3] * 3 + [1.0] * 3)
+    spread = metres @ np.asarray(covariance, np.float64) @ metres
+    pose = pose_fields(np.asarray(T, np.float64))
+    return {
+        "header": header(t_ns, frame_id),
+        "pose": {"pose": pose, "covariance": spread.ravel().tolist()},
+    }
+
+
+def header(t_ns: int, frame_id: str) -> dict[str, Any]:
+    """Return a `std_msgs/Header`."""
+    sec, nanosec = divmod(max(t_ns, 0), 1_000_000_000)
+    return {"stamp": {"sec": sec & 0x7FFFFFFF, "nanosec": nanosec}, "frame_id": frame_id}
+
+
+def pose_fields(T: NDArray[np.float64]) -> dict[str, Any]:
+    """Return the `geometry_msgs/Pose` of (4, 4), mm: metres and a quaternion."""
+    from scipy.spatial.transform import Rotation
+
+    x, y, z, w = Rotation.from_matrix(T[:3, :3]).as_quat(canonical=True).tolist()
+    at = dict(zip("xyz", (T[:3, 3] * 1e-3).tolist(), strict=True))
+    return {"position": at, "orientation": {"x": x, "y": y, "z": z, "w": w}}

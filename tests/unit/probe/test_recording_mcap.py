@@ -1,0 +1,213 @@
+"""MCAP: identity with our recordings both ways, and what rosbags and mcap-ros2-support read."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from mcap_ros2.writer import Writer
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+from scipy.spatial.transform import Rotation
+
+from probe.command import run
+from probe.errors import RecordingError
+from probe.frame import frame_from
+from probe.recording.mcap import export_mcap, import_mcap
+from probe.recording.read import Recording
+from probe.recording.record import Recorder
+from probe.recording.ros import DEFINITIONS, IMAGE, POSE, TOUCH_FRAME, covariance_message
+
+RNG = np.random.default_rng(23)
+N = 40
+
+
+def pose_at(number):
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_rotvec([0.1, 0.02 * number, -0.3]).as_matrix()
+    T[:3, 3] = [300.1 + number / 3, -12.7, 1 / 7]
+    return T
+
+
+@pytest.fixture
+def recording(tmp_path):
+    """Full counts, gaps in seq, a clock that begins anew, poses here and there, attributes."""
+    path = tmp_path / "touch.h5"
+    more = {"overlay": "tab", "rate": 220.0, "list": [1, 2]}
+    with Recorder(path, sensor="bench 1", calibration="ab" * 32, attributes=more) as recorder:
+        for i in range(N):
+            recorder.append(
+                frame_from(
+                    RNG.integers(0, 65536, (16, 16)),
+                    t_ns=(i if i < 30 else i - 30) * 4_545_454 + 3,
+                    seq=i if i < 7 else 2**33 + i,
+                    wrist=RNG.integers(0, 1024, 4),
+                    pose=pose_at(i) if i % 3 else None,
+                )
+            )
+    return Recording(path)
+
+
+def assert_same(one, other):
+    assert one.origin.more.keys() == other.origin.more.keys()
+    for attribute in ("sensor", "calibration", "units"):
+        assert getattr(one.origin, attribute) == getattr(other.origin, attribute)
+    for name, value in one.origin.more.items():
+        assert np.array_equal(value, other.origin.more[name]), name
+    a, b = one.block(), other.block()
+    for name, values in a.datasets().items():
+        assert np.array_equal(values, b.datasets()[name], equal_nan=name == "pose"), name
+
+
+def test_there_and_back_is_the_same_recording_and_the_same_file(recording, tmp_path):
+    assert export_mcap(recording, tmp_path / "a.mcap") == N
+    back = import_mcap(tmp_path / "a.mcap", tmp_path / "back.h5")
+    assert_same(recording, back)
+    export_mcap(back, tmp_path / "b.mcap")
+    digests = {hashlib.sha256((tmp_path / n).read_bytes()).digest() for n in ("a.mcap", "b.mcap")}
+    assert len(digests) == 1
+
+
+def test_mcap_ros2_support_reads_it(recording, tmp_path):
+    export_mcap(recording, tmp_path / "a.mcap")
+    frames = list(recording.frames())
+    with open(tmp_path / "a.mcap", "rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        seen = [
+            (schema.name, message)
+            for schema, _, _, message in reader.iter_decoded_messages(log_time_order=False)
+        ]
+    images = [message for name, message in seen if name == IMAGE]
+    for frame, image in zip(frames, images, strict=True):
+        assert (image.encoding, image.height, image.width, image.step) == ("32FC1", 16, 16, 64)
+        read = np.frombuffer(bytes(image.data), "<f4").reshape(16, 16)
+        assert np.array_equal(read, frame.counts)
+        assert image.header.stamp.sec * 10**9 + image.header.stamp.nanosec == frame.t_ns
+    poses = [message for name, message in seen if name == POSE]
+    known = [frame.pose for frame in frames if frame.pose is not None]
+    for T, pose in zip(known, poses, strict=True):
+        at, turn = pose.pose.position, pose.pose.orientation
+        assert np.allclose([at.x, at.y, at.z], T[:3, 3] / 1000, atol=1e-15)
+        R = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).as_matrix()
+        assert np.allclose(R, T[:3, :3], atol=1e-14)
+    assert len([1 for name, _ in seen if name == TOUCH_FRAME]) == N
+
+
+def test_rosbags_reads_it(recording, tmp_path):
+    """By the message types that rosbags knows itself, ours by the definition in the file."""
+    path = tmp_path / "a.mcap"
+    export_mcap(recording, path)
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    with AnyReader([path], default_typestore=store) as reader:
+        topics = {c.topic: c.msgtype for c in reader.connections}
+        assert topics == {"/touch/image": IMAGE, "/touch/frame": TOUCH_FRAME, "/touch/pose": POSE}
+        images = sorted(
+            (
+                reader.deserialize(raw, connection.msgtype).data.tobytes()
+                for connection, _, raw in reader.messages()
+                if connection.topic == "/touch/image"
+            )
+        )
+        rests = [
+            reader.deserialize(raw, connection.msgtype)
+            for connection, _, raw in reader.messages()
+            if connection.topic == "/touch/frame"
+        ]
+    assert images == sorted(f.counts.astype("<f4").tobytes() for f in recording.frames())
+    assert {rest.seq for rest in rests} == set(recording.block().seq.tolist())
+
+
+def foreign(path, *, encoding="16UC1", dtype="<u2", image=None, step=None):
+    """Write what a robot's own recorder writes: images and poses on topics of its own."""
+    image = np.arange(256).reshape(16, 16) if image is None else image
+    with open(path, "wb") as stream:
+        writer = Writer(stream)
+        kinds = {kind: writer.register_msgdef(kind, DEFINITIONS[kind]) for kind in (IMAGE, POSE)}
+        for i in (1, 0):
+            stamp = {"sec": 1_700_000_000, "nanosec": i * 5_000_000}
+            head = {"stamp": stamp, "frame_id": "finger"}
+            fields = {"header": head, "height": 16, "width": 16, "encoding": encoding}
+            fields |= {"is_bigendian": int(dtype[0] == ">"), "step": step or 16 * int(dtype[2])}
+            fields["data"] = (image + i).astype(dtype).tobytes()
+            when = stamp["sec"] * 10**9 + stamp["nanosec"]
+            writer.write_message("/finger/tactile", kinds[IMAGE], fields, log_time=when + 77)
+            at = {"x": 0.1 * i, "y": 0.2, "z": 0.3}
+            turn = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+            pose = {"header": head, "pose": {"position": at, "orientation": turn}}
+            writer.write_message("/finger/pose", kinds[POSE], pose, log_time=when + 99)
+        writer.finish()
+    return path
+
+
+@pytest.mark.parametrize(("encoding", "dtype"), [("16UC1", "<u2"), ("32FC1", ">f4")])
+def test_images_of_others_become_a_recording(tmp_path, encoding, dtype):
+    path = foreign(tmp_path / "robot.mcap", encoding=encoding, dtype=dtype)
+    block = import_mcap(path, tmp_path / "r.h5").block()
+    assert np.array_equal(block.counts[1], np.arange(256).reshape(16, 16) + 1)
+    assert np.diff(block.t_ns).tolist() == [5_000_000]
+    assert np.allclose(block.pose[:, 0, 3], [0, 100])
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"encoding": "rgb8", "dtype": "<u2"}, "image 0 is encoded as rgb8"),
+        ({"encoding": "32FC1", "dtype": "<f4", "image": np.full((16, 16), 0.5)}, "whole numbers"),
+        ({"step": 31}, "bytes, not 16 rows of 31"),
+    ],
+)
+def test_images_that_are_none_are_refused_and_nothing_is_left(tmp_path, options, said):
+    path = foreign(tmp_path / "robot.mcap", **options)
+    with pytest.raises(RecordingError, match=said) as caught:
+        import_mcap(path, tmp_path / "r.h5")
+    assert caught.value.fix
+    assert [p.name for p in tmp_path.iterdir()] == ["robot.mcap"]
+
+
+def test_files_that_are_none_are_refused(tmp_path, recording):
+    (tmp_path / "text.mcap").write_text("no messages here")
+    with pytest.raises(RecordingError, match="no MCAP file"):
+        import_mcap(tmp_path / "text.mcap", tmp_path / "r.h5")
+    stream = io.BytesIO()
+    writer = Writer(stream)
+    writer.write_message(
+        "/pose", writer.register_msgdef(POSE, DEFINITIONS[POSE]),
+        covariance_message(np.eye(4), np.eye(6), 0, "base")["pose"], log_time=0,
+    )  # fmt: skip
+    writer.finish()
+    (tmp_path / "pose.mcap").write_bytes(stream.getvalue())
+    with pytest.raises(RecordingError, match="no sensor_msgs/msg/Image in it, but geometry_msgs"):
+        import_mcap(tmp_path / "pose.mcap", tmp_path / "r.h5")
+    export_mcap(recording, tmp_path / "a.mcap")
+    cut = (tmp_path / "a.mcap").read_bytes()[:-2000]
+    (tmp_path / "cut.mcap").write_bytes(cut)
+    with pytest.raises(RecordingError):
+        import_mcap(tmp_path / "cut.mcap", tmp_path / "r.h5")
+    assert not (tmp_path / "r.h5").exists()
+
+
+def test_a_covariance_is_in_metres():
+    covariance = np.diag([4.0, 9.0, 16.0, 0.01, 0.02, 0.03])
+    covariance[0, 5] = covariance[5, 0] = 0.5
+    T = np.eye(4)
+    T[:3, 3] = [10, 20, 30]
+    fields = covariance_message(T, covariance, 1_500_000_000, "base")
+    read = np.array(fields["pose"]["covariance"]).reshape(6, 6)
+    assert np.allclose(np.diag(read), [4e-6, 9e-6, 16e-6, 0.01, 0.02, 0.03])
+    assert read[0, 5] == pytest.approx(0.5e-3)
+    assert fields["pose"]["pose"]["position"] == {"x": 0.01, "y": 0.02, "z": 0.03}
+    assert fields["header"]["stamp"] == {"sec": 1, "nanosec": 500_000_000}
+
+
+def test_the_commands(recording, tmp_path, capsys):
+    out = tmp_path / "out.mcap"
+    assert run(["export", str(recording.path), "--mcap", str(out)]) == 0
+    assert run(["import", str(out), "-o", str(tmp_path / "again.h5")]) == 0
+    assert f"{N} frames" in capsys.readouterr().out
+    assert_same(recording, Recording(tmp_path / "again.h5"))
+    assert run(["export", str(recording.path), "--mcap", str(out)]) == 2
+    assert "there already" in capsys.readouterr().err
