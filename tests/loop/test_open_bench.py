@@ -9,6 +9,7 @@ from contextlib import contextmanager
 import httpx
 import numpy as np
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect, sync_playwright
 
 from probe.recording.read import Recording
@@ -313,6 +314,20 @@ def test_every_control_has_a_name_and_text_stands_out(page):
         page.evaluate(f"document.documentElement.dataset.theme = '{theme}'")
         for colour in ("--text", "--muted", "--accent", "--good", "--bad", "--lit"):
             assert contrast(page, colour, "--panel") >= 4.5 - (colour == "--lit")
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(1440, "light"), (1440, "dark"), (390, "light")])
+def test_axe_finds_nothing(browser, bench, width, scheme):
+    with opened(
+        browser, bench, viewport={"width": width, "height": 900}, color_scheme=scheme,
+        bypass_csp=True,  # for axe's own script
+    ) as page:  # fmt: skip
+        rest(page)
+        touched(page)
+        for _ in range(2):  # in contact, and lifted
+            found = Axe().run(page).response["violations"]
+            assert [(one["id"], [node["html"] for node in one["nodes"]]) for one in found] == []
+            rest(page)
 
 
 def contrast(page, ink, paper):

@@ -87,7 +87,7 @@ export class Work {
     for (const { number, at_ms, text } of status.notices) {
       if (number <= this.shown) continue;
       this.shown = number;
-      const item = document.createElement("li");
+      const item = document.createElement("p");
       item.textContent = `${new Date(at_ms).toLocaleTimeString("en-GB")}  ${text}`;
       list.prepend(item);
       while (list.children.length > 60) list.lastElementChild?.remove();
