@@ -1,33 +1,33 @@
 """Where a probe stands on a part as it was printed: some per mille smaller, a little askew.
 
 Pose read from the symbols, as if they stood where they were designed + AsBuilt -> pose beside the
-printed part, with its covariance. Part frame: that of the part's file, z up from the bed, x and y
-along the printer's axes, its origin in the middle of the part. A point p of the design is printed
-at S p, S of `print_matrix`: x and y are scaled from that origin, z is as designed. No touch tells
-which of the two axes a skewed printer has turned: here x keeps its direction and y leans, as the
-skew correction of printer firmware has it (Marlin, M852). mm, rad.
+printed part, with its covariance. Of a part that nobody has measured it is known how prints come
+out as a rule (`usual_print`); each touch feels the scale besides, and both together say where the
+symbols stand. Part frame: that of the part's file, z up from the bed, x and y along the printer's
+axes, its origin in the middle of the part. A point p of the design is printed at S p, S of
+`print_matrix`: x and y are scaled from that origin, z is as designed. No touch tells which of the
+two axes a skewed printer has turned: here x keeps its direction and y leans, as the skew correction
+of printer firmware has it (Marlin, M852). mm, rad.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from generator.database.as_built import AsBuilt
-from recognizer.touch.settings import DEFAULTS
+from recognizer.touch.settings import DEFAULTS, PrintedSettings
 
 Array = NDArray[np.float64]
 
 
 def print_matrix(as_built: AsBuilt) -> Array:
     """Return S (3, 3): a point p of the part's design is printed at S p; z is as designed."""
-    sin, cos = math.sin(as_built.skew_rad), math.cos(as_built.skew_rad)
-    scale_x, scale_y = as_built.scale_x, as_built.scale_y
-    return np.array([[scale_x, scale_y * sin, 0.0], [0.0, scale_y * cos, 0.0], [0.0, 0.0, 1.0]])
+    return _print_matrix(np.array([getattr(as_built, name) for name in _PRINT]))
 
 
 def print_of(prints: Sequence[AsBuilt], part: str, printer: str) -> AsBuilt | None:
@@ -48,14 +48,37 @@ def print_of(prints: Sequence[AsBuilt], part: str, printer: str) -> AsBuilt | No
     return alike[0] if len(alike) == 1 else None
 
 
+def usual_print(settings: PrintedSettings = DEFAULTS.printed) -> AsBuilt:
+    """Return what is known of a part that nobody has measured: as designed, more or less."""
+    common, apart = settings.scale**2, settings.apart**2 / 2
+    covariance = np.zeros((4, 4))
+    covariance[:2, :2] = common
+    covariance[[0, 1, 2], [0, 1, 2]] += apart, apart, settings.skew_rad**2
+    return AsBuilt(
+        object_id=None, part=None, printer="", material="", scale_x=1.0, scale_y=1.0, skew_rad=0.0,
+        stroke_mm=1.0, covariance=covariance, touches=0,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FeltScale:
+    """The scale of a print as one touch felt it, together with the pose that it goes with."""
+
+    excess: float  #: lattice over print, less 1
+    covariance: Array  #: (4,) with x, y (mm) and the turn (rad) on the face, and its variance
+    expected: float  #: standard deviation within which the fit took it to be 0
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PrintedFace:
-    """A flat face of a part of which it is known how it was printed."""
+    """A flat face of a part, and what is known of how it was printed."""
 
     as_built: AsBuilt
     T_part_face: Array  #: (4, 4), mm
 
-    def pose(self, T_face_probe: Array, covariance: Array) -> tuple[Array, Array]:
+    def pose(
+        self, T_face_probe: Array, covariance: Array, felt: FeltScale | None = None
+    ) -> tuple[Array, Array]:
         """Return pose and covariance on the printed part, in the face frame of the design.
 
         Parameters
@@ -64,28 +87,58 @@ class PrintedFace:
             (4, 4) as it was read.
         covariance
             (3, 3) of x, y (mm) and the turn about z (rad).
+        felt
+            What the touch says of the scale; None where it is not told.
 
         Notes
         -----
         B, the face's x and y axes in the part frame, is printed as S B = Q U, Q orthonormal and U
         symmetric. The reader fits a turned and scaled lattice to what is turned and stretched,
-        which finds the turn against Q, whatever U.
+        which finds the turn against Q, whatever U, and the mean of U's eigenvalues as the scale.
         """
-        printed = self._printed(self.as_built, T_face_probe)
-        at, step = _planar(printed), DEFAULTS.printed.step
-        slopes = []
-        for name in ("scale_x", "scale_y", "skew_rad"):
-            changed = replace(self.as_built, **{name: getattr(self.as_built, name) + step})
-            slopes.append((_planar(self._printed(changed, T_face_probe)) - at) / step)
-        by_print = np.column_stack(slopes)
+        settings = DEFAULTS.printed
+        print_ = np.array([getattr(self.as_built, name) for name in _PRINT])
+        spread = self.as_built.covariance[:3, :3]
+        slope, alone = np.zeros(3), covariance
+        if felt is not None:
+            slope = felt.covariance[:3] / felt.covariance[3]
+            alone = covariance - np.outer(slope, felt.covariance[:3])
+            print_, spread = self._with_scale(print_, spread, felt, settings.step)
+
+        def posed(print_: Array) -> Array:
+            moved = T_face_probe
+            if felt is not None:
+                moved = _moved(T_face_probe, slope * (self._excess(print_) - felt.excess))
+            return self._printed(print_, moved)
+
+        printed = posed(print_)
+        by_print = _slopes(lambda one: _planar(posed(one)), print_, settings.step)
         along = np.eye(3)
         R = self.T_part_face[:3, :3]
-        along[:2, :2] = (R.T @ print_matrix(self.as_built) @ R)[:2, :2]
-        told = along @ covariance @ along.T
-        return printed, told + by_print @ self.as_built.covariance[:3, :3] @ by_print.T
+        along[:2, :2] = (R.T @ _print_matrix(print_) @ R)[:2, :2]
+        floor = np.diag([settings.aside_mm**2, settings.aside_mm**2, 0.0])
+        return printed, along @ alone @ along.T + by_print @ spread @ by_print.T + floor
 
-    def _printed(self, as_built: AsBuilt, T_face_probe: Array) -> Array:
-        S, R = print_matrix(as_built), self.T_part_face[:3, :3]
+    def _with_scale(
+        self, print_: Array, spread: Array, felt: FeltScale, step: float
+    ) -> tuple[Array, Array]:
+        """Return scales and skew with what a touch says of them, and their covariance (3, 3)."""
+        variance = felt.covariance[3]
+        told = 1.0 / variance - 1.0 / felt.expected**2  # by the image alone
+        if not told > 0:
+            return print_, spread
+        by = _slopes(lambda one: np.array([self._excess(one)]), print_, step)[0]
+        gain = spread @ by / (by @ spread @ by + 1.0 / told)
+        away = felt.excess / (variance * told) - self._excess(print_)
+        return print_ + gain * away, spread - np.outer(gain, by @ spread)
+
+    def _excess(self, print_: Array) -> float:
+        """Return lattice over print, less 1, as a touch of the face feels it."""
+        scales = np.linalg.svd(_print_matrix(print_) @ self.T_part_face[:3, :2], compute_uv=False)
+        return 1.0 / float(scales.mean()) - 1.0
+
+    def _printed(self, print_: Array, T_face_probe: Array) -> Array:
+        S, R = _print_matrix(print_), self.T_part_face[:3, :3]
         left, _, right = np.linalg.svd(S @ R[:, :2], full_matrices=False)
         Q = left @ right
         T_part_probe = np.eye(4)
@@ -97,6 +150,31 @@ class PrintedFace:
         T_face_part[:3, :3] = R.T
         T_face_part[:3, 3] = -R.T @ self.T_part_face[:3, 3]
         return np.asarray(T_face_part @ T_part_probe)
+
+
+_PRINT = ("scale_x", "scale_y", "skew_rad")  # what of a print moves places
+
+
+def _print_matrix(print_: Array) -> Array:
+    scale_x, scale_y, skew = print_.tolist()
+    sin, cos = math.sin(skew), math.cos(skew)
+    return np.array([[scale_x, scale_y * sin, 0.0], [0.0, scale_y * cos, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _slopes(of: Callable[[Array], Array], at: Array, step: float) -> Array:
+    """Return the derivatives (m, 3) of a function of a print."""
+    here = of(at)
+    return np.column_stack([(of(at + step * one) - here) / step for one in np.eye(3)])
+
+
+def _moved(T_face_probe: Array, by: Array) -> Array:
+    """Return a pose moved by x, y (mm) and a turn about z (rad) on the face."""
+    x, y, turn = by.tolist()
+    moved = T_face_probe.copy()
+    cos, sin = math.cos(turn), math.sin(turn)
+    moved[:2, :3] = np.array([[cos, -sin], [sin, cos]]) @ T_face_probe[:2, :3]
+    moved[:2, 3] += x, y
+    return moved
 
 
 def _planar(T: Array) -> Array:

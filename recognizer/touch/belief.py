@@ -15,7 +15,7 @@ The best of all registered places always exists; it is an answer only if
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ from recognizer.touch.locate import Hypothesis, coincide, labels_at, neighbours,
 from recognizer.touch.settings import BeliefSettings
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.gain import Image
+from recognizer.touch.symbols.posterior import fit_posterior
 from recognizer.touch.symbols.projection import explained_share
 from recognizer.touch.symbols.template import ResponseTemplate
 
@@ -84,6 +85,26 @@ class VerifiedHypothesis:
         """Whether both say the same place: not one a pitch beside either."""
         return self.embossed is other.embossed and coincide(
             self.embossed, self.fit, self.hypothesis, other.fit, other.hypothesis
+        )
+
+    def last_fit(self) -> Fit:
+        """Return its fit with the pose as its symbols tell it, those that are worn left out."""
+        embossed, fit, place = self.embossed, self.fit, self.hypothesis
+        worn = fit.cells[weigh_cells(embossed, fit, place, self.image.settings.belief).worn]
+
+        def shown(at: Ints) -> Ints:
+            return unworn_labels_at(embossed, place, worn, at)
+
+        found = fit_posterior(self.image, self.template, fit.pose, fit.gain, shown)
+        return replace(
+            fit,
+            x_mm=float(found.pose[0]),
+            y_mm=float(found.pose[1]),
+            theta_rad=math.remainder(float(found.pose[2]), math.tau),
+            nuisance=found.pose[3:],
+            gain=found.gain,
+            covariance=found.covariance[:3, :3],
+            with_scale=found.covariance[3],
         )
 
     def support(self) -> Support:

@@ -33,7 +33,7 @@ from generator.database.registered import (
 )
 from generator.database.transaction import read_transaction
 from recognizer.errors import LabError
-from recognizer.touch.as_built import PrintedFace, print_of
+from recognizer.touch.as_built import PrintedFace, print_of, usual_print
 from recognizer.touch.settings import DEFAULTS, LabSettings
 from recognizer.touch.windows import Windows, index_windows
 
@@ -56,7 +56,7 @@ class EncodedFace:
     round: RoundFace | None = None  #: of a round face; its frame is that of the unrolled plane
     part: str = ""  #: name of the printed part that bears it; empty where no part is registered
     T_part_face: NDArray[np.float64] | None = None  #: (4, 4) to the frame of the part's file
-    printed: PrintedFace | None = None  #: None where nothing is known of the print, or it is round
+    printed: PrintedFace | None = None  #: None on round faces
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -238,10 +238,13 @@ def _encoded_faces(
         face = found.faces[layout.face]
         part = part_with(found, face.name)
         T_part_face, printed = None, None
-        if part is not None and face.round is None:
-            T_part_face = np.linalg.inv(part.T_object_part) @ face.T_object_face
-            known = print_of(prints, part.name, printer_of(found))
-            printed = None if known is None else PrintedFace(known, T_part_face)
+        if face.round is None:
+            known = None
+            if part is not None:
+                T_part_face = np.linalg.inv(part.T_object_part) @ face.T_object_face
+                known = print_of(prints, part.name, printer_of(found))
+            at = _about_middle(face.polygon_mm[0]) if T_part_face is None else T_part_face
+            printed = PrintedFace(known or usual_print(), at)
         yield (
             layout.face,
             EncodedFace(
@@ -260,6 +263,13 @@ def _encoded_faces(
                 printed=printed,
             ),
         )
+
+
+def _about_middle(outline_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return T_part_face (4, 4) of a face that is a part of its own, printed as it lies."""
+    T_part_face = np.eye(4)
+    T_part_face[:2, 3] = -(outline_mm.min(axis=0) + outline_mm.max(axis=0)) / 2
+    return T_part_face
 
 
 def part_with(found: RegisteredObject, face: str) -> RegisteredPart | None:

@@ -11,6 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from recognizer.touch.as_built import FeltScale
 from recognizer.touch.lab import EmbossedArray, EncodedFace
 from recognizer.touch.locate import Hypothesis
 from recognizer.touch.symbols.fit import Fit
@@ -50,6 +51,22 @@ def face_covariance(face: EncodedFace, covariance: Array) -> Array:
     c, s = math.cos(face.rotation_rad), math.sin(face.rotation_rad)
     turn = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
     return np.asarray(turn @ covariance @ turn.T)
+
+
+def felt_scale(face: EncodedFace, fit: Fit, expected: float) -> FeltScale | None:
+    """Return what a fit says of the scale of a print, in the face frame; None if nothing.
+
+    Parameters
+    ----------
+    expected
+        Standard deviation within which the fit took it to be 1.
+    """
+    if fit.with_scale is None:
+        return None
+    x, y, turn, variance = fit.with_scale.tolist()
+    c, s = math.cos(face.rotation_rad), math.sin(face.rotation_rad)
+    covariance = np.array([c * x + s * y, c * y - s * x, turn, variance])
+    return FeltScale(float(fit.nuisance[3]), covariance, expected)
 
 
 def inside_mm(face: EncodedFace, x: float, y: float) -> float:

@@ -21,7 +21,13 @@ from recognizer.touch.chance import expected_matches
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.locate import Hypothesis, under_centre
 from recognizer.touch.next_touch import propose_next
-from recognizer.touch.pose import face_covariance, face_pose, inside_mm, pose_on_object
+from recognizer.touch.pose import (
+    face_covariance,
+    face_pose,
+    felt_scale,
+    inside_mm,
+    pose_on_object,
+)
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.recognition import (
     AMBIGUOUS,
@@ -108,8 +114,9 @@ def _answer(
             margin = min(margin, best.score - beside.score)
         if margin < limits.margin:
             reason = AMBIGUOUS
+    fit = best.fit if reason else best.last_fit()
     answer = answer_at(
-        best.embossed, best.fit, best.hypothesis, settings, seq,
+        best.embossed, fit, best.hypothesis, settings, seq,
         reason=reason, margin=margin, runner_up=runner_up,
     )  # fmt: skip
     return answer, support.inliers
@@ -156,7 +163,7 @@ def answer_at(
 ) -> Recognition:
     """Return the answer at a place, or the refusal where there is a reason or no face.
 
-    Where it is known how the part was printed, the pose is that on the printed part.
+    The pose is that on the printed part, as far as it is known how that came out.
     """
     if reason:
         return refusal(seq, reason, margin=margin, runner_up=runner_up)
@@ -166,7 +173,8 @@ def answer_at(
         return refusal(seq, OUTSIDE, margin=margin, runner_up=runner_up)
     covariance = face_covariance(face, fit.covariance)
     if face.printed is not None:
-        pose, covariance = face.printed.pose(pose, covariance)
+        felt = felt_scale(face, fit, settings.refine.prior[-1])
+        pose, covariance = face.printed.pose(pose, covariance, felt)
     return Recognition(
         seq=seq,
         object=face.object,

@@ -158,6 +158,34 @@ class CovarianceSettings:
     tab: float = 0.6  #: times the variance under tabs ...
     strange: float = 0.025  #: ... and with the fourth power of the form's distance from known
     unseen: float = 1e-8  #: least eigenvalue of a normal matrix of unit diagonal
+    size: float = 1.1  #: times the variance of an answer's pose (`symbols.posterior`) ...
+    blurred: float = 2.5  #: ... and more by this, for what readings hold of their neighbours ...
+    usual_blur: float = 0.12  #: ... beyond this share
+
+
+@dataclass(frozen=True, slots=True)
+class SpreadSettings:
+    """How far readings of a sensor scatter, until a touch tells it (`symbols.spread`)."""
+
+    felt: float = 0.08  #: deviation of psi on a covered tactel
+    aside_mm: float = 0.08  #: of a tip's place, each way
+    touches: float = 4.0  #: tactels that these two weigh as much as
+    freedom: float = 8.0  #: of Student's distribution of errors
+    rounds: int = 3  #: of expectation and maximisation, at each step
+    unseen: float = 1e-8  #: as that of `CovarianceSettings`
+
+
+@dataclass(frozen=True, slots=True)
+class PosteriorSettings:
+    """The last fit of an answer: a lattice, and what a sensor adds to its image."""
+
+    steps: int = 2  #: of damped least squares
+    offset: float = 0.05  #: of the largest reading: deviation of what all readings have too much
+    blur: float = 0.05  #: deviation of the share of each neighbour in a reading
+    #: largest changes of offset (of the largest reading) and of the blur both ways in one step
+    step: tuple[float, float, float] = (0.1, 0.05, 0.05)
+    #: added to the diagonal of the normal matrix for these
+    least: tuple[float, float, float] = (0.01, 1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -292,8 +320,16 @@ class NextSettings:
 
 @dataclass(frozen=True, slots=True)
 class PrintedSettings:
-    """How a pose is corrected where it is known how the part was printed."""
+    """How prints come out that nobody has measured, and how poses on prints are corrected.
 
+    Standard deviations: printers are off by .3 % as a rule and .6 % at worst, and backlash and
+    shifted layers move symbols by up to .03 mm (`docs/printed.md`).
+    """
+
+    scale: float = 0.004  #: of what both axes have in common
+    apart: float = 0.002  #: of the difference between the two
+    skew_rad: float = 0.001
+    aside_mm: float = 0.02  #: each way, of the place of symbols, beyond scale and skew
     step: float = 1e-6  #: of scales and skew, of the differences that stand for derivatives
 
 
@@ -319,6 +355,8 @@ class ReaderSettings:
     refine: RefineSettings = field(default_factory=RefineSettings)
     stretch: StretchSettings = field(default_factory=StretchSettings)
     covariance: CovarianceSettings = field(default_factory=CovarianceSettings)
+    spread: SpreadSettings = field(default_factory=SpreadSettings)
+    posterior: PosteriorSettings = field(default_factory=PosteriorSettings)
     first: FitSettings = field(default_factory=FitSettings)  #: the first try
     #: the second, of touches that the first does not answer or that few cells speak for: seven
     #: times the work (`docs/recognizer.md`)

@@ -35,11 +35,13 @@ def covariances(image: Image, lattices: Lattices, away: Array, noise: float) -> 
         size = settings.tab + settings.strange * strange**2
     else:
         size = settings.pad * _neighbours_alike(away, image.shape, image.settings.noise.far * first)
-    shapes = np.array([_inverse(normal, settings.unseen)[:3, :3] for normal in lattices.normal])
+    shapes = np.array(
+        [invert_normal(normal, settings.unseen)[:3, :3] for normal in lattices.normal]
+    )
     return np.asarray((noise / first) ** 2 * size[:, None, None] * shapes)
 
 
-def _inverse(normal: Array, unseen: float) -> Array:
+def invert_normal(normal: Array, unseen: float) -> Array:
     """Return the inverse of a normal matrix; wide, not narrow, in what the image does not show."""
     unit = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-12))
     sizes, axes = np.linalg.eigh(normal * np.outer(unit, unit))

@@ -48,6 +48,7 @@ class Fit:
     noise: float  #: standard deviation of psi with which the scores were made
     value: float  #: log-likelihood of the image with every cell at its best, nats
     covariance: Array  #: (3, 3) of x, y (mm) and theta (rad)
+    with_scale: Array | None = None  #: (4,) covariance of scale - 1 with these, and its variance
 
     @property
     def pose(self) -> Array:

@@ -122,19 +122,19 @@ def linearize_image(
     felt, cells = under.felt, under.cells
     scores = log_likelihoods(felt, under.tables, np.full(len(pose), noise.first))
     labels = likeliest_labels(cells, scores) if shown is None else shown(cells)
-    known, precision = _from_prior(image, pose, gain), _precision(image)
+    known, precision = prior_departure(image, pose, gain), prior_precision(image)
     value = np.take_along_axis(scores, labels[..., None], axis=2)[..., 0].sum(axis=1)
     value += felt.measure + (felt.trust * np.log(felt.press)).sum(axis=1)
     value -= 0.5 * (known**2 * precision).sum(axis=1)
     values = values_of(under, labels)
-    jacobian, force = _jacobian(image, pose, gain, values, felt)
+    jacobian, force = force_jacobian(image, pose, gain, values, felt)
     width = _width(values, felt, noise.first)
     left = image.forces - force
     sure = np.where(np.abs(left / width) < noise.far, felt.trust, 0.0) / width**2
     return LinearizedImage(value, jacobian, left, sure, known, precision)
 
 
-def _from_prior(image: Image, pose: Array, gain: Array) -> Array:
+def prior_departure(image: Image, pose: Array, gain: Array) -> Array:
     """Return how far (b, 11) each unknown lies from what is known of it beforehand."""
     away = np.zeros((len(pose), 11))
     away[:, 3:POSE] = pose[:, 3:]
@@ -143,7 +143,7 @@ def _from_prior(image: Image, pose: Array, gain: Array) -> Array:
     return away
 
 
-def _precision(image: Image) -> Array:
+def prior_precision(image: Image) -> Array:
     """Return what is known of each unknown beforehand, one over its variance (11,)."""
     settings = image.settings.refine
     scale = settings.scale_known if image.newtons else 0.0
@@ -157,7 +157,7 @@ def _width(values: Array, felt: NormalizedImage, noise: float) -> Array:
     return np.asarray(relative * response_by_psi(response_of(values[..., 0])) * felt.plateau)
 
 
-def _jacobian(
+def force_jacobian(
     image: Image, pose: Array, gain: Array, values: Array, felt: NormalizedImage
 ) -> tuple[Array, Array]:
     """Return the derivatives (b, n, 11) of the forces by pose and gain, and the forces (b, n)."""

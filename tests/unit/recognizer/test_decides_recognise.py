@@ -39,6 +39,10 @@ class Found:
     face: int = 0
     index: tuple = (3, 4)
     shift: int = 0  # pitches
+    last: object = None  # the fit that poses it; None: the same
+
+    def last_fit(self):
+        return self.last or self.fit
 
     @property
     def hypothesis(self):
@@ -306,6 +310,17 @@ def test_what_many_places_match_by_chance_is_refused(reads, doubt, reason, inlie
     assert tries == (1 if inliers == 16 else 2)
 
 
+def test_an_answer_is_where_its_last_fit_lies_and_a_refusal_needs_none(reads):
+    found = reads.one()
+    found.last = replace(found.fit, x_mm=17.02, covariance=np.diag([4.0, 5.0, 6.0]))
+    answer, _, _ = reads.read([found])
+    assert answer.x_mm == pytest.approx(17.02)
+    np.testing.assert_allclose(answer.covariance, found.last.covariance)
+    found.last = "not asked for"
+    found.speaks = replace(SURE, inliers=2)
+    assert reads.read([found], [found])[0].reason == TOO_FEW
+
+
 def test_what_is_refused_for_another_reason_has_no_doubt(reads):
     assert refused(reads).doubt is None
     assert reads.read([], [])[0].doubt is None
@@ -317,7 +332,8 @@ def refused(reads):
 
 
 def test_where_the_print_is_known_the_pose_is_that_on_the_print(reads):
-    def pose(read, covariance):
+    def pose(read, covariance, felt):
+        assert felt is None  # the fit says nothing of it
         moved = read.copy()
         moved[0, 3] += 1.5
         return moved, 2 * covariance

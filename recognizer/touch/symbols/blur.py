@@ -1,0 +1,21 @@
+"""Readings that run into each other along rows and along columns: what a board or a slide leaves.
+
+Images (n, k), one a column, rows of the matrix from the top -> their second differences, tactel by
+tactel. A reading that holds the share b of both its neighbours is the image plus b times that.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def second_differences(images: Array, shape: tuple[int, int]) -> tuple[Array, Array]:
+    """Return those across rows (n, k), and across columns; beyond the rim nothing is felt."""
+    square = images.reshape(*shape, -1)
+    padded = np.pad(square, ((1, 1), (1, 1), (0, 0)))
+    rows = padded[:-2, 1:-1] + padded[2:, 1:-1] - 2.0 * square
+    columns = padded[1:-1, :-2] + padded[1:-1, 2:] - 2.0 * square
+    return rows.reshape(images.shape), columns.reshape(images.shape)

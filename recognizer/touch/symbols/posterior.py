@@ -1,0 +1,165 @@
+"""Where a lattice of known symbols lies, and how sure that is: its last fit.
+
+Image + a lattice near the truth + what its cells show -> pose, gain and their covariance. What a
+sensor may be off by decides what each tactel is worth and how wide the ellipse is: how far its
+readings scatter and how far its tips stand aside is fitted to each touch (`spread`), together with
+what it adds to all readings alike and what neighbouring readings hold of each other (`blur`), which
+makes slopes less steep than the template's. Damped least squares; lattice and sensor frame, mm.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recognizer.touch.settings import PosteriorSettings
+from recognizer.touch.symbols.blur import second_differences
+from recognizer.touch.symbols.covariance import invert_normal
+from recognizer.touch.symbols.gain import Image, bounded_gain
+from recognizer.touch.symbols.projection import (
+    Shown,
+    project_template,
+    response_by_psi,
+    response_of,
+    values_of,
+)
+from recognizer.touch.symbols.refine import (
+    POSE,
+    force_jacobian,
+    prior_departure,
+    prior_precision,
+)
+from recognizer.touch.symbols.spread import Spread, fit_spread, usual_spread
+from recognizer.touch.symbols.template import ResponseTemplate
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PosePosterior:
+    """A pose, as far as one touch tells it."""
+
+    pose: Array  #: (7,) of `refine.Lattices`
+    gain: Array  #: (4,)
+    covariance: Array  #: (4, 4) of x, y (mm), theta (rad) and scale - 1
+    spread: Spread
+    blur: tuple[float, float]  #: shares of each neighbour in a row's, in a column's reading
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Linearized:
+    """An image about one lattice."""
+
+    pose: Array
+    gain: Array
+    more: Array  # (3,) offset, blur across rows and across columns
+    left: Array  # (n,) forces that are left over
+    parts: Array  # (2, n) of `spread`
+    jacobian: Array  # (n, 14) forces by pose, gain and these three
+    departure: Array  # (14,) how far each unknown lies from what is known beforehand
+
+
+def fit_posterior(
+    image: Image, template: ResponseTemplate, pose: Array, gain: Array, shown: Shown
+) -> PosePosterior:
+    """Return the pose of a lattice whose symbols are known.
+
+    Parameters
+    ----------
+    pose, gain
+        (7,) and (4,), to begin with.
+    shown
+        What the cells show.
+    """
+    settings, spreads = image.settings.posterior, image.settings.spread
+    known = np.diag(_precision(image, settings))
+    trust, freedom = image.trust, spreads.freedom
+    at = _linearize(image, template, pose, gain, np.zeros(3), shown)
+    spread, damping = usual_spread(spreads), image.settings.refine.damping
+    for step in range(settings.steps + 1):
+        spread = fit_spread(spread, at.left, at.parts, at.jacobian, known, trust, spreads)
+        weights = spread.weights(at.left, at.parts, trust, freedom)
+        weighted = (at.jacobian * weights[:, None]).T
+        normal = weighted @ at.jacobian + known
+        if step == settings.steps:
+            break
+        right = weighted @ at.left - known @ at.departure
+        tried = _move(image, template, at, normal, right, damping, shown)
+        before, after = (
+            spread.log_likelihood(one.left, one.parts, trust, freedom)
+            - 0.5 * float(one.departure @ known @ one.departure)
+            for one in (at, tried)
+        )
+        if after > before:
+            at, damping = tried, damping / image.settings.refine.easier
+        else:
+            damping *= image.settings.refine.harder
+    told = invert_normal(normal, image.settings.covariance.unseen)
+    rows = [0, 1, 2, POSE - 1]
+    covariance = _size(image, at) * told[np.ix_(rows, rows)]
+    blur = float(at.more[1]), float(at.more[2])
+    return PosePosterior(at.pose, at.gain, covariance, spread, blur)
+
+
+def _linearize(
+    image: Image, template: ResponseTemplate, pose: Array, gain: Array, more: Array, shown: Shown
+) -> _Linearized:
+    under = project_template(image, template, pose[None], gain[None])
+    felt, noise = under.felt, image.settings.noise
+    values = values_of(under, shown(under.cells))
+    slopes, forces = force_jacobian(image, pose[None], gain[None], values, felt)
+    jacobian, force, value = slopes[0], forces[0], values[0]
+    across = second_differences(np.column_stack([force, jacobian]), image.shape)
+    blurred = [one[:, 0] for one in across]
+    jacobian = jacobian + sum(
+        share * one[:, 1:] for share, one in zip(more[1:], across, strict=True)
+    )
+    unit = response_by_psi(response_of(value[:, 0])) * felt.plateau[0] / felt.press[0]
+    parts = unit**2 * np.stack(
+        [noise.quiet**2 + value[:, 0] ** 2, value[:, 1] ** 2 + value[:, 2] ** 2]
+    )
+    columns = np.column_stack([np.ones_like(force), *blurred])
+    left = image.forces - force - columns @ more
+    departure = np.concatenate([prior_departure(image, pose[None], gain[None])[0], more])
+    jacobian = np.column_stack([jacobian, columns])
+    return _Linearized(pose, gain, more, left, parts, jacobian, departure)
+
+
+def _move(
+    image: Image, template: ResponseTemplate, at: _Linearized, normal: Array, right: Array,
+    damping: float, shown: Shown,
+) -> _Linearized:  # fmt: skip
+    """Return the image about the lattice a damped step further."""
+    refine, settings = image.settings.refine, image.settings.posterior
+    least = np.array([*refine.least, *settings.least])
+    most = np.array([*refine.step, *settings.step])
+    lattice = len(at.pose) + len(at.gain)
+    most[lattice] *= float(image.forces.max())
+    limits = np.array(refine.limits)
+    system = normal + np.diag(np.diag(normal) * damping + least)
+    step = np.clip(np.linalg.solve(system, right), -most, most)
+    pose, gain = at.pose + step[:POSE], at.gain + step[POSE:lattice]
+    pose[3:] = np.clip(pose[3:], -limits, limits)
+    gain[1] = np.clip(gain[1], refine.shallower * at.gain[1], refine.deepest)
+    gain = bounded_gain(gain[None], image.settings.gain.steepest)[0]
+    return _linearize(image, template, pose, gain, at.more + step[lattice:], shown)
+
+
+def _precision(image: Image, settings: PosteriorSettings) -> Array:
+    """Return what is known of each unknown beforehand, one over its variance (14,)."""
+    offset = settings.offset * max(float(image.forces.max()), 1e-12)
+    more = 1.0 / np.square([offset, settings.blur, settings.blur])
+    return np.concatenate([prior_precision(image), more])
+
+
+def _size(image: Image, at: _Linearized) -> float:
+    """Return by how much the covariance is wider than least squares say.
+
+    Readings that hold much of each other do so in a way that no second difference tells.
+    """
+    settings = image.settings.covariance
+    heard = image.settings.template.cross_talk * (1 + float(at.pose[4]))
+    heard += 2 * float(at.more[1:].sum())
+    return settings.size + settings.blurred * max(0.0, heard - settings.usual_blur)

@@ -1,0 +1,154 @@
+"""The last fit of a pose: images made of the template itself, with what a sensor is off by."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from generator.alphabet import SymbolStyle, alphabet_named
+from probe.sensor import SensorType
+from recognizer.touch.settings import DEFAULTS
+from recognizer.touch.signal import Signal
+from recognizer.touch.symbols.blur import second_differences
+from recognizer.touch.symbols.gain import image_of_signal
+from recognizer.touch.symbols.posterior import fit_posterior
+from recognizer.touch.symbols.projection import project_template, values_of
+from recognizer.touch.symbols.refine import force_jacobian
+from recognizer.touch.symbols.template import template_of
+
+SENSOR = SensorType()
+STYLE = SymbolStyle(pitch_mm=7.0, height_mm=1.0, stroke_mm=1.4)
+TRUE = np.array([17.3, 9.1, 0.6, 0.2, -0.3, -0.1, 0.0])
+GAIN = np.array([4.6, 0.35, 0.03, -0.02])
+LABELS = np.random.default_rng(5).integers(0, 4, (24, 24))
+
+
+def shown(cells):
+    return LABELS[cells[..., 0] % 24, cells[..., 1] % 24]
+
+
+@pytest.fixture(scope="module")
+def template():
+    return template_of(alphabet_named("dense-4"), STYLE, SENSOR, DEFAULTS.template)
+
+
+@pytest.fixture(scope="module")
+def touch(template):
+    """Return a function that makes an image: a sensor with these errors at the true pose."""
+    signal = Signal(np.ones((16, 16)), np.ones((16, 16)), contact=True, newtons=False)
+    plain = image_of_signal(SENSOR, signal, STYLE.height_mm)
+
+    def made(seed=0, aside_mm=0.0, gain=0.0, offset=0.0, blur=(0.0, 0.0), pose=TRUE):
+        rng = np.random.default_rng(seed)
+        at = replace(plain, points_mm=plain.points_mm + aside_mm * rng.standard_normal((256, 2)))
+        under = project_template(at, template, pose[None], GAIN[None])
+        values = values_of(under, shown(under.cells))
+        force = force_jacobian(at, pose[None], GAIN[None], values, under.felt)[1][0]
+        force = force * np.exp(gain * rng.standard_normal(256)) + 1.5 * rng.standard_normal(256)
+        rows, columns = (one[:, 0] for one in second_differences(force[:, None], (16, 16)))
+        return replace(plain, forces=force + blur[0] * rows + blur[1] * columns + offset)
+
+    return made
+
+
+def near(rng):
+    """A pose as the search leaves it, and a gain."""
+    spread = (0.05, 0.05, 0.004, 0.1, 0.1, 0.1, 0.0)
+    pose = TRUE + rng.normal(0, 1, 7) * spread
+    return pose, GAIN * (1 + rng.normal(0, 0.03, 4))
+
+
+def fit(template, image, seed=0):
+    return fit_posterior(image, template, *near(np.random.default_rng(100 + seed)), shown)
+
+
+def away(found):
+    pose = found.pose[:3] - TRUE[:3]
+    return np.append(pose, found.pose[6])
+
+
+@pytest.mark.parametrize(("aside_mm", "gain"), [(0.03, 0.05), (0.08, 0.12), (0.2, 0.05)])
+def test_errors_are_as_large_as_the_covariance_says(template, touch, aside_mm, gain):
+    squares, felt = [], []
+    for seed in range(40):
+        found = fit(template, touch(seed, aside_mm, gain), seed)
+        error = away(found)[:3]
+        squares.append(error @ np.linalg.solve(found.covariance[:3, :3], error))
+        felt.append(found.spread.aside_mm)
+    assert 1.6 < np.mean(squares) < 4.5  # of three numbers: 3, nearly
+    assert np.mean(np.array(squares) < 7.815) >= 0.85
+    assert np.mean(felt) == pytest.approx(aside_mm, abs=0.02 + 0.2 * aside_mm)
+
+
+def test_tips_that_stand_aside_widen_it_and_even_gains_do_not_hide_them(template, touch):
+    widths = []
+    for aside_mm in (0.02, 0.1, 0.25):
+        found = [fit(template, touch(seed, aside_mm), seed).covariance for seed in range(4)]
+        widths.append(math.sqrt(np.mean([one[0, 0] for one in found])))
+    assert widths[1] > 1.5 * widths[0]
+    assert widths[2] > 1.5 * widths[1]
+
+
+def test_what_all_readings_have_too_much_is_told(template, touch):
+    plain, lifted = (fit(template, touch(2, 0.03, offset=offset)) for offset in (0.0, 12.0))
+    assert lifted.pose[:3] == pytest.approx(plain.pose[:3], abs=0.01)
+
+
+def test_blur_of_rows_and_of_columns_is_told_and_flattens_slopes(template, touch):
+    plain = fit(template, touch(3, 0.05))
+    assert plain.blur == pytest.approx((0.0, 0.0), abs=0.02)
+    for blur in ((0.08, 0.0), (0.0, 0.08)):
+        found = fit(template, touch(3, 0.05, blur=blur))
+        assert found.blur == pytest.approx(blur, abs=0.03)
+        assert found.pose[:2] == pytest.approx(plain.pose[:2], abs=0.03)
+        assert found.covariance[0, 0] > 0.9 * plain.covariance[0, 0]
+
+
+def test_much_blur_widens_it_beyond_least_squares(template, touch):
+    image = touch(3, 0.05, blur=(0.1, 0.1))
+    settings = DEFAULTS.covariance
+    usual, twice = (
+        fit(template, replace(image, settings=replace(DEFAULTS, covariance=changed)))
+        for changed in (
+            replace(settings, size=1.0, blurred=0.0),
+            replace(settings, size=2.0, blurred=0.0),
+        )
+    )
+    np.testing.assert_allclose(twice.covariance, 2 * usual.covariance)
+    found = fit(template, image)
+    heard = DEFAULTS.template.cross_talk * (1 + found.pose[4]) + 2 * sum(found.blur)
+    assert heard > settings.usual_blur
+    factor = settings.size + settings.blurred * (heard - settings.usual_blur)
+    np.testing.assert_allclose(found.covariance, factor * usual.covariance, rtol=1e-9)
+    even = fit(template, touch(3, 0.05))
+    assert DEFAULTS.template.cross_talk * (1 + even.pose[4]) + 2 * sum(even.blur) < 0.12
+
+
+def test_a_scale_is_told_with_its_covariance(template, touch):
+    errors, scaled = [], TRUE + np.array([0, 0, 0, 0, 0, 0, 0.004])
+    for seed in range(30):
+        found = fit(template, touch(seed, 0.08, 0.1, pose=scaled), seed)
+        errors.append((found.pose[6] - 0.004) / math.sqrt(found.covariance[3, 3]))
+    assert abs(np.mean(errors)) < 0.5
+    assert 0.6 < np.std(errors) < 1.25
+
+
+def test_dead_tactels_and_masked_ones_do_not_move_it(template, touch):
+    image = touch(6, 0.05)
+    forces, trust = image.forces.copy(), image.trust.copy()
+    forces[[40, 100, 170]] = 0.0
+    dead = fit(template, replace(image, forces=forces))
+    trust[[40, 100, 170]] = 0.0
+    masked = fit(template, replace(image, forces=forces, trust=trust))
+    whole = fit(template, image)
+    assert masked.pose[:3] == pytest.approx(whole.pose[:3], abs=0.02)
+    assert dead.pose[:3] == pytest.approx(masked.pose[:3], abs=0.02)
+    # to leave tactels out costs information
+    assert np.linalg.det(masked.covariance) > np.linalg.det(whole.covariance)
+
+
+def test_where_nothing_tells_a_place_it_is_wide(template, touch):
+    found = fit(template, replace(touch(7, 0.05), trust=np.zeros(256)))
+    assert np.isfinite(found.covariance).all()
+    assert found.covariance[0, 0] > 1.0
