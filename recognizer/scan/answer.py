@@ -44,6 +44,7 @@ from recognizer.touch.round import bend_at
 from recognizer.touch.settings import HypothesisSettings
 from recognizer.touch.symbols.fit import Fit, score_cells
 from recognizer.touch.symbols.gain import Image, bend_image
+from recognizer.touch.symbols.posterior import refit_pose
 from recognizer.touch.symbols.projection import explained_share
 from recognizer.touch.symbols.refine import refine_lattices
 from recognizer.touch.symbols.template import ResponseTemplate
@@ -161,7 +162,7 @@ def refine_last_pose(
         covariance=again.covariance,
     )
     share = explained_share(image, template, finer.pose, finer.gain, shown)
-    return replace(found, fit=finer, explained=share)
+    return replace(found, fit=refit_pose(image, template, finer, shown), explained=share)
 
 
 def answer_scan(

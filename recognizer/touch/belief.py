@@ -15,7 +15,7 @@ The best of all registered places always exists; it is an answer only if
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from recognizer.touch.locate import Hypothesis, coincide, labels_at, neighbours,
 from recognizer.touch.settings import BeliefSettings
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.gain import Image
-from recognizer.touch.symbols.posterior import fit_posterior
+from recognizer.touch.symbols.posterior import refit_pose
 from recognizer.touch.symbols.projection import explained_share
 from recognizer.touch.symbols.template import ResponseTemplate
 
@@ -95,17 +95,7 @@ class VerifiedHypothesis:
         def shown(at: Ints) -> Ints:
             return unworn_labels_at(embossed, place, worn, at)
 
-        found = fit_posterior(self.image, self.template, fit.pose, fit.gain, shown)
-        return replace(
-            fit,
-            x_mm=float(found.pose[0]),
-            y_mm=float(found.pose[1]),
-            theta_rad=math.remainder(float(found.pose[2]), math.tau),
-            nuisance=found.pose[3:],
-            gain=found.gain,
-            covariance=found.covariance[:3, :3],
-            with_scale=found.covariance[3],
-        )
+        return refit_pose(self.image, self.template, fit, shown)
 
     def support(self) -> Support:
         """Return what speaks for it."""

@@ -9,7 +9,8 @@ makes slopes less steep than the template's. Damped least squares; lattice and s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from recognizer.touch.settings import PosteriorSettings
 from recognizer.touch.symbols.blur import second_differences
 from recognizer.touch.symbols.covariance import invert_normal
+from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.gain import Image, bounded_gain
 from recognizer.touch.symbols.projection import (
     Shown,
@@ -59,6 +61,21 @@ class _Linearized:
     parts: Array  # (2, n) of `spread`
     jacobian: Array  # (n, 14) forces by pose, gain and these three
     departure: Array  # (14,) how far each unknown lies from what is known beforehand
+
+
+def refit_pose(image: Image, template: ResponseTemplate, fit: Fit, shown: Shown) -> Fit:
+    """Return a fit with pose, gain and covariance as its symbols tell them."""
+    found = fit_posterior(image, template, fit.pose, fit.gain, shown)
+    return replace(
+        fit,
+        x_mm=float(found.pose[0]),
+        y_mm=float(found.pose[1]),
+        theta_rad=math.remainder(float(found.pose[2]), math.tau),
+        nuisance=found.pose[3:],
+        gain=found.gain,
+        covariance=found.covariance[:3, :3],
+        with_scale=found.covariance[3],
+    )
 
 
 def fit_posterior(
