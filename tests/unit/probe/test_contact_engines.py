@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import math
+import sys
+from types import ModuleType
 
 import numpy as np
 import pytest
 from manifold3d import Manifold
 from scipy.optimize import brentq
 
-from probe.contact.contract import Touch, WristStiffness
-from probe.contact.engines import ENGINES, engine_named
+from probe.contact.contract import Contact, Touch, WristStiffness
+from probe.contact.engines import ENGINES, Engine, EngineEntry, engine_named
 from probe.contact.engines.mujoco import MujocoSettings
 from probe.contact.engines.under_sensor import UNDER, mesh_under
 from probe.contact.tips import Tips
 from probe.errors import ContactError, ProbeError
 from probe.sensor import Overlay, SensorType
+from probe.simulate.world.levels import LEVELS
+from probe.simulate.world.reading import read_sensor
 from probe.surface.mesh import mesh
 
 RIGID = WristStiffness(math.inf, math.inf)
@@ -177,6 +181,25 @@ def test_what_cannot_be_touched_is_refused(press, surface, sensor, touch, says):
     given = surface or mesh(block((-30, -30, -5), (30, 30, 0)))
     with pytest.raises(ProbeError, match=says):
         press(given, sensor, touch, TIPS)
+
+
+def test_a_third_engine_is_one_module_and_one_line(monkeypatch):
+    def press_alike(surface, sensor, touch, tips):
+        assert tips.points == 19
+        each = touch.force_n / (sensor.rows * sensor.columns)
+        return Contact(np.full((sensor.rows, sensor.columns), each), 0.25, 0.0, 0.0, "third", 1)
+
+    module = ModuleType("third_engine")
+    module.ENGINE = Engine(press_alike, points=19, overlays=("tab",))
+    monkeypatch.setitem(sys.modules, "third_engine", module)
+    monkeypatch.setitem(ENGINES, "third", EngineEntry("third_engine", "everything"))
+    rng = np.random.default_rng(3)
+    counts, contact = read_sensor(
+        Void(), SENSOR, Touch(0, 0, 0, 128.0), LEVELS["sound"], rng, "third"
+    )
+    assert (contact.level, contact.z_mm) == ("third", 0.25)
+    assert np.ptp(counts.astype(int)) <= 2  # every tactel bears half a newton; the board rounds
+    assert counts.min() > 60
 
 
 def test_an_unknown_engine_is_named_with_those_there_are():
