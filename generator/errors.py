@@ -12,6 +12,7 @@
         ├── LayoutError       a face that shows no place, or an array that is full
         ├── SolidError        a part that cannot be made or did not pass its proof
         ├── PrintError        a slicer that is missing or fails, or G-code that cannot be read
+        ├── WriteError        exit code 1: a full disk, a folder that may not be written
         └── DatabaseError     exit code 4: cannot be opened, newer, or holds another object
 
 Every error says what was given, what is allowed, and the way out (`fix`).
@@ -52,6 +53,12 @@ class SolidError(GeneratorError):
 
 class PrintError(GeneratorError):
     """A slicer that is missing or fails, G-code that cannot be read, or no part in it."""
+
+
+class WriteError(GeneratorError):
+    """A file that cannot be written: no space, no right, something in its way."""
+
+    exit_code = 1
 
 
 class DatabaseError(GeneratorError):

@@ -1,6 +1,6 @@
 """Lengths and angles as people write them.
 
-`40`, `40 mm`, `4 cm`, `1.6 in` -> mm; `10`, `10 deg`, `0.17 rad` -> radians (a bare
+`40`, `40 mm`, `4 cm`, `1.6 in`, `2 1/2 in` -> mm; `10`, `10 deg`, `0.17 rad` -> radians (a bare
 angle is in degrees); `1.24 g/cm3`, `1240` -> kg/m3. Values are rounded to 1e-9 mm and 1e-12 rad,
 so that the same length in two units is the same number.
 """
@@ -33,6 +33,9 @@ SHOWN_UNITS = {
 _QUANTITY = re.compile(
     r"\s*(?P<number>[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]{1,4})?)\s*"
     r"(?P<unit>[^\s0-9.,+-][^\s]{0,40})?\s*\Z"
+)
+_FRACTION = re.compile(
+    r"\s*(?:(?P<whole>[0-9]{1,6})[\s-]+)?(?P<over>[0-9]{1,6})/(?P<under>[1-9][0-9]{0,5})"
 )
 _COMMA = re.compile(r"\s*[-+]?[0-9]+,[0-9]+(?![0-9,])")
 _SIDES = re.compile(r"\s*(?:x|×|by)\s*")
@@ -110,7 +113,7 @@ def _number(value: Any, units: dict[str, float], bare: str, what: str, example: 
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise refuse(f"this must be {what}", f"write, for example, {example}")
     if isinstance(value, str):
-        match = _QUANTITY.match(value)
+        match = _QUANTITY.match(_with_point(value))
         if match is None:
             raise _unreadable_error(value, what, example)
         number, unit = float(match["number"]), match["unit"] or bare
@@ -124,6 +127,15 @@ def _number(value: Any, units: dict[str, float], bare: str, what: str, example: 
     if not math.isfinite(number * units[unit]):
         raise refuse(f"{what} must be a finite number", f"write, for example, {example}")
     return number * units[unit]
+
+
+def _with_point(text: str) -> str:
+    """Return a text in which a fraction, as in 2 1/2 in, is a decimal number."""
+    match = _FRACTION.match(text)
+    if match is None:
+        return text
+    value = int(match["whole"] or 0) + int(match["over"]) / int(match["under"])
+    return f"{value:.12f}{text[match.end() :]}"
 
 
 def _unreadable_error(value: str, what: str, example: str) -> PydanticCustomError:

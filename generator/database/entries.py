@@ -5,6 +5,7 @@ Every function takes a connection, as those of `generator.database.read`.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -18,13 +19,26 @@ from generator.errors import DatabaseError
 
 def list_objects(connection: Connection) -> tuple[ObjectEntry, ...]:
     """Return one entry per object, in the order of their names."""
-    return tuple(_entries(connection, _select_entries().order_by(tables.objects.c.name)))
+    entries = _entries(connection, _select_entries())
+    return tuple(sorted(entries, key=lambda entry: natural_key(entry.name)))
 
 
 def object_names(connection: Connection) -> tuple[str, ...]:
     """Return the names of all objects, in order; without the counts of `list_objects`."""
     names = tables.objects.c.name
-    return tuple(connection.execute(select(names).order_by(names)).scalars())
+    return tuple(sorted(connection.execute(select(names)).scalars(), key=natural_key))
+
+
+def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
+    """Return what sorts names as people count: Block-2 before Block-10.
+
+    Examples
+    --------
+    >>> sorted(["B-10", "B-2", "A"], key=natural_key)
+    ['A', 'B-2', 'B-10']
+    """
+    runs = re.findall(r"[0-9]+|[^0-9]+", name)
+    return tuple((0, int(run), run) if run[0] in "0123456789" else (1, 0, run) for run in runs)
 
 
 def find_object(connection: Connection, name: str) -> ObjectEntry | None:

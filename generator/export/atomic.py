@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
-from generator.errors import GeneratorError
+from generator.errors import WriteError
 
 _PREFIX = ".encode-object-"
 
@@ -46,7 +46,7 @@ class Staging:
 
     Raises
     ------
-    GeneratorError
+    WriteError
         The folder cannot be made or written, a file cannot be written or moved.
 
     Examples
@@ -189,7 +189,7 @@ def _named_errors(path: Path, action: str) -> Iterator[None]:
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else str(error)
         fix = _FIXES.get(error.errno or 0, "check the folder or choose another one with -o")
-        raise GeneratorError(f"cannot {action}: {reason}", fix=fix, place=str(path)) from error
+        raise WriteError(f"cannot {action}: {reason}", fix=fix, place=str(path)) from error
 
 
 _OTHER_FOLDER = "choose a folder that you may write with -o"

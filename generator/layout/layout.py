@@ -230,7 +230,7 @@ def _full_array_error(plan: LayoutPlan, occupancy: Occupancy) -> LayoutError:
     )
     if needed <= occupancy.free:
         cause += ", but not in blocks that hold its faces"
-    fix = "take a larger array, such as profile large, or profile auto, which chooses one"
+    fix = "set profile: auto, which takes an array that is large enough"
     return LayoutError(cause, fix=f"{fix}, or start a new database" if occupancy.used else fix)
 
 

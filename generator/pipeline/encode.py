@@ -10,6 +10,7 @@ finds the cells in the database and makes the same bytes again.
 from __future__ import annotations
 
 import dataclasses
+import json
 import time
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
@@ -161,11 +162,31 @@ def plan_in_lab(
         plans = plan_all(choice)
         if engine is not None or not make:
             return engine, plans
-        parts_of(plans[0], place_object(None, plans[0], replace=False).layout)
+        _try_all(plans)
         engine = open_database(url, lab_key=lab.key)
         with read_transaction(engine) as connection:
             if stored_lab_key(connection) == lab.key:
                 return engine, plans
+
+
+def _try_all(plans: Sequence[ObjectPlan]) -> None:
+    """Lay out and build one of each kind, so that what is refused leaves no empty database.
+
+    Where they fill more than half of the array, places are found for all.
+    """
+    kinds: dict[str, int] = {}
+    needed = 0
+    for plan in plans:
+        kind = json.dumps(plan.meaning, sort_keys=True, default=str)
+        if kind not in kinds:
+            layout = place_object(None, plan, replace=False).layout
+            parts_of(plan, layout)
+            kinds[kind] = sum(len(face.labels) for face in layout.faces)
+        needed += kinds[kind]
+    if 2 * needed > plans[0].array.rows * plans[0].array.columns:
+        taken = occupancy_of(None, plans[0])
+        for plan in plans:
+            taken = occupancy_with(taken, place_object(None, plan, False, taken).layout)
 
 
 def _rehearse(

@@ -16,7 +16,7 @@ from pathlib import Path
 from sqlalchemy import Connection, Engine
 
 from encoded_objects.errors import install_line
-from generator.database.entries import find_object
+from generator.database.entries import find_object, natural_key
 from generator.database.part_state import part_state
 from generator.database.read import read_layout, read_parts
 from generator.database.register import require_in_use
@@ -164,7 +164,8 @@ def _intact_product(connection: Connection, order: Order) -> Product | None:
     if "glb" in order.formats:
         others.append(f"{stem}.glb")
     if "3mf" in order.formats:
-        plates = sorted(order.folder.glob(f"{_escape_glob(plan.spec.name)}-plate-*.3mf"))
+        found = order.folder.glob(f"{_escape_glob(plan.spec.name)}-plate-*.3mf")
+        plates = sorted(found, key=lambda plate: natural_key(plate.name))
         others += map(str, plates or [Path(f"{stem}.3mf"), Path(f"{stem}-prusaslicer.3mf")])
     if not all(os.path.isfile(other) for other in others):
         return None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from pydantic import BaseModel, ValidationError
 
 from encoded_objects.document.explain import SettingWords, explain_settings, model_at
@@ -22,6 +24,9 @@ _TEMPLATES = {
 }
 
 
+_AFTER_COMMA = re.compile(r"[0-9]+ ?(mm|cm|m|um|in|deg)?")  # what a decimal comma leaves as a key
+
+
 def explain_errors(error: ValidationError, tree: Tree, model: type[BaseModel]) -> list[Problem]:
     """Return the problems behind a validation error; see `explain_settings`."""
     return explain_settings(error, tree, model, _WORDS)
@@ -34,7 +39,10 @@ def _unknown_setting(place: Place, mark: SourceMark, model: type[BaseModel]) -> 
     inside = f" in '{block[-1]}'" if block else ""
     what = "shape" if block == ("shape",) else "setting"
     cause = f"unknown {what} '{word[:60]}'" + ("" if what == "shape" else inside)
-    if block == ("shape",) and word.lower() in OTHER_NAMES:
+    if _AFTER_COMMA.fullmatch(word):
+        cause = f"the comma before '{word}' ends the value"
+        fix = "write a point for decimals: 60.5 mm"
+    elif block == ("shape",) and word.lower() in OTHER_NAMES:
         fix = f"write shape: {EXAMPLES[OTHER_NAMES[word.lower()]]}"
     elif elsewhere := _other_place(word, block):
         fix = elsewhere

@@ -15,8 +15,9 @@ from encoded_objects.document.tree import Place, Tree, read_tree
 from generator.spec.explain import explain_errors
 from generator.spec.located import LocatedSpec, mark_of
 from generator.spec.problem import SPEC, SpecError
-from generator.spec.resolve import resolve
-from generator.spec.settings import Defaults, ObjectSettings
+from generator.spec.resolve import folder_name, resolve
+from generator.spec.resolved import ShapeSpec
+from generator.spec.settings import Defaults, NamedSettings, ObjectSettings, SharedSettings
 
 OBJECTS_MAX = 10_000
 PROBLEMS_SHOWN = 25
@@ -53,16 +54,23 @@ def read_specs(
     problems: list[Problem] = []
     found: list[LocatedSpec] = []
     for path in paths:
-        for tree in _collect_trees(_objects(path, problems), problems):
+        try:
+            source = path if isinstance(path, Tree) else read_tree(Path(path), SPEC)
+        except SpecError as error:
+            problems += error.problems
+            continue
+        problems += source.problems
+        origin = _origin(path, source)
+        for tree in _collect_trees(_objects(source, problems), problems):
             try:
                 settings = ObjectSettings.model_validate(tree.value)
                 if len(found) + settings.copies <= OBJECTS_MAX:
-                    origin = "" if isinstance(path, Tree) else Path(path).stem
                     found += [LocatedSpec(spec, tree, origin) for spec in resolve(settings, tree)]
                 else:
                     problems.append(_too_many(tree))
             except ValidationError as error:
                 problems += explain_errors(error, tree, ObjectSettings)
+                problems += _problems_beside(error, tree)
             except SpecError as error:
                 problems += error.problems
     if not problems:
@@ -81,18 +89,43 @@ def _collect_trees(trees: Iterable[Tree], problems: list[Problem]) -> list[Tree]
         return []
 
 
-def _objects(source: Path | str | Tree, problems: list[Problem]) -> Iterable[Tree]:
+def _origin(path: Path | str | Tree, source: Tree) -> str:
+    """Return what the files of a set are called: its name, or that of its file."""
+    value = source.value
+    named = value.get("name") if isinstance(value, dict) and "objects" in value else None
+    if isinstance(named, str):
+        return named
+    return "" if isinstance(path, Tree) else Path(path).stem
+
+
+def _problems_beside(error: ValidationError, tree: Tree) -> list[Problem]:
+    """Return what blocks without a misread value mean wrongly, so that it is told at once.
+
+    Where symbols or what they depend on are misread, nothing is concluded from defaults.
+    """
+    misread = {item["loc"][0] if item["loc"] else "" for item in error.errors(include_url=False)}
+    if not isinstance(tree.value, dict) or not misread <= {"shape", "name", "copies", "output"}:
+        return []
+    left = {key: value for key, value in tree.value.items() if key not in {*misread, "shape"}}
+    try:
+        resolve(NamedSettings.model_validate({**left, "name": "A"}), tree, ShapeSpec("solid", {}))
+    except SpecError as found:
+        return list(found.problems)
+    except ValidationError:
+        return []
+    return []
+
+
+def _objects(tree: Tree, problems: list[Problem]) -> Iterable[Tree]:
     """Yield the objects of a file; those of a set with the set's defaults merged in."""
-    tree = source if isinstance(source, Tree) else read_tree(Path(source), SPEC)
-    problems += tree.problems
     if not isinstance(tree.value, dict) or "objects" not in tree.value:
         yield tree
         return
     shared = tree.without("objects")
     try:
-        Defaults.model_validate(shared.value)
+        SharedSettings.model_validate(shared.value)
     except ValidationError as error:
-        problems += explain_errors(error, tree, Defaults)
+        problems += explain_errors(error, tree, SharedSettings)
     entries = tree.value["objects"]
     if not isinstance(entries, list) or not entries:
         fix = "write  objects:  and below it a list of  - name: ...  or  - file.yaml"
@@ -175,12 +208,15 @@ def _shared_problems(found: Sequence[LocatedSpec], database: str | None) -> list
     names: dict[str, LocatedSpec] = {}
     for located in found:
         spec = located.spec
-        other = names.setdefault(spec.name.casefold(), located)
+        other = names.setdefault(folder_name(spec.name).casefold(), located)
         if other is not located:
             where = mark_of(other.tree, "name")
             problems.append(
                 Problem(
-                    f"two objects are called '{spec.name}', the first in {where}",
+                    f"two objects are called '{spec.name}', the first in {where}"
+                    if other.spec.name == spec.name
+                    else f"'{spec.name}' differs from '{other.spec.name}' in {where} only by "
+                    "case, spaces or dashes",
                     "give it another name",
                     mark_of(located.tree, "name"),
                 )

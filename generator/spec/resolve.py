@@ -124,7 +124,7 @@ def resolve(
         printer=printer,
         colours=settings.print.colours,
         formats=tuple(dict.fromkeys(settings.output.formats or FORMATS)),
-        folder=Path(settings.output.folder or f"out/{_folder_name(settings.name)}"),
+        folder=Path(settings.output.folder or f"out/{folder_name(settings.name)}"),
         database=settings.output.database or DATABASE,
         lab_key=settings.output.lab_key or "",
         density_kg_m3=settings.robot.density or printer.density_kg_m3,
@@ -135,8 +135,9 @@ def resolve(
     return tuple(replace(spec, name=f"{spec.name}-{k + 1}") for k in range(settings.copies))
 
 
-def _folder_name(name: str) -> str:
-    return re.sub(r"\s+", "-", name.lower())
+def folder_name(name: str) -> str:
+    """Return the folder of an object's files: names that give the same one are told apart badly."""
+    return re.sub(r"[\s-]+", "-", name.lower())
 
 
 def _printer(

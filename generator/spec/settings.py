@@ -193,7 +193,14 @@ class ObjectSettings(NamedSettings):
     shape: Annotated[Shape, BeforeValidator(shape_block)]
 
 
-class SetSettings(Defaults):
+class SharedSettings(Defaults):
+    """What stands beside the objects of a set."""
+
+    name: ObjectName | None = None
+    """What the files of the set are called: as the spec file if left out."""
+
+
+class SetSettings(SharedSettings):
     """Objects that share one array, and what holds for all of them."""
 
     objects: Annotated[list[ObjectSettings | str], Field(min_length=1)]

@@ -158,7 +158,7 @@ def test_a_full_array_says_how_many_cells_are_free_and_needed():
     rows, columns = np.mgrid[:63, :65].reshape(2, -1)
     with pytest.raises(LayoutError, match=r"needs 384 cells, 300 of 4095 are free") as caught:
         laid_out(shapes.cube(60.0), (rows[:-300], columns[:-300]), kind="faces")
-    assert "profile large" in caught.value.fix
+    assert "profile: auto" in caught.value.fix
     with pytest.raises(LayoutError, match="not in blocks"):
         laid_out(shapes.cube(180.0))
 

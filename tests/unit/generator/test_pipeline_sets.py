@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from generator.database import cells as cells_module
+from generator.database.entries import natural_key
 from generator.database.occupancy import taken_tiles
 from generator.database.open import open_database
 from generator.database.read import read_layout
@@ -222,3 +223,24 @@ def test_errors_come_back_from_other_processes(tmp_path):
     for jobs in (1, 2):
         with Workers(jobs) as workers, pytest.raises(ValueError, match="'x'"):
             workers.done(tasks, no_progress)
+
+
+@pytest.mark.parametrize("copies", [1, 12])
+def test_a_refused_set_leaves_no_database(tmp_path, copies):
+    """A part of the second object cannot be made, or the array does not hold all copies."""
+    size = "[60 mm, 60 mm, 5 mm]" if copies == 1 else "[60 mm, 60 mm, 60 mm]"
+    path = tmp_path / "set.yaml"
+    path.write_text(
+        "objects:\n- {name: A, shape: {cube: 60 mm}}\n"
+        f"- {{name: B, shape: {{box: {size}}}, copies: {copies}}}\n"
+    )
+    with pytest.raises(SpecError):
+        encode(read_specs([path]), folder=tmp_path / "out", database=f"sqlite:///{tmp_path}/l.db")
+    assert [file.name for file in tmp_path.iterdir()] == ["set.yaml"]
+
+
+def test_names_are_listed_as_people_count():
+    names = ["Block-10", "Block-2", "Block-1", "Block", "2nd", "10th"]
+    assert sorted(names, key=natural_key) == [
+        "2nd", "10th", "Block", "Block-1", "Block-2", "Block-10",
+    ]  # fmt: skip

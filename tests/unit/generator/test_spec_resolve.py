@@ -4,7 +4,9 @@ import math
 from pathlib import Path
 
 import pytest
+from pydantic_core import PydanticCustomError
 
+from encoded_objects.document.quantity import length_mm
 from generator.alphabet.known import ALPHABETS
 from generator.alphabet.outline import SymbolStyle
 from generator.alphabet.printable import check_printable
@@ -274,3 +276,43 @@ def test_blame():
         "  face F1",
         "  face F2",
     ]
+
+
+def test_a_set_has_a_name_and_folders_of_their_own(tmp_path):
+    path = tmp_path / "c.yaml"
+    one = "{name: Cube A, shape: {cube: 60 mm}}"
+    path.write_text(f"name: Course\nobjects:\n- {one}\n")
+    assert [located.origin for located in read_specs([path])] == ["Course"]
+    path.write_text(f"objects:\n- {one}\n")
+    assert [located.origin for located in read_specs([path])] == ["c"]
+    for other in ("cube a", "Cube-a", "CUBE  A"):
+        path.write_text(f"objects:\n- {one}\n- {one.replace('Cube A', other)}\n")
+        with pytest.raises(SpecError, match="only by case, spaces or dashes"):
+            read_specs([path])
+
+
+def test_what_other_blocks_mean_wrongly_is_told_with_a_misread_shape(tmp_path):
+    path = tmp_path / "c.yaml"
+    path.write_text("name: A\nshape: {sphere: 3}\nprint: {wall: 0.1 mm, gap: 9 mm}\n")
+    with pytest.raises(SpecError) as caught:
+        read_specs([path])
+    places = [problem.place.partition(":")[2] for problem in caught.value.problems]
+    assert places == ["2:9", "3:15", "3:28"]
+    path.write_text("name: A\nshape: {sphere: 3}\nsymbols: {pitch: x}\nprint: {gap: 9 mm}\n")
+    with pytest.raises(SpecError) as caught:
+        read_specs([path])
+    assert len(caught.value.problems) == 2  # nothing is concluded from a default pitch
+
+
+@pytest.mark.parametrize(
+    ("text", "length"),
+    [('2 1/2"', 63.5), ("2-1/2 in", 63.5), ("3/4 in", 19.05), ("1 1/8 in", 28.575), ("1/2", 0.5)],
+)
+def test_fractions_are_lengths(text, length):
+    assert length_mm(text) == pytest.approx(length, abs=1e-9)
+
+
+@pytest.mark.parametrize("text", ["1/0 in", "1/2/3 in", "a 1/2 in", "1 /2 in x"])
+def test_what_is_no_fraction_is_refused(text):
+    with pytest.raises(PydanticCustomError):
+        length_mm(text)
