@@ -47,7 +47,7 @@ class BenchContext:
 
     session: Session
     broker: Broker
-    parts: Path | None  #: folder of the files that may be downloaded
+    parts: Path | None  #: folder of the files that may be downloaded; None: the database's
     ports: tuple[tuple[str, str], ...]  #: URLs and labels that are always offered
 
 

@@ -12,14 +12,18 @@ from generator.database.entries import object_entry
 from generator.database.open import open_database
 from generator.database.read import read_parts
 from generator.database.transaction import read_transaction
-from recognizer.bench.errors import UnknownError
-from recognizer.bench.files import part_to_send
+from recognizer.bench.errors import BusyError, UnknownError
+from recognizer.bench.example import make_example
+from recognizer.bench.files import part_folder, part_to_send
 from recognizer.bench.lab_json import arrays_json, map_json, object_json, objects_json
 from recognizer.bench.session import Session
+from recognizer.bench.simulated import SCHEME
+
+LAB = "lab.db"  #: in the folder where the bench was started, where no database was named
 
 
 def lab_routes(session: Session, parts: Path | None) -> APIRouter:
-    """Return the routes; files are sent from the folder `parts` alone."""
+    """Return the routes; files are sent from the folder `parts`, or the database's, alone."""
     routes = APIRouter(prefix="/api")
 
     def engine() -> Any:
@@ -33,6 +37,15 @@ def lab_routes(session: Session, parts: Path | None) -> APIRouter:
             return {"objects": []}
         with read_transaction(engine()) as connection:
             return {"objects": objects_json(connection)}
+
+    @routes.post("/example")
+    def example() -> dict[str, Any]:
+        if session.database and objects()["objects"]:
+            raise BusyError("objects are registered already", fix="touch one of these")
+        name = make_example(Path.cwd(), session.database or LAB)
+        session.use_database(session.database or LAB)
+        session.open(SCHEME)
+        return {"object": name}
 
     @routes.get("/objects/{name}")
     def one(name: str) -> dict[str, Any]:
@@ -48,7 +61,8 @@ def lab_routes(session: Session, parts: Path | None) -> APIRouter:
             known = read_parts(connection, object_entry(connection, name).object_id)
         if not 0 <= number < len(known):
             raise UnknownError(f"{name} has no part {number}", fix=f"it has {len(known)}")
-        path = part_to_send(session.database, parts, known[number])
+        folder = parts or part_folder(session.database)
+        path = part_to_send(session.database, folder and folder.resolve(), known[number])
         return FileResponse(path, filename=path.name, media_type="application/octet-stream")
 
     @routes.get("/lab")

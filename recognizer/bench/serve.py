@@ -23,7 +23,6 @@ from probe.sensor_types import choose_sensor_type
 from recognizer.bench.app import BenchContext, app_for
 from recognizer.bench.broker import Broker
 from recognizer.bench.errors import BenchError
-from recognizer.bench.files import part_folder
 from recognizer.bench.guard import RequestGuard, access_rules, is_loopback
 from recognizer.bench.patience import PatientProtocol
 from recognizer.bench.session import Session
@@ -76,10 +75,7 @@ def serve(options: BenchOptions) -> int:
     session = Session(database, options.folder, sensor, broker)
     try:
         _begin(session, options.port)
-        parts = options.parts if options.parts or not database else part_folder(database)
-        bench = BenchContext(
-            session, broker, parts and parts.resolve(), _ports(options.port, database)
-        )
+        bench = BenchContext(session, broker, options.parts, _ports(options.port))
         config = uvicorn.Config(
             RequestGuard(app_for(bench), access_rules(options.host, token)),
             log_level="warning", access_log=False, server_header=False,
@@ -129,9 +125,9 @@ def _database(url: str) -> str:
     )
 
 
-def _ports(port: str, database: str) -> tuple[tuple[str, str], ...]:
-    always = (SOFTWARE, FIRMWARE) if database else ()
-    return ((port, port), *always, PATTERN) if port and port != "touch:" else (*always, PATTERN)
+def _ports(port: str) -> tuple[tuple[str, str], ...]:
+    always = (SOFTWARE, FIRMWARE, PATTERN)
+    return ((port, port), *always) if port and port != "touch:" else always
 
 
 def _open_socket(host: str, port: int) -> socket.socket:

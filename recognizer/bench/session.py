@@ -145,6 +145,14 @@ class Session:
             )
         return self.simulation
 
+    def use_database(self, database: str) -> None:
+        """Read the objects of a database from now on."""
+        with self._turn:
+            self.database = self.recognition.database = database
+            self.recognition.reload()
+            self._note(f"objects are those of {database}")
+            self._report()
+
     def touch_next(self) -> None:
         """Let the simulated probe make the step that the newest answer proposes.
 

@@ -82,6 +82,13 @@ class LineSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class ExampleSettings:
+    """What the example of an empty lab may cost."""
+
+    longest_s: float = 120.0  #: to make it
+
+
+@dataclass(frozen=True, slots=True)
 class PageSettings:
     """What pages may ask of the live line, and how much they get."""
 
@@ -104,4 +111,4 @@ class TouchLogSettings:
 TRIGGER, RECOGNITION, SESSION = TriggerSettings(), RecognitionSettings(), SessionSettings()
 TOUCHES = TouchLogSettings()
 GUIDE, REPLAY, PRESS = GuideSettings(), ReplaySettings(), PressSettings()
-LINE, PAGE = LineSettings(), PageSettings()
+LINE, PAGE, EXAMPLE = LineSettings(), PageSettings(), ExampleSettings()

@@ -37,10 +37,13 @@ def served(lab):
     """Return a context manager: options -> address of a server, that has to end in order."""
 
     @contextmanager
-    def running(*options):
-        words = ("--database", lab / "lab.db", "--folder", lab / "recordings", "--web-port", 0)
+    def running(*options, folder=None):
+        words = ("--database", lab / "lab.db") if folder is None else ()
+        words += ("--folder", (folder or lab) / "recordings", "--web-port", 0)
         command = [sys.executable, "-m", "recognizer.bench.command", *map(str, (*words, *options))]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        with subprocess.Popen(
+            command, stdout=subprocess.PIPE, text=True, cwd=folder
+        ) as process:  # fmt: skip
             try:
                 yield process.stdout.readline().split()[-1]
             finally:

@@ -367,6 +367,42 @@ def test_the_answer_is_on_the_first_screen(browser, bench, size):
         assert box["y"] + box["height"] <= height
 
 
+def test_an_empty_lab_offers_an_example(served, browser, tmp_path):
+    with served(folder=tmp_path) as address:
+        page = browser.new_page(viewport={"width": 1440, "height": 900})
+        page.goto(address)
+        button = page.get_by_test_id("example")
+        expect(button).to_be_visible(timeout=PATIENCE_S * 1e3)
+        button.click()
+        until(page, "bench.answers > 0")
+        assert page.get_by_test_id("answer").inner_text().startswith("Example F1")
+        expect(button).to_be_hidden()
+        assert (tmp_path / "lab.db").exists()
+        assert httpx.post(f"{address}api/example", json={}).status_code == 409
+        page.close()
+
+
+def test_where_to_touch_next_is_said_and_done(page):
+    shown(page, "Cube")
+    page.get_by_test_id("touch-face").select_option("F1")
+    answers = page.evaluate("bench.answers")
+    for axis in "xy":
+        page.locator(f"#touch-{axis}").fill("2")
+    page.get_by_test_id("touch-go").click()
+    until(page, f"bench.answers > {answers}")
+    assert page.get_by_test_id("answer").inner_text().startswith("Not recognised:")
+    expect(page.get_by_test_id("next")).to_contain_text(re.compile("Next: .* mm (right|left)"))
+    rest(page)
+    for _ in range(2):
+        if page.evaluate("bench.state") == "answered":
+            break
+        answers = page.evaluate("bench.answers")
+        page.get_by_test_id("next-go").click()
+        until(page, f"bench.answers > {answers}")
+        rest(page)
+    assert page.get_by_test_id("answer").inner_text().startswith("Cube F1")
+
+
 def test_a_token_is_asked_for_where_others_can_come(served, browser):
     with served("--host", "0.0.0.0", "--port", "sim:") as address:
         assert "0.0.0.0" not in address  # nobody can open that

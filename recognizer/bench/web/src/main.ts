@@ -167,6 +167,7 @@ async function begin(): Promise<void> {
   async function reader(state: ReaderState): Promise<void> {
     const texts = { preparing: "reading the database…", ready: "", off: `${state.cause ?? ""}: ${state.fix ?? ""}` };
     say(element("reader"), texts[state.state]);
+    if (state.state === "off") await empty();
     if (state.state !== "ready") return;
     const { encodings } = await get<{ encodings: Encoding[] }>("lab");
     heat.encodings = encodings;
@@ -176,6 +177,27 @@ async function begin(): Promise<void> {
     await objects();
   }
 
+  /** Offer an example where nothing is registered. */
+  async function empty(): Promise<void> {
+    const { objects: held } = await get<{ objects: ObjectEntry[] }>("objects");
+    element("empty").hidden = held.length > 0;
+  }
+
+  /** Make the example, and touch the middle of its first face. */
+  async function example(): Promise<void> {
+    const button = element<HTMLButtonElement>("example");
+    button.disabled = true;
+    say(button, "Making it…");
+    try {
+      const { object } = await post<{ object: string }>("example");
+      await show(object);
+      await touch({ face: element<HTMLSelectElement>("touch-face").value, x_mm: Number(element<HTMLInputElement>("touch-x").value), y_mm: Number(element<HTMLInputElement>("touch-y").value) });
+    } finally {
+      button.disabled = false;
+      say(button, "Make an example and touch it");
+    }
+  }
+
   async function array(number: number): Promise<void> {
     map.show(await get<ArrayMap>(`map/${number}`), number);
   }
@@ -183,6 +205,7 @@ async function begin(): Promise<void> {
   async function objects(): Promise<void> {
     const { objects: held } = await get<{ objects: ObjectEntry[] }>("objects");
     choices(element("object"), held.map((one) => [one.name, `${one.name}${one.retired ? " (retired)" : ""}`]));
+    element("empty").hidden = held.length > 0;
     const first = part.shape?.name ?? held[0]?.name;
     if (first) await show(first);
   }
@@ -204,6 +227,7 @@ async function begin(): Promise<void> {
     const number = (id: string): number => Number(element<HTMLInputElement>(id).value);
     void touch({ face: element<HTMLSelectElement>("touch-face").value, x_mm: number("touch-x"), y_mm: number("touch-y") }).catch(() => undefined);
   });
+  element("example").addEventListener("click", () => void example().catch(() => undefined));
   element("next-go").addEventListener("click", () => {
     clicked = performance.now();
     void post("touch/next").catch(() => undefined);
