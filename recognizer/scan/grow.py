@@ -41,6 +41,7 @@ from recognizer.scan.views import (
     widest_mm,
 )
 from recognizer.touch.belief import VerifiedHypothesis
+from recognizer.touch.felt_area import EarlierTouch
 from recognizer.touch.next_touch import PlaceHypothesis, propose_next
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise_with_rivals
@@ -152,7 +153,7 @@ def extend_scan(scan: ScanBelief, touch: PlacedTouch) -> ScanBelief:
         return _begin_anew(scan, *touches[-astray:])
     answer, told = _believable_answer(scan, answer, astray, 0 if by_hand else limits.patience)
     rivals: Sequence[PlaceHypothesis] = found if agrees or not seen.rivals else seen.rivals
-    step = propose_next(reader, touch.signal, answer, rivals, _earlier(touch_poses))
+    step = propose_next(reader, touch.signal, answer, rivals, _earlier(touches, touch_poses))
     return ScanBelief(
         reader=reader,
         settings=limits,
@@ -231,9 +232,11 @@ def _says_the_same(answer: Recognition, alone: Recognition, pitch_mm: float) -> 
     return away < pitch_mm / 2 and turn < 45.0
 
 
-def _earlier(touch_poses: TouchPoses) -> Array:
-    """Return (n - 1, 3) where earlier touches stand in the frame of the last one."""
-    return np.asarray(relative_pose(touch_poses.poses[-1], touch_poses.poses[:-1]))
+def _earlier(touches: Sequence[PlacedTouch], touch_poses: TouchPoses) -> list[EarlierTouch]:
+    """Return the touches before the last one, as they stand to it."""
+    poses = relative_pose(touch_poses.poses[-1], touch_poses.poses[:-1])
+    before = zip(poses, touches[:-1], strict=True)
+    return [EarlierTouch(pose, touch.signal) for pose, touch in before]
 
 
 def _pose_last_touch(

@@ -22,8 +22,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import SensorType
 from probe.surface.polygon import polygon
+from recognizer.touch.felt_area import EarlierTouch, FeltArea, felt_area, strongest_reading
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.locate import Hypothesis
 from recognizer.touch.pose import face_pose
@@ -66,7 +66,7 @@ def propose_next(
     signal: Signal,
     answer: Recognition,
     hypotheses: Sequence[PlaceHypothesis],
-    earlier: Array | None = None,
+    earlier: Sequence[EarlierTouch] = (),
 ) -> NextTouch | None:
     """Return where to touch next; None where the answer is sure.
 
@@ -81,8 +81,7 @@ def propose_next(
     hypotheses
         Places that the touch may be, best first.
     earlier
-        (k, 3) x, y (mm) and turn (rad) of touches before, in the sensor frame of this one: what
-        they have seen is not new.
+        Touches before: what they have seen is not new, and says where the face is.
     """
     settings = reader.settings.next
     if answer and not _is_unsure(answer, settings):
@@ -91,16 +90,15 @@ def propose_next(
         return NextTouch(0.0, 0.0, 0.0, settings.force_n, "nothing is felt: press onto the object")
     steps = _steps(settings)
     pitch_mm = min(each.style.pitch_mm for each in reader.lab.arrays)
-    felt = _loaded(signal, settings)
-    if felt.mean() >= settings.whole_share:
+    area = felt_area(reader.sensor, signal, earlier, settings)
+    if area.share >= settings.whole_share:
         settings = replace(settings, novelty=settings.novelty_inside)
-    before = np.zeros((1, 3)) if earlier is None else np.concatenate([np.zeros((1, 3)), earlier])
-    by_image, borne = _symbols_by_image(reader.sensor, felt, steps, before, pitch_mm, settings)
+    by_image, borne = _symbols_by_image(area, steps, pitch_mm, settings)
     value = by_image
     # where nothing speaks for symbols of a registered place, hypotheses know no border either
     likely = _likely(hypotheses, settings) if answer or answer.reason in _PLACES_KNOWN else []
     if likely:
-        each = [_symbols_by_face(reader.sensor, one, steps, before, settings) for one, _ in likely]
+        each = [_symbols_by_face(area, one, steps, settings) for one, _ in likely]
         weights = np.array([weight for _, weight in likely])
         by_face = weights @ np.stack([symbols for symbols, _ in each])
         inside = weights @ np.stack([within for _, within in each])
@@ -111,7 +109,7 @@ def propose_next(
     value -= settings.turning * (steps[:, 2] != 0)
     best = int(np.argmax(value)) if borne.any() else 0
     dx, dy, turn = steps[best].tolist()
-    why = _why(signal, felt, (dx, dy, turn), answer, settings)
+    why = _why(signal, area.share, (dx, dy, turn), answer, settings)
     return NextTouch(
         round(dx, 1), round(dy, 1), round(math.degrees(turn), 1), settings.force_n, why
     )
@@ -131,77 +129,22 @@ def _steps(settings: NextSettings) -> Array:
     return np.array([(x, y, turn) for turn in settings.turns_rad for x, y in moves])
 
 
-def _loaded(signal: Signal, settings: NextSettings) -> Flags:
-    """Return (rows, columns) where the sensor lies on something, gaps between strokes closed."""
-    forces = signal.forces * signal.trust
-    least = settings.least_n if signal.newtons else settings.least_counts
-    pressed = forces > max(settings.faint * _strongest(signal, settings), least)
-    reach = settings.gap // 2
-    near = _windows(np.pad(pressed, reach), settings.gap).any(axis=(2, 3))
-    closed = _windows(np.pad(near, reach, constant_values=True), settings.gap)
-    return np.asarray(closed.all(axis=(2, 3)))
-
-
-def _windows(values: Flags, size: int) -> Flags:
-    return np.lib.stride_tricks.sliding_window_view(values, (size, size))
-
-
-def _strongest(signal: Signal, settings: NextSettings) -> float:
-    """Return the mean of the strongest readings."""
-    forces = np.sort(signal.forces * signal.trust, axis=None)
-    return float(forces[-settings.strongest :].mean())
-
-
 def _symbols_by_image(
-    sensor: SensorType,
-    felt: Flags,
-    steps: Array,
-    before: Array,
-    pitch_mm: float,
-    settings: NextSettings,
+    area: FeltArea, steps: Array, pitch_mm: float, settings: NextSettings
 ) -> tuple[Array, Flags]:
     """Return (n,) symbols worth at each step, and whether the centre then lies on what was felt."""
-    beyond = math.ceil(max(settings.lengths_mm) / sensor.pitch_mm) + max(felt.shape)
-    wide = np.pad(felt, beyond, mode="edge")
-    half = np.array(sensor.half_mm)
+    half = np.array(area.sensor.half_mm)
     line = (np.arange(settings.points) + 0.5) / settings.points * 2 - 1
     grid = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2) * half
     c, s = np.cos(steps[:, 2, None]), np.sin(steps[:, 2, None])
     x = steps[:, 0, None] + c * grid[:, 0] - s * grid[:, 1]
     y = steps[:, 1, None] + s * grid[:, 0] + c * grid[:, 1]
     points = np.stack([x, y], axis=-1)
-    held = wide[_tactels(sensor, points, beyond, wide.shape)].astype(np.float64)
-    held *= np.where((np.abs(points) < half).all(axis=-1), 1.0, settings.beyond)
     cells = 4 * half[0] * half[1] / pitch_mm**2
-    new = ~_within(points, before, half)
-    worth = cells * (held * (1 + settings.novelty * new)).mean(axis=1)
+    new = settings.novelty * ~area.seen(points)
+    worth = cells * (area.expected(points) * (1 + new)).mean(axis=1)
     around = settings.clear_mm * np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)])
-    near = steps[:, None, :2] + around
-    known = (np.abs(near) < half).all(axis=-1)
-    on = wide[_tactels(sensor, near, beyond, wide.shape)] & known
-    return worth, np.asarray(on.all(axis=1))
-
-
-def _within(points_mm: Array, touches: Array, half_mm: Array) -> Flags:
-    """Return which points (..., 2) lie under a sensor at any of touches (k, 3)."""
-    found = np.zeros(points_mm.shape[:-1], np.bool_)
-    for x, y, turn in touches.tolist():
-        c, s = math.cos(turn), math.sin(turn)
-        away = (points_mm - (x, y)) @ np.array([[c, -s], [s, c]])
-        found |= (np.abs(away) < half_mm).all(axis=-1)
-    return found
-
-
-def _tactels(
-    sensor: SensorType, points_mm: Array, beyond: int, shape: tuple[int, ...]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return rows and columns of the tactels at points, in an image widened all round."""
-    column = np.floor((points_mm[..., 0] + sensor.half_mm[0]) / sensor.pitch_mm).astype(np.int64)
-    row = np.floor((sensor.half_mm[1] - points_mm[..., 1]) / sensor.pitch_mm).astype(np.int64)
-    return (
-        (row + beyond).clip(0, shape[0] - 1),
-        (column + beyond).clip(0, shape[1] - 1),
-    )
+    return worth, np.asarray(area.felt(steps[:, None, :2] + around).all(axis=1))
 
 
 def _likely(
@@ -216,11 +159,7 @@ def _likely(
 
 
 def _symbols_by_face(
-    sensor: SensorType,
-    one: PlaceHypothesis,
-    steps: Array,
-    before: Array,
-    settings: NextSettings,
+    area: FeltArea, one: PlaceHypothesis, steps: Array, settings: NextSettings
 ) -> tuple[Array, Array]:
     """Return (n,) symbols worth at each step on a face, and whether its centre lies on it."""
     face = one.embossed.face(one.hypothesis.face)
@@ -231,9 +170,9 @@ def _symbols_by_face(
     dx, dy = own[:, 0] - steps[:, 0, None], own[:, 1] - steps[:, 1, None]
     then = np.stack([c * dx + s * dy, c * dy - s * dx], axis=-1)
     rim = settings.whole * one.embossed.style.pitch_mm
-    half = np.array(sensor.half_mm)
+    half = np.array(area.sensor.half_mm)
     seen = (np.abs(then) < half - rim).all(axis=-1)
-    new = ~_within(own, before, half - rim)
+    new = ~area.seen(own)
     worth = (seen * (1 + settings.novelty * new)).sum(axis=1)
     places = steps[:, :2] @ R.T + at
     region = polygon(list(face.polygon_mm))
@@ -243,15 +182,16 @@ def _symbols_by_face(
 
 def _why(
     signal: Signal,
-    felt: Flags,
+    share: float,
     step: tuple[float, float, float],
     answer: Recognition,
     settings: NextSettings,
 ) -> str:
     """Return in words what a step promises."""
     words = []
-    share = float(felt.mean())
-    if _strongest(signal, settings) < (settings.soft_n if signal.newtons else settings.soft_counts):
+    if strongest_reading(signal, settings) < (
+        settings.soft_n if signal.newtons else settings.soft_counts
+    ):
         words.append("more force: little is felt")
     if step[0] or step[1]:
         if share < settings.whole_share:

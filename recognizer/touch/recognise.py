@@ -18,6 +18,7 @@ from dataclasses import replace
 
 from recognizer.touch.belief import VerifiedHypothesis, symbols_to_name
 from recognizer.touch.chance import expected_matches
+from recognizer.touch.first_look import may_tell_more, shows_strokes
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.locate import Hypothesis, under_centre
 from recognizer.touch.next_touch import propose_next
@@ -69,11 +70,15 @@ def recognise_with_rivals(
     """
     if not signal.contact:
         return refusal(seq, NO_CONTACT), []
+    if not shows_strokes(reader, signal):
+        return refusal(seq, NOT_ENCODED), []
     settings, limits = reader.settings, reader.settings.belief
     first = verify_hypotheses(reader, signal, settings.first)
     answer, inliers = _answer(first, settings, seq)
     if answer and inliers >= limits.many_inliers:
         return _refuse_by_chance(reader, first[0], answer), first
+    if not may_tell_more(reader, signal, answer, first[0] if first else None, inliers):
+        return answer, first
     # Spend more where it is needed: no answer yet, or one that few cells speak for.
     second = verify_hypotheses(reader, signal, settings.thorough)
     final, inliers = _answer(second, settings, seq)

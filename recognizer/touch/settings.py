@@ -287,6 +287,28 @@ class RoundSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class FirstLookSettings:
+    """Which touches are refused before a search, or before a wide one.
+
+    Chosen on touches of `docs/validation/forty.yaml` with seed 901: of 2,161 touches of registered
+    faces none had fewer gaps than .286, of 282 of a blank plate nine in ten had fewer than .26; of
+    583 that the first try did not answer, six were answered by the wide search, all of them with
+    94 tactels pressed or more and 2 nats over symbols of no registered place.
+    """
+
+    strongest: int = 12  #: tactels that say how hard is pressed
+    pressed: float = 0.15  #: share of that from which a tactel is pressed
+    around: int = 5  #: tactels, side of a square in which strokes and gaps lie
+    high: float = 0.85  #: quantile of its readings that stands for strokes
+    weak: float = 0.35  #: share of that below which a tactel lies over a gap
+    gaps: float = 0.26  #: share of such tactels below which nothing is embossed
+    finest: float = 4.0  #: tactels, pitches between which gaps were measured
+    coarsest: float = 5.0
+    ink: float = 0.44  #: share of a cell's tactels that its symbol presses, and some beside it
+    foreign: float = -4.0  #: nats over symbols of no registered place
+
+
+@dataclass(frozen=True, slots=True)
 class NextSettings:
     """Which steps are weighed, and what they are worth (`tests/campaigns/next_touch.py`)."""
 
@@ -302,7 +324,7 @@ class NextSettings:
     clear_mm: float = 2.5  #: from where the face may end to the centre: nearer, the plate tips
     points: int = 8  #: along each side of the sensor at which a view is asked
     whole: float = 0.36  #: pitches within the rim at which a symbol's centre is seen whole
-    beyond: float = 0.85  #: trust in that a face goes on beyond the sensor's rim
+    beyond_mm: float = 30.0  #: beyond the sensor's rim at which trust in a face falls to 1/e
     novelty: float = 0.2  #: more that a symbol is worth which was not seen yet ...
     novelty_inside: float = 0.5  #: ... where no edge is near: there another look tells as little
     faces: int = 6  #: hypotheses that are asked, and ...
@@ -366,6 +388,7 @@ class ReaderSettings:
     bends: BendSettings = field(default_factory=BendSettings)
     round: RoundSettings = field(default_factory=RoundSettings)
     printed: PrintedSettings = field(default_factory=PrintedSettings)
+    first_look: FirstLookSettings = field(default_factory=FirstLookSettings)
     next: NextSettings = field(default_factory=NextSettings)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from probe.sensor import SensorType
+from recognizer.touch.felt_area import EarlierTouch
 from recognizer.touch.locate import Hypothesis
 from recognizer.touch.next_touch import propose_next
 from recognizer.touch.recognition import AMBIGUOUS, NO_CONTACT, TOO_FEW, NextTouch, refusal
@@ -66,8 +67,17 @@ def test_along_a_narrow_face_the_sensor_is_turned_and_keeps_to_the_middle(small)
 def test_what_was_seen_before_is_not_sought_again(small):
     inside = np.full((16, 16), True)
     right = np.array([[x, y, 0.0] for x in (9.0, 18.0) for y in (-20.0, 0.0, 20.0)])
-    assert step_of(small, inside, earlier=right)[0][0] < -5
-    assert step_of(small, inside, earlier=-right)[0][0] > 5
+    before = [EarlierTouch(pose, felt(inside)) for pose in right]
+    assert step_of(small, inside, earlier=before)[0][0] < -4
+    before = [EarlierTouch(-pose, felt(inside)) for pose in right]
+    assert step_of(small, inside, earlier=before)[0][0] > 4
+
+
+def test_what_a_touch_before_did_not_feel_is_no_face(small):
+    inside = np.full((16, 16), True)
+    for side in (-1, 1):  # there the touch before was loaded on its near side alone
+        before = [EarlierTouch(np.array([14.0 * side, 0.0, 0.0]), felt(side * X < -4))]
+        assert step_of(small, inside, earlier=before)[0][0] * side <= 0
 
 
 def test_without_contact_the_same_place_is_pressed_harder(small):

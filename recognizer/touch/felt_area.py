@@ -1,0 +1,115 @@
+"""Where something lies under the sensor, and what lies beyond it. Thesis 6.3.
+
+Signal, and those of touches before -> for points of the sensor's plane, how much a face is to be
+expected there: certainly where a touch is loaded, not where none of those that reached there is,
+and the less the farther beyond all of them, as the sensor's rim has it. A tilted plate hangs over
+parts of the face: what one touch has felt there counts. Sensor frame of the last touch, mm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.sensor import SensorType
+from recognizer.touch.settings import NextSettings
+from recognizer.touch.signal import Signal
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EarlierTouch:
+    """A touch before, and where."""
+
+    pose: Array  #: (3,) x, y (mm) and turn (rad), in the sensor frame of the last touch
+    signal: Signal
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FeltArea:
+    """What touches say of where a face is."""
+
+    sensor: SensorType
+    loaded: Flags  #: (rows, columns) of the last touch
+    earlier: tuple[tuple[Array, Flags], ...]  #: poses (3,) and what was loaded there
+    beyond_mm: float  #: `NextSettings.beyond_mm`
+
+    @property
+    def share(self) -> float:
+        """Return how much of the sensor lies on something."""
+        return float(self.loaded.mean())
+
+    def expected(self, points_mm: Array) -> Array:
+        """Return 0 ... 1, how much a face is expected at points (..., 2)."""
+        seen, felt = self._felt(points_mm)
+        half = np.array(self.sensor.half_mm)
+        away = np.linalg.norm(np.maximum(np.abs(points_mm) - half, 0.0), axis=-1)
+        inside = np.clip(points_mm, -0.999 * half, 0.999 * half)
+        rim = self.loaded[_tactels(self.sensor, inside)] * np.exp(-away / self.beyond_mm)
+        return np.asarray(np.where(seen, felt, rim))
+
+    def felt(self, points_mm: Array) -> Flags:
+        """Return where among points (..., 2) a face was felt."""
+        return self._felt(points_mm)[1]
+
+    def seen(self, points_mm: Array) -> Flags:
+        """Return which points (..., 2) lay under the sensor."""
+        return self._felt(points_mm)[0]
+
+    def _felt(self, points_mm: Array) -> tuple[Flags, Flags]:
+        half = np.array(self.sensor.half_mm)
+        seen = np.zeros(points_mm.shape[:-1], np.bool_)
+        felt = np.zeros(points_mm.shape[:-1], np.bool_)
+        for (x, y, turn), loaded in ((np.zeros(3), self.loaded), *self.earlier):
+            c, s = math.cos(turn), math.sin(turn)
+            own = (points_mm - (x, y)) @ np.array([[c, -s], [s, c]])
+            under = (np.abs(own) < half).all(axis=-1)
+            seen |= under
+            felt[under] |= loaded[_tactels(self.sensor, own[under])]
+        return seen, felt
+
+
+def felt_area(
+    sensor: SensorType, signal: Signal, earlier: Sequence[EarlierTouch], settings: NextSettings
+) -> FeltArea:
+    """Return where something lies, as the last touch and those before have it."""
+    before = tuple((one.pose, loaded_tactels(one.signal, settings)) for one in earlier)
+    return FeltArea(sensor, loaded_tactels(signal, settings), before, settings.beyond_mm)
+
+
+def loaded_tactels(signal: Signal, settings: NextSettings) -> Flags:
+    """Return (rows, columns) where the sensor lies on something, gaps between strokes closed."""
+    forces = signal.forces * signal.trust
+    least = settings.least_n if signal.newtons else settings.least_counts
+    pressed = forces > max(settings.faint * strongest_reading(signal, settings), least)
+    reach = settings.gap // 2
+    near = _windows(np.pad(pressed, reach), settings.gap).any(axis=(2, 3))
+    closed = _windows(np.pad(near, reach, constant_values=True), settings.gap)
+    return np.asarray(closed.all(axis=(2, 3)))
+
+
+def strongest_reading(signal: Signal, settings: NextSettings) -> float:
+    """Return the mean of the strongest readings."""
+    forces = np.sort(signal.forces * signal.trust, axis=None)
+    return float(forces[-settings.strongest :].mean())
+
+
+def _windows(values: Flags, size: int) -> Flags:
+    return np.lib.stride_tricks.sliding_window_view(values, (size, size))
+
+
+def _tactels(sensor: SensorType, points_mm: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return rows and columns of the tactels at points under the sensor."""
+    half_x, half_y = sensor.half_mm
+    column = np.floor((points_mm[..., 0] + half_x) * sensor.columns / (2 * half_x))
+    row = np.floor((half_y - points_mm[..., 1]) * sensor.rows / (2 * half_y))
+    return (
+        row.astype(np.int64).clip(0, sensor.rows - 1),
+        column.astype(np.int64).clip(0, sensor.columns - 1),
+    )

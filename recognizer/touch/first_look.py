@@ -1,0 +1,92 @@
+"""What a touch can show at all, told before symbols are searched for, or searched for widely.
+
+Signal -> whether there are strokes under the sensor: beside them it hangs over the bare face, so
+that within a pitch of the strongest readings lie weak ones. A blank plate presses evenly.
+
+Signal and what the first try found -> whether a wider search can change the answer. It cannot where
+symbols explain the image and are so few that they stand elsewhere as well, where fewer tactels are
+pressed than the symbols would press that it takes to name a place, and where the image speaks for
+symbols of no registered place. Thesis 6.3.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recognizer.touch.belief import VerifiedHypothesis, null_log_likelihood, symbols_to_name
+from recognizer.touch.lab import EmbossedArray
+from recognizer.touch.prepare import PreparedLab
+from recognizer.touch.recognition import AMBIGUOUS, Recognition
+from recognizer.touch.settings import FirstLookSettings
+from recognizer.touch.signal import Signal
+
+Array = NDArray[np.float64]
+
+
+def shows_strokes(reader: PreparedLab, signal: Signal) -> bool:
+    """Return whether a touch may be of symbols; true wherever that is not known to be told."""
+    settings, sensor = reader.settings.first_look, reader.sensor
+    if sensor.overlay.kind != "tab":
+        return True  # a pad smears what lies between strokes
+    pitches = [each.style.pitch_mm / sensor.pitch_mm for each in reader.lab.arrays]
+    finest, coarsest = min(pitches), max(pitches)
+    if finest < settings.finest or coarsest > settings.coarsest:
+        return True
+    return gap_share(signal, settings) >= settings.gaps
+
+
+def gap_share(signal: Signal, settings: FirstLookSettings) -> float:
+    """Return which share of the tactels that lie beside strong ones feel little."""
+    forces = signal.forces * signal.trust
+    reach = settings.around // 2
+    windows = np.lib.stride_tricks.sliding_window_view(
+        np.pad(forces, reach, mode="edge"), (settings.around, settings.around)
+    )
+    near = np.quantile(windows, settings.high, axis=(2, 3))
+    beside = (near > _pressed_from(signal, settings)) & (signal.trust > 0)
+    weak = beside & (forces < settings.weak * near)
+    return float(weak.sum()) / max(int(beside.sum()), 1)
+
+
+def may_tell_more(
+    reader: PreparedLab,
+    signal: Signal,
+    answer: Recognition,
+    best: VerifiedHypothesis | None,
+    inliers: int,
+) -> bool:
+    """Return whether a wide search may find what the first try has not.
+
+    Parameters
+    ----------
+    answer, best, inliers
+        Of the first try: what it says, the hypothesis that was judged (None: there was none) and
+        how many of its cells speak for it.
+    """
+    settings, arrays = reader.settings.first_look, reader.lab.arrays
+    if answer or best is None or any(each.radii_mm for each in arrays):
+        return True  # on a round face few tactels are pressed
+    if answer.reason == AMBIGUOUS and inliers < symbols_to_name(best.embossed):
+        return False  # the image is explained, and it shows no more
+    least = min(_tactels_to_name(reader, each, settings) for each in arrays)
+    surprise = best.score - null_log_likelihood(best.embossed, best.fit)
+    return pressed_tactels(signal, settings) >= least and surprise >= settings.foreign
+
+
+def pressed_tactels(signal: Signal, settings: FirstLookSettings) -> int:
+    """Return how many tactels are pressed by strokes."""
+    return int((signal.forces * signal.trust > _pressed_from(signal, settings)).sum())
+
+
+def _pressed_from(signal: Signal, settings: FirstLookSettings) -> float:
+    strongest = np.sort(signal.forces * signal.trust, axis=None)[-settings.strongest :]
+    return settings.pressed * float(strongest.mean())
+
+
+def _tactels_to_name(
+    reader: PreparedLab, embossed: EmbossedArray, settings: FirstLookSettings
+) -> float:
+    """Return how many tactels the symbols press that can name one of the registered cells."""
+    cell = (embossed.style.pitch_mm / reader.sensor.pitch_mm) ** 2
+    return settings.ink * cell * symbols_to_name(embossed)
