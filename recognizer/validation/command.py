@@ -164,6 +164,12 @@ def touch_set(
         str, typer.Option(metavar="tcp://HOST:PORT", show_default=False,
                           help="A dask scheduler whose workers do the work."),
     ] = "",
+    export: Annotated[
+        str, typer.Option(metavar="npz|lerobot", show_default=False,
+                          help="Write the touches with their truth too, for training: DIR/"
+                               "dataset.npz or DIR/lerobot. With --resume also of a run that is "
+                               "done."),
+    ] = "",
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the run in DIR."),
     ] = False,
@@ -191,7 +197,7 @@ def touch_set(
                 surfaces=surfaces, print_profile=print_profile,
                 faults=faults, prints=prints or "", engine=engine, sensor_per=sensor_per,
                 policy=policy, study=study, shard=shard, seed=seed, jobs=processes, cluster=cluster,
-                resume=resume, progress=TouchProgress(bar),
+                export=export, resume=resume, progress=TouchProgress(bar),
             )  # fmt: skip
         _say(result, as_json=as_json)
         return result.exit_code(fail_under)

@@ -61,6 +61,7 @@ from recognizer.validation.workers import workers_of
 from recognizer.validation.worlds import world_times
 
 TRIALS, RESULTS, TIMES_FILE = "trials.parquet", "results.json", "times.json"
+EXPORTS = ("npz", "lerobot")
 REPORT, PROVENANCE = "report.html", "provenance.json"
 
 
@@ -106,6 +107,7 @@ def validate(
     seed: int | None = None,
     jobs: int = 1,
     cluster: str = "",
+    export: str = "",
     resume: bool = False,
     progress: TouchProgress | None = None,
 ) -> ValidationResult:
@@ -152,6 +154,8 @@ def validate(
     jobs, cluster
         Processes on this machine, or a dask scheduler (`tcp://host:8786`) whose workers do
         the work. Who does it changes no result.
+    export
+        `npz` or `lerobot`: write the touches with their truth too, for training (`dataset`).
     resume
         Go on with the run that the folder holds.
     progress
@@ -174,6 +178,10 @@ def validate(
     4 touches: ... right, 0 wrong, ... rejected; ...
     """
     require_report("validate-set")
+    if export and export not in EXPORTS:
+        raise ValidationError(
+            f"'{export}' is not known", fix=f"give {' or '.join(EXPORTS)}", place="--export"
+        )
     begun, start = datetime.now(UTC), time.monotonic()
     named = [Path(spec) for spec in ([specs] if isinstance(specs, str | Path) else specs)]
     place, steps = Path(folder), progress or TouchProgress()
@@ -197,6 +205,8 @@ def validate(
         touch_all(record, place, workers_of(jobs, cluster), steps)
         steps.begin("report", 0, 0)
         results = _finish(record, place)
+        if export:
+            _export(record, place, export, steps)
         seconds = round(time.monotonic() - start, 3)
         write_json(place / PROVENANCE, circumstances(begun, seconds, jobs, cluster))
     return result_from(results, seconds, place)
@@ -220,6 +230,18 @@ def report_anew(folder: Path) -> ValidationResult:
     with lock_folder(folder):
         results = _finish(record, folder)
     return result_from(results, round(time.monotonic() - start, 3), folder)
+
+
+def _export(record: RunRecord, folder: Path, kind: str, progress: TouchProgress) -> None:
+    """Write the touches of a run as a data set."""
+    from recognizer.validation.dataset import touch_dataset, write_npz
+    from recognizer.validation.lerobot import write_lerobot
+
+    data = touch_dataset(record, folder, progress)
+    if kind == "npz":
+        write_npz(data, folder)
+    else:
+        write_lerobot(data, folder)
 
 
 def _campaign(options: CampaignOptions, known: Campaign | None) -> Campaign:
