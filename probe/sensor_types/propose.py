@@ -18,7 +18,7 @@ class ProposalSettings:
     """What a touch should show. Chosen so that `fsr-16` gets the 7 mm of profile `one-touch`."""
 
     tactels: float = 4.41  #: to a pitch: more do not help (7 mm of `fsr-16`)
-    cells: float = 13.1  #: on the matrix's area: about nine of them are seen whole
+    cells: float = 11.7  #: on the matrix's area: about eight of them are seen whole
     grid_mm: float = 0.5  #: pitches are multiples of this
     least_mm: float = 3.0  #: finer strokes do not print
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 from generator.alphabet import Alphabet, SymbolStyle
@@ -25,6 +26,7 @@ class PreparedLab:
     prepared: tuple[Prepared, ...] = field(init=False)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "settings", settings_for(self.lab, self.sensor, self.settings))
         settings = self.settings.template, self.settings.search
         made = tuple(
             (each, *_template_and_bank(each.alphabet, each.style, self.sensor, *settings))
@@ -34,6 +36,26 @@ class PreparedLab:
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.lab}; {self.sensor.name}, {self.sensor.overlay.kind})"
+
+
+def settings_for(lab: Lab, sensor: SensorType, settings: ReaderSettings) -> ReaderSettings:
+    """Return settings whose numbers of tactels suit a sensor that has few of them on a symbol.
+
+    As they are where the smallest symbols of the lab lie under `BeliefSettings.coarse` tactels or
+    more, as all do on `fsr-16`.
+    """
+    few = min((each.style.pitch_mm for each in lab.arrays), default=math.inf) / sensor.pitch_mm
+    share = min(1.0, few**2 / settings.belief.coarse) ** 2
+    if share == 1.0:
+        return settings
+    belief, hypotheses = settings.belief, settings.hypotheses
+    return replace(
+        settings,
+        belief=replace(belief, whole=share * belief.whole, coarse=few**2),
+        hypotheses=replace(
+            hypotheses, corner=share * hypotheses.corner, heavy=share * hypotheses.heavy
+        ),
+    )
 
 
 @lru_cache(maxsize=16)

@@ -243,6 +243,9 @@ class BeliefSettings:
     clearly: float = 8.0  #: nats
     plainly: float = 16.0
     whole: float = 6.0  #: tactels that look at a cell which counts as seen
+    #: tactels to a symbol below which numbers of tactels shrink with the square of the share: 8x8
+    #: at 3 mm, 7 mm symbols, 40 typical touches mid-face, 0 wrong: 38 answered, 0 without it
+    coarse: float = 8.0
     rim_mm: float = 2.0  #: how far the sensor's centre may lie beyond the face
     #: registered places that foreign symbols may match as well by chance; a hundredth of it would
     #: refuse a third of the answers at the edges of a cube (`docs/recognizer.md`)
