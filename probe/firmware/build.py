@@ -21,6 +21,7 @@ SOURCES = Path(__file__).parent
 BOARDS = ("uno", "mega", "teensy")
 BAUDS = (500_000, 1_000_000, 2_000_000)  #: exact at 16 MHz, and known to every terminal
 LONGEST_SETTLING_US = 63.75
+WIRINGS = ("grounded", "floating")  #: of the rows that are not read
 
 PACKAGES = "apt-get install make gcc libc6-dev gcc-avr avr-libc libsimavr-dev libelf-dev"
 _FIRMWARE_TOOLS = ("make", "avr-gcc", "avr-objcopy")
@@ -29,7 +30,12 @@ _SHOWN_LINES = 12
 
 
 def build_firmware(
-    *, board: str = "uno", baud: int = 1_000_000, settle_us: float = 10.0, adc_divider: int = 16
+    *,
+    board: str = "uno",
+    baud: int = 1_000_000,
+    settle_us: float = 10.0,
+    adc_divider: int = 16,
+    wiring: str = "grounded",
 ) -> Path:
     """Return the folder with `probe.elf` and `probe.hex`.
 
@@ -44,6 +50,8 @@ def build_firmware(
         conversion.
     adc_divider
         16, 32, 64 or 128: of 16 MHz, the clock of the ADC.
+    wiring
+        Of the rows that are not read: grounded, by shift registers, or floating.
 
     Raises
     ------
@@ -64,8 +72,10 @@ def build_firmware(
         raise PortError(
             f"the ADC cannot run at 16 MHz / {adc_divider}", fix="take 16, 32, 64 or 128"
         )
+    if wiring not in WIRINGS:
+        raise PortError(f"there is no wiring {wiring!r}", fix=f"take {' or '.join(WIRINGS)}")
     settings = (f"BOARD={board}", f"BAUD={baud}", f"SETTLE={int(quarters)}",
-                f"ADC_DIVIDER={adc_divider}")  # fmt: skip
+                f"ADC_DIVIDER={adc_divider}", f"WIRING={wiring}")  # fmt: skip
     sources = [*SOURCES.glob("*.[ch]"), *SOURCES.glob("boards/*.h")]
     return _build_cached("firmware", settings, sources, _FIRMWARE_TOOLS)
 

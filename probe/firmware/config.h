@@ -19,6 +19,11 @@
 #define SETTLE 40
 #endif
 
+/* 1: rows are outputs of shift registers, all but one at ground; 0: of a multiplexer, floating. */
+#ifndef GROUNDED
+#define GROUNDED 1
+#endif
+
 /* ADC clock = F_CPU / ADC_DIVIDER. */
 #ifndef ADC_DIVIDER
 #define ADC_DIVIDER 16

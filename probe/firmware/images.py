@@ -20,6 +20,8 @@ SENSORS = 8
 ROWS, COLUMNS = 16, 16  #: of the boards that the firmware runs on
 FULL_MV = 5000.0  #: reference of the ADC
 REMEMBERED = 4096  #: scans
+_SHAPES = ((ROWS, COLUMNS), (SENSORS, ROWS, COLUMNS))
+_MILLIVOLTS, _SIEMENS = 0, 1  # what tactels are given in
 
 _LAYOUT = np.dtype(
     [
@@ -27,8 +29,9 @@ _LAYOUT = np.dtype(
         ("version", "<u4"),
         ("lock", "<u4"),
         ("number", "<u4"),
-        ("reserved", "<u4", 11),
-        ("tactels_mv", "<f4", (SENSORS, ROWS, COLUMNS)),
+        ("kind", "<u4"),
+        ("reserved", "<u4", 10),
+        ("tactels", "<f4", (SENSORS, ROWS, COLUMNS)),
         ("wrist_mv", "<f4", WRIST),
         ("boots", "<u4"),
         ("scans", "<u4"),
@@ -45,7 +48,7 @@ class FeltImages:
         self._one_writer = threading.Lock()
         self._number = 0
         self._file["magic"] = b"PROBEIMG"
-        self._file["version"] = 1
+        self._file["version"] = 2
         self._file.flush()
 
     def show(self, tactels_mv: ArrayLike, wrist_mv: ArrayLike | None = None) -> int:
@@ -67,13 +70,38 @@ class FeltImages:
         PortError
             When a shape is wrong or a voltage is no number.
         """
-        tactels = _voltages(tactels_mv, ((ROWS, COLUMNS), (SENSORS, ROWS, COLUMNS)))
+        tactels = _voltages(tactels_mv, _SHAPES)
+        return self._write(_MILLIVOLTS, tactels, wrist_mv)
+
+    def show_conductances(self, tactels_s: ArrayLike, wrist_mv: ArrayLike | None = None) -> int:
+        """Make every tactel a resistor from the next scan on; see `show`.
+
+        Parameters
+        ----------
+        tactels_s
+            (16, 16) for all sensors, or (8, 16, 16), S, 0 or more.
+
+        Raises
+        ------
+        PortError
+            When a shape is wrong or a value is no conductance.
+        """
+        tactels = np.asarray(tactels_s, dtype=np.float64)
+        if tactels.shape not in _SHAPES or not (np.isfinite(tactels) & (tactels >= 0)).all():
+            raise PortError(
+                f"conductances of shape {tactels.shape}, or below 0, or no numbers",
+                fix=f"give siemens, {' or '.join(str(shape) for shape in _SHAPES)}",
+            )
+        return self._write(_SIEMENS, tactels.astype(np.float32), wrist_mv)
+
+    def _write(self, kind: int, tactels: NDArray[np.float32], wrist_mv: ArrayLike | None) -> int:
         wrist = None if wrist_mv is None else _voltages(wrist_mv, ((WRIST,),))
         with self._one_writer:
             self._number += 1
             self._file["lock"] += 1
             self._file["number"] = self._number
-            self._file["tactels_mv"] = tactels
+            self._file["kind"] = kind
+            self._file["tactels"] = tactels
             if wrist is not None:
                 self._file["wrist_mv"] = wrist
             self._file["lock"] += 1

@@ -12,6 +12,22 @@
 #define SETTLED ((uint16_t)SETTLE * 4) /* cycles */
 
 static uint16_t switched; /* when the inputs were switched, cycles */
+static uint8_t driven;    /* row that is at the supply */
+
+/* Rows follow each other: a one enters the registers at row 0 and moves on a row at a time, so
+ * that whatever disturbs them is gone with the next image.
+ */
+INLINE void select_tactel(uint8_t row, uint8_t column)
+{
+    board_select_column(column);
+    if (row == driven)
+        return;
+    driven = row;
+    if (GROUNDED)
+        board_shift_rows(row == 0);
+    else
+        board_select_row(row);
+}
 
 INLINE void select_channel(uint8_t channel)
 {
@@ -32,7 +48,7 @@ INLINE uint16_t convert(packet_t *packet, uint8_t before, uint16_t reading, uint
     else if (before)
         packet_u8(packet, (uint8_t)reading);
     clock_wait(started, HELD);
-    board_select_tactel(address >> 4, address & 15);
+    select_tactel(address >> 4, address & 15);
     select_channel(channel);
     switched = clock_cycles();
     if (before == 10)
@@ -45,7 +61,11 @@ INLINE uint16_t convert(packet_t *packet, uint8_t before, uint16_t reading, uint
 void scan_init(void)
 {
     ADCSRA = _BV(ADEN) | ADC_PRESCALER;
-    board_select_tactel(0, 0);
+    if (GROUNDED)
+        for (uint8_t row = 0; row < ROWS; row++)
+            board_shift_rows(0); /* what they held at power on */
+    driven = ROWS - 1;
+    select_tactel(0, 0);
     select_channel(TACTEL);
     scan_select(0);
 }

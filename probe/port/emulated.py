@@ -77,6 +77,10 @@ class EmulatedProbe:
         """Show an image from the next scan on; see `FeltImages.show`."""
         return self._images.show(image_mv, wrist_mv)
 
+    def show_conductances(self, tactels_s: ArrayLike, wrist_mv: ArrayLike | None = None) -> int:
+        """Make every tactel a resistor from the next scan on; see `FeltImages`."""
+        return self._images.show_conductances(tactels_s, wrist_mv)
+
     def felt(self, seq: int) -> int:
         """Return the number of the image in frame `seq` since the last reset."""
         return self._images.felt(seq)
@@ -129,6 +133,8 @@ def emulated_probe(
     paced: bool = True,
     board: str = "uno",
     adc_divider: int = 16,
+    wiring: str = "grounded",
+    load_ohm: float = 2200.0,
     trace: Path | None = None,
 ) -> Iterator[EmulatedProbe]:
     """Run the firmware on an emulated AVR while the block lasts.
@@ -149,6 +155,11 @@ def emulated_probe(
         At 16 MHz of real time; otherwise as fast as the machine can.
     board
         uno or mega.
+    wiring
+        Of the rows that are not read: grounded (driven by shift registers) or floating (through a
+        multiplexer, as in figure 4.5 of the thesis).
+    load_ohm
+        From the column that is read to ground, where tactels are shown as conductances.
     trace
         File that gets a line for every change of a port ("cycle port letter value") and
         every conversion ("cycle convert channel").
@@ -167,10 +178,15 @@ def emulated_probe(
             f"tau_us {tau_us}, noise_mv {noise_mv} or seed {seed} is out of range",
             fix="take tau_us 0 ... 1e6, noise_mv 0 ... 5000 and a seed of at most 64 bits",
         )
-    firmware = build_firmware(board=board, baud=baud, settle_us=settle_us, adc_divider=adc_divider)
+    if not 0 < load_ohm < 1e9:
+        raise PortError(f"a load of {load_ohm:g} ohm", fix="give more than 0, say 2200")
+    firmware = build_firmware(
+        board=board, baud=baud, settle_us=settle_us, adc_divider=adc_divider, wiring=wiring
+    )
     command = [
         str(build_emulator() / "emulator"), "--board", board,
         "--firmware", str(firmware / "probe.elf"),
+        "--wiring", wiring, "--load", repr(float(load_ohm)),
         "--tau", repr(float(tau_us)), "--noise", repr(float(noise_mv)), "--seed", str(seed),
     ]  # fmt: skip
     command += [] if paced else ["--free"]

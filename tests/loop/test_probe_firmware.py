@@ -15,6 +15,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from probe.circuit import QUIET, Electronics, invert_readings
+from probe.circuit.readout import shares
 from probe.errors import PortError
 from probe.firmware.build import SOURCES
 from probe.port import open_port
@@ -312,23 +314,35 @@ def level(ports, pins):
 
 
 @pytest.mark.parametrize("board", ["uno", "mega"])
-def test_pins_move_as_documented(board, tmp_path):
+@pytest.mark.parametrize("wiring", ["grounded", "floating"])
+def test_pins_move_as_documented(board, wiring, tmp_path):
     trace = tmp_path / "trace.txt"
-    with emulated_probe(board=board, paced=False, trace=trace) as probe, Line(probe.url) as line:
+    running = emulated_probe(board=board, wiring=wiring, paced=False, trace=trace)
+    with running as probe, Line(probe.url) as line:
         line.send(b"6")
         line.ask(b"g", FramePacket)
     pins = pins_of(board)
     ports = dict.fromkeys("ABCD", 0)
+    data, clock, latch = pins["rows, grounded: SER SRCLK RCLK"]
+    held, rows = 0b1010, 0b1010  # of the registers, and behind their latch
     seen, switched, converted, early, settling = [], 0, 0, [], []
     for entry in trace.read_text().splitlines():
         cycle, what, *rest = entry.split()
         if what == "port":
+            before = level(ports, [clock]), level(ports, [latch])
             ports[rest[0]] = int(rest[1])
+            after = level(ports, [clock]), level(ports, [latch])
+            if after[0] > before[0]:
+                held = (held << 1 | level(ports, [data])) & 0xFFFF
+            if after[1] > before[1]:
+                rows = held
             switched = int(cycle)
             early.append(int(cycle) - converted)
         else:
-            address = level(ports, pins["row address"]), level(ports, pins["column address"])
-            seen.append((*address, int(rest[0])))
+            row = level(ports, pins["rows, floating:"])
+            if wiring == "grounded":
+                row = {1 << i: i for i in range(16)}.get(rows)  # one at the supply, no other
+            seen.append((row, level(ports, pins["column address"]), int(rest[0])))
             settling.append((int(cycle) - switched, int(rest[0])))
             converted = int(cycle)
     scan = [(r, c, 0) for r in range(16) for c in range(16)] + [(0, 0, k) for k in (1, 2, 3, 4)]
@@ -336,6 +350,26 @@ def test_pins_move_as_documented(board, tmp_path):
     assert level(ports, pins["sensor select"]) == 6
     assert min(gap for gap, channel in settling[1:] if channel == 0) >= 10e-6 * HERTZ
     assert min(early[-255:]) >= 2.5 * ADC_CLOCK
+
+
+@pytest.mark.parametrize("wiring", ["grounded", "floating"])
+def test_a_matrix_of_resistors_reads_as_its_network(wiring):
+    rng = np.random.default_rng(4)
+    g = np.full((16, 16), 1e-7)
+    g[rng.integers(16, size=40), rng.integers(16, size=40)] = 10.0 ** rng.uniform(-5, -3, 40)
+    board = Electronics(readout=wiring, reference_v=5.0, bias_lsb=0.0, coupling=0.0, noise=QUIET)
+    running = emulated_probe(wiring=wiring, load_ohm=board.load_ohm, tau_us=0, paced=False)
+    with running as probe, Line(probe.url) as line:
+        probe.show_conductances(g)
+        line.ask(b"g", FramePacket)
+        counts = line.ask(b"g", FramePacket).counts.astype(float)
+    expected = np.floor(1024 * shares(g, board)).clip(0, 1023)
+    assert np.abs(counts - expected).max() <= 1
+    found = invert_readings(counts, board).conductance_s
+    seen = g > 1e-4
+    assert np.abs(found[seen] / g[seen] - 1).max() < (0.1 if wiring == "grounded" else 0.5)
+    ghosts = counts[(g < 1e-6)].max()
+    assert ghosts <= 1 if wiring == "grounded" else ghosts > 100
 
 
 @pytest.mark.parametrize("board", ["uno", "mega"])

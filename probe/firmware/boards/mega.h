@@ -1,6 +1,7 @@
 /* Arduino Mega 2560.
  *
- *   row address S0..S3      PA0 PA1 PA2 PA3   D22 D23 D24 D25
+ *   rows, grounded          PA0 SER, PA1 SRCLK, PA2 RCLK   D22 D23 D24
+ *   rows, floating S0..S3   PA0 PA1 PA2 PA3   D22 D23 D24 D25
  *   column address S0..S3   PA4 PA5 PA6 PA7   D26 D27 D28 D29
  *   sensor select A0..A2    PC0 PC1 PC2       D37 D36 D35
  *   tactel, wrist 1..4      ADC0, ADC1..ADC4  A0, A1..A4
@@ -30,9 +31,26 @@ static inline void board_init(void)
     DIDR0 = 0x1F; /* no digital inputs on the analog pins */
 }
 
-static inline void board_select_tactel(uint8_t row, uint8_t column)
+static inline void board_shift_rows(uint8_t first)
 {
-    PORTA = (uint8_t)((column << 4) | row);
+    if (first)
+        PORTA |= 1;
+    else
+        PORTA &= (uint8_t)~1;
+    PORTA |= 2;
+    PORTA &= (uint8_t)~2;
+    PORTA |= 4;
+    PORTA &= (uint8_t)~4;
+}
+
+static inline void board_select_row(uint8_t row)
+{
+    PORTA = (uint8_t)((PORTA & 0xF0) | row);
+}
+
+static inline void board_select_column(uint8_t column)
+{
+    PORTA = (uint8_t)((PORTA & 0x0F) | (column << 4));
 }
 
 static inline void board_select_sensor(uint8_t sensor)

@@ -1,6 +1,7 @@
 /* Teensy++ 2.0 (AT90USB1286 at 16 MHz and 5 V).
  *
- *   row address S0..S3      PC0 PC1 PC2 PC3
+ *   rows, grounded          PC0 SER, PC1 SRCLK, PC2 RCLK
+ *   rows, floating S0..S3   PC0 PC1 PC2 PC3
  *   column address S0..S3   PC4 PC5 PC6 PC7
  *   sensor select A0..A2    PB4 PB5 PB6
  *   tactel, wrist 1..4      PF0, PF1..PF4 (ADC0, ADC1..ADC4)
@@ -42,9 +43,26 @@ static inline void board_init(void)
     DIDR0 = 0x1F; /* no digital inputs on the analog pins */
 }
 
-static inline void board_select_tactel(uint8_t row, uint8_t column)
+static inline void board_shift_rows(uint8_t first)
 {
-    PORTC = (uint8_t)((column << 4) | row);
+    if (first)
+        PORTC |= 1;
+    else
+        PORTC &= (uint8_t)~1;
+    PORTC |= 2;
+    PORTC &= (uint8_t)~2;
+    PORTC |= 4;
+    PORTC &= (uint8_t)~4;
+}
+
+static inline void board_select_row(uint8_t row)
+{
+    PORTC = (uint8_t)((PORTC & 0xF0) | row);
+}
+
+static inline void board_select_column(uint8_t column)
+{
+    PORTC = (uint8_t)((PORTC & 0x0F) | (column << 4));
 }
 
 static inline void board_select_sensor(uint8_t sensor)

@@ -1,6 +1,7 @@
 /* Arduino Uno or Nano, or a bare ATmega328P with a 16 MHz crystal.
  *
- *   row address S0..S3      PB0 PB1 PB2 PB3   D8 D9 D10 D11
+ *   rows, grounded          PB0 SER, PB1 SRCLK, PB2 RCLK   D8 D9 D10
+ *   rows, floating S0..S3   PB0 PB1 PB2 PB3   D8 D9 D10 D11
  *   column address S0..S3   PD4 PD5 PD6 PD7   D4 D5 D6 D7
  *   sensor select A0..A2    PD2 PD3 PB4       D2 D3 D12
  *   tactel, wrist 1..4      ADC0, ADC1..ADC4  A0, A1..A4
@@ -30,9 +31,25 @@ static inline void board_init(void)
     DIDR0 = 0x1F; /* no digital inputs on the analog pins */
 }
 
-static inline void board_select_tactel(uint8_t row, uint8_t column)
+static inline void board_shift_rows(uint8_t first)
+{
+    if (first)
+        PORTB |= 1;
+    else
+        PORTB &= (uint8_t)~1;
+    PORTB |= 2;
+    PORTB &= (uint8_t)~2;
+    PORTB |= 4;
+    PORTB &= (uint8_t)~4;
+}
+
+static inline void board_select_row(uint8_t row)
 {
     PORTB = (uint8_t)((PORTB & 0xF0) | row);
+}
+
+static inline void board_select_column(uint8_t column)
+{
     PORTD = (uint8_t)((PORTD & 0x0F) | (column << 4));
 }
 

@@ -7,8 +7,9 @@
 #include <simavr/avr_ioport.h>
 
 #include "chance.h"
+#include "network.h"
 
-#define REFERENCE_MV 5000
+#define REFERENCE_MV 5000 /* and the supply of the rows */
 #define ADCSRA 0x7A /* data address, the same in both parts */
 #define CHANNELS 8
 
@@ -28,13 +29,18 @@ static const wiring_t wirings[] = {
 static avr_t *avr;
 static avr_irq_t *inputs; /* of the ADC, by channel */
 static const wiring_t *wiring;
+static readout_t readout;
+static network_t network; /* of the image and sensor at hand */
 static images_t *shared, image; /* the file, and what is felt in this scan */
 static FILE *trace;
 static chance_t chance;
 static double tau_cycles, noise_mv;
 
 static uint8_t ports['Z' + 1]; /* output levels by letter */
-static unsigned row, column, sensor;
+static uint16_t rows; /* at the supply, by bits */
+static unsigned column, sensor;
+static uint16_t shifted;      /* what the registers hold behind their latch */
+static unsigned clock_was, latch_was;
 
 /* the voltage at the ADC's tactel input: `from_mv` at `since`, running towards the tactel's */
 static double from_mv;
@@ -47,7 +53,21 @@ static double noise;
 
 static double tactel_mv(void)
 {
-    return image.tactels_mv[sensor][16 * row + column];
+    const float *tactels = image.tactels[sensor];
+    double ratio;
+
+    if (image.kind == SIEMENS) {
+        if (readout.floating)
+            ratio = network_floating(&network, tactels, image.number, sensor, rows, column,
+                                     1 / readout.load_ohm);
+        else
+            ratio = network_grounded(tactels, rows, column, 1 / readout.load_ohm);
+        return REFERENCE_MV * ratio;
+    }
+    for (unsigned row = 0; row < 16; row++)
+        if (rows == 1u << row)
+            return tactels[16 * row + column];
+    return 0; /* no row, or several */
 }
 
 static double voltage_mv(avr_cycle_count_t cycle)
@@ -86,10 +106,28 @@ static unsigned address(const pin_t *pins, int count)
     return value;
 }
 
+/* Follow the pins of the rows; return which are at the supply. */
+static uint16_t rows_now(void)
+{
+    unsigned clock, latch;
+
+    if (readout.floating)
+        return (uint16_t)(1u << address(wiring->row, 4));
+    clock = address(wiring->row + 1, 1);
+    latch = address(wiring->row + 2, 1);
+    if (clock && !clock_was)
+        shifted = (uint16_t)(shifted << 1 | address(wiring->row, 1));
+    uint16_t held_rows = latch && !latch_was ? shifted : rows;
+    clock_was = clock;
+    latch_was = latch;
+    return held_rows;
+}
+
 static void port_changed(avr_irq_t *irq, uint32_t value, void *parameter)
 {
     char letter = *(const char *)parameter;
-    unsigned new_row, new_column, new_sensor;
+    uint16_t new_rows;
+    unsigned new_column, new_sensor;
 
     (void)irq;
     if (ports[(int)letter] == (uint8_t)value)
@@ -97,14 +135,14 @@ static void port_changed(avr_irq_t *irq, uint32_t value, void *parameter)
     ports[(int)letter] = (uint8_t)value;
     if (trace)
         fprintf(trace, "%llu port %c %u\n", (unsigned long long)avr->cycle, letter, value & 0xFF);
-    new_row = address(wiring->row, 4);
+    new_rows = rows_now();
     new_column = address(wiring->column, 4);
     new_sensor = address(wiring->sensor, 3);
-    if (new_row == row && new_column == column && new_sensor == sensor)
+    if (new_rows == rows && new_column == column && new_sensor == sensor)
         return;
     from_mv = voltage_mv(avr->cycle);
     since = avr->cycle;
-    row = new_row;
+    rows = new_rows;
     column = new_column;
     sensor = new_sensor;
     if (avr->cycle < held && channel == 0)
@@ -127,7 +165,7 @@ static void conversion_starts(avr_irq_t *irq, uint32_t value, void *parameter)
     if (channel > WRIST)
         channel = 0;
     held = (avr->cycle + clock - 1) / clock * clock + clock + clock / 2;
-    if (channel == 0 && row == 0 && column == 0) {
+    if (channel == 0 && rows == 1 && column == 0) {
         images_take(shared, &image);
         shared->felt[shared->scans % REMEMBERED] = image.number;
         __atomic_store_n(&shared->scans, shared->scans + 1, __ATOMIC_RELEASE);
@@ -146,13 +184,14 @@ const wiring_t *electric_wiring(const char *board)
     return 0;
 }
 
-void electric_connect(avr_t *processor, const wiring_t *wires, images_t *images, uint64_t seed,
-                      FILE *file)
+void electric_connect(avr_t *processor, const wiring_t *wires, readout_t how, images_t *images,
+                      uint64_t seed, FILE *file)
 {
     static const char letters[] = "ABCD";
 
     avr = processor;
     wiring = wires;
+    readout = how;
     shared = images;
     trace = file;
     chance = chance_from(seed);
@@ -172,7 +211,10 @@ void electric_connect(avr_t *processor, const wiring_t *wires, images_t *images,
 void electric_reset(void)
 {
     memset(ports, 0, sizeof ports);
-    row = column = sensor = 0;
+    column = sensor = 0;
+    clock_was = latch_was = 0;
+    rows = readout.floating ? 1 : 0xA53C;
+    shifted = 0x5AC3; /* at power on registers hold anything */
     from_mv = 0;
     since = held = 0;
     shared->scans = 0;

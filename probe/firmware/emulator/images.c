@@ -7,7 +7,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-_Static_assert(offsetof(images_t, tactels_mv) == 64, "layout");
+_Static_assert(offsetof(images_t, tactels) == 64, "layout");
 _Static_assert(offsetof(images_t, wrist_mv) == 8256, "layout");
 _Static_assert(offsetof(images_t, felt) == 8280, "layout");
 _Static_assert(sizeof(images_t) == 24664, "layout");
@@ -26,9 +26,9 @@ images_t *images_open(const char *path, const char **why)
         *why = "is no file of 24664 bytes that can be read and written";
         return 0;
     }
-    if (memcmp(images->magic, "PROBEIMG", 8) || images->version != 1) {
+    if (memcmp(images->magic, "PROBEIMG", 8) || images->version != 2) {
         munmap(images, sizeof(images_t));
-        *why = "does not begin with PROBEIMG, version 1";
+        *why = "does not begin with PROBEIMG, version 2";
         return 0;
     }
     return images;

@@ -1,7 +1,7 @@
 /* Runs the probe's firmware on an emulated AVR, with its circuit, serial line and faults.
  *
  *   emulator --board uno --firmware probe.elf --images FILE --link PATH
- *            [--tau US] [--noise MV] [--seed N] [--trace FILE] [--free]
+ *            [--wiring grounded|floating] [--load OHM] [--tau US] [--noise MV] [--seed N] [--trace FILE] [--free]
  *
  * Says "ready" on standard output, then obeys the lines of control.h. Paced at 16 MHz of real
  * time, with --free as fast as it goes. Ends with its standard input.
@@ -31,10 +31,11 @@
 
 static struct {
     const char *board, *firmware, *images, *link, *trace;
+    readout_t readout;
     double tau_us, noise_mv;
     uint64_t seed;
     bool free;
-} options = {.board = "uno", .tau_us = 1};
+} options = {.board = "uno", .readout = {.load_ohm = 2200}, .tau_us = 1};
 
 static volatile sig_atomic_t terminated;
 
@@ -91,6 +92,7 @@ static void read_options(int count, char **values)
         {"board", 1, 0, 'b'}, {"firmware", 1, 0, 'f'}, {"images", 1, 0, 'i'},
         {"link", 1, 0, 'l'},  {"trace", 1, 0, 'c'},    {"tau", 1, 0, 't'},
         {"noise", 1, 0, 'n'}, {"seed", 1, 0, 's'},     {"free", 0, 0, 'r'},
+        {"wiring", 1, 0, 'w'}, {"load", 1, 0, 'o'},
         {0, 0, 0, 0}};
     int letter;
 
@@ -105,6 +107,12 @@ static void read_options(int count, char **values)
         case 'n': options.noise_mv = atof(optarg); break;
         case 's': options.seed = strtoull(optarg, 0, 0); break;
         case 'r': options.free = true; break;
+        case 'o': options.readout.load_ohm = atof(optarg); break;
+        case 'w':
+            options.readout.floating = !strcmp(optarg, "floating");
+            if (!options.readout.floating && strcmp(optarg, "grounded"))
+                fail("the wiring '%s' is not known: take grounded or floating", optarg);
+            break;
         default: exit(2);
         }
     }
@@ -112,6 +120,8 @@ static void read_options(int count, char **values)
         fail("'%s' is no option", values[optind]);
     if (!options.firmware || !options.images || !options.link)
         fail("--firmware, --images and --link are needed");
+    if (!(options.readout.load_ohm > 0))
+        fail("a load resistor has more than 0 ohm");
 }
 
 static void reset(void)
@@ -222,7 +232,7 @@ int main(int count, char **values)
     signal(SIGPIPE, SIG_IGN);
 
     make_processor(wiring);
-    electric_connect(avr, wiring, images, options.seed, trace);
+    electric_connect(avr, wiring, options.readout, images, options.seed, trace);
     electric_set_tau(options.tau_us);
     electric_set_noise(options.noise_mv);
     line_connect(avr, options.link, ~options.seed);

@@ -25,7 +25,8 @@ def test_layout(images, tmp_path):
     images.show(tactels, [1.5, 2.5, 3.5, 4.5])
     data = path.read_bytes()
     assert data[:8] == b"PROBEIMG"
-    assert [word(path, at) for at in (8, 12, 16)] == [1, 2, 1]  # version, lock, number
+    assert [word(path, at) for at in (8, 12, 16)] == [2, 2, 1]  # version, lock, number
+    assert word(path, 20) == 0  # millivolts
     assert (np.frombuffer(data, "<f4", 2048, 64) == tactels.ravel()).all()
     assert np.frombuffer(data, "<f4", 4, 8256).tolist() == [1.5, 2.5, 3.5, 4.5]
     assert len(data) == 24664
@@ -37,7 +38,7 @@ def test_the_c_side_asserts_the_same_offsets():
             r"offsetof\(images_t, (\w+)\) == (\d+)", (SOURCES / "emulator/images.c").read_text()
         )
     )
-    assert stated == {"tactels_mv": "64", "wrist_mv": "8256", "felt": "8280"}
+    assert stated == {"tactels": "64", "wrist_mv": "8256", "felt": "8280"}
 
 
 def test_images_are_numbered_and_the_lock_is_even_between_them(images, tmp_path):
