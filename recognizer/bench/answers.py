@@ -35,7 +35,10 @@ def answer_json(recognition: Recognition, lab: Lab, sensor: SensorType) -> dict[
     margin = recognition.margin
     answer["margin"] = None if margin is None or math.isinf(margin) else round(margin, 2)
     answer["alone"] = margin is not None and math.isinf(margin)
-    answer["advice"] = ADVICE.get(recognition.reason, "")
+    cause = recognition.cause
+    answer["advice"] = (
+        ADVICE.get(recognition.reason, "") if cause is None else f"{cause}; {recognition.way_out}"
+    )
     answer["noise"] = None if recognition.noise is None else round(recognition.noise, 3)
     pose = recognition.T_face_probe
     found = _face(lab, recognition)

@@ -18,6 +18,7 @@ from dataclasses import replace
 
 from recognizer.touch.belief import VerifiedHypothesis, symbols_to_name
 from recognizer.touch.chance import expected_matches
+from recognizer.touch.diagnose import diagnose
 from recognizer.touch.first_look import may_tell_more, shows_strokes
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.locate import Hypothesis, under_centre
@@ -50,7 +51,8 @@ from recognizer.touch.verify import verify_hypotheses
 def recognise(reader: PreparedLab, signal: Signal, seq: int = 0) -> Recognition:
     """Return what one touch says, and where to touch next if that is not enough."""
     answer, found = recognise_with_rivals(reader, signal, seq)
-    return replace(answer, next=propose_next(reader, signal, answer, found))
+    cause = None if answer else diagnose(reader, signal, found)
+    return replace(answer, next=propose_next(reader, signal, answer, found), cause=cause)
 
 
 def recognise_with_hypothesis(

@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from recognizer.touch.cause import Cause
+
 NO_CONTACT = "no contact"
 TOO_FEW = "too few symbols"
 AMBIGUOUS = "ambiguous"
@@ -94,6 +96,7 @@ class Recognition:
     are registered) would match as well by chance; None where another reason refuses, and where the
     thesis's way is read."""
     next: NextTouch | None = None  #: where it does not answer or is unsure
+    cause: Cause | None = None  #: what of the touch made it fail; None where it answers
 
     def __bool__(self) -> bool:
         return self.object is not None
@@ -106,9 +109,10 @@ class Recognition:
                 others = f", {self.runner_up.object}/{self.runner_up.face} among others"
             if self.doubt is not None and self.reason == BY_CHANCE:
                 others = f", as {places_by_chance(self.doubt)} would match"
+            said = self.reason if self.cause is None else _said(self.reason, self.cause)
             way_out = f"; {self.way_out}" if self.way_out else ""
             step = f"; next: {self.next}" if self.next is not None else ""
-            return f"not recognised: {self.reason}{others}{way_out}{step}"
+            return f"not recognised: {said}{others}{way_out}{step}"
         alone = self.margin is None or math.isinf(self.margin)
         given = "" if math.isnan(self.spread_mm) else f" +- {self.spread_mm:.2f}"
         return (
@@ -143,7 +147,14 @@ class Recognition:
     @property
     def way_out(self) -> str:
         """What a person does about the reason; empty where it answers."""
+        if self.cause is not None and self.reason in (TOO_FEW, NOT_ENCODED):
+            return self.cause.way_out
         return WAYS_OUT.get(self.reason, "")
+
+    @property
+    def reason_code(self) -> str:
+        """What made it fail, for programs: a code of `cause`, else the reason in small letters."""
+        return self.reason.replace(" ", "_") if self.cause is None else self.cause.code
 
     def as_json(self) -> dict[str, Any]:
         """Return the plain values that `recognize-object --json` prints."""
@@ -165,6 +176,8 @@ class Recognition:
                 "index": list(runner_up.index),
             },
             "reason": self.reason,
+            "reason_code": self.reason_code,
+            "evidence": None if self.cause is None else dict(self.cause.evidence),
             "doubt": self.doubt,
             "scale": self.scale,
             "stroke_mm": self.stroke_mm,
@@ -183,6 +196,12 @@ def refusal(
     """Return the value of a touch that is not answered."""
     none = None, None, None, None, None, None
     return Recognition(seq, *none, margin, runner_up, reason, doubt=doubt)
+
+
+def _said(reason: str, cause: Cause) -> str:
+    """Return what people read of a reason and its cause: the cause, and what it led to."""
+    told = str(cause)
+    return told if reason in (NO_CONTACT, TOO_FEW, NOT_ENCODED) else f"{reason}: {told}"
 
 
 def places_by_chance(doubt: float) -> str:

@@ -28,6 +28,7 @@ class Signal:
     trust: Array  #: (rows, columns) 0 ... 1
     contact: bool  #: whether anything is touched
     newtons: bool  #: whether forces are in newtons
+    noise: float = 0.0  #: standard deviation of readings that nothing presses
     state: SensorState | None = None  #: of the sensor that felt them, as far as it was learned
 
 
@@ -73,30 +74,31 @@ def signal_of(
     if sensor is not None and sensor.exponent != 1.0 and not newtons:
         forces = forces ** (1.0 / sensor.exponent)
     rise = settings.contact_n if newtons else settings.contact_counts
+    noise = noise_of(good)
     if not (newtons or (good == np.rint(good)).all()):  # no counts: of a scale of their own
-        rise = min(rise, settings.contact_sigmas * noise_of(good))
+        rise = min(rise, settings.contact_sigmas * noise)
     strongest = np.sort(forces[known > 0])[-settings.strongest :]
     alive = _live_mask(forces, known, settings)
-    return Signal(forces, known * alive, bool(strongest[0] > rise), newtons)
+    return Signal(forces, known * alive, bool(strongest[0] > rise), newtons, noise)
 
 
 def noise_of(readings: Array) -> float:
     """Return the standard deviation of readings (n,) of tactels that nothing presses.
 
-    Those are the ones about the densest readings, the mode of half samples; what lies below it
-    is noise alone. At least what rounding to the smallest step between two readings leaves.
+    Those are the ones about the densest readings (the mode of half samples, begun with a quarter:
+    symbols may press most of the tactels); what lies below it is noise alone. At least what
+    rounding to the smallest step between two readings leaves.
 
     References
     ----------
     T. Robertson and J. D. Cryer, an iterative procedure for estimating the mode.
     """
-    found = np.sort(readings)
-    whole = found
+    whole = found = np.sort(readings)
+    share = 4
     while len(found) > 2:
-        half = (len(found) + 1) // 2
-        width = found[half - 1 :] - found[: len(found) - half + 1]
-        start = int(np.argmin(width))
-        found = found[start : start + half]
+        part = max(2, (len(found) + 1) // share)
+        start = int(np.argmin(found[part - 1 :] - found[: len(found) - part + 1]))
+        found, share = found[start : start + part], 2
     mode = float(found.mean())
     below, at = mode - whole[whole < mode], int((whole == mode).sum())
     steps = np.diff(whole)

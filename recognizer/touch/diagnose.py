@@ -1,0 +1,216 @@
+"""Image and best hypothesis of a touch that is not answered -> its cause.
+
+What the image shows by itself comes first (smeared, even, soft, falling off to one side, loaded in
+part), then what the best hypothesis leaves: tactels that read nothing where symbols press, symbols
+that are read but contradict every place, a pattern that no symbols explain.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.sensor import SensorType
+from recognizer.touch import cause
+from recognizer.touch.belief import VerifiedHypothesis, unworn_labels_at, weigh_cells
+from recognizer.touch.cause import Cause
+from recognizer.touch.first_look import shows_strokes
+from recognizer.touch.prepare import PreparedLab
+from recognizer.touch.signal import Signal
+from recognizer.touch.symbols.fit import fit_lattices
+from recognizer.touch.symbols.gain import image_of_signal
+from recognizer.touch.symbols.projection import explained_share, project_template, values_of
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class CauseSettings:
+    """Chosen on 40 touches of each cause, own engine, `typical`, seed 61 (`docs/recognizer.md`)."""
+
+    top: float = 90.0  #: percentile of the envelope that counts as loaded in full
+    plateau: float = 95.0  #: percentile of the readings that stands for a symbol's
+    part: float = 0.2  #: of the full load, from which a place is loaded
+    sigmas: float = 5.0  #: of the noise, likewise
+    even: float = 0.75  #: variation of the readings (deviation over mean) of a face without relief
+    smeared: float = 0.85  #: likewise, below which contours may be smeared ...
+    sharp: float = 0.6  #: ... if they are so much less sharp one way than across
+    soft: float = 16.0  #: signal to noise below which a touch is soft
+    soft_n: float = 0.15  #: plateau below which it is, where readings are newtons
+    falling: float = 0.42  #: share of the load by which it falls from the middle to the rim ...
+    lying: float = 0.65  #: ... of a plate that lies on so much of the sensor: less is an edge
+    narrow_mm: float = 7.5  #: width of one row of symbols
+    longer: float = 1.8  #: times as long as wide
+    loaded: float = 0.85  #: share of the sensor below which it hangs over an edge
+    pressed: float = 0.6  #: psi of a symbol that presses
+    silent: float = 0.15  #: psi below which a tactel reads nothing
+    dead: float = 0.1  #: share of the pressed tactels that read nothing, of a faulty sensor
+    ghosts: float = 0.08  #: share of the free ones that read a symbol, of another pattern
+    known: float = -2.0  #: nats over symbols of no registered place, least where one is right
+    explained: float = 0.8  #: share of the image that symbols of this size explain, wherever
+    clear: float = 6.0  #: nats by which a symbol is read
+    pattern: float = 0.35  #: share below which they are other ones
+
+
+CAUSES = CauseSettings()
+
+
+@dataclass(frozen=True, slots=True)
+class ImageFeatures:
+    """What an image shows before any symbol is read."""
+
+    plateau: float  #: reading on a symbol
+    signal_to_noise: float
+    loaded: float  #: share of the sensor
+    slope: float  #: of the load, from the middle to the rim over its mean
+    variation: float  #: deviation over mean
+    sharpness: float  #: of contours one way, over that across
+    direction_deg: float  #: the way that they are less sharp, sensor frame
+    width_mm: float  #: of what is loaded
+    length_mm: float
+
+
+def image_features(
+    sensor: SensorType, signal: Signal, pitch_mm: float, settings: CauseSettings = CAUSES
+) -> ImageFeatures:
+    """Return what an image of symbols of a pitch shows before any of them is read."""
+    good = signal.trust > 0
+    forces = np.where(good, signal.forces, 0.0)
+    noise = signal.noise
+    reach = max(1, round(pitch_mm / sensor.pitch_mm) // 2)
+    padded = np.pad(forces, reach)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, (2 * reach + 1,) * 2)
+    envelope = windows.max(axis=(-2, -1))
+    top = max(float(np.percentile(envelope, settings.top)), 1e-300)
+    plateau = float(np.percentile(forces[good], settings.plateau))
+    points = sensor.centres_mm().reshape(-1, 2)
+    basis = np.column_stack([np.ones(len(points)), points / np.array(sensor.half_mm)])
+    plane = np.linalg.lstsq(basis, envelope.ravel() / top, rcond=None)[0]
+    down, across = np.gradient(forces)
+    tensor = np.cov(np.stack([across.ravel(), -down.ravel()]))
+    least, vectors = np.linalg.eigh(tensor)
+    spread = np.cov(points.T, aweights=np.maximum(forces.ravel(), 1e-12 * top))
+    width, length = np.sqrt(12 * np.maximum(np.linalg.eigvalsh(spread), 0.0)).tolist()
+    return ImageFeatures(
+        plateau=plateau,
+        signal_to_noise=plateau / max(noise, 1e-300),
+        loaded=float((envelope > max(settings.part * top, settings.sigmas * noise)).mean()),
+        slope=math.hypot(*plane[1:]),
+        variation=float(forces[good].std() / max(forces[good].mean(), 1e-300)),
+        sharpness=float(least[0] / max(least[1], 1e-300)),
+        direction_deg=math.degrees(math.atan2(vectors[1, 0], vectors[0, 0])) % 180.0,
+        width_mm=width,
+        length_mm=length,
+    )
+
+
+def diagnose(
+    reader: PreparedLab,
+    signal: Signal,
+    found: list[VerifiedHypothesis],
+    settings: CauseSettings = CAUSES,
+) -> Cause:
+    """Return why a touch is not answered.
+
+    Parameters
+    ----------
+    found
+        The hypotheses that were judged, best first; none where nothing could be fitted.
+    """
+    if not signal.contact:
+        return Cause(cause.NO_LOAD, {})
+    pitch = min(each.style.pitch_mm for each in reader.lab.arrays)
+    image = image_features(reader.sensor, signal, pitch, settings)
+    seen = _by_image(image, signal, settings)
+    if seen is not None:
+        return seen
+    support = found[0].support() if found else None
+    symbols = 0 if support is None else support.inliers
+    if image.width_mm < settings.narrow_mm and image.length_mm > settings.longer * image.width_mm:
+        return Cause(cause.ONE_ROW, {"width_mm": image.width_mm, "symbols": float(symbols)})
+    if not shows_strokes(reader, signal):
+        return Cause(cause.PLAIN, {"variation": image.variation, "plateau": image.plateau})
+    if support is None:
+        return Cause(cause.UNCLEAR, {"symbols": 0.0, "explained": 0.0, "loaded": image.loaded})
+    numbers = {"symbols": float(symbols), "explained": support.explained, "loaded": image.loaded,
+               "surprise": support.surprise, "against": float(support.clear)}  # fmt: skip
+    silent, ghosts = _disagreement(found[0], settings)
+    placed = support.surprise > settings.known and image.loaded > settings.lying
+    if placed and silent > settings.dead and ghosts < settings.ghosts:
+        return Cause(cause.DEAD_TACTELS, {**numbers, "silent": silent})
+    if image.loaded < settings.loaded:
+        return Cause(cause.EDGE, numbers)
+    explained, read = _read_anywhere(reader, signal, settings)
+    numbers |= {"explained_anywhere": explained, "symbols_anywhere": float(read)}
+    if support.surprise < settings.known and explained > settings.explained:
+        return Cause(cause.NOT_REGISTERED, numbers)
+    if max(support.explained, explained) < settings.pattern:
+        return Cause(cause.OTHER_PATTERN, numbers)
+    return Cause(cause.UNCLEAR, numbers)
+
+
+def _by_image(image: ImageFeatures, signal: Signal, settings: CauseSettings) -> Cause | None:
+    """Return what the image shows by itself; None if nothing."""
+    if image.variation < settings.smeared and image.sharpness < settings.sharp:
+        return Cause(cause.MOVING, {"sharpness": image.sharpness,
+                                    "direction_deg": image.direction_deg})  # fmt: skip
+    if image.variation < settings.even:
+        return Cause(cause.PLAIN, {"variation": image.variation, "plateau": image.plateau})
+    weak = image.plateau < settings.soft_n
+    if weak if signal.newtons else image.signal_to_noise < settings.soft:
+        return Cause(cause.SOFT, {"plateau": image.plateau, "newtons": float(signal.newtons),
+                                  "signal_to_noise": image.signal_to_noise})  # fmt: skip
+    if image.slope > settings.falling and image.loaded > settings.lying:
+        return Cause(cause.TILTED, {"slope": image.slope, "loaded": image.loaded})
+    return None
+
+
+def _read_anywhere(
+    reader: PreparedLab, signal: Signal, settings: CauseSettings
+) -> tuple[float, int]:
+    """Return the share of the image that symbols explain wherever they stand, and how many do.
+
+    Each cell shows what fits it best, whether such a window is registered or not.
+    """
+    best, read = -math.inf, 0
+    for embossed, template, bank in reader.prepared:
+        image = image_of_signal(reader.sensor, signal, embossed.style.height_mm, reader.settings)
+        for fit in fit_lattices(image, template, bank, reader.settings.first)[:1]:
+            order = fit.scores.shape[1] - 1
+            labels = fit.scores.argmax(axis=1)
+            shows = np.where(labels == order, -1, labels).tolist()
+            held = dict(zip(map(tuple, fit.cells.tolist()), shows, strict=True))
+
+            def shown(cells: Ints, held: dict[tuple[int, ...], int] = held) -> Ints:
+                found = [held.get(tuple(cell), -1) for cell in cells.reshape(-1, 2).tolist()]
+                return np.array(found, np.int64).reshape(cells.shape[:-1])
+
+            explained = explained_share(image, template, fit.pose, fit.gain, shown)
+            if explained > best:
+                ranked = np.sort(fit.scores, axis=1)
+                clear = ranked[:, -1] - ranked[:, -2] > settings.clear
+                best, read = explained, int((clear & (labels < order)).sum())
+    return best if math.isfinite(best) else 0.0, read
+
+
+def _disagreement(best: VerifiedHypothesis, settings: CauseSettings) -> tuple[float, float]:
+    """Return the share of pressed tactels that read nothing, and of free ones that read a symbol.
+
+    Pressed and free as the symbols say that are registered at the place.
+    """
+    fit, embossed, place = best.fit, best.embossed, best.hypothesis
+    worn = fit.cells[weigh_cells(embossed, fit, place, best.image.settings.belief).worn]
+    under = project_template(best.image, best.template, fit.pose[None], fit.gain[None])
+    labels = unworn_labels_at(embossed, place, worn, under.cells)
+    value, felt = values_of(under, labels)[0, :, 0], under.felt.psi[0]
+    known = best.image.trust > 0
+    pressed = known & (labels[0] >= 0) & (value > settings.pressed)
+    free = known & (value < settings.silent)
+    return (
+        float((felt[pressed] < settings.silent).sum() / max(pressed.sum(), 1)),
+        float((felt[free] > settings.pressed).sum() / max(free.sum(), 1)),
+    )

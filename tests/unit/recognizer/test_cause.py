@@ -1,0 +1,168 @@
+"""Why a touch is not answered: each cause from an image made for it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from generator.pipeline import encode
+from generator.spec import read_specs
+from probe.contact.contract import Touch
+from probe.contact.press import press
+from probe.sensor import SensorType
+from probe.simulate.registered import registered_surface
+from recognizer.touch import cause
+from recognizer.touch.cause import Cause
+from recognizer.touch.diagnose import CauseSettings, diagnose, image_features
+from recognizer.touch.lab import open_lab
+from recognizer.touch.reader import Reader
+from recognizer.touch.recognition import AMBIGUOUS, NOT_ENCODED, TOO_FEW, refusal
+from recognizer.touch.signal import signal_of
+from recognizer.validation.surfaces import FOREIGN
+
+SENSOR = SensorType()
+X, Y = np.moveaxis(SENSOR.centres_mm(), -1, 0)
+
+
+def bars(rng, high=200.0):
+    """Readings of strokes, one tactel wide, on a face: noise of 2, a background of 8."""
+    image = np.where((np.arange(16) % 3 == 0)[:, None] | (np.arange(16) % 5 == 0), high, 0.0)
+    return 8.0 + image * np.exp(rng.normal(0, 0.1, (16, 16))) + rng.normal(0, 2, (16, 16))
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory):
+    """Two labs, each with a cube, whose symbols differ in size."""
+    folder = tmp_path_factory.mktemp("causes")
+    for name, profile in (("Cube", "large"), ("Small", "fine")):
+        (folder / "cube.yaml").write_text(
+            f"{{name: {name}, shape: {{cube: 48 mm}}, profile: {profile}}}"
+        )
+        encode(read_specs([folder / "cube.yaml"]), folder=folder / name, formats=("stl",),
+               database=f"sqlite:///{folder / name}.db")  # fmt: skip
+    return folder
+
+
+@pytest.fixture(scope="module")
+def reader(lab):
+    return Reader(open_lab(lab / "Cube.db"))
+
+
+def felt(lab, name, touch):
+    surface = registered_surface(f"{lab}/{name}.db", name, "F1").surface
+    noise = np.random.default_rng(7).normal(0, 2, (16, 16))
+    return 8 + 150 * press(surface, SENSOR, touch).forces_n + noise
+
+
+def code_of(reader, image):
+    signal = signal_of(np.asarray(image, float))
+    return diagnose(reader, signal, []).code
+
+
+def test_what_the_image_shows_by_itself(reader):
+    rng = np.random.default_rng(1)
+    image = bars(rng)
+    assert code_of(reader, image) == cause.UNCLEAR  # nothing is the matter with it
+    assert code_of(reader, np.full((16, 16), 8.0)) == cause.NO_LOAD
+    assert code_of(reader, np.where(X < -1, image, 8.0)) == cause.EDGE
+    assert code_of(reader, 8 + (image - 8) * np.clip((X + 14) / 26, 0, 1)) == cause.TILTED
+    assert code_of(reader, bars(rng, high=18.0)) == cause.SOFT
+    even = 100 * np.exp(rng.normal(0, 0.15, (16, 16)))
+    even[0, :13] = 8.0
+    assert code_of(reader, even) == cause.PLAIN
+    row = np.where(np.abs(Y) < 3, image, 8.0)
+    assert code_of(reader, row) == cause.ONE_ROW
+    smeared = 8 + np.mean([np.roll(image - 8, k, axis=1) for k in range(5)], axis=0)
+    signal = signal_of(smeared)
+    found = diagnose(reader, signal, [], CauseSettings(smeared=1.5))
+    assert found.code == cause.MOVING
+    assert found.evidence["direction_deg"] == pytest.approx(0, abs=10) or found.evidence[
+        "direction_deg"
+    ] == pytest.approx(180, abs=10)  # along the columns
+
+
+def test_the_numbers_of_an_image():
+    image = np.zeros((16, 16))
+    image[:, :8] = 100.0
+    signal = replace(signal_of(image, floor=0.0), noise=2.0)
+    found = image_features(SENSOR, signal, 7.0)
+    assert (found.plateau, found.signal_to_noise) == (100.0, 50.0)
+    assert found.loaded == pytest.approx(10 / 16)  # symbols reach two tactels beyond their middle
+    assert found.variation == pytest.approx(1.0)
+    assert (found.width_mm, found.length_mm) == pytest.approx((12.6, 25.4), abs=0.2)
+    assert image_features(SENSOR, signal, 14.0).loaded == pytest.approx(12 / 16)
+    masked = replace(signal, trust=np.where(X < 0, 1.0, 0.0))
+    assert image_features(SENSOR, masked, 7.0).variation == 0.0
+
+
+def test_weak_is_told_in_newtons_where_they_are_known(reader):
+    image = np.where(bars(np.random.default_rng(2)) > 50, 1.0, 0.0)
+    for high, code in ((0.14, cause.SOFT), (0.16, cause.UNCLEAR)):
+        signal = signal_of(high * image, floor=0.0, newtons=True)
+        assert diagnose(reader, signal, []).code == code
+    assert str(diagnose(reader, signal_of(0.14 * image, floor=0.0, newtons=True), [])).startswith(
+        "pressed too softly: readings reach 0.14 N"
+    )
+
+
+def test_an_edge_is_said_with_its_numbers(lab, reader):
+    found = reader.read(felt(lab, "Cube", Touch(2.5, 3.0, 0.4, 60.0)))
+    assert not found
+    assert found.reason_code == cause.EDGE
+    assert "at an edge: " in str(found)
+    assert "is the object in this database" not in str(found)
+    told = found.as_json()
+    assert (told["reason"], told["reason_code"]) == (found.reason, "edge")
+    assert told["evidence"]["loaded"] == found.cause.evidence["loaded"] < 0.85
+
+
+def test_symbols_of_another_lab_are_said_to_stand_nowhere(reader):
+    surface = FOREIGN["other lab"](reader.lab.arrays[0], np.random.default_rng(3))
+    codes = []
+    for x in (21.0, 24.0, 27.0):
+        forces = press(surface, SENSOR, Touch(x, 24.0, 0.3, 70.0)).forces_n
+        codes.append(reader.read(np.rint(8 + 150 * forces)).reason_code)
+    assert codes.count(cause.NOT_REGISTERED) >= 2
+
+
+def test_symbols_of_another_size_are_said_to_be_other_ones(lab, reader):
+    codes = [reader.read(felt(lab, "Small", Touch(x, 24.0, 0.3, 70.0))).reason_code
+             for x in (21.0, 24.0, 27.0)]  # fmt: skip
+    assert codes.count(cause.OTHER_PATTERN) >= 2
+
+
+def test_dead_tactels_are_counted(lab, reader):
+    rng = np.random.default_rng(5)
+    found = []
+    for x in (20.0, 23.0, 25.0, 28.0):
+        image = felt(lab, "Cube", Touch(x, 24.0, 0.3, 70.0))
+        image[rng.random((16, 16)) < 0.4] = 8.0
+        found.append(reader.read(image))
+    codes = [one.reason_code for one in found]
+    assert codes.count(cause.DEAD_TACTELS) >= 2
+    one = found[codes.index(cause.DEAD_TACTELS)]
+    assert "recognize-object --learn" in str(one)
+    assert 0.1 < one.cause.evidence["silent"] < 0.5
+
+
+def test_a_cause_is_said_beside_the_reason_it_led_to():
+    edge = Cause(cause.EDGE, {"loaded": 0.5, "symbols": 3.0})
+    assert str(replace(refusal(1, TOO_FEW), cause=edge)) == (
+        "not recognised: at an edge: 50 % of the sensor is loaded, 3 symbols are read; "
+        "move towards the loaded part"
+    )
+    both = str(replace(refusal(1, AMBIGUOUS), cause=edge))
+    assert both.startswith("not recognised: ambiguous: at an edge: 50 %")
+    assert both.endswith("touch again a few mm beside")
+    assert refusal(1, NOT_ENCODED).reason_code == "not_an_encoded_surface"
+    numbers = dict.fromkeys(
+        ("plateau", "signal_to_noise", "newtons", "loaded", "symbols", "direction_deg",
+         "sharpness", "silent", "explained", "explained_anywhere",
+         "symbols_anywhere", "slope", "width_mm", "variation"), 0.5
+    )  # fmt: skip
+    codes = [value for name, value in vars(cause).items() if name.isupper() and name[0] != "_"]
+    assert len(codes) == 11
+    for code in codes:
+        one = Cause(code, numbers)
+        assert str(one)
+        assert one.way_out
