@@ -49,17 +49,20 @@ class Cause:
         return _WAYS_OUT[self.code]
 
 
+def _percent(share: float) -> str:
+    return f"{100 * max(share, 0.0):.0f} %"
+
+
 def _soft(n: Numbers) -> str:
-    unit = "N" if n["newtons"] else "counts"
+    reach = f"{n['plateau']:.2g} N" if n["newtons"] else f"{n['plateau']:.0f} counts"
     return (
-        f"pressed too softly: readings reach {n['plateau']:.2g} {unit}, "
-        f"{n['signal_to_noise']:.0f} times their noise"
+        f"pressed too softly: readings reach {reach}, {n['signal_to_noise']:.0f} times their noise"
     )
 
 
 def _edge(n: Numbers) -> str:
     return (
-        f"at an edge: {100 * n['loaded']:.0f} % of the sensor is loaded, "
+        f"at an edge: {_percent(n['loaded'])} of the sensor is loaded, "
         f"{n['symbols']:.0f} symbols are read"
     )
 
@@ -67,34 +70,32 @@ def _edge(n: Numbers) -> str:
 def _moving(n: Numbers) -> str:
     return (
         f"the sensor moved while it was read: along {n['direction_deg']:.0f} degrees contours "
-        f"are {100 * n['sharpness']:.0f} % as sharp as across"
+        f"are {_percent(n['sharpness'])} as sharp as across"
     )
 
 
 def _dead(n: Numbers) -> str:
-    return (
-        f"dead tactels: {100 * n['silent']:.0f} % of those that symbols should press read nothing"
-    )
+    return f"dead tactels: {_percent(n['silent'])} of those that symbols should press read nothing"
 
 
 def _not_registered(n: Numbers) -> str:
     return (
         f"{n['symbols_anywhere']:.0f} symbols are read and explain "
-        f"{100 * n['explained_anywhere']:.0f} % of the image, but stand so nowhere in this database"
+        f"{_percent(n['explained_anywhere'])} of the image, but stand so nowhere in this database"
     )
 
 
 def _other_pattern(n: Numbers) -> str:
     return (
         "raised, but not by symbols of this database: they explain "
-        f"{100 * max(n['explained_anywhere'], 0.0):.0f} % of the image"
+        f"{_percent(n['explained_anywhere'])} of the image"
     )
 
 
 _WORDS: dict[str, Callable[[Numbers], str]] = {
     NO_LOAD: lambda _: "no contact",
     SOFT: _soft,
-    TILTED: lambda n: f"tilted: the load falls by {100 * n['slope']:.0f} % across the sensor",
+    TILTED: lambda n: f"tilted: the load falls by {_percent(n['slope'])} across the sensor",
     MOVING: _moving,
     EDGE: _edge,
     ONE_ROW: lambda n: f"one row of symbols: what is loaded is {n['width_mm']:.0f} mm wide",
@@ -102,11 +103,11 @@ _WORDS: dict[str, Callable[[Numbers], str]] = {
     NOT_REGISTERED: _not_registered,
     OTHER_PATTERN: _other_pattern,
     PLAIN: lambda n: (
-        f"not an encoded surface: pressed all over, {100 * n['variation']:.0f} % of variation"
+        f"not an encoded surface: no strokes are felt, readings vary by {_percent(n['variation'])}"
     ),
     UNCLEAR: lambda n: (
         f"symbols are read poorly: {n['symbols']:.0f} of them, which explain "
-        f"{100 * max(n['explained'], 0.0):.0f} % of the image"
+        f"{_percent(n['explained'])} of the image"
     ),
 }
 

@@ -135,7 +135,8 @@ def diagnose(
     if not shows_strokes(reader, signal):
         return Cause(cause.PLAIN, {"variation": image.variation, "plateau": image.plateau})
     if support is None:
-        return Cause(cause.UNCLEAR, {"symbols": 0.0, "explained": 0.0, "loaded": image.loaded})
+        code = cause.EDGE if image.loaded < settings.loaded else cause.UNCLEAR
+        return Cause(code, {"symbols": 0.0, "explained": 0.0, "loaded": image.loaded})
     numbers = {"symbols": float(symbols), "explained": support.explained, "loaded": image.loaded,
                "surprise": support.surprise, "against": float(support.clear)}  # fmt: skip
     silent, ghosts = _disagreement(found[0], settings)

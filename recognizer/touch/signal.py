@@ -87,7 +87,7 @@ def noise_of(readings: Array) -> float:
 
     Those are the ones about the densest readings (the mode of half samples, begun with a quarter:
     symbols may press most of the tactels); what lies below it is noise alone. At least what
-    rounding to the smallest step between two readings leaves.
+    rounding leaves: to whole numbers, or to the smallest step between two readings.
 
     References
     ----------
@@ -103,6 +103,8 @@ def noise_of(readings: Array) -> float:
     below, at = mode - whole[whole < mode], int((whole == mode).sum())
     steps = np.diff(whole)
     step = float(steps[steps > 0].min()) if steps.any() else 0.0
+    if (whole == np.rint(whole)).all():
+        step = 1.0
     square = float((below**2).sum()) / max(len(below) + at / 2, 1.0)
     return math.sqrt(square + step**2 / 12)
 

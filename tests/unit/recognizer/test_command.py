@@ -233,7 +233,9 @@ def test_what_is_not_recognised_says_why_and_what_to_do(asked, lab):
     assert "; " in out
     entry = json.loads(asked(path, "--json")[1])[0]
     assert entry["object"] is entry["face"] is entry["index"] is entry["T_face_probe"] is None
-    assert entry["reason"] in out
+    assert (entry["reason"], entry["reason_code"]) == ("not an encoded surface", "not_encoded")
+    assert "not an encoded surface: no strokes are felt, readings vary by 113 %" in out
+    assert entry["evidence"]["variation"] == pytest.approx(math.sqrt(9 / 7))
 
 
 @pytest.fixture(scope="module")

@@ -99,6 +99,7 @@ def reads(small, lab, monkeypatch):
         monkeypatch.setattr(recognizer.touch.recognise, "verify_hypotheses", found)
         monkeypatch.setattr(recognizer.touch.recognise, "expected_matches", matches)
         monkeypatch.setattr(recognizer.touch.recognise, "propose_next", lambda *_: None)
+        monkeypatch.setattr(recognizer.touch.recognise, "diagnose", lambda *_: None)
         monkeypatch.setattr(recognizer.touch.recognise, "shows_strokes", lambda *_: True)
         monkeypatch.setattr(recognizer.touch.recognise, "may_tell_more", lambda *_: True)
         answer, judged = recognise_with_hypothesis(READER, signal, 7)

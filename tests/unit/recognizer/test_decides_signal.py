@@ -178,6 +178,8 @@ def test_noise_is_that_of_tactels_that_nothing_presses():
     rng = np.random.default_rng(10)
     free, pressed = rng.normal(5.0, 0.5, 180), rng.uniform(20.0, 200.0, 76)
     assert noise_of(np.r_[free, pressed]) == pytest.approx(0.5, rel=0.2)
-    assert noise_of(np.full(9, 3.0)) == 0.0
+    assert noise_of(np.full(9, 3.5)) == 0.0
+    assert noise_of(np.full(9, 3.0)) == pytest.approx(np.sqrt(1 / 12))  # counts are rounded
+    assert noise_of(np.array([0.0] * 9 + [180.0] * 7)) == pytest.approx(np.sqrt(1 / 12))
     by_hand = np.array([0.0] * 3 + [1.0] * 13)  # mode 1, three one below it
     assert noise_of(by_hand) == pytest.approx(np.sqrt(3 / (3 + 13 / 2) + 1 / 12))
