@@ -145,6 +145,7 @@ def _sentence(answer: Answer, needed: int) -> str:
     if not answer.found and answer.found.reason != NO_CONTACT:
         more = f"; go on: about {needed} touches" if answer.touches < needed else ""
         said = f"{answer.touch.seq}: not yet: {answer.found.reason}{more}"
+        said += f"; next: {answer.found.next}" if answer.found.next is not None else ""
     said = f"{said} ({answer.touches} {'touch' if answer.touches == 1 else 'touches'})"
     return "; ".join((said, *map(report.edge_words, answer.edges or ())))
 

@@ -197,7 +197,7 @@ def answer_scan(
         return answer
     arrays, settings = reader.lab.arrays, reader.settings
     doubt = expected_matches(arrays, best.encoding, best.fit, best.place, settings)
-    if doubt > settings.belief.doubt:
+    if doubt > limits.doubt:
         return refusal(seq, BY_CHANCE, margin=margin, runner_up=runner_up, doubt=doubt)
     return replace(answer, doubt=doubt)
 

@@ -1,18 +1,25 @@
 """A scan as a program has it: touches in, the belief so far out. Thesis 4.3, 6.3.
 
-Where a touch stands against the first one is what the arm says (its pose, with a covariance
-where it gives one), or what a hand may have done since the touch before; then overlapping
-images tell, see `recognizer.scan.mosaic`.
+Where a touch stands against the first one of its face is what the arm says (its pose, with a
+covariance where it gives one), or what a hand may have done since the touch before; then
+overlapping images tell, see `recognizer.scan.mosaic`. A pose that does not lie in the plane of
+the touches so far is of another face; what faces say of the object is joined (`faces`).
 """
 
 from __future__ import annotations
+
+import math
+from copy import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from probe.arm.carried import SensorPose
 from probe.sensor import SensorType
-from recognizer.scan.grow import begin_scan, extend_scan
+from recognizer.scan.belief import ScanBelief, begin_scan
+from recognizer.scan.faces import TouchedFace, contradict, join_faces
+from recognizer.scan.grow import extend_scan
 from recognizer.scan.mosaic.planar import planar_covariance, planar_pose
 from recognizer.scan.mosaic.touch import PlacedTouch, PlanarBelief, planar_belief
 from recognizer.scan.settings import ScanSettings
@@ -26,7 +33,7 @@ Array = NDArray[np.float64]
 
 
 class Scan:
-    """Several overlapping touches of one face, read as one belief.
+    """Several touches of one object, read as one belief.
 
     Parameters
     ----------
@@ -54,10 +61,11 @@ class Scan:
         sensor: SensorType | None = None,
         settings: ScanSettings | None = None,
     ) -> None:
-        reader = lab if isinstance(lab, Reader) else Reader(lab, sensor or SensorType())
-        self._belief = begin_scan(reader, settings)
-        self._places = TouchPlaces(self._belief.settings)
-        self._answer = self._belief.recognition
+        self._reader = lab if isinstance(lab, Reader) else Reader(lab, sensor or SensorType())
+        self._settings = settings or ScanSettings()
+        self._faces = [self._new_face()]  # the last one is being touched
+        self._answer = self._faces[0].belief.recognition
+        self._changed = 0
 
     @property
     def answer(self) -> Recognition:
@@ -70,7 +78,12 @@ class Scan:
     @property
     def touches(self) -> int:
         """How many touches the belief rests on: those with contact."""
-        return len(self._belief.touches)
+        return sum(len(face.belief.touches) for face in self._faces)
+
+    @property
+    def changes(self) -> int:
+        """How often what was told was given up: the object has slipped, or is another one."""
+        return self._changed
 
     def add(
         self,
@@ -84,31 +97,74 @@ class Scan:
         Parameters
         ----------
         touch
-            Of the same face as those before, overlapping one of them by a third or more:
-            counts (rows, columns), a signal, or a touch of `recognizer.touch.contacts`.
+            Of the same object as those before: counts (rows, columns), a signal, or a touch of
+            `recognizer.touch.contacts`. Where nobody knows how the probe moved, touches of a face
+            must overlap by a third or more unless each of them is answered by itself.
         pose
             (4, 4) T_base_sensor, mm, in any fixed frame; with the arm's own covariance if it
-            is a `SensorPose`; by default the touch's own, if it has one.
+            is a `SensorPose`; by default the touch's own, if it has one. It tells when another
+            face is touched.
         seq
             Number of the touch; counted if not given.
 
         Raises
         ------
         MosaicError
-            Another sensor's image, or a pose that does not face the plane of the first one.
+            Another sensor's image.
         """
         given = touch.seq if isinstance(touch, TouchImage) and seq is None else seq
         if isinstance(touch, TouchImage):
             pose, touch = touch.pose if pose is None else pose, touch.counts
-        signal = touch if isinstance(touch, Signal) else self._belief.reader.signal(touch)
+        signal = touch if isinstance(touch, Signal) else self._reader.signal(touch)
         number = self.touches if given is None else given
-        self._belief = extend_scan(self._belief, self._places.place(signal, pose, number))
-        found = self._belief.recognition
         if signal.contact:
-            self._places.keep(pose)
-            if found or not self._answer or self._belief.told is None:
-                self._answer = found
+            self._turn_to_face(pose)
+        face = self._faces[-1]
+        before = face.belief
+        belief = extend_scan(before, face.places.place(signal, pose, number))
+        if belief.begun > before.begun:  # what was told so far may be true of another face
+            face = _Face(replace(belief, begun=before.begun), copy(face.places))
+            self._faces.append(face)
+        face.belief = belief = replace(belief, begun=before.begun)
+        if not signal.contact:
+            return belief.recognition
+        face.places.keep(pose)
+        face.pose = None if pose is None else _matrix(pose)
+        found = self._join()
+        if found or not self._answer or (before.told is not None and belief.told is None):
+            self._answer = found
         return found
+
+    def _new_face(self) -> _Face:
+        return _Face(begin_scan(self._reader, self._settings), TouchPlaces(self._settings))
+
+    def _turn_to_face(self, pose: SensorPose | ArrayLike | None) -> None:
+        """Let the face that a pose lies on be the last one, a new one if it lies on none."""
+        if pose is None or self._faces[-1].places.holds(pose):
+            return
+        for k, face in enumerate(self._faces):
+            if face.places.holds(pose):
+                self._faces.append(self._faces.pop(k))
+                return
+        self._faces.append(self._new_face())
+
+    def _join(self) -> Recognition:
+        """Return what the last touch says, as those of other faces have it."""
+        *others, last = (TouchedFace(face.belief, face.pose) for face in self._faces)
+        if any(contradict(last, other, self._settings) for other in others):
+            self._faces = self._faces[-1:]
+            self._changed += 1
+            return last.belief.recognition
+        return join_faces(last, others)
+
+
+@dataclass(slots=True)
+class _Face:
+    """A face that was touched."""
+
+    belief: ScanBelief
+    places: TouchPlaces
+    pose: Array | None = None  #: (4, 4) T_base_sensor of its last touch; None: not known
 
 
 class TouchPlaces:
@@ -131,6 +187,14 @@ class TouchPlaces:
         if not self._any and pose is not None:
             self._T_first_base = _inverse(_matrix(pose))
         self._before, self._any = pose, True
+
+    def holds(self, pose: SensorPose | ArrayLike) -> bool:
+        """Whether a pose lies in the plane of the touches so far, or nobody can tell."""
+        if self._T_first_base is None:
+            return True
+        T = self._T_first_base @ _matrix(pose)
+        facing = float(T[2, 2]) > math.cos(self.settings.facing_rad)
+        return facing and abs(float(T[2, 3])) < self.settings.above_mm
 
     def place(self, signal: Signal, pose: SensorPose | ArrayLike | None, seq: int) -> PlacedTouch:
         """Return a touch with what is known of its place."""

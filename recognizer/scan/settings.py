@@ -19,6 +19,9 @@ class ScanSettings:
     contradicts: float = 20.0  #: nats that a touch may contradict all others before it is left out
     noise: float = 0.4  #: standard deviation of psi beyond which a touch shows no symbols
     clean: float = 0.15  #: noise of a touch whose symbols are where the answer says: not searched
+    #: registered places that a foreign surface may match as well by chance; a lab holds fewer
+    #: symbols of a profile that takes a scan than a touch of another can tell apart
+    doubt: float = 2e-2
     wrong: float = 0.05  #: share of the cells that may clearly speak for another symbol
     floor_mm: float = 0.25  #: of places, beyond what is believed of them
     floor_rad: float = 0.01  #: of turns
@@ -34,6 +37,12 @@ class ScanSettings:
     places: int = 6  #: of every lattice that are compared by all cells
     loose_mm: float = 0.6  #: largest standard deviation of a place that is given as an answer
     patience: int = 3  #: touches in a row that may agree with nothing while others are believed
+    #: between touches of two faces of one object: an edge, and what plate and arm err by
+    facing_rad: float = math.radians(20)  #: turned further against a face, a touch is of another
+    above_mm: float = 6.0  #: as far above or below it as well
+    changed: float = 20.0  #: nats that another face can say at most: the object may be another now
+    object_mm: float = 6.0  #: by which one object may seem to lie apart as two faces have it
+    object_rad: float = math.radians(6)
     verify_steps: int = 3  #: of the last touch's pose, with the symbols that the database holds
     #: standard deviations of x, y (mm) and the turn (rad) of the first touch against itself,
     #: where nothing is known

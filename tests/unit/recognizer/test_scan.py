@@ -15,7 +15,6 @@ from probe.simulate.registered import registered_surface
 from probe.simulate.world.levels import MISMATCH, TYPICAL
 from probe.simulate.world.reading import read_sensor
 from recognizer.scan.grow import begin_scan, extend_scan, read_scan
-from recognizer.scan.mosaic.errors import MosaicError
 from recognizer.scan.mosaic.touch import PlacedTouch, planar_belief
 from recognizer.scan.session import Scan, TouchPlaces
 from recognizer.scan.settings import ScanSettings
@@ -229,10 +228,58 @@ def test_places_follow_from_poses_steps_or_a_hand(felt):
     assert late.place(signal, poses[1], 0).stepped.pose == pytest.approx([6 * c, -6 * s, 0])
 
 
-def test_another_face_is_no_touch_of_this_scan(reader, felt):
-    session = Scan(reader)
-    session.add(felt[0][0].signal, true_pose(10, 20, 0.1))
-    beside = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]])
-    with pytest.raises(MosaicError, match="tilted by 90 degrees") as refusal:
-        session.add(felt[0][1].signal, true_pose(16, 20, 0.1) @ beside)
-    assert "one face" in refusal.value.fix
+@pytest.fixture(scope="module")
+def one_touch(tmp_path_factory):
+    """Two cubes whose faces one touch can tell, and what touches of them feel."""
+    folder = tmp_path_factory.mktemp("faces")
+    (folder / "cube.yaml").write_text(
+        "{name: Cube, shape: {cube: 50 mm}, profile: one-touch, copies: 2}"
+    )
+    url = f"sqlite:///{folder / 'lab.db'}"
+    encode(read_specs([folder / "cube.yaml"]), folder=folder, database=url, formats=())
+
+    def felt(name, face, x, y, T_base_object=None):
+        scene = registered_surface(url, name, face)
+        touch = Touch(x, y, 0.4, 80.0)
+        counts, _ = read_sensor(scene.surface, SENSOR, touch, TYPICAL, np.random.default_rng(1))
+        if T_base_object is None:
+            return counts, None
+        return counts, T_base_object @ scene.T_object_surface @ surface_to_sensor(x, y, 0.4)
+
+    return Reader(open_lab(url), SENSOR), felt
+
+
+def test_faces_of_one_object_are_one_belief_and_a_moved_object_is_a_new_one(one_touch):
+    reader, felt = one_touch
+    scan, T = Scan(reader), np.eye(4)
+    for face in ("F1", "F2", "F3"):
+        answer = scan.add(*felt("Cube-1", face, 24, 26, T))
+        assert (answer.object, answer.face) == ("Cube-1", face)
+    assert (scan.touches, scan.changes) == (3, 0)
+    moved = T.copy()
+    moved[:3, 3] = 15.0, -4.0, 8.0
+    assert scan.add(*felt("Cube-1", "F2", 24, 26, moved)).face == "F2"
+    assert (scan.touches, scan.changes) == (1, 1)
+
+
+def test_another_object_begins_a_new_belief_though_nobody_knows_the_motion(one_touch):
+    reader, felt = one_touch
+    scan = Scan(reader)
+    for name, face in (("Cube-1", "F1"), ("Cube-1", "F4")):
+        answer = scan.add(*felt(name, face, 24, 26))
+        assert (answer.object, answer.face) == (name, face)
+    assert scan.changes == 0
+    answer = scan.add(*felt("Cube-2", "F4", 24, 26))
+    assert (answer.object, answer.face) == ("Cube-2", "F4")
+    assert (scan.touches, scan.changes) == (1, 1)
+
+
+def test_a_slip_on_a_face_is_found_and_the_new_place_is_the_answer(one_touch):
+    reader, felt = one_touch
+    scan, T = Scan(reader), np.eye(4)
+    scan.add(*felt("Cube-1", "F1", 24, 20, T))
+    counts, _ = felt("Cube-1", "F1", 24, 31, T)  # though the arm believes 24, 20
+    _, pose = felt("Cube-1", "F1", 24, 20, T)
+    answer = scan.add(counts, pose)
+    assert math.hypot(answer.x_mm - 24, answer.y_mm - 31) < 0.3
+    assert (scan.touches, scan.changes) == (1, 1)
