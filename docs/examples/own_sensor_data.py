@@ -1,4 +1,7 @@
-"""Read images of a sensor of your own: an array (N, 16, 16) of values that rise with force."""
+"""Read images of a sensor of your own: an array (N, rows, columns) of values that rise with force.
+
+Of another shape than 16x16 with its type: import_array(..., sensor_type="flexitac-12x32").
+"""
 
 from pathlib import Path
 

@@ -160,16 +160,18 @@ def _gel_responses(
     settings: TemplateSettings,
 ) -> Array:
     """Return the responses (order, n, n) of the pixels of a gel."""
-    from scipy.ndimage import gaussian_filter, uniform_filter
+    from scipy.ndimage import correlate1d, gaussian_filter
 
     x, y = np.meshgrid(axis, axis)
     reach, step = alphabet.reach * style.pitch_mm, settings.step_mm
+    pixel = _line(sensor.pitch_mm, step)
     blur = math.hypot(sensor.overlay.blur_mm, sensor.overlay.membrane_mm) / step
 
     def seen(strokes: Array) -> Array:
         presence = _presence(_distance(strokes * reach, x, y), style, settings)
         imprint = gaussian_filter(presence, blur, mode="constant")
-        return np.asarray(uniform_filter(imprint, round(sensor.pitch_mm / step), mode="constant"))
+        across = correlate1d(imprint, pixel, axis=0, mode="constant")
+        return np.asarray(correlate1d(across, pixel, axis=1, mode="constant"))
 
     found = np.stack([seen(np.array(glyph.strokes, float)) for glyph in alphabet.glyphs])
     return np.asarray(np.minimum(found / np.percentile(found, settings.gel_peak), 1.0))
@@ -219,6 +221,13 @@ def _disc(radius: float, step: float) -> Array:
     """Return the weights of a disc on the grid; their sum is 1."""
     disc = np.clip((radius - _from_centre(math.ceil(radius / step), step)) / step + 0.5, 0, 1)
     return np.asarray(disc / disc.sum())
+
+
+def _line(length: float, step: float) -> Array:
+    """Return the weights of a line about the middle grid point, an odd number; their sum is 1."""
+    away = np.abs(np.arange(-math.ceil(length / step), math.ceil(length / step) + 1) * step)
+    line = np.clip((length / 2 - away) / step + 0.5, 0, 1)
+    return np.asarray(line / line.sum())
 
 
 def _annulus(radius: float, step: float) -> Array:

@@ -1,0 +1,40 @@
+"""Every shipped sensor type: symbols of the pitch it proposes, touched and read by the commands."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+
+from encoded_objects import encode
+from probe.command import run as probe_sensor
+from probe.sensor_types import proposed_pitch_mm
+from probe.sensor_types.read import sensor_type_named, shipped_names
+from recognizer.command import run as recognize_object
+
+
+@pytest.mark.parametrize("name", shipped_names())
+def test_a_type_reads_its_symbols(name, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    sensor = sensor_type_named(name)
+    pitch = proposed_pitch_mm(sensor)
+    spec = {
+        "name": "Box",
+        "shape": {"box": ["90 mm", "80 mm", "70 mm"]},
+        "profile": "large",
+        "symbols": {"pitch": f"{pitch} mm"},
+        "print": {"printer": "resin" if pitch < 5 else "fdm-0.4"},
+    }
+    encode(spec, database="lab.db", formats=())
+    force = 80 * math.prod(sensor.half_mm) / 12.7**2 / (4 if sensor.value == "depth" else 1)
+    touch = ["simulate", "lab.db#Box/F1", "--x", "42", "--y", "38", "--theta", "31"]
+    given = ["--force", str(force), "--sensor-type", name, "-o", "touch.h5"]
+    assert probe_sensor([*touch, *given]) == 0
+    capsys.readouterr()
+    assert recognize_object(["touch.h5", "--json"]) == 0
+    (answer,) = json.loads(capsys.readouterr().out)
+    assert (answer["object"], answer["face"]) == ("Box", "F1")
+    T = answer["T_face_probe"]
+    assert math.hypot(T[0][3] - 42, T[1][3] - 38) < 0.15
+    assert math.degrees(math.atan2(T[1][0], T[0][0])) == pytest.approx(31, abs=0.6)
