@@ -64,5 +64,5 @@ def overhang_of(plan: ObjectPlan, layout: Layout) -> Overhang:
             beside += count
     return Overhang(
         bottom, tuple(dict.fromkeys(faces)), symbols, beside,
-        resin=not plan.printer.nozzle_mm, round=bool(polyhedron.surfaces),
+        resin=not plan.printer.nozzle_mm, round=bool(polyhedron.surfaces or polyhedron.blank),
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Polyhedra from files: STL and OBJ with planar faces, STEP with round ones, too.
+"""Polyhedra from files: STL and OBJ, whose curved regions stay blank, and STEP with round faces.
 
 A mesh file holds triangles or polygons in mm; coplanar ones that hang together become one
 face with its holes. A STEP file's own unit is honoured. One body per file.
@@ -14,11 +14,12 @@ import numpy as np
 from generator.errors import ShapeError
 from generator.polyhedron.read.merge import merge_triangles
 from generator.polyhedron.read.obj import read_obj
+from generator.polyhedron.read.regions import mesh_polyhedron
 from generator.polyhedron.read.settings import MODEL
 from generator.polyhedron.read.soup import Soup
 from generator.polyhedron.read.step import read_step
 from generator.polyhedron.read.stl import read_stl
-from generator.polyhedron.winged import Polyhedron, polyhedron
+from generator.polyhedron.winged import Polyhedron
 
 MESHES: dict[str, Callable[[bytes, str], Soup]] = {".stl": read_stl, ".obj": read_obj}
 STEP = (".step", ".stp")
@@ -46,7 +47,7 @@ def read_shape(path: str | Path, scale: float = 1.0) -> Polyhedron:
     ------
     ShapeError
         With file, place, cause and way out: no such file, too large, truncated, not closed,
-        several bodies, a mesh with curved surfaces, larger than 10 m.
+        several bodies, a mesh of too many faces, larger than 10 m.
     """
     file = Path(path)
     suffix = file.suffix.lower()
@@ -64,7 +65,7 @@ def read_shape(path: str | Path, scale: float = 1.0) -> Polyhedron:
             solid = read_step(content, place, scale)
         else:
             vertices, faces = merge_triangles(MESHES[suffix](content, place))
-            solid = polyhedron("file", scale * vertices, faces)
+            solid = mesh_polyhedron(scale * vertices, faces)
         _check_size(solid)
         return solid
     except ShapeError as error:

@@ -51,7 +51,7 @@ def polyhedron_of_facets(found: dict[str, Any], kind: str) -> Polyhedron:
         for surface in found["surfaces"]
     )
     blank = tuple(number[k] for k in found["blank"] if k in number)
-    notes = (*solid.notes, *found["notes"], *_blank_notes(found["kinds"]))
+    notes = (*solid.notes, *found["notes"], *_blank_notes(found["kinds"], _places(found)))
     return replace(solid, notes=notes, surfaces=surfaces, blank=blank)
 
 
@@ -91,13 +91,32 @@ def _facet_error(error: ShapeError, found: dict[str, Any]) -> ShapeError:
     )
 
 
-def _blank_notes(kinds: dict[str, str]) -> list[str]:
+def _places(found: dict[str, Any]) -> dict[str, str]:
+    """Return the middle of the box of each blank face, by name."""
+    points = np.array(found["points"], dtype=np.float64)
+    corners: dict[str, list[int]] = {}
+    for name, loops in zip(found["names"], found["faces"], strict=True):
+        own = name.partition(".")[0]
+        if own in found["kinds"]:
+            corners.setdefault(own, []).extend(v for loop in loops for v in loop)
+    places = {}
+    for name, numbers in corners.items():
+        low, high = points[numbers].min(axis=0), points[numbers].max(axis=0)
+        places[name] = "({:.4g}, {:.4g}, {:.4g})".format(*((low + high) / 2).tolist())
+    return places
+
+
+def _blank_notes(kinds: dict[str, str], places: dict[str, str]) -> list[str]:
     by_kind: dict[str, list[str]] = {}
     for name, surface in kinds.items():
         by_kind.setdefault(surface, []).append(name)
     notes = []
     for surface, names in by_kind.items():
-        what = f"faces {', '.join(names)} stay" if len(names) > 1 else f"face {names[0]} stays"
+        listed = [f"{name} about {places[name]}" if name in places else name
+                  for name in names[: MODEL.listed_blank]]  # fmt: skip
+        if len(names) > MODEL.listed_blank:
+            listed.append(f"{len(names) - MODEL.listed_blank} more")
+        what = f"faces {', '.join(listed)} stay" if len(names) > 1 else f"face {listed[0]} stays"
         why = "outline" if surface in ("cylinder", "cone") else "surface"
         notes.append(f"{what} blank: the {why} ({surface}) does not unroll into a simple strip")
     return notes

@@ -15,6 +15,7 @@ from generator.errors import ShapeError
 from generator.plane.polygon import area_vector
 from generator.polyhedron.read.settings import MODEL
 from generator.polyhedron.read.soup import Soup, cluster_labels
+from generator.polyhedron.read.tee import split_at_tees
 
 _REPAIR = "repair the mesh (PrusaSlicer, MeshLab or the program that made it) and export it again"
 
@@ -30,8 +31,9 @@ def merge_triangles(soup: Soup) -> tuple[Floats, Faces]:
     ------
     ShapeError
         An open, branching or inconsistently oriented mesh (with the first place), or a
-        curved surface: more than 400 faces, or a face that is not planar.
+        surface of more than `MODEL.most_facets` planar faces, or a face that is not planar.
     """
+    soup = split_at_tees(soup)
     twin = _twins(soup)
     group = _coplanar_groups(soup, twin)
     boundary = group[soup.face] != group[soup.face[twin]]
@@ -116,6 +118,11 @@ def _coplanar_groups(soup: Soup, twin: Integers) -> Integers:
     flat = (off <= tolerance) & (turn <= allowed) & ~sliver[large] & ~sliver[small]
     group = cluster_labels(np.arange(count), large[flat], small[flat])
     group = _with_slivers(group, sliver, large, small, off, turn, tolerance)
+    bent = _bends(soup, group, vector, corner) > 2.0 * tolerance
+    if bent[group].any():  # of a curved surface: each of its polygons is a face
+        flat &= ~bent[group[large]]
+        group = cluster_labels(np.arange(count), large[flat], small[flat])
+        group = _with_slivers(group, sliver, large, small, off, turn, tolerance)
     _check_groups(soup, group, vector, corner)
     return group
 
@@ -169,28 +176,38 @@ def _with_slivers(
     return group
 
 
-def _check_groups(soup: Soup, group: Integers, vector: Floats, corner: Integers) -> None:
-    """Refuse surfaces that are curved: too many faces, or faces that bend."""
-    numbers, compact = np.unique(group, return_inverse=True)
-    total = np.zeros((len(numbers), 3))
-    np.add.at(total, compact, vector)
+def _bends(soup: Soup, group: Integers, vector: Floats, corner: Integers) -> Floats:
+    """Return for each group, at its own number, how far its points leave its plane, mm."""
+    total = np.zeros((len(group), 3))
+    np.add.at(total, group, vector)
     area = np.linalg.norm(total, axis=1)
-    if len(numbers) > MODEL.most_faces:
-        raise ShapeError(
-            f"{len(numbers)} planar faces, the smallest of {area.min():.2g} mm^2: the surface "
-            f"is curved; {MODEL.most_faces} faces are allowed",
-            fix="encode a model whose faces are planar, or export round parts more coarsely",
-        )
-    face = compact[soup.face]
+    face = group[soup.face]
     normal = total / np.where(area > 0.0, area, 1.0)[:, None]
-    seed = soup.points[corner[numbers]][face]
-    height = np.einsum("ij,ij->i", soup.points[soup.origin] - seed, normal[face])
-    middle = np.bincount(face, height) / np.bincount(face)
-    bend = np.zeros(len(numbers))
+    height = np.einsum(
+        "ij,ij->i", soup.points[soup.origin] - soup.points[corner[face]], normal[face]
+    )
+    middle = np.bincount(face, height) / np.maximum(np.bincount(face), 1)
+    bend = np.zeros(len(group))
     np.maximum.at(bend, face, np.abs(height - middle[face]))
+    return bend
+
+
+def _check_groups(soup: Soup, group: Integers, vector: Floats, corner: Integers) -> None:
+    """Refuse too many faces, and faces that bend."""
+    numbers, compact = np.unique(group, return_inverse=True)
+    if len(numbers) > MODEL.most_facets:
+        total = np.zeros((len(numbers), 3))
+        np.add.at(total, compact, vector)
+        area = np.linalg.norm(total, axis=1)
+        raise ShapeError(
+            f"{len(numbers)} planar faces, the smallest of {area.min():.2g} mm^2; "
+            f"{MODEL.most_facets} are allowed",
+            fix="export round parts more coarsely, or as STEP, where they count once",
+        )
+    bend = _bends(soup, group, vector, corner)
     worst = int(bend.argmax())
     if bend[worst] > 2.0 * _distance(soup):
-        x, y, z = soup.points[corner[numbers[worst]]]
+        x, y, z = soup.points[corner[worst]]
         raise ShapeError(
             f"a face near ({x:.6g}, {y:.6g}, {z:.6g}) is curved: it bends by {bend[worst]:.2g} mm; "
             f"{2.0 * _distance(soup):.2g} mm are allowed",

@@ -43,8 +43,22 @@ class ModelSettings:
     """Coplanar polygons turn by no more than this, besides the noise."""
     sliver: float = 8.0
     """A polygon thinner than this many times the noise has no direction."""
-    most_faces: int = 400
-    """After merging: more belong to a curved surface that was divided into triangles."""
+    most_faces: int = 100
+    """After merging: of more, those that bend belong to curved surfaces, and stay blank."""
+
+    # regions.py
+    smooth_rad: float = 0.36
+    """Facets of one curved surface meet at no more: circles of 18 sides and more."""
+    bend: float = 0.5
+    """Radius, as a share of the size, above which narrow faces are planar ones."""
+    faint_rad: float = 0.02
+    """Strips that meet at less belong to one curved surface of any radius."""
+    strip: float = 0.05
+    """Width of such a strip, as a share of the size."""
+
+    # tee.py
+    tee_noise: float = 4.0
+    """A point this many times the noise beside an edge lies on it."""
 
     # step.py
     longest_s: float = 300.0
@@ -66,11 +80,13 @@ class ModelSettings:
     coarser: tuple[float, ...] = (1.0, 2.0, 5.0, 10.0)
     """Times the chord errors, until there are few enough facets."""
     most_facets: int = 6000
-    """Of a solid with round faces: bounds the time."""
+    """Of a solid with round faces, or of a mesh after merging: bounds the time."""
 
     # facets.py
     facet_weld: float = 1e-5
     """Points of the kernel's facets nearer than this share of the size are one."""
+    listed_blank: int = 12
+    """Blank faces of one kind that a note names with their places."""
 
 
 MODEL = ModelSettings()

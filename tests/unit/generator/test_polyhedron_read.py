@@ -11,7 +11,7 @@ import pytest
 
 from generator.errors import ShapeError
 from generator.polyhedron import SHAPES, dihedral, face_area, polyhedron, surface_area, volume
-from generator.polyhedron.read import read_shape
+from generator.polyhedron.read import merge, read_shape
 from generator.polyhedron.read.settings import MODEL
 
 SHAPES_FOLDER = Path(__file__).parents[3] / "fixtures" / "shapes"
@@ -187,10 +187,59 @@ def sphere(rows, columns, radius=30.0):
     ]
 
 
-def test_sphere_is_refused_with_its_faces(tmp_path):
+def test_a_sphere_stays_blank(tmp_path):
+    solid = read_shape(written(tmp_path, "s.stl", binary_stl(sphere(24, 48))))
+    assert len(solid.blank) == len(solid.faces) == 1152
+    assert {face.name.partition(".")[0] for face in solid.faces} == {"F1"}
+    assert "1 curved region stays blank, 1152 of 1152 facets: F1 about (0, 0, 0)" in solid.notes[-1]
+
+
+def test_too_many_faces_are_counted_not_called_curved(tmp_path, monkeypatch):
+    monkeypatch.setattr(merge, "MODEL", replace(MODEL, most_facets=1000))
     error = refused(written(tmp_path, "s.stl", binary_stl(sphere(24, 48))))
     assert error.cause.startswith("1152 planar faces, the smallest of ")
-    assert "the surface is curved; 400 faces are allowed" in error.cause
+    assert error.cause.endswith(" mm^2; 1000 are allowed")
+
+
+def rounded_bar(steps):
+    """Return the triangles of a bar of 60 x 40 x 50 mm, one long edge rounded by 10 mm."""
+    turn = np.linspace(0, np.pi / 2, steps + 1)
+    arc = np.stack([50 + 10 * np.cos(turn), 30 + 10 * np.sin(turn)], axis=1)
+    ring = np.concatenate([[[0, 0], [60, 0]], arc, [[0, 40]]])
+    found = []
+    for p, q in zip(ring, np.roll(ring, -1, axis=0), strict=True):
+        found += [((*p, 0), (*q, 0), (*q, 50)), ((*p, 0), (*q, 50), (*p, 50))]
+    for p, q in itertools.pairwise(ring[1:]):
+        found += [((*ring[0], 50), (*p, 50), (*q, 50)), ((*ring[0], 0), (*q, 0), (*p, 0))]
+    return found
+
+
+def test_planar_faces_of_a_rounded_mesh_keep_their_symbols(tmp_path):
+    solid = read_shape(written(tmp_path, "r.stl", binary_stl(rounded_bar(100))))
+    blank = [solid.faces[face].name for face in solid.blank]
+    assert blank == ["F7", *(f"F7.{k}" for k in range(2, 101))]
+    plain = [f.name for k, f in enumerate(solid.faces) if k not in solid.blank]
+    assert sorted(plain) == [f"F{k}" for k in range(1, 7)]
+    assert volume(solid) == pytest.approx(50 * (2400 - 100 + 25 * np.pi), rel=1e-4)
+    assert "100 of 106 facets: F7 about (55, 35, 25)" in solid.notes[-1]
+    few = read_shape(written(tmp_path, "f.stl", binary_stl(rounded_bar(20))))
+    assert (len(few.faces), few.blank) == (26, ())
+
+
+def test_corners_on_other_edges_are_joined(tmp_path):
+    """One side of a box has an edge that its neighbours have in two and three pieces."""
+    corners = [(0, 0), (30, 0), (30, 20), (0, 20)]
+    found = []
+    for (a, b), (c, d) in zip(corners, corners[1:] + corners[:1], strict=True):
+        found += [((a, b, 0), (c, d, 0), (c, d, 10)), ((a, b, 0), (c, d, 10), (a, b, 10))]
+    found += [((0, 0, 10), (10, 0, 10), (0, 20, 10)), ((10, 0, 10), (18, 0, 10), (0, 20, 10)),
+              ((18, 0, 10), (30, 0, 10), (0, 20, 10)), ((30, 0, 10), (30, 20, 10), (0, 20, 10)),
+              ((15, 0, 0), (0, 0, 0), (0, 20, 0)), ((30, 0, 0), (15, 0, 0), (0, 20, 0)),
+              ((30, 0, 0), (0, 20, 0), (30, 20, 0))]  # fmt: skip
+    solid = read_shape(written(tmp_path, "t.stl", binary_stl(found)))
+    assert (len(solid.faces), volume(solid)) == (6, pytest.approx(6000.0))
+    gap = refused(written(tmp_path, "g.stl", binary_stl(found[:-1])))
+    assert "not closed" in gap.cause
 
 
 def test_coarse_sphere_is_a_polyhedron(tmp_path):
@@ -198,7 +247,7 @@ def test_coarse_sphere_is_a_polyhedron(tmp_path):
     assert (len(solid.faces), solid.genus) == (96, 0)
 
 
-def test_slightly_curved_face_is_refused(tmp_path):
+def test_a_slightly_curved_face_stays_blank(tmp_path):
     # A plate with a bulge of 2 mm over 3000 mm, in steps too small for an edge each.
     x = np.linspace(0, 3000, 400)
     top = 2.0 - 2.0 * ((x - 1500) / 1500) ** 2 + 100
@@ -212,8 +261,9 @@ def test_slightly_curved_face_is_refused(tmp_path):
         a, b, c, d = lower[k], lower[k + 1], upper[k + 1], upper[k]
         caps += [((*a, 500), (*b, 500), (*c, 500)), ((*a, 500), (*c, 500), (*d, 500))]
         caps += [((*c, 0), (*b, 0), (*a, 0)), ((*d, 0), (*c, 0), (*a, 0))]
-    error = refused(written(tmp_path, "bulge.stl", binary_stl(sides + caps)))
-    assert "is curved: it bends by" in error.cause
+    solid = read_shape(written(tmp_path, "bulge.stl", binary_stl(sides + caps)))
+    assert "1 curved region stays blank" in solid.notes[-1]
+    assert len(solid.faces) - len(solid.blank) == 5
 
 
 def test_step_with_a_bore_has_a_round_face():

@@ -89,7 +89,7 @@ def test_fillets_unroll_and_their_corners_stay_blank():
     solid = polyhedron_from(fillet(8.0))
     assert kinds(solid) == [("cylinder", False, False)] * 12
     (note,) = solid.notes
-    assert note.startswith("faces F6, F7")
+    assert note.startswith("faces F6 about (4, 4, 4), F7 about (4, 4, 36), ")
     assert "(sphere)" in note
     assert solid.blank
 
