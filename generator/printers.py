@@ -1,8 +1,10 @@
 """What a printer can make: the limits that symbols and panels must respect.
 
-Figures for a 0.4 mm nozzle and for resin: measured with a slicer and a resin
-printer's data sheet; a stroke under two nozzle widths may print nothing. A machine is a bed with
-the limits of its nozzle: `prusa-mk4`, `prusa-mk4-0.6`.
+Figures for nozzles of 0.4 and 0.6 mm and for resin: measured with a slicer and a resin
+printer's data sheet. Strokes and gaps inside symbols are the narrowest of which all survive on the
+simulated print with bad faults (docs/pitches.md): of 4 mm symbols on 0.4 mm, of 4.5 mm ones on
+0.6 mm, where 34 of 81 symbols of 4 mm survive; of 0.8 mm they are in proportion to 0.4 mm. A
+machine is a bed with the limits of its nozzle: `prusa-mk4`, `prusa-mk4-0.6`.
 """
 
 from __future__ import annotations
@@ -23,7 +25,8 @@ class Printer:
     bed_mm: tuple[float, float]  #: usable x and y of the bed, mm
     layer_mm: float  #: layer height, mm; symbol heights are best a multiple of it
     stroke_min_mm: float  #: narrowest stroke that prints at its full volume, mm
-    gap_min_mm: float  #: narrowest gap between two strokes that stays open, mm
+    gap_min_mm: float  #: narrowest gap between two symbols or plates that stays open, mm
+    gap_inside_mm: float  #: narrowest gap between two strokes of one symbol at their tops, mm
     height_min_mm: float  #: lowest symbol that can be felt after printing, mm
     edge_min_mm: float  #: least distance from a symbol's foot to a face edge, mm
     overhang_max_rad: float  #: steepest overhang, from the vertical, that needs no support
@@ -45,15 +48,15 @@ PRINTERS: dict[str, Printer] = {
     printer.name: printer
     for printer in (
         Printer("fdm-0.4", "filament, 0.4 mm nozzle, 0.2 mm layers", (250.0, 210.0), 0.2, 0.8, 0.8,
-                0.4, 0.8, math.radians(45), 0.4),
+                0.24, 0.4, 0.8, math.radians(45), 0.4),
         Printer("fdm-0.25", "filament, 0.25 mm nozzle, 0.1 mm layers", (250.0, 210.0), 0.1, 0.5,
-                0.5, 0.3, 0.5, math.radians(45), 0.25),
-        Printer("fdm-0.6", "filament, 0.6 mm nozzle, 0.3 mm layers", (250.0, 210.0), 0.3, 1.2, 1.2,
-                0.6, 1.2, math.radians(45), 0.6),
+                0.5, 0.24, 0.3, 0.5, math.radians(45), 0.25),
+        Printer("fdm-0.6", "filament, 0.6 mm nozzle, 0.3 mm layers", (250.0, 210.0), 0.3, 0.9, 1.0,
+                0.27, 0.6, 1.2, math.radians(45), 0.6),
         Printer("fdm-0.8", "filament, 0.8 mm nozzle, 0.4 mm layers", (250.0, 210.0), 0.4, 1.6, 1.6,
-                0.8, 1.6, math.radians(45), 0.8),
-        Printer("resin", "resin, 0.05 mm pixels and layers", (140.0, 85.0), 0.05, 0.4, 0.3, 0.1,
-                0.3, math.radians(60), 0.0, 1180.0),
+                0.48, 0.8, 1.6, math.radians(45), 0.8),
+        Printer("resin", "resin, 0.05 mm pixels and layers", (140.0, 85.0), 0.05, 0.4, 0.3,
+                0.15, 0.1, 0.3, math.radians(60), 0.0, 1180.0),
     )
 }  # fmt: skip
 

@@ -1,8 +1,8 @@
 """Whether a printer can make the symbols of an alphabet as a style asks.
 
 Limits, from `Printer`: stroke and height; between neighbouring symbols the gap at the foot,
-because symbols that grow together change what is read; inside a symbol half of that gap
-between the tops of two strokes, because there a gap that half closes costs contrast only
+because symbols that grow together change what is read; inside a symbol the gap between the
+tops of two strokes, which may be narrower, because one that half closes costs contrast only
 (strokes 0.2 mm too wide are still read without error).
 """
 
@@ -16,7 +16,6 @@ import numpy as np
 
 from generator.alphabet.known import Alphabet
 from generator.alphabet.outline import SymbolStyle, Tiers, footprint_half_mm, outlines
-from generator.alphabet.settings import OUTLINE
 from generator.errors import AlphabetError
 from generator.printers import Printer
 
@@ -92,7 +91,7 @@ def check_printable(alphabet: Alphabet, style: SymbolStyle, printer: Printer) ->
             fix=_ways_out(alphabet, style, printer),
             place=place,
         )
-    least = OUTLINE.inside_share * printer.gap_min_mm
+    least = printer.gap_inside_mm
     for glyph, tiers in zip(alphabet.glyphs, outlines(alphabet, style), strict=True):
         inside = gap_inside_mm(tiers)
         if inside < least * (1 - 1e-9):
@@ -115,7 +114,7 @@ def _ways_out(alphabet: Alphabet, style: SymbolStyle, printer: Printer) -> str:
         except AlphabetError:
             return False
         return gap_between_mm(alphabet, trial) >= printer.gap_min_mm and all(
-            gap_inside_mm(tiers) >= OUTLINE.inside_share * printer.gap_min_mm * (1 - 1e-9)
+            gap_inside_mm(tiers) >= printer.gap_inside_mm * (1 - 1e-9)
             for tiers in outlines(alphabet, trial)
         )
 

@@ -12,8 +12,6 @@ class OutlineSettings:
     shortest_edge: float = 0.01  #: of the stroke: an edge shorter than this is refused as collapsed
     least_chamfer_mm: float = 0.01  #: a smaller one cannot be seen, and its sides would be slivers
     foot_margin: float = 0.005  #: of the pitch: free around the footprint, for triangulation
-    inside_share: float = 0.5
-    """Of the printer's least gap that strokes of one symbol keep at their tops."""
 
 
 OUTLINE = OutlineSettings()

@@ -144,7 +144,7 @@ def encode(
         `lab.db`, `sqlite:///lab.db` or `postgresql://host/name`, in place of the spec's own;
         `lab.db` if neither says one.
     profile
-        As in a spec: one-touch, thesis, product, large, fine, auto.
+        As in a spec: auto (if left out), one-touch, large, fine, thesis, product.
     folder
         For the files; the spec's own or `out/NAME` if left out.
     formats
@@ -177,9 +177,9 @@ def encode(
     >>> spec = {"name": "Cube", "shape": {"cube": "30 mm"}}
     >>> result = encode(spec, database=f"{folder}/lab.db", folder=folder, formats=["stl"])
     >>> print(result)  # doctest: +ELLIPSIS
-    Cube: 6 faces, 96 symbols, 8 files in ...
+    Cube: 6 faces, 150 symbols, 9 files in ...
     >>> result.symbols, result.files[0].name
-    (96, 'Cube-F1.stl')
+    (150, 'Cube-F1.stl')
     """
     named = {"name": name, "profile": profile, **settings}
     url = None if database is None else database_option(database)

@@ -1,11 +1,11 @@
 """The array of a run: the lab's own of the profile, and for `auto` the one that the objects need.
 
 Of arrays with the same symbols the smallest is taken in which the objects fit beside what the
-database holds: `one-touch`, `large`, and its next sizes. Objects that are registered keep the array
-they are on, and a lab goes on with the arrays that it has: what it made objects on under a
-profile's name is what that profile means. Faces that stay blank and would show a place with the
-finer symbols of `fine` make it the choice where the spec names a printer for them, and a note
-where it does not. Objects that came from another lab, asked for again, keep that lab's array.
+database holds, an empty one with room for more of them: `large`, and its next sizes. Objects that
+are registered keep the array they are on and their pitch, and a lab goes on with the arrays that
+it has: what it made objects on under a profile's name is what that profile means. The finer
+symbols are taken where the printer makes them and they show places on faces that would
+stay blank. Objects that came from another lab, asked for again, keep that lab's array.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from generator.database.registered import RegisteredArray
 from generator.errors import ArrayError, GeneratorError, LayoutError
 from generator.layout.placement import Layout
 from generator.pipeline.place import NO_CELLS, lay_out_object
-from generator.pipeline.plan import ObjectPlan, plan_object
+from generator.pipeline.plan import ObjectPlan, has_round_faces, plan_object
 from generator.pipeline.settings import CHOICE
 from generator.polyhedron import Polyhedron
 from generator.spec import LocatedSpec, error_at
-from generator.spec.profile import AUTO
+from generator.spec.profile import AUTO, SMALLEST
 from generator.spec.script import with_profile
 
 
@@ -80,21 +80,24 @@ def choose_array(
             return Choice(tuple(_follow(one, profile, *published) for one in specs))
         made = (other.definition, other.lab_key) if other else _made_on(PROFILES[profile], lab)
         return Choice(tuple(_follow(one, profile, *made) for one in specs))
-    if other is not None:
-        made = other.definition, other.lab_key
-        return Choice(tuple(_with_array(one, other.profile, *made) for one in specs))
-    if connection is not None:
-        for one in specs:
-            known = find_object(connection, one.spec.name)
-            kept = lab.made.get(known.profile) if known else None
-            if kept is not None and _of_candidate(kept.profile):
-                made = kept.definition, kept.lab_key
-                return Choice(tuple(_with_array(each, kept.profile, *made) for each in specs))
+    pitches = _registered_pitches(specs, connection)
+    kept = other or _array_kept(specs, lab, connection)
+    if kept is not None:
+        made = kept.definition, kept.lab_key
+        new = next(iter(pitches.values()), None)  # as those that stand beside it
+        return Choice(
+            tuple(
+                _with_array(one, kept.profile, *made, pitches.get(one.spec.name, new))
+                for one in specs
+            )
+        )
     short: list[str] = []  # why each smaller array does not do
     for candidate in _candidates():
         array = lab.of_profile(candidate)
         made = array.definition(), lab.key_of(candidate)
-        tried = tuple(_with_array(one, candidate.name, *made) for one in specs)
+        tried = tuple(
+            _with_array(one, candidate.name, *made, _pitch_of_shape(one, solid)) for one in specs
+        )
         needed, blank = _count_needs(tried, solid)
         room = _room(array, connection)
         size = f"{candidate.name} {array.rows}x{array.columns}"
@@ -105,7 +108,7 @@ def choose_array(
         else:
             notes = (_larger_note(candidate, array, short[-1]),) if short else ()
             found = Choice(tried, notes)
-            return _choose_finer(found, blank, lab, connection, solid) if blank else found
+            return _choose_finer(found, blank, room, solid) if blank else found
     raise LayoutError(
         f"the objects fit no array that is made here: {short[-1]}",
         fix="make them in several databases",
@@ -115,40 +118,30 @@ def choose_array(
 def _larger_note(chosen: Profile, array: SymbolArray, why: str) -> str:
     """Return the note that a larger array was taken than the smallest one."""
     rows, columns = array.window
-    of_smallest = "x".join(map(str, PROFILES[DEFAULT_PROFILE].window))
+    of_smallest = "x".join(map(str, PROFILES[SMALLEST].window))
     window = f"window {rows}x{columns} in place of {of_smallest}"
     return f"profile {chosen.name} is taken ({window}): {why}"
 
 
-def _choose_finer(
-    coarse: Choice,
-    blank: int,
-    lab: LabArrays,
-    connection: Connection | None,
-    solid: Polyhedron | None,
-) -> Choice:
-    """Take the finer symbols where they show faces that stay blank otherwise."""
-    fine = PROFILES["fine"]
-    array = lab.of_profile(fine)
-    made = array.definition(), lab.key_of(fine)
-    try:
-        finer = tuple(_with_array(one, fine.name, *made) for one in coarse.specs)
-        needed, left = _count_needs(finer, solid)
-    except GeneratorError:  # the printer that the spec names cannot make them
-        return coarse
-    if needed is None or left >= blank or needed > _room(array, connection):
-        return coarse
-    if all(_names_printer(one) for one in coarse.specs):
-        return Choice(finer)
-    faces = f"{blank - left} of the {blank} blank faces"
-    note = f"profile fine, for resin printers, would show places on {faces}"
-    return Choice(coarse.specs, (*coarse.notes, note))
+def _choose_finer(coarse: Choice, blank: int, room: int, solid: Polyhedron | None) -> Choice:
+    """Take finer symbols on the same array where they show faces that stay blank otherwise."""
+    found, left = coarse, blank
+    for pitch in CHOICE.finer_mm:
+        try:
+            finer = tuple(_with_pitch(one, pitch) for one in coarse.specs)
+            needed, now = _count_needs(finer, solid)
+        except GeneratorError:  # the printer cannot make them
+            break
+        if needed is not None and now < left and needed <= room:
+            faces = f"{blank - now} of the {blank} faces that coarser symbols leave blank"
+            note = f"pitch {pitch:g} mm is taken: it shows places on {faces}"
+            found, left = Choice(finer, (*coarse.notes, note)), now
+    return found
 
 
 def _candidates() -> Iterator[Profile]:
     """Yield the arrays from the smallest on."""
-    yield PROFILES["one-touch"]
-    larger = PROFILES["large"]
+    larger = PROFILES[SMALLEST]
     yield larger
     for _ in range(CHOICE.larger):
         try:
@@ -181,16 +174,55 @@ def _array_of_another_lab(
     return array if keyed and array.lab_key != lab.key else None
 
 
+def _registered_pitches(
+    specs: Sequence[LocatedSpec], connection: Connection | None
+) -> dict[str, float]:
+    """Return the pitch of each object that is registered already, mm."""
+    if connection is None:
+        return {}
+    entries = (find_object(connection, one.spec.name) for one in specs)
+    return {entry.name: entry.pitch_mm for entry in entries if entry is not None}
+
+
+def _array_kept(
+    specs: Sequence[LocatedSpec], lab: LabArrays, connection: Connection | None
+) -> RegisteredArray | None:
+    """Return the array of the lab's own that one of the objects is registered on."""
+    if connection is None:
+        return None
+    for one in specs:
+        known = find_object(connection, one.spec.name)
+        kept = lab.made.get(known.profile) if known else None
+        if kept is not None and _of_candidate(kept.profile):
+            return kept
+    return None
+
+
 def _of_candidate(profile: str) -> bool:
-    """Whether a profile's name is one that `auto` gives: one-touch, large, large-511x513, ..."""
-    return profile == DEFAULT_PROFILE or profile.partition("-")[0] == "large"
+    """Whether `auto` gave objects arrays under a profile's name, in this version or before it."""
+    return profile in (DEFAULT_PROFILE, "fine") or profile.partition("-")[0] == SMALLEST
 
 
 def _with_array(
-    located: LocatedSpec, profile: str, encoding: Mapping[str, Any], array_key: str
+    located: LocatedSpec,
+    profile: str,
+    encoding: Mapping[str, Any],
+    array_key: str,
+    pitch_mm: float | None = None,
 ) -> LocatedSpec:
-    defaults = "large" if profile.startswith("large") else profile
-    return with_profile(located, profile, defaults, encoding, array_key)
+    """Return a spec of `auto` on an array; at a pitch, if its own is to be chosen."""
+    return with_profile(located, profile, AUTO, encoding, array_key, pitch_mm)
+
+
+def _pitch_of_shape(located: LocatedSpec, solid: Polyhedron | None) -> float | None:
+    """Return the pitch that an object's faces are read best at; None for the usual one."""
+    bent = bool(solid.surfaces) if solid else has_round_faces(located.spec)
+    return CHOICE.round_mm if bent else None
+
+
+def _with_pitch(located: LocatedSpec, pitch_mm: float) -> LocatedSpec:
+    spec = located.spec
+    return _with_array(located, spec.profile, spec.encoding, spec.array_key, pitch_mm)
 
 
 def _follow(
@@ -200,7 +232,7 @@ def _follow(
     if located.spec.profile != AUTO:
         spec = replace(located.spec, encoding=encoding, array_key=array_key)
         return replace(located, spec=spec)
-    defaults = profile if profile in PROFILES else DEFAULT_PROFILE
+    defaults = profile if profile in PROFILES else AUTO
     return with_profile(located, profile, defaults, encoding, array_key)
 
 
@@ -229,11 +261,10 @@ def _counts(plan: ObjectPlan, layout: Layout) -> tuple[int, int]:
 
 
 def _room(array: SymbolArray, connection: Connection | None) -> int:
-    """Return how many more cells of an array faces of all shapes can have."""
+    """Return how many more cells of an array objects may have, faces of all shapes.
+
+    The first ones leave room for more.
+    """
     taken = 0 if connection is None else occupancy(connection, array).used
-    return max(0, int(LIMITS.full * array.rows * array.columns) - taken)
-
-
-def _names_printer(located: LocatedSpec) -> bool:
-    written = located.tree.value.get("print")
-    return isinstance(written, dict) and written.get("printer") is not None
+    room = max(0, int(LIMITS.full * array.rows * array.columns) - taken)
+    return room if taken else int(CHOICE.first * room)

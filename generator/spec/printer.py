@@ -78,7 +78,8 @@ class PrinterSettings(Block):
     stroke: Length | None = None
     """Narrowest stroke that prints at its full volume."""
     gap: Length | None = None
-    """Narrowest gap between two strokes that stays open."""
+    """Narrowest gap between two symbols that stays open; inside a symbol, that share of it which
+    the printer keeps that it is like."""
     height: Length | None = None
     """Lowest symbol that can be felt after printing."""
     edge: Length | None = None
@@ -121,6 +122,8 @@ def resolved_printer(settings: PrinterSettings, tree: Tree) -> Printer:
     if settings.nozzle is not None:
         limits = printer_of_nozzle(settings.nozzle)
         base = replace(limits, name=base.name, description=base.description, bed_mm=base.bed_mm)
+    if settings.gap is not None:
+        given["gap_inside_mm"] = settings.gap * base.gap_inside_mm / base.gap_min_mm
     if not given and settings.nozzle is None and settings.name is None:
         return base
     name = settings.name or f"own (like {settings.like})"

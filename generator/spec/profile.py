@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 from generator.array.profiles import PROFILES
 
-DEFAULT_PROFILE = "one-touch"
-AUTO = "auto"  # the smallest array that the objects fit, chosen when they are made
+AUTO = "auto"  # the default: array and pitch are chosen when the objects are made
+SMALLEST = "large"  # of the arrays that `auto` takes: room for some hundred objects
 EXPLICIT = "explicit"  # stands for the profile's name where an encoding is written out
 HEIGHT_MM = 1.0  # a multiple of common layer heights
 DRAFTS_RAD = (0.174532925199, 0.130899693900, 0.087266462600, 0.043633231300)
@@ -28,21 +28,34 @@ class SymbolDefaults:
 
     alphabet: str
     pitch_mm: float
-    printer: str = "fdm-0.4"
+    printer: str
+    coarser_mm: tuple[float, ...] = ()  #: pitches for symbols that need more room, rising
 
+
+PRINTER = "fdm-0.4"
+READ_BEST_MM = 5.0
+"""Pitch that `auto` takes: what touches are read best at, on nozzles of 0.4 and 0.6 mm and CAD
+surfaces alike (docs/pitches.md)."""
+COARSER_MM = (5.5, 6.0, 7.0, 8.0, 10.0, 12.0)
+"""And the first of these that prints, where a spec asks for symbols that need more room."""
 
 _OF_ORDER = {
-    2: SymbolDefaults("thesis-2", 12.0),
-    4: SymbolDefaults("dense-4", 7.0),
-    8: SymbolDefaults("dense-8", 8.0),
+    2: SymbolDefaults("thesis-2", 12.0, PRINTER),
+    4: SymbolDefaults("dense-4", 7.0, PRINTER),
+    8: SymbolDefaults("dense-8", 8.0, PRINTER),
 }
 
 
 def defaults_of_profile(name: str) -> SymbolDefaults:
-    """Return what a profile gives; the strokes of `fine` need a finer printer."""
+    """Return what a profile that is named gives; `fine` is meant for resin."""
     profile = PROFILES[name]
-    printer = "resin" if name == "fine" else "fdm-0.4"
+    printer = "resin" if name == "fine" else PRINTER
     return SymbolDefaults(profile.alphabet, profile.pitch_mm, printer)
+
+
+def auto_defaults() -> SymbolDefaults:
+    """Return what `auto` gives."""
+    return SymbolDefaults(PROFILES[SMALLEST].alphabet, READ_BEST_MM, PRINTER, COARSER_MM)
 
 
 def defaults_of_order(order: int) -> SymbolDefaults:

@@ -15,6 +15,7 @@ from encoded_objects.document.tree import Place, Tree, read_tree
 from generator.spec.explain import explain_errors
 from generator.spec.located import LocatedSpec, mark_of
 from generator.spec.problem import SPEC, SpecError
+from generator.spec.profile import AUTO
 from generator.spec.resolve import folder_name, resolve
 from generator.spec.resolved import ShapeSpec
 from generator.spec.settings import Defaults, NamedSettings, ObjectSettings, SharedSettings
@@ -49,7 +50,7 @@ def read_specs(
     Examples
     --------
     >>> read_specs(["fixtures/cube.yaml"])[0].spec.style.pitch_mm
-    7.0
+    5.0
     """
     problems: list[Problem] = []
     found: list[LocatedSpec] = []
@@ -204,7 +205,8 @@ def _names_array(tree: Tree) -> bool:
 def _shared_problems(found: Sequence[LocatedSpec], database: str | None) -> list[Problem]:
     """Return what keeps the objects from standing on one array, in one database."""
     problems: list[Problem] = []
-    first = found[0]
+    first = found[0]  # those of `auto` follow the ones that name an array
+    on_array = next((one for one in found if one.spec.profile != AUTO), first)
     names: dict[str, LocatedSpec] = {}
     for located in found:
         spec = located.spec
@@ -221,10 +223,10 @@ def _shared_problems(found: Sequence[LocatedSpec], database: str | None) -> list
                     mark_of(located.tree, "name"),
                 )
             )
-        path = ""
-        if spec.encoding != first.spec.encoding:
-            path, what = "profile, encoding", "array"
-            one, two = spec.profile, first.spec.profile
+        path, beside = "", first
+        if spec.profile != AUTO and spec.encoding != on_array.spec.encoding:
+            path, what, beside = "profile, encoding", "array", on_array
+            one, two = spec.profile, on_array.spec.profile
         elif database is None and spec.database != first.spec.database:
             path, what = "output.database", "database"
             one, two = spec.database, first.spec.database
@@ -232,7 +234,7 @@ def _shared_problems(found: Sequence[LocatedSpec], database: str | None) -> list
             path, what = "output.lab_key", "lab key"
             one, two = spec.lab_key or "none", first.spec.lab_key or "none"
         if path:
-            cause = f"'{spec.name}' is on another {what} ({one}) than '{first.spec.name}' ({two})"
+            cause = f"'{spec.name}' is on another {what} ({one}) than '{beside.spec.name}' ({two})"
             fix = f"run encode-object once for each {what}"
             problems.append(Problem(cause, fix, mark_of(located.tree, path)))
     return problems

@@ -27,14 +27,15 @@ from generator.spec.problem import SpecError
 from generator.spec.profile import (
     AUTO,
     DATABASE,
-    DEFAULT_PROFILE,
     DRAFTS_RAD,
     EXPLICIT,
     FORMATS,
     GAP_MM,
     HEIGHT_MM,
+    SMALLEST,
     WALL_MM,
     SymbolDefaults,
+    auto_defaults,
     defaults_of_order,
     defaults_of_profile,
 )
@@ -78,8 +79,10 @@ def resolve(
     if isinstance(settings, ObjectSettings):
         shape = resolved_shape(settings.shape, tree, refuse)
     encoding, order = _array(settings, refuse)
-    if settings.encoding is None or order is None:
-        defaults = defaults_of_profile(_profile(settings))
+    if settings.encoding is None and _profile(settings) == AUTO:
+        defaults = auto_defaults()
+    elif settings.encoding is None or order is None:
+        defaults = defaults_of_profile(_array_profile(settings))
     else:
         defaults = defaults_of_order(order)
     printer = _printer(settings, defaults, tree, problems)
@@ -89,6 +92,8 @@ def resolve(
         _refuse_order(alphabet, order, refuse)
     elif order is not None:
         found = _printable(alphabet, style, printer, settings.symbols.draft is None)
+        if isinstance(found, AlphabetError) and settings.symbols.pitch is None:
+            found = _coarser(settings, defaults, alphabet, printer) or found
         if isinstance(found, AlphabetError):
             _refuse_style(found, refuse)
         else:
@@ -113,7 +118,7 @@ def resolve(
     spec = ObjectSpec(
         name=settings.name,
         shape=shape,
-        profile=EXPLICIT if settings.encoding else settings.profile or DEFAULT_PROFILE,
+        profile=EXPLICIT if settings.encoding else _profile(settings),
         encoding=encoding,
         alphabet=alphabet.name,
         style=style,
@@ -158,6 +163,18 @@ def _whole_layers_mm(height_mm: float, printer: Printer) -> float:
     while layers * printer.layer_mm < printer.height_min_mm - 1e-9:
         layers += 1
     return round(layers * printer.layer_mm, 6)
+
+
+def _coarser(
+    settings: NamedSettings, defaults: SymbolDefaults, alphabet: Alphabet, printer: Printer
+) -> SymbolStyle | None:
+    """Return the finest style that prints of those which the defaults allow beside their own."""
+    for pitch in defaults.coarser_mm:
+        style = _style(settings, replace(defaults, pitch_mm=pitch), printer)
+        found = _printable(alphabet, style, printer, settings.symbols.draft is None)
+        if isinstance(found, SymbolStyle):
+            return found
+    return None
 
 
 def _style(settings: NamedSettings, defaults: SymbolDefaults, printer: Printer) -> SymbolStyle:
@@ -212,15 +229,19 @@ def _refuse_order(alphabet: Alphabet, order: int, refuse: Refuse) -> None:
 
 
 def _profile(settings: NamedSettings) -> str:
-    """Return the profile that defaults come from; `auto` begins with the default one."""
-    named = settings.profile or DEFAULT_PROFILE
-    return DEFAULT_PROFILE if named == AUTO else named
+    """Return the profile of a spec that writes no encoding."""
+    return settings.profile or AUTO
+
+
+def _array_profile(settings: NamedSettings) -> str:
+    """Return the profile whose array is taken as long as none is chosen for `auto`."""
+    return SMALLEST if _profile(settings) == AUTO else _profile(settings)
 
 
 def _array(settings: NamedSettings, refuse: Refuse) -> tuple[dict[str, Any], int | None]:
     """Return the complete definition of the array, and its number of symbols."""
     if settings.encoding is None:
-        return _profile_definition(_profile(settings))
+        return _profile_definition(_array_profile(settings))
     if settings.profile is not None:
         refuse(
             "encoding",

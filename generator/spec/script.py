@@ -74,7 +74,12 @@ def tree_from(settings: Mapping[str, Any]) -> Tree:
 
 
 def with_profile(
-    located: LocatedSpec, name: str, defaults: str, encoding: Mapping[str, Any], array_key: str
+    located: LocatedSpec,
+    name: str,
+    defaults: str,
+    encoding: Mapping[str, Any],
+    array_key: str,
+    pitch_mm: float | None = None,
 ) -> LocatedSpec:
     """Return a spec on another array.
 
@@ -90,6 +95,8 @@ def with_profile(
         Complete definition of the array.
     array_key
         Lab key that it was made from; empty for a published one.
+    pitch_mm
+        Where the spec says none, in place of that of `defaults`.
 
     Raises
     ------
@@ -97,6 +104,9 @@ def with_profile(
         The spec's own settings do not go with those of the profile.
     """
     value = {key: inner for key, inner in located.tree.value.items() if key != "shape"}
+    if pitch_mm is not None:
+        given = {k: v for k, v in (value.get("symbols") or {}).items() if v is not None}
+        value["symbols"] = {"pitch": pitch_mm, **given}
     read = NamedSettings.model_validate({**value, "profile": defaults, "copies": 1})
     (spec,) = resolve(read, located.tree, located.spec.shape)
     name_of_copy = located.spec.name

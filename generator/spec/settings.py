@@ -107,11 +107,11 @@ class Symbols(Block):
     """How the symbols are embossed; what is left out follows from the profile."""
 
     pitch: Length | None = None
-    """Distance between neighbouring symbols; 7 mm for one-touch."""
+    """Distance between neighbouring symbols; auto takes what reads best on the printer."""
     height: Length | None = None
     """How far symbols stand out; 1 mm."""
     stroke: Length | None = None
-    """Width of the strokes at their top; a share of the pitch, 1.4 mm for one-touch."""
+    """Width of the strokes at their top; a fifth of the pitch for most alphabets."""
     draft: Angle | None = None
     """Slope of the strokes' sides from the vertical; 10 deg, or less where there is no room."""
     chamfer: LengthOrZero | None = None
@@ -165,8 +165,8 @@ class Defaults(Block):
     version: Version = 1
     """Version of this file format."""
     profile: ProfileName | None = None
-    """The array, its alphabet and its pitch by name; one-touch if left out. auto takes the
-    smallest array that holds the objects."""
+    """The array, its alphabet and its pitch by name; auto if left out: the smallest array with
+    room for the objects and more, at the pitch that the printer's prints are read best at."""
     encoding: Encoding | None = None
     """The array, named explicitly, in place of a profile."""
     layout: Literal["auto", "net", "faces"] = "auto"

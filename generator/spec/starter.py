@@ -21,15 +21,15 @@ version: 1
 name: {name}
 {shape}
 
-# profile: one-touch     # one-touch | thesis | product | large | fine | auto
+# profile: auto          # auto | one-touch | large | fine | thesis | product
 # layout: auto           # auto | net (one lattice through the unfolded object) | faces
 # copies: 1              # each copy has cells of its own, so that two are told apart
 
 # symbols:
-#   pitch: 7 mm          # distance between neighbouring symbols
+#   pitch: 5 mm          # distance between neighbouring symbols
 #   height: 1 mm         # best a multiple of the layer height
-#   stroke: 1.4 mm       # width of the strokes at their top
-#   draft: 10 deg        # slope of their sides
+#   stroke: 1 mm         # width of the strokes at their top
+#   draft: 7.5 deg       # slope of their sides
 #   chamfer: 0 mm        # of their top edges
 #   alphabet: dense-4    # dense-4 | letters-4 | thesis-2 | dense-8
 

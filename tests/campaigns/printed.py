@@ -1,10 +1,11 @@
 """Print one panel of each profile on several printers in simulation; how symbols come out.
 
     python tests/campaigns/printed.py [-o docs/printed] [--size 60]
+    python tests/campaigns/printed.py --size 40 --pitches 4,4.5,5,5.5,6    # of profile large
 
 Prints a table (docs/printed.md holds it) and writes one picture for each combination. Needs
-PrusaSlicer. Profile `fine` is planned for resin, so that its 4.5 mm symbols are not refused
-for filament, and printed on filament all the same.
+PrusaSlicer. All are planned for resin, so that nothing is refused for filament, and printed on
+filament all the same.
 """
 
 from __future__ import annotations
@@ -27,16 +28,17 @@ from generator.solid.part import Part
 from generator.solid.triangulate import triangles
 from generator.spec.read import read_specs
 
-SPECS = ("one-touch", "large", "fine", "thesis", "product")
+SPECS = [(profile, "") for profile in ("one-touch", "large", "fine", "thesis", "product")]
 PRINTS = ("fdm-0.4-0.2", "fdm-0.4-0.3", "fdm-0.6-0.3")
 FAULTS = ("none", "usual", "bad")
 
 
-def panel(profile: str, size_mm: float, folder: Path) -> tuple[ObjectPlan, Part]:
-    printer = "\nprint: {printer: resin}" if profile == "fine" else ""
+def panel(profile: str, pitch: str, size_mm: float, folder: Path) -> tuple[ObjectPlan, Part]:
     spec = folder / f"{profile}.yaml"
+    symbols = f"symbols: {{pitch: {pitch} mm}}\n" if pitch else ""
     spec.write_text(
-        f"name: {profile}\nshape: {{cube: {size_mm:g} mm}}\nprofile: {profile}{printer}\n"
+        f"name: {profile}\nshape: {{cube: {size_mm:g} mm}}\nprofile: {profile}\n"
+        f"print: {{printer: resin}}\n{symbols}"
     )
     plan = plan_object(read_specs([spec], database=None)[0])
     layout = place_object(None, plan, False).layout
@@ -48,14 +50,16 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("-o", "--output", type=Path)
     options.add_argument("--size", type=float, default=60.0)
+    options.add_argument("--pitches", default="", help="of profile large, in place of profiles")
     asked = options.parse_args()
+    panels = [("large", pitch) for pitch in asked.pitches.split(",")] if asked.pitches else SPECS
     print("| profile | print | faults | symbols | overlap | worst | lost % | widened % | height mm "
           "| moved mm | survive | lost |")  # fmt: skip
     print("| --- " * 12 + "|")
     spent: dict[str, list[float]] = {"slicing": [], "beads": [], "surface": [], "survey": []}
     with tempfile.TemporaryDirectory() as name:
-        for profile in SPECS:
-            plan, part = panel(profile, asked.size, Path(name))
+        for profile, pitch in panels:
+            plan, part = panel(profile, pitch, asked.size, Path(name))
             stl = Path(name) / f"{profile}.stl"
             stl.write_bytes(b"".join(stl_chunks(triangles(part))))
             embossing = next(e for e in part.embossings if e.face is not None)
@@ -77,7 +81,7 @@ def main() -> None:
                     checks = [tile.check for tile in tiles]
                     area = np.mean([c.area_mm2 for c in checks])
                     print(
-                        f"| {profile} | {machine} | {faults} | {len(checks)} "
+                        f"| {profile} {pitch}| {machine} | {faults} | {len(checks)} "
                         f"| {np.mean([c.overlap for c in checks]):.3f} "
                         f"| {min(c.overlap for c in checks):.3f} "
                         f"| {100 * np.mean([c.lost_mm2 for c in checks]) / area:.1f} "

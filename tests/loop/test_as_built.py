@@ -49,7 +49,7 @@ def rms_mm(capsys, seed):
 @pytest.fixture
 def lab(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    Path("cube.yaml").write_text("{name: Cube, shape: {cube: 60 mm}}\n")
+    Path("cube.yaml").write_text("{name: Cube, shape: {cube: 60 mm}, profile: large}\n")
     assert encode_object(["cube.yaml", "-o", "out", "--format", "stl"]) == 0
     write_scaled(Path("out/Cube-F1.stl"), Path("printed/Cube-F1.stl"), (0.98, 0.985, 1.0))
     return tmp_path
@@ -86,7 +86,9 @@ def test_what_touches_tell_of_a_print_betters_later_poses(lab, capsys):
     assert rms_mm(capsys, 3)[0] < 0.06
 
     # the object is made anew: what was known of its part goes, what its printer makes stays
-    Path("cube.yaml").write_text("{name: Cube, shape: {cube: 60 mm}, print: {wall: 4 mm}}\n")
+    Path("cube.yaml").write_text(
+        "{name: Cube, shape: {cube: 60 mm}, profile: large, print: {wall: 4 mm}}\n"
+    )
     assert encode_object(["cube.yaml", "-o", "new", "--format", "stl", "--replace"]) == 0
     with closing(sqlite3.connect("lab.db")) as connection:
         kept = connection.execute("select object_id, part, printer, material from as_built")

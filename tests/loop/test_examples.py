@@ -47,7 +47,7 @@ def test_cadquery_wedge(tmp_path):
 def test_encode_set(tmp_path):
     said = said_by("encode_set.py", tmp_path)
     assert [line.partition(":")[0] for line in said.splitlines()[:3]] == ["Cube", "Box-1", "Box-2"]
-    assert re.search(r"^\d+ of 4095 cells in use$", said, re.MULTILINE)
+    assert re.search(r"^\d+ of 65535 cells in use$", said, re.MULTILINE)
 
 
 def test_simulate_and_read(tmp_path):
@@ -98,7 +98,8 @@ def test_report(tmp_path):
 
 
 def test_trimesh_part(tmp_path):
-    assert said_by("trimesh_part.py", tmp_path).startswith("Block: 6 faces, 184 symbols")
+    (symbols,) = re.findall(r"^Block: 6 faces, (\d+) symbols", said_by("trimesh_part.py", tmp_path))
+    assert 320 < int(symbols) < 350  # of 5 mm; how faces are laid out depends on the lab's array
 
 
 def test_examples_are_short_and_all_shown_and_run():

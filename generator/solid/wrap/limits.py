@@ -10,7 +10,6 @@ import numpy as np
 
 from generator.alphabet.outline import SymbolStyle, Tiers
 from generator.alphabet.printable import gap_inside_mm
-from generator.alphabet.settings import OUTLINE
 from generator.polyhedron.development import Development
 from generator.printers import Printer
 
@@ -48,7 +47,7 @@ def bend_problem(
             f"{printer.stroke_min_mm:g} mm"
         )
     gap = share * min(gap_inside_mm(shape) for shape in tiers)
-    least = OUTLINE.inside_share * printer.gap_min_mm
+    least = printer.gap_inside_mm
     if gap < least * (1 - 1e-9):
         return (
             f"its bend narrows gaps in a symbol to {gap:.3g} mm, {printer.name} needs {least:g} "

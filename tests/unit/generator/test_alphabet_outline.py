@@ -94,7 +94,10 @@ def test_a_loop_leaves_a_hole():
 @pytest.mark.parametrize(
     ("alphabet", "style", "printer"),
     [
-        ("dense-4", SymbolStyle(), "fdm-0.4"),  # the default
+        ("dense-4", SymbolStyle(), "fdm-0.4"),
+        ("dense-4", SymbolStyle(5.0, 1.0, 1.0, math.radians(7.5)), "fdm-0.4"),  # the default
+        ("dense-4", SymbolStyle(4.0, 1.0, 0.8, math.radians(5)), "fdm-0.4"),
+        ("dense-4", SymbolStyle(4.5, 1.0, 0.9, math.radians(5)), "fdm-0.6"),
         ("dense-4", SymbolStyle(4.5, 0.5, 0.9), "resin"),
         ("thesis-2", SymbolStyle(12.0, 1.0, 1.68), "fdm-0.4"),
         ("dense-8", SymbolStyle(10.0, 1.0, 2.0), "fdm-0.4"),
@@ -112,7 +115,7 @@ def test_profiles_can_be_printed(alphabet, style, printer):
     [
         (SymbolStyle(stroke_mm=0.5), "prints no stroke under 0.8 mm"),
         (SymbolStyle(height_mm=0.2), "cannot be felt"),
-        (SymbolStyle(pitch_mm=6.0, stroke_mm=1.2, height_mm=0.8), "two strokes of symbol '1'"),
+        (SymbolStyle(pitch_mm=3.9, stroke_mm=0.8, height_mm=0.5), "two strokes of symbol '1'"),
         (SymbolStyle(pitch_mm=7.0, stroke_mm=3.0), "touch at a pitch of 7 mm"),
         (SymbolStyle(draft_rad=math.radians(14)), "collapse"),
         (SymbolStyle(pitch_mm=8.0, stroke_mm=1.4), "collapse"),
@@ -133,7 +136,7 @@ def test_what_cannot_be_printed_is_refused(style, words):
 @pytest.mark.parametrize(
     "style",
     [
-        SymbolStyle(pitch_mm=6.0, stroke_mm=1.2, height_mm=0.8),
+        SymbolStyle(pitch_mm=3.9, stroke_mm=0.8, height_mm=0.5),
         SymbolStyle(pitch_mm=8.0, stroke_mm=1.4),
         SymbolStyle(stroke_mm=1.2),
         SymbolStyle(draft_rad=math.radians(14)),

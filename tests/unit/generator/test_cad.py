@@ -116,13 +116,13 @@ def test_a_spec_is_a_file_its_text_or_its_settings(tmp_path):
     settings = {"name": "Cube", "shape": {"cube": "30 mm"}}
     given = {"database": str(tmp_path / "lab.db"), "formats": (), "folder": tmp_path / "out"}
     first = encode(settings, **given)
-    assert (first.name, first.faces, first.symbols) == ("Cube", 6, 96)
+    assert (first.name, first.faces, first.symbols) == ("Cube", 6, 150)
     assert first.folder == tmp_path / "out"
-    assert str(first) == f"Cube: 6 faces, 96 symbols, {len(first.files)} files in {first.folder}"
+    assert str(first) == f"Cube: 6 faces, 150 symbols, {len(first.files)} files in {first.folder}"
     for again in (text, tmp_path / "cube.yaml", str(tmp_path / "cube.yaml")):
         assert encode(again, **given).objects[0].reused  # the same spec: the same cells
     two = encode({"objects": [settings, settings | {"name": "Second"}]}, **given)
-    assert (two.name, two.symbols) == ("Cube, Second", 192)
+    assert (two.name, two.symbols) == ("Cube, Second", 300)
     assert str(two).count("\n") == 1
     with pytest.raises(SpecError, match="'layout' stands beside a spec"):
         encode(text, layout="net", **given)

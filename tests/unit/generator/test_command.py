@@ -77,7 +77,7 @@ def test_made_object_end_to_end():
     assert {Path(file).parts[0] for file in cube["files"]} == {"made"}
     assert any(file.endswith(".stl") for file in cube["files"])
     assert not any(file.endswith((".step", ".3mf")) for file in cube["files"])
-    assert value["array"] == {"rows": 63, "columns": 65, "used_cells": cube["symbols"]}
+    assert value["array"] == {"rows": 51, "columns": 1285, "used_cells": cube["symbols"]}
     assert value["database"] == "sqlite:///d.db"
     assert value["seconds"] > 0
     listed = command("list", "--database", "d.db", "--json")
@@ -85,7 +85,7 @@ def test_made_object_end_to_end():
     assert (entry["name"], entry["symbols"]) == ("Cube", cube["symbols"])
     table = command("list", "--database", "d.db")
     assert table.returncode == 0
-    assert "one-touch 63x65" in table.stdout
+    assert "large 51x1285" in table.stdout
 
 
 def test_dry_run_says_what_would_be_made_and_writes_nothing(capsys):

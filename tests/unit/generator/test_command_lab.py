@@ -26,9 +26,9 @@ def _in_folder(tmp_path, monkeypatch):
     monkeypatch.setenv("COLUMNS", "160")
 
 
-def make(name, database, *options, more="", code=0):
+def make(name, database, *options, more="", top="", code=0):
     Path("spec.yaml").write_text(
-        f"name: {name}\nshape: {{cube: 30 mm}}\noutput: {{formats: stl{more}}}\n"
+        f"name: {name}\nshape: {{cube: 30 mm}}\noutput: {{formats: stl{more}}}\n{top}"
     )
     assert run(["spec.yaml", "--database", database, "-o", f"{database}-{name}", *options]) == code
 
@@ -60,7 +60,7 @@ def test_a_new_lab_draws_a_key_and_keeps_it(capsys, monkeypatch):
     assert b["lab_key"] == lab_key_of(b"other" * 4)
     assert held("a.db").array == held("a.db", "Second").array
     assert held("a.db").array.lab_key == a["lab_key"]
-    own = profile("one-touch").array_of_lab(a["lab_key"])
+    own = profile("large").array_of_lab(a["lab_key"])
     assert held("a.db").array.definition == own.definition()
     assert held("a.db").layout.faces[0].placement.row == own.first[0]
     assert files("a.db")["Cube-F1.stl"] != files("b.db")["Cube-F1.stl"]
@@ -80,12 +80,12 @@ def test_the_key_is_printed_with_the_arrays_and_what_is_left(capsys):
     value = said(capsys, "lab", "--database", "a.db")
     assert (value["lab_key"], value["database"]) == (KEY, "sqlite:///a.db")
     (array,) = value["arrays"]
-    assert (array["taken"], array["objects"], array["own"]) == (96, 1, True)
-    assert array["room"] == int(0.8 * 63 * 65) - 96
+    assert (array["taken"], array["objects"], array["own"]) == (150, 1, True)
+    assert array["room"] == int(0.8 * 51 * 1285) - 150
     capsys.readouterr()
     assert run(["lab", "--database", "a.db"]) == 0
     text = capsys.readouterr().out
-    for word in (KEY, "one-touch 63x65", "96 of 4095", "this lab's key", "2% full"):
+    for word in (KEY, "large 51x1285", "150 of 65535", "this lab's key", "0% full"):
         assert word in text
 
 
@@ -135,7 +135,11 @@ def test_a_lab_from_before_there_were_keys_goes_on_as_it_was(capsys):
     before = held("old.db")
     assert said(capsys, "lab", "--database", "old.db")["lab_key"] is None
     make("Second", "old.db")
-    assert held("old.db", "Second").array == before.array
+    brick = held("old.db", "Brick").array  # profile large was 255x257 then
+    assert held("old.db", "Second").array == brick
+    assert (brick.rows, brick.lab_key) == (255, "")
+    make("Same", "old.db", top="profile: one-touch\n")
+    assert held("old.db", "Same").array == before.array
     assert before.array.definition == profile("one-touch").array().definition()
     make("Third", "old.db", "--lab-key", KEY, code=2)
     assert "before there were lab keys" in capsys.readouterr().err
@@ -164,7 +168,7 @@ def test_another_program_may_make_the_database_meanwhile(monkeypatch):
     make("Cube", "a.db")
     with read_transaction(open_database("a.db")) as connection:
         assert lab_key(connection) == OTHER
-        assert lab_arrays(connection).made["one-touch"].lab_key == OTHER
+        assert lab_arrays(connection).made["large"].lab_key == OTHER
     assert held("a.db").array.lab_key == OTHER
 
 

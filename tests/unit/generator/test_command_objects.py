@@ -51,10 +51,10 @@ def said(capsys, *arguments, code=0):
 
 def test_show_names_faces_cells_files_and_origin(capsys):
     value = said(capsys, "show", "Cube")
-    assert (value["name"], value["shape"], value["symbols"]) == ("Cube", "cube", 96)
+    assert (value["name"], value["shape"], value["symbols"]) == ("Cube", "cube", 150)
     assert [face["name"] for face in value["faces"]] == ["F1", "F2", "F3", "F4", "F5", "F6"]
     cells = {tuple(cell[:2]) for face in value["faces"] for cell in face["cells"]}
-    assert len(cells) == 96
+    assert len(cells) == 150
     assert value["faces"][0]["placement"]["row"] == value["faces"][0]["cells"][0][0]
     assert {file["state"] for file in value["files"]} == {"ok"}
     assert spec_hash(value["provenance"]["spec"]) == value["spec_hash"]
@@ -62,7 +62,7 @@ def test_show_names_faces_cells_files_and_origin(capsys):
     assert value["database"] == "sqlite:///lab.db"
     assert run(["show", "Cube"]) == 0
     text = capsys.readouterr().out
-    for word in ("one-touch 63x65", "dense-4", "square", "900 mm2", "Cube-F1", "ok"):
+    for word in ("large 51x1285", "dense-4", "square", "900 mm2", "Cube-F1", "ok"):
         assert word in text
 
 
@@ -132,7 +132,7 @@ def test_retired_objects_are_listed_as_such_and_keep_their_cells(capsys):
     assert [entry["retired_utc"] is not None for entry in listed] == [False, True]
     capsys.readouterr()
     assert run(["retire", "Cube", "--undo"]) == 0
-    assert capsys.readouterr().out == "Cube: restored; its 96 cells were taken all the time\n"
+    assert capsys.readouterr().out == "Cube: restored; its 150 cells were taken all the time\n"
     assert run(["Cube.yaml"]) == 0
     assert said(capsys, "show", "Cube")["retired_utc"] is None
 
@@ -144,7 +144,7 @@ def test_cells_are_freed_only_when_that_is_confirmed(capsys):
     assert run(["retire", "Cube", "--free", "--undo"]) == 2
     assert len(said(capsys, "list")["objects"]) == 1
     assert run(["retire", "Cube", "--free", "--yes"]) == 0
-    assert capsys.readouterr().out == "Cube: removed; its 96 cells are free again\n"
+    assert capsys.readouterr().out == "Cube: removed; its 150 cells are free again\n"
     assert said(capsys, "list")["objects"] == []
 
 

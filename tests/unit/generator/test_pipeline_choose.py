@@ -44,19 +44,16 @@ def profiles(found) -> set[str]:
 
 def test_auto_takes_the_smallest_array_that_holds_the_objects(tmp_path):
     text = "name: A\nprofile: auto\nshape: {cube: 60 mm}\ncopies: "
-    smallest = choice(tmp_path, text + "2")
-    assert (profiles(smallest), smallest.notes) == ({"one-touch"}, ())
-    large = choice(tmp_path, text + "9")
-    assert profiles(large) == {"large"}
-    (note,) = large.notes
-    assert note.startswith("profile large is taken (window 4x2 in place of 3x2)")
-    assert note.endswith("3456 cells are needed, and one-touch 63x65 has room for 3276")
-    larger = choice(tmp_path, text + "200")
+    smallest = choice(tmp_path, text + "36")
+    assert (profiles(smallest), smallest.notes) == ({"large"}, ())
+    assert {one.spec.style.pitch_mm for one in smallest.specs} == {5.0}
+    larger = choice(tmp_path, text + "37")  # 36 leave room for as many
     assert profiles(larger) == {"large-511x513"}
     assert plan_object(larger.specs[0]).array.rows == 511
     (note,) = larger.notes
-    assert "76800 cells are needed, and large 51x1285 has room for 52428" in note
-    assert larger.specs[199].spec.name == "A-200"
+    assert note.startswith("profile large-511x513 is taken (window 3x3 in place of 4x2): ")
+    assert note.endswith("26862 cells are needed, and large 51x1285 has room for 26214")
+    assert larger.specs[36].spec.name == "A-37"
 
 
 @pytest.mark.parametrize("profile", ["auto", "one-touch"])
@@ -79,15 +76,16 @@ def test_a_run_opens_the_database_once(tmp_path, monkeypatch, profile, copies):
 
 
 def test_auto_goes_on_where_the_database_is_full(tmp_path):
-    text = "name: {}\nprofile: auto\nshape: {{cube: 140 mm}}\nprint: {{parts: whole}}\n"
-    first = dry(tmp_path, text.format("A"), dry_run=False, formats=())
-    assert (first.rows, first.columns) == (63, 65)
-    second = choice(tmp_path, text.format("B"))
-    assert profiles(second) == {"large"}
-    assert "one-touch 63x65 has room for" in second.notes[0]  # beside A
-    again = dry(tmp_path, text.format("A"))
+    text = "name: {}\nshape: {{cube: 200 mm}}\nprint: {{parts: whole}}\ncopies: {}\n"
+    first = dry(tmp_path, text.format("A", 2), dry_run=False, formats=())
+    assert (first.rows, first.columns) == (51, 1285)
+    assert profiles(choice(tmp_path, text.format("B", 2))) == {"large"}  # which is there for it
+    more = choice(tmp_path, text.format("B", 4))
+    assert profiles(more) == {"large-511x513"}
+    assert "large 51x1285 has room for" in more.notes[0]  # beside A
+    again = dry(tmp_path, text.format("A", 2))
     assert again.objects[0].reused
-    assert (again.rows, again.columns) == (63, 65)
+    assert (again.rows, again.columns) == (51, 1285)
 
 
 def test_a_database_goes_on_with_the_arrays_that_it_has(tmp_path):
@@ -100,40 +98,58 @@ def test_a_database_goes_on_with_the_arrays_that_it_has(tmp_path):
         assert (result.rows, result.columns) == (255, 257)
         assert result.used_cells > result.objects[0].symbols  # beside the brick
     brick = "name: Brick\nprofile: {}\nshape: {{box: [40, 30, 20]}}\n"
-    for profile in ("large", "auto"):
+    for profile in ("large", "auto"):  # of 7 mm, as it is registered
         (same,) = dry(tmp_path, brick.format(profile)).objects
         assert same.reused
+    beside = choice(tmp_path, f"objects:\n- {{{brick[:11]}, shape: {{box: [40, 30, 20]}}}}\n"
+                    "- {name: Beside, shape: {cube: 30 mm}}\n")  # fmt: skip
+    assert [one.spec.style.pitch_mm for one in beside.specs] == [7.0, 7.0]
     many = choice(tmp_path, new.format("Many", "auto") + "copies: 120\n")
     assert profiles(many) == {"large"}
     assert many.specs[0].spec.encoding["rows"] == 255
     assert dry(tmp_path, new.format("Other", "one-touch")).rows == 63
 
 
-def test_auto_takes_finer_symbols_for_a_printer_that_makes_them(tmp_path):
-    text = "name: A\nprofile: auto\nshape: {prism: {sides: 8, side: 14, height: 20}}\n"
+def test_auto_takes_finer_symbols_on_a_printer_that_makes_them(tmp_path):
+    text = "name: A\nshape: {box: [60, 15, 15]}\n"
     found = choice(tmp_path, text)
-    assert profiles(found) == {"one-touch"}
+    assert profiles(found) == {"large"}
+    assert found.specs[0].spec.style.pitch_mm == 4.5
     (note,) = found.notes
-    assert note.startswith("profile fine, for resin printers, would show places on 8 of the 8")
-    assert profiles(choice(tmp_path, text + "print: {printer: resin}\n")) == {"fine"}
-    coarse = choice(tmp_path, text + "print: {printer: fdm-0.4}\n")
-    assert (profiles(coarse), coarse.notes) == ({"one-touch"}, ())
+    assert note.startswith("pitch 4.5 mm is taken: it shows places on 2 of the 2 faces")
+    for box, settings, pitch in (
+        ("[60, 14, 14]", "", 4.0),
+        ("[60, 14, 14]", "print: {printer: fdm-0.6}\n", 5.0),  # makes 4.5 mm, which show no more
+        ("[60, 15, 15]", "symbols: {pitch: 5 mm}\n", 5.0),
+        ("[60, 17, 17]", "", 5.0),
+    ):
+        found = choice(tmp_path, f"name: A\nshape: {{box: {box}}}\n{settings}")
+        assert found.specs[0].spec.style.pitch_mm == pitch
+        assert bool(found.notes) == (pitch < 5)
+
+
+def test_round_objects_are_embossed_coarser(tmp_path):
+    can = "name: A\nshape: {cylinder: {diameter: 60 mm, height: 50 mm}}\n"
+    assert choice(tmp_path, can).specs[0].spec.style.pitch_mm == 7.0
+    asked = choice(tmp_path, can + "symbols: {pitch: 6 mm}\n")
+    assert asked.specs[0].spec.style.pitch_mm == 6.0
 
 
 def test_auto_follows_a_profile_that_the_set_names(tmp_path):
-    text = "objects:\n- {name: A, shape: {cube: 60}, profile: large}\n"
-    with pytest.raises(SpecError, match="on another array"):
-        dry(tmp_path, text + "- {name: B, shape: {cube: 60}, profile: auto}\n")
-    text = text.replace("large", "one-touch") + "- {name: B, shape: {cube: 60}, profile: auto}\n"
-    assert dry(tmp_path, text).rows == 63
+    text = "objects:\n- {name: A, shape: {cube: 60}}\n- {name: B, shape: {cube: 60}, profile: %s}\n"
+    for profile, rows in (("large", 51), ("one-touch", 63)):
+        assert dry(tmp_path, text % profile).rows == rows
+    two = text % "one-touch" + "- {name: C, shape: {cube: 60}, profile: large}\n"
+    with pytest.raises(SpecError, match=r"'C' is on another array \(large\) than 'B' \(one-touch"):
+        dry(tmp_path, two)
 
 
 def test_each_face_is_told_with_the_least_size_that_shows_a_place(tmp_path):
-    (made,) = dry(tmp_path, "name: A\nshape: {cube: 60 mm}\n").objects
+    (made,) = dry(tmp_path, "name: A\nshape: {cube: 60 mm}\nprofile: one-touch\n").objects
     assert [face.name for face in made.face_reports] == [f"F{k}" for k in range(1, 7)]
     least = made.face_reports[0].smallest_mm[0]
     assert 18 < least < 24
-    box = "name: A\nshape: {{box: [60, {0:.2f}, {0:.2f}]}}\nlayout: faces\n"
+    box = "name: A\nshape: {{box: [60, {0:.2f}, {0:.2f}]}}\nlayout: faces\nprofile: one-touch\n"
     (enough,) = dry(tmp_path, box.format(least + 0.5)).objects
     assert enough.face_reports[2].places > 0
     (short,) = dry(tmp_path, box.format(least - 1.5)).objects
@@ -160,14 +176,14 @@ def test_panels_of_a_round_object_are_refused_where_they_are_asked_for(tmp_path)
 
 
 def test_what_is_made_with_a_larger_array_is_told(tmp_path):
-    text = "name: A\nprofile: auto\nshape: {cube: 30 mm}\ncopies: 60\n"
+    text = "name: A\nshape: {cube: 150 mm}\nprint: {parts: whole}\ncopies: 6\n"
     result = dry(tmp_path, text)
-    assert (result.rows, result.columns) == (51, 1285)
-    assert "profile large is taken" in result.objects[0].warnings[0]
+    assert (result.rows, result.columns) == (511, 513)
+    assert "profile large-511x513 is taken" in result.objects[0].warnings[0]
     assert not any("is taken" in w for made in result.objects[1:] for w in made.warnings)
 
 
 def test_a_set_too_large_for_the_profile_it_names_is_told_of_auto(tmp_path):
     with pytest.raises(SpecError, match="array 63x65 is full") as caught:
-        dry(tmp_path, "name: A\nshape: {cube: 60 mm}\ncopies: 12\n")
-    assert "or profile auto" in caught.value.problems[0].fix
+        dry(tmp_path, "name: A\nshape: {cube: 60 mm}\ncopies: 12\nprofile: one-touch\n")
+    assert "set profile: auto" in caught.value.problems[0].fix

@@ -86,7 +86,7 @@ def test_files_that_are_made_promise_the_same_and_again_so():
     text = "name: Cube\nshape: {cube: 45 mm}\n"
     first, again = (encode(specs(text), formats=["stl"]).objects[0] for _ in range(2))
     assert again.reused
-    planned = reports(text)
+    planned = reports(text, "auto")
     assert [f.promise for f in first.face_reports] == [f.promise for f in planned]
     assert again.face_reports == first.face_reports
     assert first.face_reports[0].smallest_mm is None

@@ -158,7 +158,7 @@ def counted(folder: Path, copies: int, monkeypatch) -> tuple[int, int]:
         patched.setattr(occupancy, "tiles_of", count)
         read = lambda *given: reads.append(1) or taken_tiles(*given)  # noqa: E731
         patched.setattr(cells_module, "taken_tiles", read)
-        text = f"name: D\nshape: {{cube: 22 mm}}\ncopies: {copies}\n"
+        text = f"name: D\nshape: {{cube: 22 mm}}\nprofile: large\ncopies: {copies}\n"
         with pytest.raises(PlacesChosenError):
             run(folder, text, jobs=1, progress=progress)
     return sum(cells), len(reads)

@@ -1,5 +1,6 @@
 """What a spec means: defaults, units, sets, copies, places and the hash of the meaning."""
 
+import json
 import math
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from generator.spec import SpecError, error_at, locate, read_specs
 
 FIXTURES = Path(__file__).parents[3] / "fixtures"
 CUBE = "name: Cube\nshape: {cube: 60 mm}\n"
+LARGE = json.dumps(dict(PROFILES["large"].encoding))
 
 
 @pytest.fixture(autouse=True)
@@ -39,12 +41,12 @@ def test_smallest_spec():
     (found,) = read_specs([FIXTURES / "cube.yaml"])
     cube = found.spec
     assert (cube.name, cube.shape.kind, cube.shape.parameters) == ("Cube", "cube", {"side": 60.0})
-    assert (cube.profile, cube.alphabet, cube.printer.name) == ("one-touch", "dense-4", "fdm-0.4")
-    assert cube.style == SymbolStyle(7.0, 1.0, 1.4, pytest.approx(math.radians(10)), 0.0)
+    assert (cube.profile, cube.alphabet, cube.printer.name) == ("auto", "dense-4", "fdm-0.4")
+    assert cube.style == SymbolStyle(5.0, 1.0, 1.0, pytest.approx(math.radians(7.5)), 0.0)
     assert (cube.layout, cube.parts, cube.wall_mm) == ("auto", "panels", 3.0)
     assert cube.formats == ("step", "stl", "3mf")
     assert (cube.folder, cube.database) == (Path("out/cube"), "sqlite:///lab.db")
-    assert (cube.encoding["rows"], cube.encoding["columns"]) == (63, 65)
+    assert (cube.encoding["rows"], cube.encoding["columns"]) == (51, 1285)
 
 
 @pytest.mark.parametrize("profile", PROFILES)
@@ -66,11 +68,36 @@ def test_draft_gives_way_where_strokes_need_the_room():
     def draft_deg(settings):
         return math.degrees(spec(CUBE + settings).style.draft_rad)
 
-    assert draft_deg("") == pytest.approx(10)
-    assert draft_deg("symbols: {height: 1.2 mm}\n") == pytest.approx(7.5)
+    assert draft_deg("profile: large\n") == pytest.approx(10)
+    assert draft_deg("profile: large\nsymbols: {height: 1.2 mm}\n") == pytest.approx(7.5)
+    assert draft_deg("") == pytest.approx(7.5)
     assert draft_deg("profile: fine\n") == pytest.approx(5)
     with pytest.raises(SpecError, match="draft"):
-        spec(CUBE + "symbols: {height: 1.2 mm, draft: 10 deg}\n")
+        spec(CUBE + "profile: large\nsymbols: {height: 1.2 mm, draft: 10 deg}\n")
+
+
+@pytest.mark.parametrize(
+    ("settings", "pitch_mm"),
+    [
+        ("", 5.0),
+        ("print: {printer: fdm-0.6}\n", 5.0),
+        ("print: {printer: resin}\n", 5.0),
+        ("symbols: {alphabet: letters-4}\n", 6.0),  # strokes of .14 of the pitch: .8 mm wide
+        ("symbols: {draft: 10 deg}\n", 7.0),
+        ("symbols: {stroke: 1.4 mm}\n", 5.0),
+        ("symbols: {pitch: 6 mm}\n", 6.0),
+    ],
+)
+def test_auto_takes_the_pitch_that_reads_best_of_those_that_print(settings, pitch_mm):
+    made = spec(CUBE + settings)
+    assert made.profile == "auto"
+    assert made.style.pitch_mm == pitch_mm
+    check_printable(ALPHABETS[made.alphabet], made.style, made.printer)
+
+
+def test_settings_that_print_at_no_pitch_are_refused_as_they_are():
+    with pytest.raises(SpecError, match=r"stroke 0\.5 mm,"):
+        spec(CUBE + "symbols: {stroke: 0.5 mm}\n")
 
 
 @pytest.mark.parametrize(
@@ -146,11 +173,11 @@ def test_scale_of_a_file_counts_unless_it_is_one():
     "same",
     [
         "# a comment\nshape: {cube: 6 cm}\nname: Cube\n",
-        CUBE + "profile: one-touch\nsymbols: {pitch: 7, draft: 10 deg}\nprint: {wall: 0.3 cm}\n",
+        CUBE + "profile: auto\nsymbols: {pitch: 5, draft: 7.5 deg}\nprint: {wall: 0.3 cm}\n",
         CUBE + "symbols:\nprint:\ncopies: 1\nlayout:\n",
         CUBE + "output: {folder: elsewhere, formats: [glb], database: other.db}\n",
         "name: Another\nshape: {cube: 60}\n",
-        CUBE + "encoding: {family: prmva, order: 4, degree: 6, window: [3, 2]}\n",
+        CUBE + f"encoding: {LARGE}\nsymbols: {{pitch: 5}}\n",
     ],
 )
 def test_same_meaning_same_hash(same):
@@ -226,8 +253,8 @@ def test_full_fixture_names_every_setting():
     blocks = (ObjectSettings, Symbols, Print, Robot, Output)
     missing = {name for block in blocks for name in block.model_fields if f"{name}:" not in text}
     assert missing == set()
-    one_touch = read_specs([FIXTURES / "cube.yaml"])[0].spec
-    assert read_specs([FIXTURES / "specs/full.yaml"])[0].spec.encoding == one_touch.encoding
+    one_touch = PROFILES["one-touch"].array().definition()
+    assert read_specs([FIXTURES / "specs/full.yaml"])[0].spec.encoding == one_touch
 
 
 def test_several_databases_are_fine_when_one_is_given():

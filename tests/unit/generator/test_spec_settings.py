@@ -27,7 +27,7 @@ REFUSED_LATER = {
     "stroke": (BASE + "symbols:\n  stroke: 0.5 mm\n", "4:11", "stroke 0.5 mm"),
     "height": (BASE + "symbols:\n  height: 0.2 mm\n", "4:11", "height 0.2 mm"),
     "chamfer": (BASE + "symbols: {chamfer: 0.6 mm}\n", "3:20", ""),
-    "printer": (BASE + "symbols: {pitch: 4.5 mm}\n", "3:18", ""),
+    "printer": (BASE + "symbols: {pitch: 4.5 mm, stroke: 0.99 mm}\n", "3:34", ""),
     "shared pitch": (
         "symbols: {pitch: 3}\nobjects: [{name: A, shape: {cube: 9}}, {name: B, shape: {cube: 8}}]",
         "1:18",

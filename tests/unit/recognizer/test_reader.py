@@ -169,7 +169,7 @@ def test_a_reader_decides_by_its_settings(reader, counts):
 
 def test_a_lab_says_what_it_holds(lab):
     held = open_lab(lab / "lab.db")
-    assert str(held).endswith("lab.db: 1 object, 6 faces, 150 symbols")
+    assert str(held).endswith("lab.db: 1 object, 6 faces, 294 symbols")
     assert repr(Reader(held)) == f"Reader({held}; fsr-16, tab)"
 
 

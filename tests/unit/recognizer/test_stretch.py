@@ -69,7 +69,7 @@ def test_an_answer_carries_scale_and_stroke(reader):
         image = felt(reader, scale * np.eye(2), Touch(18.0, 21.5, 0.3, 80.0))
         answer = reader.read(image.counts)
         assert answer.scale == pytest.approx(scale, abs=0.003)
-        assert answer.stroke_mm == pytest.approx(1.4, abs=0.16)
+        assert answer.stroke_mm == pytest.approx(1.0, abs=0.16)
         said = answer.as_json()
         assert (said["scale"], said["stroke_mm"]) == (answer.scale, answer.stroke_mm)
     nothing = reader.read(np.zeros((16, 16)))
