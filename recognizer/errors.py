@@ -7,6 +7,7 @@
         ├── LabError          the database holds nothing that can be read by touch
         ├── TouchError        an image that is none of the sensor's
         ├── AsBuiltError      touches that do not tell how a part was printed
+        ├── WiringError       a change of the image that there is not
         └── SensorStateError  a file that does not tell of a sensor, or tells of another one
 
 A touch that is not recognised is no error but a value with a reason (`recognition`).
@@ -35,3 +36,7 @@ class AsBuiltError(RecognizerError):
 
 class SensorStateError(RecognizerError):
     """A file that is no state of a sensor, or another sensor's."""
+
+
+class WiringError(RecognizerError):
+    """A change of the image that is not known, or that the matrix does not allow."""

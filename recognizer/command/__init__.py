@@ -2,6 +2,8 @@
 
 `recognize-object as-built RECORDING`: how a part came out of the printer.
 
+`recognize-object check --at OBJECT/FACE`: how the sensor is mounted.
+
 ::
 
     app           options
@@ -11,6 +13,7 @@
     in_base       the object in the robot's base
     report        answers as text and as JSON
     as_built      recognize-object as-built
+    check         recognize-object check
 
 Results go to stdout, progress and messages to stderr. Exit codes: 0 recognised, 1 nothing
 recognised, or ran but failed, 2 bad input, 3 device, 4 database, 130 interrupted. Nothing heavy is
@@ -29,6 +32,7 @@ if TYPE_CHECKING:
 
 NAME = "recognize-object"
 AS_BUILT = "as-built"
+CHECK = "check"
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
@@ -46,6 +50,10 @@ def application(arguments: list[str]) -> Typer:
     """Return the application that reads the arguments; a recording needs no command's name."""
     if arguments[:1] == [AS_BUILT]:
         from recognizer.command.as_built import app
+
+        return app
+    if arguments[:1] == [CHECK]:
+        from recognizer.command.check import app
 
         return app
     from recognizer.command.app import app

@@ -55,6 +55,7 @@ class RecognizeOptions:
     joints_file: Path | None = None  #: angles of every touch
     learn: Path | None = None  #: what is learned of the sensor, kept and read by
     state: Path | None = None  #: the same, read by alone
+    flip: str = ""  #: how images arrive
     mcap: Path | None = None  #: images and answers as ROS 2 messages
 
 

@@ -82,6 +82,12 @@ def recognize(
                                        "floating rows. Kept in FILE, which is read by from then "
                                        "on, and goes on learning."),
     ] = None,
+    flip: Annotated[
+        str, typer.Option(metavar="LIST", show_default=False,
+                          help="How the image arrives: columns, rows, transpose, quarter, "
+                               "column-halves, row-halves, values (readings fall with force); "
+                               "refusals and [bold]recognize-object check[/] say it."),
+    ] = "",
     state: Annotated[
         Path | None, typer.Option("--sensor-state", metavar="FILE", show_default=False,
                                   help="Read by what was learned of the sensor."),
@@ -160,6 +166,7 @@ def recognize(
                 joints_deg=angles, joint_error_deg=joint_error, plot=plot, replace=replace,
                 as_json=as_json, scan=method if scan else "",
                 joints_file=Path(by_touch) if by_touch else None, learn=learn, state=state,
+                flip=flip,
                 mcap=mcap,
             )
         )  # fmt: skip

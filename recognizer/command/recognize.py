@@ -22,10 +22,13 @@ from recognizer.command.learning import SensorLearning, learning_for
 from recognizer.command.port import listen, source_at
 from recognizer.command.scanning import touches_for
 from recognizer.command.sinks import AnswerSink, sinks_for
+from recognizer.touch.contacts import TouchImage
 from recognizer.touch.lab import Lab, open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import NO_CONTACT
 from recognizer.touch.source import TouchSource, source_of
+
+TRIED = 6  #: refused touches, none answered, after which it is asked how the sensor is wired
 
 
 def recognize_touches(options: RecognizeOptions) -> int:
@@ -49,10 +52,10 @@ def recognize_touches(options: RecognizeOptions) -> int:
                 calibration=options.calibration, every=options.every,
             )  # fmt: skip
             learning = _reader(options, lab, source)
-            learning.learn_from(source.touches(recording.frames(), learning.reader.settings))
-            return _print_answers(
-                options, learning, source, recording.frames(), interrupted, recording.origin
-            )
+            frames = _rewire(options, source, recording.frames())
+            learning.learn_from(source.touches(frames, learning.reader.settings))
+            frames = _rewire(options, source, recording.frames())
+            return _print_answers(options, learning, source, frames, interrupted, recording.origin)
         source = source_at(
             options.port, sensor_type=options.sensor_type, overlay=options.overlay,
             calibration=options.calibration, every=options.every,
@@ -60,7 +63,29 @@ def recognize_touches(options: RecognizeOptions) -> int:
         learning = _reader(options, lab, source)  # before frames come
         with listen(source, interrupted, options.sensor, options.calibration) as frames:
             origin = RecordingOrigin(sensor=options.port)
+            frames = _rewire(options, source, frames)
             return _print_answers(options, learning, source, frames, interrupted, origin)
+
+
+def _rewire(
+    options: RecognizeOptions, source: TouchSource, frames: Iterator[Frame]
+) -> Iterator[Frame]:
+    """Return frames as the sensor has them, where a person says that they arrive otherwise."""
+    if not options.flip:
+        return frames
+    from recognizer.sensor.wiring import wiring_named
+
+    wiring = wiring_named(options.flip)
+    return (wiring.frame(frame, source.sensor.full) for frame in frames)
+
+
+def _hint_wiring(reader: Reader, source: TouchSource, refused: list[TouchImage]) -> None:
+    """Say how the sensor seems to be wired, where refused touches tell."""
+    from recognizer.sensor.wiring import wiring_hint
+
+    hint = wiring_hint(reader, refused, calibration=source.calibration)
+    if hint:
+        message(hint)
 
 
 def _reader(options: RecognizeOptions, lab: Lab, source: TouchSource) -> SensorLearning:
@@ -81,6 +106,7 @@ def _print_answers(
     out = sys.stdout  # a bar would take it for its terminal
     values: list[dict[str, Any]] = []
     kept: list[Answer] = []
+    refused: list[TouchImage] = []
     read = answered = 0
     lines = options.as_json and options.follow
     reader = learning.reader
@@ -98,6 +124,10 @@ def _print_answers(
             for sink in sinks:
                 sink.answer(answer)
             read += 1
+            if not answer.found and not options.scan and answer.found.reason != NO_CONTACT:
+                refused.append(answer.touch)
+                if len(refused) == TRIED and not answered:
+                    _hint_wiring(learning.reader, source, refused)
             answered = bool(answer.found) + (0 if options.scan else answered)
             if options.plot is not None:
                 if options.follow:
@@ -119,6 +149,8 @@ def _print_answers(
             else:
                 values.append(entry)
     learning.end()
+    if refused and not answered and len(refused) < TRIED and not interrupted.is_set():
+        _hint_wiring(learning.reader, source, refused)
     if options.plot is not None and kept:
         draw_answers(learning.reader, source, kept, options.plot, interrupted)
     if options.as_json and not lines:

@@ -11,20 +11,24 @@ from generator.spec import read_specs
 from probe.circuit.network import effective_resistances
 from probe.contact.contract import Touch
 from probe.contact.engines.own import ENGINE
+from probe.contact.press import press
 from probe.contact.tips import Tips
 from probe.frame import frame_from
 from probe.recording.record import Recorder
 from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from recognizer.command import run
-from recognizer.errors import SensorStateError
+from recognizer.errors import SensorStateError, WiringError
 from recognizer.sensor.answering import answering_of
 from recognizer.sensor.file import read_state, write_state
 from recognizer.sensor.learn import learn_sensor
+from recognizer.sensor.mounting import find_mounting
 from recognizer.sensor.settings import LEARNING
+from recognizer.sensor.wiring import wiring_hint, wiring_named
 from recognizer.sensor.words import state_entry, state_words
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
+from recognizer.touch.recognition import Recognition
 from recognizer.touch.sensor_state import invert_floating, unknown_state
 
 SENSOR = SensorType()
@@ -255,3 +259,98 @@ def test_the_command_learns_and_keeps_and_reads_by_it(lab, felt, tmp_path, capsy
     write_state(replace(read_state(kept), sensor="right"), kept)
     assert run([*words, "--sensor-state", str(kept)]) == 2
     assert "is of sensor 'right', not of 'left'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("way", "flip"),
+    [
+        (np.fliplr, "columns"),
+        (np.transpose, "columns"),
+        (lambda image: 1023 - image, "values"),
+        (lambda image: np.roll(image, 8, axis=1), "column-halves"),
+        (lambda image: np.roll(image, 8, axis=0), "row-halves"),
+    ],
+)
+def test_a_way_of_wiring_is_said_when_refused_touches_agree(lab, felt, way, flip):
+    reader = Reader(open_lab(lab / "lab.db"))
+    images = [way(image) for image in felt[0][:2]]
+    assert not any(reader.read(image) for image in images)
+    hint = wiring_hint(reader, images)
+    assert hint.startswith("2 of 2 touches that were refused are recognised so: ")
+    assert f"`--flip {flip}`" in hint
+    assert wiring_hint(reader, images[:1]).startswith(
+        "one touch says it alone, so it may be chance"
+    )
+    undone = wiring_named(flip).apply(images[0], 1023)
+    assert reader.read(undone).object == "Cube"
+
+
+def test_nothing_is_said_where_no_way_of_wiring_helps(lab):
+    reader = Reader(open_lab(lab / "lab.db"))
+    flat = 8 + 100 * np.exp(np.random.default_rng(3).normal(0, 0.1, (2, 16, 16)))
+    assert wiring_hint(reader, list(np.rint(flat))) == ""
+
+
+def test_flips_are_read_from_an_option():
+    image = np.array([[0, 1], [2, 3]])
+    assert wiring_named("").apply(image, 3).tolist() == image.tolist()
+    assert wiring_named("rows, values").apply(image, 3).tolist() == [[1, 0], [3, 2]]
+    assert wiring_named("quarter").apply(image, 3).tolist() == [[1, 3], [0, 2]]
+    assert wiring_named("column-halves").apply(image, 3).tolist() == [[1, 0], [3, 2]]
+    with pytest.raises(WiringError, match="'sideways' is no change"):
+        wiring_named("sideways")
+    with pytest.raises(WiringError, match="not square"):
+        wiring_named("transpose").apply(np.zeros((2, 3)), 3)
+
+
+@pytest.mark.parametrize(
+    ("way", "changes"),
+    [
+        (lambda image: image, ()),
+        (np.rot90, ("quarter", "quarter", "quarter")),
+        (lambda image: np.rot90(image, 2), ("quarter", "quarter")),
+        (lambda image: np.rot90(image, 3), ("quarter",)),
+        (np.fliplr, ("columns",)),
+        (np.flipud, ("rows",)),
+        (np.transpose, ("transpose",)),
+        (lambda image: np.rot90(image.T, 2), ("transpose", "quarter", "quarter")),
+    ],
+)
+def test_a_placed_touch_tells_the_mounting(lab, way, changes):
+    reader = Reader(open_lab(lab / "lab.db"))
+    surface = registered_surface(f"{lab}/lab.db", "Cube", "F1").surface
+    forces = press(surface, SENSOR, Touch(29.0, 31.0, np.radians(-12), 70.0)).forces_n
+    found = find_mounting(reader, way(np.rint(8 + 150 * forces)), ("Cube", "F1"))
+    assert found.wiring.changes == changes
+    assert found.turn_deg == pytest.approx(-12, abs=1)
+    assert found.answer.x_mm == pytest.approx(29.0, abs=0.3)
+    assert ("read with --flip" in str(found)) is bool(changes)
+    other = find_mounting(reader, way(np.rint(8 + 150 * forces)), ("Cube", "F2"))
+    assert isinstance(other, Recognition)
+
+
+def test_the_commands_say_flip_and_check(lab, felt, tmp_path, capsys):
+    images, _, _ = felt
+    with Recorder(tmp_path / "mirrored.h5", sensor="left") as recorder:
+        for seq, counts in enumerate(images[:2]):
+            recorder.append(frame_from(np.fliplr(counts).astype(np.uint16), t_ns=seq, seq=seq))
+    words = [str(tmp_path / "mirrored.h5"), "--every", "--database", str(lab / "lab.db")]
+    assert run(words) == 1
+    assert "columns or rows seem reversed" in capsys.readouterr().err
+    assert run([*words, "--flip", "columns"]) == 0
+    assert capsys.readouterr().out.count("Cube/F1 at") == 2
+    assert run([*words, "--flip", "sideways"]) == 2
+
+    surface = registered_surface(f"{lab}/lab.db", "Cube", "F1").surface
+    forces = press(surface, SENSOR, Touch(30.0, 30.0, 0.1, 70.0)).forces_n
+    with Recorder(tmp_path / "placed.h5", sensor="left") as recorder:
+        counts = np.rot90(np.rint(8 + 150 * forces)).astype(np.uint16)
+        recorder.append(frame_from(np.ascontiguousarray(counts), t_ns=0, seq=0))
+    words = ["check", str(tmp_path / "placed.h5"), "--every", "--database", str(lab / "lab.db")]
+    capsys.readouterr()
+    assert run([*words, "--at", "Cube/F1"]) == 1
+    assert "mounted a quarter turn off, the other way" in capsys.readouterr().out
+    assert run([*words, "--at", "Cube/F1", "--json"]) == 1
+    told = json.loads(capsys.readouterr().out)
+    assert (told["flip"], told["agree"]) == (["quarter"] * 3, 1)
+    assert run([*words, "--at", "Cube"]) == 2

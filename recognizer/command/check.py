@@ -1,0 +1,129 @@
+"""`recognize-object check`: how the sensor is mounted, from a touch placed by hand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from threading import Event
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from encoded_objects import console
+from encoded_objects.console import Action
+
+if TYPE_CHECKING:
+    from recognizer.touch.contacts import TouchImage
+    from recognizer.touch.reader import Reader
+    from recognizer.touch.source import TouchSource
+
+HELP = """Say how the sensor is mounted: as drawn, turned by quarters, mirrored.
+
+No touch by itself tells a quarter turn, so one is placed by hand: on the face that --at names, \
+near its middle, the sensor's x axis (from column 0 to the last one) along the face's first edge. \
+RECORDING holds such touches; with --port the next touch is taken.
+"""
+EPILOG = "Exit codes: 0 as drawn, 1 otherwise or not recognised, 2 bad input, 3 device, 4 database."
+
+app = console.application()
+
+
+@app.callback()
+def _commands() -> None:
+    """Say how a sensor is mounted."""
+
+
+@app.command(name="check", help=HELP, epilog=EPILOG)
+def check(
+    at: Annotated[
+        str, typer.Option("--at", metavar="OBJECT/FACE", show_default=False,
+                          help="Face that is touched, as Cube/F1."),
+    ],
+    recording: Annotated[
+        Path | None, typer.Argument(metavar="RECORDING", show_default=False,
+                                    help="Touches placed so; or give --port."),
+    ] = None,
+    port: Annotated[
+        str, typer.Option(metavar="URL", show_default=False, help="Read a port."),
+    ] = "",
+    database: Annotated[
+        str, typer.Option(metavar="URL", help="The lab's database."),
+    ] = "lab.db",
+    sensor_type: Annotated[
+        str, typer.Option(metavar="NAME|FILE", show_default=False,
+                          help="Type of the sensor; as the recording tells, fsr-16 by default."),
+    ] = "",
+    every: Annotated[
+        bool, typer.Option("--every", help="Every frame is a touch."),
+    ] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="One JSON object on stdout, also for errors."),
+    ] = False,
+) -> Action:  # fmt: skip
+    """Check the mounting; `HELP` is what people see."""
+    if (recording is None) == (not port):
+        raise typer.BadParameter("give a recording or --port URL")
+    object_name, slash, face = at.rpartition("/")
+    if not slash or not object_name or not face:
+        raise typer.BadParameter(f"--at {at}: give object and face, as Cube/F1")
+
+    def action() -> int:
+        from recognizer.touch.lab import open_lab
+        from recognizer.touch.reader import Reader
+
+        lab = open_lab(database)
+        source, touches = _placed_touches(recording, port, sensor_type, at, every)
+        return _report(Reader(lab, source.sensor), source, touches, (object_name, face), as_json)
+
+    return action
+
+
+def _placed_touches(
+    recording: Path | None, port: str, sensor_type: str, at: str, every: bool
+) -> tuple[TouchSource, list[TouchImage]]:
+    """Return the touches of a recording, or the next one at a port."""
+    from encoded_objects.console.output import message
+    from probe.recording.read import Recording
+    from recognizer.command.port import listen, source_at
+    from recognizer.touch.source import source_of
+
+    if recording is not None:
+        opened = Recording(recording)
+        source = source_of(opened, sensor_type or None, every=every)
+        return source, list(source.touches(opened.frames()))
+    source = source_at(port, sensor_type=sensor_type, overlay="", calibration=None, every=every)
+    message(f"touch {at} near its middle, the sensor's columns along the face's first edge")
+    with listen(source, Event(), None, None) as frames:
+        for touch in source.touches(frames):
+            return source, [touch]
+    return source, []
+
+
+def _report(
+    reader: Reader, source: TouchSource, touches: list[TouchImage], face: tuple[str, str],
+    as_json: bool,
+) -> int:  # fmt: skip
+    """Say what touches tell of the mounting; returns the exit code."""
+    from encoded_objects.console.output import write, write_json
+    from recognizer.sensor.mounting import WORDS, FoundMounting, find_mounting
+
+    told = [
+        find_mounting(reader, touch.counts, face, calibration=source.calibration)
+        for touch in touches
+    ]
+    known = [one for one in told if isinstance(one, FoundMounting)]
+    ways = {one.wiring.changes for one in known}
+    agreed = next(iter(ways)) if len(ways) == 1 else None
+    if as_json:
+        write_json({
+            "mounting": None if agreed is None else WORDS[agreed],
+            "flip": None if agreed is None else list(agreed),
+            "touches": len(told), "agree": len(known) if agreed is not None else 0,
+        })  # fmt: skip
+    elif not told:
+        write("no touch")
+    else:
+        for one in told:
+            write(str(one) if isinstance(one, FoundMounting) else f"not told: {one}")
+        if len(ways) > 1:
+            write("the touches disagree: place each as --at says, within 40 degrees")
+    return 0 if agreed == () else 1
