@@ -57,6 +57,7 @@ class RecognizeOptions:
     state: Path | None = None  #: the same, read by alone
     flip: str = ""  #: how images arrive
     mcap: Path | None = None  #: images and answers as ROS 2 messages
+    publish: str = ""  #: URL where images and answers are told
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -119,6 +119,11 @@ def recognize(
                                   help="Keep images and answers as ROS 2 messages, poses with "
                                        "covariance among them (docs/robot.md)."),
     ] = None,
+    publish: Annotated[
+        str, typer.Option(metavar="URL", show_default=False,
+                          help="Tell images and answers to whoever listens: "
+                               "zenoh://0.0.0.0:7447/touch (docs/robot.md)."),
+    ] = "",
     replace: Annotated[
         bool, typer.Option("--replace", help="Replace files that are there."),
     ] = False,
@@ -166,8 +171,7 @@ def recognize(
                 joints_deg=angles, joint_error_deg=joint_error, plot=plot, replace=replace,
                 as_json=as_json, scan=method if scan else "",
                 joints_file=Path(by_touch) if by_touch else None, learn=learn, state=state,
-                flip=flip,
-                mcap=mcap,
+                flip=flip, mcap=mcap, publish=publish,
             )
         )  # fmt: skip
 

@@ -40,3 +40,7 @@ def sinks_for(options: RecognizeOptions, origin: RecordingOrigin) -> Iterator[An
         from recognizer.command.ros import McapSink
 
         yield McapSink(options.mcap, origin, replace=options.replace)
+    if options.publish:
+        from recognizer.command.publish import PublishSink
+
+        yield PublishSink(options.publish)

@@ -138,3 +138,42 @@ def test_images_and_answers_are_kept_as_ros_messages(asked, lab):
         assert np.allclose([at.x, at.y, at.z], T[:3, 3] / 1000, atol=1e-12)
     assert not placed
     assert [topic for topic, _ in seen].count("/touch/image") == 18
+
+
+def test_what_is_followed_is_published(lab):
+    """Over zenoh, to its own client: images at the sensor's rate, and the answer of each touch."""
+    import socket
+    import time
+
+    import zenoh
+
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        port = one.getsockname()[1]
+    words = ("--port", "sim:lab.db#Cube/F1?x=28&y=31&period=1", "--follow", "--publish",
+             f"zenoh://127.0.0.1:{port}/bench")  # fmt: skip
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([f"tcp/127.0.0.1:{port}"]))
+    config.insert_json5("connect/timeout_ms", "20000")
+    config.insert_json5("scouting/multicast/enabled", "false")
+    with started(lab, *words) as process:
+        for line in process.stderr:
+            if line.startswith("publishing"):
+                break
+        with zenoh.open(config) as session:
+            images, answers = [], []
+            subscribers = (
+                session.declare_subscriber("bench/image", images.append),
+                session.declare_subscriber("bench/answer", answers.append),
+            )
+            until = time.monotonic() + SHORT_S
+            while (not answers or len(images) < 50) and time.monotonic() < until:
+                time.sleep(0.05)
+            assert subscribers
+        process.send_signal(signal.SIGINT)
+        assert process.wait(SHORT_S) == 130
+    assert len(images) >= 50
+    said = json.loads(answers[0].payload.to_bytes())
+    assert said["object"] == "Cube"
+    assert np.hypot(said["x_mm"] - 28, said["y_mm"] - 31) < 0.5

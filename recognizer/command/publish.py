@@ -1,0 +1,156 @@
+"""Images and answers to whoever listens: `--publish zenoh://HOST:PORT[/KEY]`.
+
+::
+
+    KEY/image     application/cdr;sensor_msgs/msg/Image    every image, at the sensor's rate
+    KEY/answer    application/json                         every answer, as --json prints it
+    KEY/object    application/cdr;geometry_msgs/msg/PoseWithCovarianceStamped
+
+KEY is `touch` if left out. Images are dropped, at the publisher, for a client that is slower than
+they come: little is kept for it, so what arrives is not stale. Answers wait for their clients, in
+a thread of their own, so that the reader never does; the last ones are also kept for clients that
+come late or lose the line (zenoh's advanced subscribers fetch them).
+"""
+
+from __future__ import annotations
+
+import json
+import queue
+import re
+from threading import Thread
+from typing import Any, Final
+
+from encoded_objects.console.output import json_value, message
+from encoded_objects.errors import EncodedObjectsError, require
+from probe.frame import Frame
+from probe.recording.cdr import cdr_bytes
+from probe.recording.ros import IMAGE, POSE_WITH_COVARIANCE, image_message
+from recognizer.command import report
+from recognizer.command.answers import Answer
+from recognizer.command.ros import object_message
+from recognizer.command.sinks import AnswerSink
+
+_URL = re.compile(
+    r"zenoh://(?P<host>[\w.-]+|\[[0-9a-fA-F:]+\]):(?P<port>\d{1,5})(?:/(?P<key>[\w./-]+))?"
+)
+KEY: Final = "touch"
+KEPT: Final = 1000  #: answers that late clients can fetch
+SEND_BUFFER: Final = 65_536  #: bytes of the socket: 60 images, a quarter of a second
+PATIENCE_S: Final = 60.0  #: for a client that takes no answer, before its line is cut
+
+
+class PublishSink(AnswerSink):
+    """A zenoh session that listens at a port.
+
+    Raises
+    ------
+    EncodedObjectsError
+        No such URL, or the port is taken.
+    MissingExtraError
+        zenoh is not installed.
+    """
+
+    def __init__(self, url: str) -> None:
+        require("zenoh", extra="robot", purpose="--publish")
+        import zenoh
+        from zenoh import CongestionControl, Encoding, Priority, ext
+
+        endpoint, self.key = endpoint_of(url)
+        try:
+            self._session = zenoh.open(_config(endpoint))
+        except zenoh.ZError as error:
+            raise EncodedObjectsError(
+                "nothing can be published there", fix="take another port; is this one free?",
+                place=url,
+            ) from error  # fmt: skip
+        cdr = Encoding.APPLICATION_CDR.with_schema
+        self._images = self._session.declare_publisher(
+            f"{self.key}/image", encoding=cdr(IMAGE), priority=Priority.DATA_LOW,
+            congestion_control=CongestionControl.DROP,
+        )  # fmt: skip
+        told: dict[str, Any] = {
+            "priority": Priority.INTERACTIVE_HIGH,
+            "congestion_control": CongestionControl.BLOCK,
+            "express": True,  # at once, in no batch
+            "cache": ext.CacheConfig(max_samples=KEPT),
+            "sample_miss_detection": ext.MissDetectionConfig(
+                heartbeat=1.0, sporadic_heartbeat=None
+            ),
+            "publisher_detection": True,
+        }
+        self._answers = ext.declare_advanced_publisher(
+            self._session, f"{self.key}/answer", encoding=Encoding.APPLICATION_JSON, **told
+        )
+        self._objects = ext.declare_advanced_publisher(
+            self._session, f"{self.key}/object", encoding=cdr(POSE_WITH_COVARIANCE), **told
+        )
+        self._waiting: queue.SimpleQueue[tuple[Any, bytes] | None] = queue.SimpleQueue()
+        self._thread = Thread(target=self._tell, name="publish", daemon=True)
+        self._thread.start()
+        message(f"publishing {self.key}/image, /answer and /object at {endpoint}")
+
+    def frame(self, frame: Frame) -> None:
+        """Publish an image; it is dropped for clients that are busy with earlier ones."""
+        self._images.put(cdr_bytes(IMAGE, image_message(frame)))
+
+    def answer(self, answer: Answer) -> None:
+        """Publish an answer, and where the object is."""
+        entry = report.entry(answer.touch, answer.found, answer.in_base)
+        self._waiting.put((self._answers, json.dumps(json_value(entry)).encode()))
+        placed = object_message(answer.found, answer.in_base, answer.touch.t_ns)
+        if placed is not None:
+            self._waiting.put((self._objects, cdr_bytes(POSE_WITH_COVARIANCE, placed)))
+
+    def close(self) -> None:
+        """Tell what waits, and end the session."""
+        if self._thread.is_alive():
+            self._waiting.put(None)
+            self._thread.join(PATIENCE_S)
+            self._session.close()  # type: ignore[no-untyped-call, unused-ignore]
+
+    def _tell(self) -> None:
+        while (item := self._waiting.get()) is not None:
+            publisher, payload = item
+            publisher.put(payload)
+
+
+def endpoint_of(url: str) -> tuple[str, str]:
+    """Return zenoh's endpoint of a URL, and the key.
+
+    Raises
+    ------
+    EncodedObjectsError
+        The URL is none.
+
+    Examples
+    --------
+    >>> endpoint_of("zenoh://127.0.0.1:7447/bench/1")
+    ('tcp/127.0.0.1:7447', 'bench/1')
+    """
+    match = _URL.fullmatch(url)
+    key = KEY if match is None else (match["key"] or KEY).strip("/")
+    if match is None or not 0 < int(match["port"]) < 65536 or "//" in key or not key:
+        raise EncodedObjectsError(
+            "this is no place to publish at", fix="write zenoh://0.0.0.0:7447/touch", place=url
+        )
+    return f"tcp/{match['host']}:{match['port']}", key
+
+
+def _config(endpoint: str) -> Any:
+    """Return a session that listens there alone, looks for nobody, and keeps little for images."""
+    import zenoh
+
+    config = zenoh.Config()
+    for path, value in (
+        ("mode", "peer"),
+        ("listen/endpoints", [f"{endpoint}#so_sndbuf={SEND_BUFFER}"]),
+        ("scouting/multicast/enabled", False),
+        ("timestamping/enabled", True),
+        ("transport/link/tx/queue/size/data_low", 1),
+        (
+            "transport/link/tx/queue/congestion_control/block/wait_before_close",
+            int(1e6 * PATIENCE_S),
+        ),
+    ):
+        config.insert_json5(path, json.dumps(value))
+    return config
