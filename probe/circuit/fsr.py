@@ -23,8 +23,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from probe.circuit.settings import FILM
 from probe.errors import CircuitError
+from probe.sensor import SensorType
 
 Image = NDArray[np.float64]  #: (..., rows, columns)
+
+_USUAL = SensorType()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,7 +83,7 @@ class FilmState:
     flutter: Image  #: the noise of the contact, unit variance
 
 
-def fsr_of(rows: int = 16, columns: int = 16) -> Fsr:
+def fsr_of(rows: int = _USUAL.rows, columns: int = _USUAL.columns) -> Fsr:
     """Return a matrix of equal, sound tactels."""
     one, none = np.ones((rows, columns)), np.zeros((rows, columns))
     return Fsr(

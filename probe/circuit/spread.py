@@ -15,6 +15,9 @@ import numpy as np
 from probe.circuit.fsr import Fsr
 from probe.circuit.settings import FILM
 from probe.errors import CircuitError
+from probe.sensor import SensorType
+
+_USUAL = SensorType()
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +58,10 @@ DATASHEET = Spread(
 
 
 def draw_fsr(
-    rng: np.random.Generator, spread: Spread = MEASURED, rows: int = 16, columns: int = 16
+    rng: np.random.Generator,
+    spread: Spread = MEASURED,
+    rows: int = _USUAL.rows,
+    columns: int = _USUAL.columns,
 ) -> Fsr:
     """Draw one sensor.
 

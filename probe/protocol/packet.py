@@ -85,8 +85,8 @@ class IdentPacket:
     baud: int = 1_000_000
     boot: int = 0  #: counts the device's starts
     name: str = "probe"  #: at most 8 characters of ASCII
-    rows: int = 16
-    columns: int = 16
+    rows: int = FIRST_SHAPE[0]
+    columns: int = FIRST_SHAPE[1]
 
 
 @dataclass(frozen=True, slots=True)

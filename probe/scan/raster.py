@@ -63,7 +63,7 @@ def raster(
     loops
         (n, 2) corners of the face, and of its holes after it, mm, either way round.
     sensor
-        The sensor; 16 by 16 if not given.
+        The sensor; `fsr-16` if not given.
     step_tactels
         Between neighbours, both ways.
     theta_rad

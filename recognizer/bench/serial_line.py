@@ -24,10 +24,13 @@ from recognizer.bench.settings import LINE
 class SoftwareLine:
     """Frames at a name under which a serial port opens."""
 
-    def __init__(self, frames: Iterator[Frame], name: str) -> None:
+    def __init__(self, frames: Iterator[Frame], name: str, shape: tuple[int, int]) -> None:
         self._folder = tempfile.TemporaryDirectory(prefix="bench-probe-")
         self._link = Path(self._folder.name) / "ttyPROBE"
-        ident = IdentPacket(seq=0, t_us=0, settling_us=0.0, baud=0, name=name)
+        rows, columns = shape
+        ident = IdentPacket(
+            seq=0, t_us=0, settling_us=0.0, baud=0, name=name, rows=rows, columns=columns
+        )
         self._probe = SoftwareProbe(self.url, frames, ident)
         self._away_s = 0.0
         self._unplugged = threading.Event()

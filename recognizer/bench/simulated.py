@@ -71,7 +71,7 @@ class TouchProbe:
                 stack.callback(self._closed.set)
                 thread.start()
             else:
-                self._line = SoftwareLine(self._presses.frames(), "bench")
+                self._line = SoftwareLine(self._presses.frames(), "bench", sensor.shape)
                 self.url = self._line.url
                 stack.callback(self._line.close)
             stack.callback(self._closed.set)
