@@ -11,7 +11,8 @@ turn about it (rad), both in base axes: T_true = [exp(r) R | p + (x, y, z)].
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,6 +40,8 @@ class ObjectPose:
 
     T_robot_object: Array  #: (4, 4), mm
     covariance: Array  #: (6, 6) of (x, y, z, rx, ry, rz), base axes, mm and rad
+    shared: Array = field(default_factory=lambda: np.zeros((6, 6)))
+    """(6, 6) of it, what is the same at every touch of a face: how the sensor sits."""
 
     def __str__(self) -> str:
         at = ", ".join(f"{value:.1f}" for value in self.T_robot_object[:3, 3])
@@ -97,12 +100,13 @@ def object_pose(
     T_robot_object = sensor.T_base_sensor @ _inverse(T_object_probe)
     R_base_face = sensor.T_base_sensor[:3, :3] @ T_face_probe[:3, :3].T
     both = np.kron(np.eye(2), R_base_face)
-    touch = both @ _on_face(recognition.covariance, seating or Seating()) @ both.T
+    sits = both @ _on_face(np.zeros((3, 3)), seating or Seating()) @ both.T
+    touch = both @ _on_face(recognition.covariance, Seating(0.0, 0.0)) @ both.T + sits
     lever = np.eye(6)
     x, y, z = T_robot_object[:3, 3] - sensor.T_base_sensor[:3, 3]
     lever[:3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
     covariance = lever @ (sensor.covariance + touch) @ lever.T
-    return ObjectPose(T_robot_object, (covariance + covariance.T) / 2)
+    return ObjectPose(T_robot_object, (covariance + covariance.T) / 2, lever @ sits @ lever.T)
 
 
 def _on_face(covariance: Array, seating: Seating) -> Array:
@@ -120,3 +124,76 @@ def _inverse(T: Array) -> Array:
     inverse[:3, :3] = T[:3, :3].T
     inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]
     return inverse
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FusedPose:
+    """Where the object is by several touches, and whether they agree."""
+
+    pose: ObjectPose
+    chi2: float  #: squared disagreement over the covariances
+    freedoms: int  #: 6 for each pose beyond the first
+    moved: bool  #: they disagree by more than `FUSION.chance` would: the object was moved
+
+
+@dataclass(frozen=True, slots=True)
+class FusionSettings:
+    """When poses of an object do not belong to one place."""
+
+    chance: float = 1e-3  #: of touches of an object that lay still being taken for moved
+    steps: int = 3  #: of Gauss and Newton's method; the first is enough for turns below a degree
+
+
+FUSION = FusionSettings()
+
+
+def fuse_poses(poses: Sequence[ObjectPose]) -> FusedPose:
+    """Return one pose of an object from those that single touches of a face told.
+
+    Errors of joints, wrist and symbols are drawn anew at every touch and average out. How the
+    sensor sits on the face (`ObjectPose.shared`) is the same each time, and stays.
+
+    Parameters
+    ----------
+    poses
+        One or more of one object, in one base frame, as `object_pose` gives them.
+    """
+    from scipy.special import gammaincinv
+
+    own = [pose.covariance - pose.shared for pose in poses]
+    T = poses[0].T_robot_object
+    for _ in range(FUSION.steps):
+        information, pull = np.zeros((6, 6)), np.zeros(6)
+        for pose, covariance in zip(poses, own, strict=True):
+            weight = np.linalg.inv(covariance)
+            information += weight
+            pull += weight @ _difference(pose.T_robot_object, T)
+        step = np.asarray(np.linalg.solve(information, pull), np.float64)
+        T = _displaced(T, step)
+    offs = [_difference(pose.T_robot_object, T) for pose in poses]
+    chi2 = sum(
+        float(off @ np.linalg.solve(spread, off)) for off, spread in zip(offs, own, strict=True)
+    )
+    freedoms = 6 * (len(poses) - 1)
+    limit = 2 * float(gammaincinv(freedoms / 2, 1 - FUSION.chance)) if freedoms else math.inf
+    whole = np.linalg.inv(information) + poses[0].shared
+    placed = ObjectPose(T, (whole + whole.T) / 2, poses[0].shared)
+    return FusedPose(placed, chi2, freedoms, chi2 > limit)
+
+
+def _difference(T_to: Array, T_from: Array) -> Array:
+    """Return (6,) what displaces and turns one pose into another, base axes."""
+    from scipy.spatial.transform import Rotation
+
+    turn = Rotation.from_matrix(T_to[:3, :3] @ T_from[:3, :3].T).as_rotvec()
+    return np.concatenate([T_to[:3, 3] - T_from[:3, 3], turn])
+
+
+def _displaced(T: Array, step: Array) -> Array:
+    """Return a pose displaced and turned by (6,), base axes."""
+    from scipy.spatial.transform import Rotation
+
+    moved = T.copy()
+    moved[:3, 3] += step[:3]
+    moved[:3, :3] = Rotation.from_rotvec(step[3:]).as_matrix() @ T[:3, :3]
+    return moved
