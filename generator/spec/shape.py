@@ -158,8 +158,8 @@ class Shape(Block):
     cone: Cone | None = None
     polyhedron: VerticesAndFaces | None = None
     file: PathText | None = None
-    """A model, relative to the spec: a .stl or .obj file with planar faces, or a .step file, whose
-    cylinder and cone faces are unrolled; other round faces stay blank."""
+    """A model, relative to the spec: a .stl or .obj file, whose curved regions stay blank, or a
+    .step file, whose cylinder and cone faces are unrolled; other round faces stay blank."""
     scale: Scale | None = None
     """How many times larger the model of `file` is made: 25.4 for a .stl in inches, 1000 for one
     in metres. A .step file says its unit, which is honoured without a scale."""
