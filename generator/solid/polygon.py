@@ -44,13 +44,8 @@ def triangulate_rings(
     elif len(points) == 4 and len(rings) == 1 and _strictly_convex(points):
         found = np.array([[0, 1, 2], [0, 2, 3]])
     else:
-        # The fast path for convex rings makes triangles of three points on a line.
-        found = np.asarray(ear_clipped(list(rings), allow_convex=False), dtype=np.int64)
-        found = without_slivers(points, found, flat)
-    areas = triangle_areas(points[found])
-    size = float(np.ptp(points, axis=0).max()) ** 2
-    wanted = sum(signed_area(ring) for ring in rings)
-    if len(found) == 0 or areas.min() < -1e-12 * size or abs(areas.sum() - wanted) > 1e-9 * size:
+        found = _clip_ears(rings, points, flat)
+    if not _covers(rings, points, found):
         raise SolidError(
             "its outline, holes or symbols overlap, so it has no triangulation",
             fix="keep symbols inside their face and apart from each other",
@@ -58,6 +53,34 @@ def triangulate_rings(
         )
     named: Index = numbers[found]
     return named
+
+
+def _clip_ears(rings: Sequence[Ring], points: Ring, flat: float) -> Index:
+    """Return triangles; rings whose points line up are turned until they come out right.
+
+    Ears are clipped from a bridge to each hole, which goes wrong now and then where many holes
+    have corners on one line, as the letters of a name do.
+    """
+    found: Index = np.zeros((0, 3), dtype=np.int64)
+    for angle in EMBOSS.clipping_turns_rad:
+        R = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        turned = [ring @ R.T for ring in rings] if angle else list(rings)
+        # The fast path for convex rings makes triangles of three points on a line.
+        found = np.asarray(ear_clipped(turned, allow_convex=False), dtype=np.int64)
+        found = without_slivers(points, found, flat)
+        if _covers(rings, points, found):
+            break
+    return found
+
+
+def _covers(rings: Sequence[Ring], points: Ring, triangles: Index) -> bool:
+    """Whether triangles cover the area between rings exactly once."""
+    areas = triangle_areas(points[triangles])
+    size = float(np.ptp(points, axis=0).max()) ** 2
+    wanted = sum(signed_area(ring) for ring in rings)
+    if len(triangles) == 0 or areas.min() < -1e-12 * size:
+        return False
+    return bool(abs(areas.sum() - wanted) <= 1e-9 * size)
 
 
 def without_slivers(points: Ring, triangles: Index, share: float = EMBOSS.flat) -> Index:

@@ -65,6 +65,8 @@ class EmbossingSettings:
     """Points may lie off their plane by this share of the part's size."""
 
     # polygon.py
+    clipping_turns_rad: tuple[float, ...] = (0.0, 0.3, 1.1, 2.0)
+    """By which an area is turned where its triangles do not come out right."""
     flat: float = 1e-9
     """Triangles thinner than this share of their longest side are taken for flat."""
 

@@ -14,7 +14,14 @@ from generator.polyhedron.shapes import box as solid_box
 from generator.polyhedron.shapes import cube, pyramid
 from generator.polyhedron.winged import polyhedron
 from generator.printers import PRINTERS
-from generator.solid import panels, prove_closed, symbol_clearance_mm, top_inset_mm, top_insets_mm
+from generator.solid import (
+    panels,
+    polygon,
+    prove_closed,
+    symbol_clearance_mm,
+    top_inset_mm,
+    top_insets_mm,
+)
 from generator.solid.emboss import turn
 from generator.solid.frame import in_frame
 from generator.solid.inset import inset, regular, shared_insets
@@ -220,6 +227,25 @@ def test_points_on_a_line_are_kept_without_flat_triangles():
     assert areas.sum() == pytest.approx(8.0)
     with pytest.raises(SolidError, match="plate"):
         triangulate_rings([outer, hole + np.array([1.5, 0.0])], np.arange(13), "plate")
+
+
+def test_an_area_is_turned_where_its_triangles_come_out_wrong(monkeypatch):
+    outer = np.array([[0, 0], [9, 0], [9, 9], [0, 9.0]])
+    hole = np.array([[3, 3], [3, 6], [6, 6], [6, 3.0]])
+    right, seen = polygon.ear_clipped, []
+
+    def wrong_at_first(rings, allow_convex):
+        seen.append(rings[0].copy())
+        found = right(rings, allow_convex=allow_convex)
+        return found if len(seen) > 2 else found[:, ::-1]
+
+    monkeypatch.setattr(polygon, "ear_clipped", wrong_at_first)
+    found = triangulate_rings([outer, hole], np.arange(8), "plate")
+    assert len(found) == 8
+    assert len(seen) == 3
+    assert np.array_equal(seen[0], outer)
+    assert np.hypot(*seen[2][2]) == pytest.approx(np.hypot(9, 9))
+    assert seen[2][2, 0] != pytest.approx(9.0)
 
 
 def test_numbers_without_room_make_one_short_warning():
