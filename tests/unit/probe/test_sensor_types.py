@@ -123,7 +123,8 @@ def test_which_type_images_are_of():
 def test_the_pitch_that_is_proposed():
     assert proposed_pitch_mm(SensorType()) == 7.0
     assert proposed_pitch_mm(sensor_type_named("gel-24x32")) == 3.0
-    small, sparse = SensorType(8, 8, 1.5875), SensorType(missing=tuple((r, 0) for r in range(16)))
+    half = tuple((row, column) for row in range(16) for column in range(0, 16, 2))
+    small, sparse = SensorType(8, 8, 1.5875), SensorType(missing=half)
     assert proposed_pitch_mm(small) < proposed_pitch_mm(sparse) < 7.0
 
 
