@@ -38,17 +38,17 @@ def answering_of(forces: Array, settings: LearningSettings = LEARNING) -> Answer
     shape = forces.shape[1:]
     none = np.zeros(shape)
     strong = np.percentile(forces.reshape(len(forces), -1), settings.strong, axis=1)
-    seen = forces[strong > 0] / strong[strong > 0, None, None]
-    if len(seen) < settings.least:
+    if (strong > 0).sum() < settings.least:
         return Answering(none > 0, none > 0, none)
+    scale = float(np.median(strong[strong > 0]))  # of all: what is stuck is so under any force
+    seen = forces[strong > 0] / scale
     few = len(seen) // settings.least  # of many touches not the extreme one: a spike is one
     free = np.sort(seen, axis=0)[few - 1]
     high = free - np.median(free) > settings.hot
     rise = np.sort(seen - np.where(high, free, 0.0), axis=0)[-few]
-    dead = high
+    dead, least = high, np.where(high, settings.raised, settings.answers)
     for _ in range(2):  # once more among those that answer: where most around one are dead
-        dead = rise < settings.answers * _around(np.where(dead, np.nan, rise), settings)
-    scale = float(np.median(strong))
+        dead = rise < least * _around(np.where(dead, np.nan, rise), settings)
     return Answering(dead & ~high, high & dead, np.where(high & ~dead, scale * free, 0.0))
 
 

@@ -13,6 +13,7 @@ class LearningSettings:
     around: int = 7  #: tactels, side of the square that a tactel is compared with
     usual: float = 70.0  #: percentile of the square that stands for a sound tactel
     answers: float = 0.25  #: of what sound ones around it rise to, from which one answers
+    raised: float = 0.6  #: the same of one that reads high: its column's load moves it as well
     hot: float = (
         0.15  #: of a plateau, that a tactel reads with nothing on it: more is no background
     )

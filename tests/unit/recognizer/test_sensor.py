@@ -40,6 +40,7 @@ def pressed(n=40, seed=2):
     """Readings of touches: half of the tactels pressed, at random."""
     rng = np.random.default_rng(seed)
     images = rng.uniform(60.0, 100.0, (n, 16, 16)) * (rng.random((n, 16, 16)) < 0.5)
+    images *= np.exp(rng.uniform(-0.7, 0.7, (n, 1, 1)))  # soft and hard touches
     for at in DEAD:
         images[:, *at] = 0.0
     for at in HOT:
