@@ -21,7 +21,11 @@ class SignalSettings:
     contact_n: float = 0.05  #: the same where readings are newtons
     contact_sigmas: float = 7.0  #: the same where they are on another scale: deviations of noise
     strongest: int = 6  #: tactels that must; a spike is one
-    background: float = 0.05  #: share of the tactels below the reading without force
+    background: float = 0.05  #: share of the tactels below the reading that a contact rises over
+    lowest: float = 0.6  #: share of the tactels among which the background is sought ...
+    densest: float = 0.4  #: ... where so many of them read most alike, and ...
+    fifth: float = 0.2  #: ... no higher over the reading that `background` names ...
+    above: float = 1.4  #: ... than so many times as this share of the tactels is
     dead: float = 0.02  #: of the median row (column): one below it is dead ...
     beside: float = 0.3  #: ... if both its neighbours are above this share
 
@@ -96,6 +100,9 @@ class NoiseSettings:
     quiet: float = 0.8  #: deviation where nothing is felt, against a covered tactel
     displaced_mm: float = 1.0  #: slopes count by this much, in the same measure
     most: float = 8.0  #: nats that one tactel can cost: a dead one or a spike
+    loud: float = 0.03  #: noise of readings over the force on a plateau, from which it counts
+    hidden: float = 0.5  #: most of an image's variance that is taken for that noise
+    above: float = 0.5  #: share of it that is seen where nothing is felt: no force is negative
     far: float = 4.0  #: deviations beyond which a tactel neither pulls nor counts as noise
 
 

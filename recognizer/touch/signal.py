@@ -69,17 +69,19 @@ def signal_of(
     good = readings[known > 0]
     if good.size == 0:
         return Signal(np.zeros(readings.shape), known, contact=False, newtons=newtons)
-    level = float(np.quantile(good, settings.background)) if floor is None else floor
+    lowest = float(np.quantile(good, settings.background)) if floor is None else floor
+    level = _background(good, lowest, settings) if floor is None else floor
     forces = np.maximum(readings - level, 0.0)
+    strongest = max(float(np.sort(good)[-settings.strongest :][0]) - lowest, 0.0)
     if sensor is not None and sensor.exponent != 1.0 and not newtons:
         forces = forces ** (1.0 / sensor.exponent)
+        strongest **= 1.0 / sensor.exponent
     rise = settings.contact_n if newtons else settings.contact_counts
     noise = noise_of(good)
     if not (newtons or (good == np.rint(good)).all()):  # no counts: of a scale of their own
         rise = min(rise, settings.contact_sigmas * noise)
-    strongest = np.sort(forces[known > 0])[-settings.strongest :]
     alive = _live_mask(forces, known, settings)
-    return Signal(forces, known * alive, bool(strongest[0] > rise), newtons, noise)
+    return Signal(forces, known * alive, strongest > rise, newtons, noise)
 
 
 def noise_of(readings: Array) -> float:
@@ -120,6 +122,23 @@ def signal_limits(sensor: SensorType, settings: SignalSettings = DEFAULTS.signal
     share = sensor.full / SensorType().full
     rise = max(settings.contact_counts * share, settings.quiet_sigmas * sensor.noise)
     return replace(settings, contact_counts=float(rise ** (1.0 / sensor.exponent)))
+
+
+def _background(readings: Array, low: float, settings: SignalSettings) -> float:
+    """Return what most of the lowest readings are: tactels that feel nothing, where some do.
+
+    Where most tactels are pressed alike, readings that are low and rare are believed.
+
+    Parameters
+    ----------
+    low
+        What a few readings lie below.
+    """
+    lowest = np.sort(readings)[: max(math.ceil(settings.lowest * readings.size), 2)]
+    count = math.ceil(settings.densest * (lowest.size - 1))
+    first = int(np.argmin(lowest[count:] - lowest[: lowest.size - count]))
+    most = low + settings.above * (float(np.quantile(readings, settings.fifth)) - low)
+    return min(float(lowest[first : first + count + 1].mean()), most)
 
 
 def _live_mask(forces: Array, known: Array, settings: SignalSettings) -> Array:

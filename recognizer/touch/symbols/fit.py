@@ -202,5 +202,6 @@ def _residuals(under: Projection) -> Array:
     felt, cells = under.felt, under.cells
     scores = log_likelihoods(felt, under.tables, np.full(len(cells), felt.settings.first))
     values = values_of(under, likeliest_labels(cells, scores))
-    deviation = psi_deviation(values[:, :, None], felt.settings)[..., 0]
+    unit = felt.settings.first / felt.press
+    deviation = psi_deviation(felt, values[:, :, None], unit)[..., 0]
     return (felt.psi - values[..., 0]) * felt.press / deviation

@@ -37,6 +37,7 @@ class Image:
     newtons: bool  #: whether the scale of the pressing is that of the forces
     plane: Array  #: (n, 3) basis of planes: 1, x and y over the half widths
     settings: ReaderSettings
+    noise: float = 0.0  #: standard deviation of forces where nothing is felt; 0: it is not one
     falls: Array | None = None  #: (1 or b, n) of a round face under b planes, overlay heights
 
 
@@ -57,6 +58,7 @@ def image_of_signal(
         shape=signal.forces.shape,
         pressing=pressing_of(sensor, height_mm, settings.gain),
         newtons=signal.newtons,
+        noise=signal.noise if signal.newtons or sensor.exponent == 1.0 else 0.0,
         plane=np.column_stack([np.ones(len(points)), points / np.array(sensor.half_mm)]),
         settings=settings,
     )
@@ -162,5 +164,6 @@ def normalize_image(image: Image, gain: Array) -> NormalizedImage:
         plain=plain,
         lower=lower,
         plateau=plateau,
+        faint=image.noise / plateau,
         settings=image.settings.noise,
     )

@@ -8,13 +8,14 @@ Losses are bounded per tactel, so that a dead one or a spike costs a known amoun
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.touch.settings import NoiseSettings
-from recognizer.touch.symbols.template import Floats, psi
+from recognizer.touch.symbols.template import PSI, Floats, psi
 
 Array = NDArray[np.float64]
 
@@ -33,14 +34,35 @@ class NormalizedImage:
     plain: Array  #: (b, n) F of `pressing` there
     lower: Array  #: (b, n) and over the bare face
     plateau: Array  #: (b, n) force on a plateau, no less than where the sensor hangs in the air
+    faint: Array  #: (b, n) noise of the readings as a share of that force
     settings: NoiseSettings
 
 
-def psi_deviation(tables: Floats | Array, settings: NoiseSettings) -> Floats:
-    """Return the spread (b, n, q) of psi around templates (b, n, q, 6), in units of the noise."""
+def psi_deviation(felt: NormalizedImage, tables: Floats | Array, unit: Array) -> Floats:
+    """Return the spread (b, n, q) of psi around templates (b, n, q, 6), in units of the noise.
+
+    Parameters
+    ----------
+    unit
+        (b, n) that unit: deviation of psi on a covered tactel.
+    """
+    settings = felt.settings
     value, x, y = tables[..., 0], tables[..., 1], tables[..., 2]
     square = settings.quiet**2 + value * value + settings.displaced_mm**2 * (x * x + y * y)
-    return np.asarray(np.sqrt(square), np.float32)
+    return np.asarray(np.sqrt(square + _readings_share(felt, value, unit)), np.float32)
+
+
+def _readings_share(felt: NormalizedImage, value: Array | Floats, unit: Array) -> Array | float:
+    """Return what the noise of readings adds to the square (b, n, q) of a spread."""
+    if felt.faint.max(initial=0.0) < felt.settings.loud:
+        return 0.0
+    return (reading_deviation(felt, value) / unit[..., None]) ** 2
+
+
+def reading_deviation(felt: NormalizedImage, value: Array | Floats) -> Array:
+    """Return the standard deviation of psi (b, n, q) that the noise of readings leaves at it."""
+    by_response = PSI / math.log1p(PSI) * np.exp(-math.log1p(PSI) * value)
+    return np.asarray(by_response * felt.faint[..., None])
 
 
 def log_likelihoods(felt: NormalizedImage, tables: Floats, noise: Array) -> Array:
@@ -54,12 +76,11 @@ def log_likelihoods(felt: NormalizedImage, tables: Floats, noise: Array) -> Arra
         (b,) standard deviation of psi on a covered tactel.
     """
     unit = noise[:, None] / np.maximum(felt.press, 1e-3)
-    symbols = _log_densities(felt, tables[..., 0], psi_deviation(tables, felt.settings), unit)
+    symbols = _log_densities(felt, tables[..., 0], psi_deviation(felt, tables, unit), unit)
     floor = psi(felt.bare)
     bare = np.stack([np.zeros_like(floor), floor], axis=-1)  # beyond the edge of the face, or not
-    nothing = _log_densities(felt, bare, np.hypot(felt.settings.quiet, bare), unit).max(
-        axis=-1, keepdims=True
-    )
+    width = np.sqrt(felt.settings.quiet**2 + bare**2 + _readings_share(felt, bare, unit))
+    nothing = _log_densities(felt, bare, width, unit).max(axis=-1, keepdims=True)
     return np.concatenate([symbols, nothing], axis=-1)
 
 

@@ -153,7 +153,8 @@ def prior_precision(image: Image) -> Array:
 
 def _width(values: Array, felt: NormalizedImage, noise: float) -> Array:
     """Return the standard deviation (b, n) of forces, from that of psi."""
-    relative = noise * psi_deviation(values[:, :, None], felt.settings)[..., 0] / felt.press
+    unit = noise / felt.press
+    relative = unit * psi_deviation(felt, values[:, :, None], unit)[..., 0]
     return np.asarray(relative * response_by_psi(response_of(values[..., 0])) * felt.plateau)
 
 

@@ -259,7 +259,7 @@ def test_an_image_of_a_signal_has_a_row_for_each_tactel():
     sensor = SensorType()
     forces = np.arange(256.0).reshape(16, 16)
     trust = np.linspace(0, 1, 256).reshape(16, 16)
-    signal = SimpleNamespace(forces=forces, trust=trust, newtons=True, state=None)
+    signal = SimpleNamespace(forces=forces, trust=trust, newtons=True, state=None, noise=2.5)
     found = image_of_signal(sensor, signal, 1.0, ReaderSettings())
     pitch = 1.5875
     assert found.points_mm.shape == (256, 2)
@@ -268,6 +268,7 @@ def test_an_image_of_a_signal_has_a_row_for_each_tactel():
     assert found.forces[37] == 37.0
     assert found.trust[37] == trust[2, 5]
     assert (found.shape, found.newtons, found.falls) == ((16, 16), True, None)
+    assert found.noise == 2.5
     half = np.array(sensor.half_mm)
     np.testing.assert_allclose(found.plane[37], [1.0, *(found.points_mm[37] / half)])
     assert np.ptp(found.points_mm[:, 0]) == pytest.approx(15 * pitch)

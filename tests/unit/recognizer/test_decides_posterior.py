@@ -13,7 +13,7 @@ from recognizer.touch.signal import Signal
 from recognizer.touch.symbols.blur import second_differences
 from recognizer.touch.symbols.gain import image_of_signal
 from recognizer.touch.symbols.posterior import fit_posterior
-from recognizer.touch.symbols.projection import project_template, values_of
+from recognizer.touch.symbols.projection import explained_share, project_template, values_of
 from recognizer.touch.symbols.refine import force_jacobian
 from recognizer.touch.symbols.template import template_of
 
@@ -152,3 +152,18 @@ def test_where_nothing_tells_a_place_it_is_wide(template, touch):
     found = fit(template, replace(touch(7, 0.05), trust=np.zeros(256)))
     assert np.isfinite(found.covariance).all()
     assert found.covariance[0, 0] > 1.0
+
+
+def test_what_noise_of_readings_leaves_is_not_left_unexplained(template, touch):
+    image = touch(8, 0.03)
+    rng = np.random.default_rng(8)
+    clean = explained_share(image, template, TRUE, GAIN, shown)
+    assert clean > 0.9
+    loud = np.maximum(image.forces + 40 * rng.standard_normal(256), 0.0)  # of 200 on a plateau
+    told = replace(image, forces=loud, noise=40.0)
+    plain = explained_share(replace(told, noise=0.0), template, TRUE, GAIN, shown)
+    assert plain < 0.7
+    assert explained_share(told, template, TRUE, GAIN, shown) > plain + 0.15
+    # symbols that are not there explain no more for it
+    other = explained_share(told, template, TRUE, GAIN, lambda cells: (shown(cells) + 1) % 4)
+    assert other < 0.3

@@ -23,11 +23,11 @@ def trusted(*sums, turned=False):
     return trust[:, 0].astype(bool).tolist()
 
 
-def test_the_floor_is_what_the_lowest_twentieth_reads():
-    readings = np.arange(100.0, 310.0, 10.0).reshape(3, 7)  # 21 tactels: one of twenty lies lower
+def test_the_background_is_what_the_densest_of_the_lowest_read():
+    readings = np.arange(100.0, 310.0, 10.0).reshape(3, 7)  # 13 of 21 are low, 6 of them alike
     found = signal_of(readings)
-    assert found.forces[0].tolist() == [0.0, 0.0, 10.0, 20.0, 30.0, 40.0, 50.0]
-    assert found.forces[2, 6] == 190.0
+    assert found.forces[0].tolist() == [0.0, 0.0, 0.0, 5.0, 15.0, 25.0, 35.0]
+    assert found.forces[2, 6] == 175.0
     assert not found.newtons
 
 
@@ -183,3 +183,17 @@ def test_noise_is_that_of_tactels_that_nothing_presses():
     assert noise_of(np.array([0.0] * 9 + [180.0] * 7)) == pytest.approx(np.sqrt(1 / 12))
     by_hand = np.array([0.0] * 3 + [1.0] * 13)  # mode 1, three one below it
     assert noise_of(by_hand) == pytest.approx(np.sqrt(3 / (3 + 13 / 2) + 1 / 12))
+
+
+def test_the_background_is_what_most_free_tactels_read():
+    rng = np.random.default_rng(6)
+    image = 8.0 + 3.0 * rng.standard_normal((16, 16))
+    image[4:12, 4:12] += rng.uniform(20, 60, (8, 8))  # a quarter of them is pressed
+    found = signal_of(image)
+    free = np.ones((16, 16), bool)
+    free[4:12, 4:12] = False
+    # forces are over the background, and none is negative
+    at = (image - found.forces)[found.forces > 0]
+    assert at == pytest.approx(np.full(at.size, 8.0), abs=1.2)
+    assert (found.forces[free] == 0).mean() == pytest.approx(0.5, abs=0.15)
+    assert signal_of(np.full((16, 16), 7.0)).forces.max() == 0.0
