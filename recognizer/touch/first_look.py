@@ -65,7 +65,9 @@ def may_tell_more(
         how many of its cells speak for it.
     """
     settings, arrays = reader.settings.first_look, reader.lab.arrays
-    if answer or best is None or any(each.radii_mm for each in arrays):
+    if answer or best is None or reader.sensor.overlay.kind != "tab":
+        return True
+    if any(each.radii_mm for each in arrays):
         return True  # on a round face few tactels are pressed
     if answer.reason == AMBIGUOUS and inliers < symbols_to_name(best.embossed):
         return False  # the image is explained, and it shows no more
