@@ -64,4 +64,8 @@ def test_a_port_of_the_page_that_is_taken(capsys, tmp_path, monkeypatch):
 
 def test_the_address_that_is_printed():
     assert _address("127.0.0.1", 8080, "") == "open-bench: http://127.0.0.1:8080/"
-    assert _address("::", 80, "secret") == "open-bench: http://[::]:80/?token=secret"
+    assert _address("fd00::1", 80, "secret") == "open-bench: http://[fd00::1]:80/?token=secret"
+    for everywhere in ("::", "0.0.0.0"):
+        told = _address(everywhere, 80, "secret")
+        assert told.startswith("open-bench: http://")
+        assert everywhere not in told.split(":80/")[0].split("//")[1].strip("[]").split()
