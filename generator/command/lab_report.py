@@ -91,15 +91,22 @@ def _chance_text(use: PitchUse) -> str:
     at = f"{use.pitch_mm:g} mm pitch, {use.order} symbols:"
     if use.touches > 1:
         return f"{at} read by a scan of about {use.touches} touches"
-    once = f"once in {round(1 / use.chance):,} touches"
+    once = f"once in {_round_text(1 / use.chance)} touches"
     text = (
         f"{at} a touch tells about {use.symbols:.0f}, so a part that is not registered here "
         f"matches one of the {use.places:,} places by chance {once}"
     )
     if use.places <= use.most_places:
-        return f"{text}; single touches are enough up to {use.most_places:,} places"
+        return f"{text}; single touches are enough up to {_round_text(use.most_places)} places"
     return (
         f"{text}, oftener than single touches may from {use.most_places:,} places on; make what "
         "comes at a finer pitch (profile fine, or symbols: {pitch: 5 mm}), or read two touches "
         "together (--scan). A larger array does not help here"
     )
+
+
+def _round_text(number: float) -> str:
+    """Return a number as people say it: two digits, the large ones as powers of ten."""
+    if number >= 1e7:
+        return f"{number:.1e}".replace("e+0", "e").replace("e+", "e")
+    return f"{float(f'{number:.2g}'):,.0f}"
