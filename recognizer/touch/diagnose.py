@@ -37,6 +37,7 @@ class CauseSettings:
     part: float = 0.2  #: of the full load, from which a place is loaded
     sigmas: float = 5.0  #: of the noise, likewise
     even: float = 0.75  #: variation of the readings (deviation over mean) of a face without relief
+    plain: float = 0.2  #: likewise, of the pressed ones alone: symbols press by .4 and more
     smeared: float = 0.85  #: likewise, below which contours may be smeared ...
     sharp: float = 0.6  #: ... if they are so much less sharp one way than across
     soft: float = 16.0  #: signal to noise below which a touch is soft
@@ -108,6 +109,13 @@ def image_features(
     )
 
 
+def _is_plain(signal: Signal, settings: CauseSettings) -> bool:
+    """Whether what is pressed is pressed evenly, up to an edge or not."""
+    good = signal.forces[signal.trust > 0]
+    pressed = good[good > settings.part * float(np.percentile(good, settings.plateau))]
+    return bool(pressed.std() < settings.plain * max(float(pressed.mean()), 1e-300))
+
+
 def diagnose(
     reader: PreparedLab,
     signal: Signal,
@@ -132,7 +140,7 @@ def diagnose(
     symbols = 0 if support is None else support.inliers
     if image.width_mm < settings.narrow_mm and image.length_mm > settings.longer * image.width_mm:
         return Cause(cause.ONE_ROW, {"width_mm": image.width_mm, "symbols": float(symbols)})
-    if not shows_strokes(reader, signal):
+    if not shows_strokes(reader, signal) or _is_plain(signal, settings):
         return Cause(cause.PLAIN, {"variation": image.variation, "plateau": image.plateau})
     if support is None:
         code = cause.EDGE if image.loaded < settings.loaded else cause.UNCLEAR

@@ -31,7 +31,7 @@ def test_build123d_bracket(tmp_path):
     # A hole of 3 mm through 12 mm, and through symbols of 1 mm where it meets them.
     assert 84 < before - after < 100
     assert {path.suffix for path in (tmp_path / "out" / "bracket").iterdir()} == {
-        ".png", ".stl", ".svg",
+        ".html", ".png", ".stl", ".svg",
     }  # fmt: skip
 
 

@@ -132,7 +132,7 @@ def test_same_spec_and_key_give_same_bytes_in_other_processes_and_folders(tmp_pa
     assert everything[0] == everything[1]
     assert everything[0].keys() == everything[2].keys()
     assert everything[0]["Cube-F1.stl"] != everything[2]["Cube-F1.stl"]  # drew a key of its own
-    assert len(everything[0]) == 6 * 2 + 5
+    assert len(everything[0]) == 6 * 2 + 7  # and the build sheet, and the assembly
 
 
 def test_registered_spec_gives_its_files_again_and_other_objects_other_cells(tmp_path):
@@ -174,7 +174,7 @@ def test_dry_run_tells_what_will_be_made_and_writes_nothing(tmp_path):
         (o.name, o.symbols, o.places, o.parts) for o in done.objects
     ]
     assert dry.used_cells == done.used_cells
-    of_set = {"spec-packing.csv", "spec-overview.pdf"}
+    of_set = {"spec-packing.csv", "spec-overview.pdf", "spec-build.html"}
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"A", "B", *of_set}
 
 

@@ -184,7 +184,7 @@ def test_a_device_that_is_no_probe_is_told(line):
 
 def test_a_firmware_of_another_version_is_told(line):
     master, url = line
-    payload = b"I\x02" + bytes(26)
+    payload = b"I\x03" + bytes(26)
     block = cobs.encode(payload + crc_hqx(payload, 0xFFFF).to_bytes(2, "little"))
     with Client(url, answer_s=0.3) as client:
         os.write(master, b"\0" + (block + b"\0") * 2)

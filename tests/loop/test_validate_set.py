@@ -230,7 +230,7 @@ def test_a_folder_is_not_taken_twice_nor_resumed_otherwise(spec, reference, caps
 
 def test_written_files_are_what_is_registered(reference):
     database = str(reference[0] / "lab.db")
-    reader = Reader(open_lab(database), sensor_of("tab"))
+    reader = Reader(open_lab(database), sensor_of("", "tab"))
     for number in range(4):
         said, written = (
             draw_touch(TouchPlan(database, level="low", files=files), number, reader)

@@ -14,15 +14,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module, resources
+from typing import TYPE_CHECKING
 
-from probe.contact.contract import Contact, Touch
-from probe.contact.tips import Tips
 from probe.errors import ContactError
-from probe.sensor import SensorType
-from probe.surface.contract import HeightMap
 
-Press = Callable[[HeightMap, SensorType, Touch, Tips], Contact]
-Triangles = Callable[[HeightMap, SensorType, Touch], tuple[int, int] | None]
+if TYPE_CHECKING:  # a command's help names the engines and needs nothing of these
+    from probe.contact.contract import Contact, Touch
+    from probe.contact.tips import Tips
+    from probe.sensor import SensorType
+    from probe.surface.contract import HeightMap
+
+    Press = Callable[[HeightMap, SensorType, Touch, Tips], Contact]
+    Triangles = Callable[[HeightMap, SensorType, Touch], tuple[int, int] | None]
 
 
 @dataclass(frozen=True, slots=True)

@@ -69,7 +69,7 @@ def coarse_url(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def pad_reader(coarse_url):
-    return Reader(open_lab(coarse_url), sensor_of("pad"))
+    return Reader(open_lab(coarse_url), sensor_of("", "pad"))
 
 
 def felt(url, name, face, touch):
@@ -369,7 +369,7 @@ def test_a_point_in_a_face(reader):
 @pytest.mark.parametrize("overlay", ["tab", "pad"])
 def test_a_template_is_the_derivative_of_itself(reader, overlay):
     encoding = reader.lab.arrays[0]
-    template = template_of(encoding.alphabet, encoding.style, sensor_of(overlay))
+    template = template_of(encoding.alphabet, encoding.style, sensor_of("", overlay))
     at = np.array([[-1.2, 0.4], [0.3, -1.7], [1.6, 1.1]])
     by = 0.1
     aside = np.array([by, 0.0])
