@@ -37,7 +37,8 @@ class CauseSettings:
     part: float = 0.2  #: of the full load, from which a place is loaded
     sigmas: float = 5.0  #: of the noise, likewise
     even: float = 0.75  #: variation of the readings (deviation over mean) of a face without relief
-    plain: float = 0.2  #: likewise, of the pressed ones alone: symbols press by .4 and more
+    plain: float = 0.2  #: likewise, of the pressed tactels alone ...
+    filled: float = 0.9  #: ... where these fill so much of the box around them
     smeared: float = 0.85  #: likewise, below which contours may be smeared ...
     sharp: float = 0.6  #: ... if they are so much less sharp one way than across
     soft: float = 16.0  #: signal to noise below which a touch is soft
@@ -110,10 +111,17 @@ def image_features(
 
 
 def _is_plain(signal: Signal, settings: CauseSettings) -> bool:
-    """Whether what is pressed is pressed evenly, up to an edge or not."""
-    good = signal.forces[signal.trust > 0]
-    pressed = good[good > settings.part * float(np.percentile(good, settings.plateau))]
-    return bool(pressed.std() < settings.plain * max(float(pressed.mean()), 1e-300))
+    """Whether what is pressed is one area without gaps, pressed evenly, up to an edge or not."""
+    good = signal.trust > 0
+    top = float(np.percentile(signal.forces[good], settings.plateau))
+    pressed = good & (signal.forces > settings.part * top)
+    rows, columns = np.flatnonzero(pressed.any(axis=1)), np.flatnonzero(pressed.any(axis=0))
+    if not len(rows):
+        return False
+    inside = np.ix_(range(rows[0], rows[-1] + 1), range(columns[0], columns[-1] + 1))
+    filled = float(pressed[inside].sum()) / max(int(good[inside].sum()), 1)
+    forces = signal.forces[pressed]
+    return filled > settings.filled and bool(forces.std() < settings.plain * forces.mean())
 
 
 def diagnose(

@@ -63,9 +63,10 @@ class NextTouch:
     why: str
 
     def __str__(self) -> str:
-        step = f"{self.dx_mm:g} mm along x, {self.dy_mm:g} mm along y"
-        turn = f", turned by {self.turn_deg:g} degrees" if self.turn_deg else ""
-        return f"{step}{turn}, {self.force_n:g} N ({self.why})"
+        steps = [f"{step:g} mm along {axis}"
+                 for step, axis in ((self.dx_mm, "x"), (self.dy_mm, "y")) if step]  # fmt: skip
+        turn = [f"turned by {self.turn_deg:g} degrees"] if self.turn_deg else []
+        return f"{', '.join([*(steps or ['here']), *turn])}, {self.force_n:g} N ({self.why})"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

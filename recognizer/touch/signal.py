@@ -138,7 +138,10 @@ def _background(readings: Array, low: float, settings: SignalSettings) -> float:
     count = math.ceil(settings.densest * (lowest.size - 1))
     first = int(np.argmin(lowest[count:] - lowest[: lowest.size - count]))
     most = low + settings.above * (float(np.quantile(readings, settings.fifth)) - low)
-    return min(float(lowest[first : first + count + 1].mean()), most)
+    level = min(float(lowest[first : first + count + 1].mean()), most)
+    middle, strong = np.quantile(readings, [0.5, settings.strong]).tolist()
+    even = strong - middle < settings.tail * (middle - low)  # strokes leave few strong ones
+    return low if even else level
 
 
 def _live_mask(forces: Array, known: Array, settings: SignalSettings) -> Array:

@@ -60,7 +60,7 @@ def test_what_touches_tell_of_a_print_betters_later_poses(lab, capsys):
     simulate(printed, 1, 24)
     simulate(printed, 2, 12)
     before, answers = rms_mm(capsys, 2)
-    assert before > 0.2
+    assert before > 0.05  # each touch has felt the scale, and was moved by it
     felt = [answer["scale"] for answer in answers if answer["object"]]
     assert 0.98 < np.mean(felt) < 0.992  # the reader takes 1 as likelier
 
@@ -78,7 +78,7 @@ def test_what_touches_tell_of_a_print_betters_later_poses(lab, capsys):
     assert re.match(r"Cube-F1: X is (1\.9|2\.0|2\.1) % short, Y is 1\.", said.out)
     assert "kept in lab.db; parts of fdm-0.4 PLA" in said.err
     after, _ = rms_mm(capsys, 2)
-    assert after < 0.06
+    assert after < min(0.06, 0.8 * before)
 
     # a part that nobody has touched is taken to be as its printer prints, less surely
     write_scaled(Path("out/Cube-F2.stl"), Path("printed/Cube-F2.stl"), (0.98, 0.985, 1.0))

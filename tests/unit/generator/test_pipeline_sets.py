@@ -233,6 +233,7 @@ def test_a_refused_set_leaves_no_database(tmp_path, copies):
     path.write_text(
         "objects:\n- {name: A, shape: {cube: 60 mm}}\n"
         f"- {{name: B, shape: {{box: {size}}}, copies: {copies}}}\n"
+        + ("profile: one-touch\n" if copies > 1 else "")
     )
     with pytest.raises(SpecError):
         encode(read_specs([path]), folder=tmp_path / "out", database=f"sqlite:///{tmp_path}/l.db")

@@ -24,11 +24,17 @@ def trusted(*sums, turned=False):
 
 
 def test_the_background_is_what_the_densest_of_the_lowest_read():
-    readings = np.arange(100.0, 310.0, 10.0).reshape(3, 7)  # 13 of 21 are low, 6 of them alike
+    low, high = np.arange(100.0, 230.0, 10.0), np.arange(300.0, 620.0, 40.0)
+    readings = np.concatenate([low, high]).reshape(3, 7)  # 13 of 21 are low, 6 of them alike
     found = signal_of(readings)
     assert found.forces[0].tolist() == [0.0, 0.0, 0.0, 5.0, 15.0, 25.0, 35.0]
-    assert found.forces[2, 6] == 175.0
+    assert found.forces[2, 6] == 455.0
     assert not found.newtons
+
+
+def test_what_presses_evenly_is_no_background():
+    readings = np.arange(100.0, 310.0, 10.0).reshape(3, 7)
+    assert signal_of(readings).forces[0].tolist() == [0.0, 0.0, 10.0, 20.0, 30.0, 40.0, 50.0]
 
 
 def test_a_floor_that_is_given_is_taken():
