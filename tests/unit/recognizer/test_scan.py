@@ -173,7 +173,7 @@ def felt_near(lab):
     """As close to each other as a hand steps that feels its way."""
     surface = registered_surface(lab.url, "Cube", "F3").surface
     places = [(x, y) for n, y in enumerate((30, 37, 44)) for x in range(20, 56, 7)[:: (-1) ** n]]
-    return scanned(surface, places, 0.8, TYPICAL, 6)
+    return scanned(surface, places, 0.8, TYPICAL, 7)
 
 
 @pytest.mark.parametrize("knows", ["pose", "arm", "nothing"])
