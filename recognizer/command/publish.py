@@ -26,9 +26,9 @@ from probe.frame import Frame
 from probe.recording.cdr import cdr_bytes
 from probe.recording.ros import IMAGE, POSE_WITH_COVARIANCE, image_message
 from recognizer.command import report
+from recognizer.command.answer_sink import AnswerSink
 from recognizer.command.answers import Answer
 from recognizer.command.ros import object_message
-from recognizer.command.sinks import AnswerSink
 
 _URL = re.compile(
     r"zenoh://(?P<host>[\w.-]+|\[[0-9a-fA-F:]+\]):(?P<port>\d{1,5})(?:/(?P<key>[\w./-]+))?"

@@ -17,11 +17,12 @@ from probe.recording.layout import RecordingOrigin
 from probe.recording.read import Recording
 from recognizer.command import report
 from recognizer.command.answer_pictures import draw_answer, draw_answers, refuse_pictures
+from recognizer.command.answer_sink import AnswerSink
 from recognizer.command.answers import Answer, RecognizeOptions, answers_of
 from recognizer.command.learning import SensorLearning, learning_for
 from recognizer.command.port import listen, source_at
 from recognizer.command.scanning import touches_for
-from recognizer.command.sinks import AnswerSink, sinks_for
+from recognizer.command.sinks import sinks_for
 from recognizer.touch.contacts import TouchImage
 from recognizer.touch.lab import Lab, open_lab
 from recognizer.touch.reader import Reader

@@ -33,8 +33,8 @@ from probe.recording.ros import (
     covariance_message,
 )
 from recognizer.command import report
+from recognizer.command.answer_sink import AnswerSink
 from recognizer.command.answers import Answer
-from recognizer.command.sinks import AnswerSink
 from recognizer.touch.recognition import Recognition
 from recognizer.touch.robot import ObjectPose, object_pose
 

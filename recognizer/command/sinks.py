@@ -1,29 +1,12 @@
-"""Where images and answers go beside the terminal: each sink takes them as they come."""
+"""Where images and answers go beside the terminal: the sinks that are asked for."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
-from probe.closing import Closing
-from probe.frame import Frame
 from probe.recording.layout import RecordingOrigin
-
-if TYPE_CHECKING:
-    from recognizer.command.answers import Answer, RecognizeOptions
-
-
-class AnswerSink(Closing):
-    """What takes images and answers as they come."""
-
-    @abstractmethod
-    def frame(self, frame: Frame) -> None:
-        """Take an image."""
-
-    @abstractmethod
-    def answer(self, answer: Answer) -> None:
-        """Take an answer."""
+from recognizer.command.answer_sink import AnswerSink
+from recognizer.command.answers import RecognizeOptions
 
 
 def sinks_for(options: RecognizeOptions, origin: RecordingOrigin) -> Iterator[AnswerSink]:

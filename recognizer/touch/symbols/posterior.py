@@ -33,7 +33,7 @@ from recognizer.touch.symbols.refine import (
     prior_departure,
     prior_precision,
 )
-from recognizer.touch.symbols.spread import Spread, fit_spread, usual_spread
+from recognizer.touch.symbols.spread import TactelScatter, fit_spread, usual_spread
 from recognizer.touch.symbols.template import ResponseTemplate
 
 Array = NDArray[np.float64]
@@ -46,7 +46,7 @@ class PosePosterior:
     pose: Array  #: (7,) of `refine.Lattices`
     gain: Array  #: (4,)
     covariance: Array  #: (4, 4) of x, y (mm), theta (rad) and scale - 1
-    spread: Spread
+    spread: TactelScatter
     blur: tuple[float, float]  #: shares of each neighbour in a row's, in a column's reading
 
 

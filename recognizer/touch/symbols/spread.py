@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Spread:
+class TactelScatter:
     """Standard deviations of psi on a covered tactel, and of the place of a tip."""
 
     felt: float
@@ -45,15 +45,15 @@ class Spread:
         return np.asarray(trust * (freedom + 1) / (freedom * variance + left * left))
 
 
-def usual_spread(settings: SpreadSettings) -> Spread:
+def usual_spread(settings: SpreadSettings) -> TactelScatter:
     """Return what a sensor is taken to be like before it is touched with."""
-    return Spread(settings.felt, settings.aside_mm)
+    return TactelScatter(settings.felt, settings.aside_mm)
 
 
 def fit_spread(
-    before: Spread, left: Array, parts: Array, jacobian: Array, known: Array, trust: Array,
+    before: TactelScatter, left: Array, parts: Array, jacobian: Array, known: Array, trust: Array,
     settings: SpreadSettings,
-) -> Spread:  # fmt: skip
+) -> TactelScatter:  # fmt: skip
     """Return the spread under which residuals are likeliest, drawn towards the usual one.
 
     Parameters
@@ -74,7 +74,7 @@ def fit_spread(
     usual = np.square([settings.felt, settings.aside_mm])
     now = np.square([before.felt, before.aside_mm])
     for _ in range(settings.rounds):
-        spread = Spread(math.sqrt(now[0]), math.sqrt(now[1]))
+        spread = TactelScatter(math.sqrt(now[0]), math.sqrt(now[1]))
         weights = spread.weights(left, parts, trust, freedom)
         normal = (jacobian * weights[:, None]).T @ jacobian + known
         inverse = invert_normal(normal, settings.unseen)
@@ -82,4 +82,4 @@ def fit_spread(
         share = trust * now[:, None] * parts / spread.variances(parts)
         asked = share @ (weights * left * left + taken) + settings.touches * usual / now
         now = now * np.sqrt(asked / (share.sum(axis=1) + settings.touches))
-    return Spread(math.sqrt(now[0]), math.sqrt(now[1]))
+    return TactelScatter(math.sqrt(now[0]), math.sqrt(now[1]))

@@ -8,29 +8,29 @@ import pytest
 
 from recognizer.touch.settings import SpreadSettings
 from recognizer.touch.symbols.blur import second_differences
-from recognizer.touch.symbols.spread import Spread, fit_spread, usual_spread
+from recognizer.touch.symbols.spread import TactelScatter, fit_spread, usual_spread
 
 USUAL = SpreadSettings()
 
 
 def test_variances_are_those_of_both_parts():
     parts = np.array([[1.0, 4.0, 0.0], [0.0, 2.0, 9.0]])
-    assert Spread(0.5, 0.1).variances(parts) == pytest.approx([0.25, 1.02, 0.09])
+    assert TactelScatter(0.5, 0.1).variances(parts) == pytest.approx([0.25, 1.02, 0.09])
     assert (usual_spread(USUAL).felt, usual_spread(USUAL).aside_mm) == (0.08, 0.08)
 
 
 def test_what_lies_far_out_weighs_little():
     left, parts, trust = np.array([0.0, 2.0, 20.0, 2.0]), np.ones((2, 4)), np.array([1.0, 1, 1, 0])
-    weights = Spread(math.sqrt(3), 1.0).weights(left, parts, trust, 8.0)  # variance 4
+    weights = TactelScatter(math.sqrt(3), 1.0).weights(left, parts, trust, 8.0)  # variance 4
     assert weights == pytest.approx([9 / 32, 9 / 36, 9 / 432, 0.0])
 
 
 def test_the_log_likelihood_is_students():
     left, parts, trust = np.array([0.5, -3.0, 1.0]), np.ones((2, 3)), np.array([1.0, 1.0, 0.0])
-    spread = Spread(0.6, 0.8)  # variance 1
+    spread = TactelScatter(0.6, 0.8)  # variance 1
     expected = sum(-4.5 * math.log(1 + x * x / 8) for x in (0.5, -3.0))
     assert spread.log_likelihood(left, parts, trust, 8.0) == pytest.approx(expected)
-    wider = Spread(1.2, 1.6).log_likelihood(left, parts, trust, 8.0)
+    wider = TactelScatter(1.2, 1.6).log_likelihood(left, parts, trust, 8.0)
     expected = sum(-4.5 * math.log(1 + x * x / 32) - math.log(2) for x in (0.5, -3.0))
     assert wider == pytest.approx(expected)
 
@@ -39,7 +39,7 @@ def touched(felt, aside, seed, count=256):
     """Residuals of a touch whose tactels differ in slope, and of which nothing was fitted."""
     rng = np.random.default_rng(seed)
     parts = np.stack([0.7 + rng.random(count), 3 * rng.random(count) ** 2])
-    left = np.sqrt(Spread(felt, aside).variances(parts)) * rng.standard_normal(count)
+    left = np.sqrt(TactelScatter(felt, aside).variances(parts)) * rng.standard_normal(count)
     return left, parts
 
 
