@@ -59,6 +59,7 @@ def opened(browser, address, **look):
 def page(browser, bench):
     with opened(browser, bench) as page:
         rest(page)
+        shown(page, "Cube")
         yield page
 
 
@@ -128,7 +129,6 @@ def test_a_click_on_a_round_face_touches_there(page, place):
     asked = [float(page.locator(f"#touch-{axis}").input_value()) for axis in "xy"]
     read = re.search(r"x (-?[\d.]+), y (-?[\d.]+) mm", page.locator("#pose").inner_text())
     assert np.allclose(asked, [float(value) for value in read.groups()], atol=0.5)
-    shown(page, "Cube")
 
 
 WATCH = """() => { window.seen = []; const look = () => {

@@ -29,7 +29,7 @@ async function begin(): Promise<void> {
   const part = new Part(sensor, (place) => void touch(place).catch(() => undefined));
   const map = new MapPanel((name) => void show(name));
   const touches = new Touches((one, past) => void take(one, past));
-  let newest: Frame | null = null, painting = false, simulated = false, past = false;
+  let newest: Frame | null = null, painting = false, simulated = false, past = false, asked = "";
   let record: TouchRecord | null = null, clicked: number | null = null, painted = 0, read = 0;
 
   const line = new Live({
@@ -137,13 +137,17 @@ async function begin(): Promise<void> {
     });
   }
 
+  /** Show an object; the last one asked for wins, and one shown again keeps the form as it was filled in. */
   async function show(name: string): Promise<void> {
+    asked = name;
     const shape = await get<ObjectShape>(`objects/${encodeURIComponent(name)}`);
+    if (asked !== name) return;
+    const again = figures.shown === name, face = element<HTMLSelectElement>("touch-face").value;
     part.show(shape);
     figures.shown = name;
     element<HTMLSelectElement>("object").value = name;
-    choices(element("touch-face"), shape.faces.filter((face) => !face.blank).map((face) => [face.name, face.name]));
-    middle(shape);
+    choices(element("touch-face"), shape.faces.filter((one) => !one.blank).map((one) => [one.name, one.name]));
+    if (!again || element<HTMLSelectElement>("touch-face").value !== face) middle(shape);
     element("files").replaceChildren(...shape.parts.map((one) => {
       const item = document.createElement("li"), link = document.createElement("a");
       link.href = `/api/objects/${encodeURIComponent(name)}/parts/${one.number}`;
