@@ -17,9 +17,10 @@ from recognizer.bench.example import make_example
 from recognizer.bench.files import part_folder, part_to_send
 from recognizer.bench.lab_json import arrays_json, map_json, object_json, objects_json
 from recognizer.bench.session import Session
+from recognizer.bench.settings import LAB
 from recognizer.bench.simulated import SCHEME
 
-LAB = "lab.db"  #: in the folder where the bench was started, where no database was named
+NEW_LAB = "lab.db"  #: in the folder where the bench was started, where no database was named
 
 
 def lab_routes(session: Session, parts: Path | None) -> APIRouter:
@@ -29,7 +30,7 @@ def lab_routes(session: Session, parts: Path | None) -> APIRouter:
     def engine() -> Any:
         if not session.database:
             raise UnknownError("no database is open", fix="start with --database lab.db")
-        return open_database(session.database, writable=False)
+        return open_database(session.database, writable=False, wait_s=LAB.wait_s)
 
     @routes.get("/objects")
     def objects() -> dict[str, Any]:
@@ -42,8 +43,8 @@ def lab_routes(session: Session, parts: Path | None) -> APIRouter:
     def example() -> dict[str, Any]:
         if session.database and objects()["objects"]:
             raise BusyError("objects are registered already", fix="touch one of these")
-        name = make_example(Path.cwd(), session.database or LAB)
-        session.use_database(session.database or LAB)
+        name = make_example(Path.cwd(), session.database or NEW_LAB)
+        session.use_database(session.database or NEW_LAB)
         session.open(SCHEME)
         return {"object": name}
 

@@ -65,6 +65,7 @@ class Session:
         self._frames = FrameHandler(sensor, broker, self.recognition, self._note)
         self._notices: deque[tuple[int, float, str]] = deque(maxlen=SESSION.notices)
         self._noted = 0
+        self._started_ms = time.time() * 1e3
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="bench", daemon=True)
         self._thread.start()
@@ -272,6 +273,7 @@ class Session:
                     {"number": n, "at_ms": at_ms, "text": text} for n, at_ms, text in self._notices
                 ],
                 "pages": len(self._broker.subscribers),
+                "started_ms": self._started_ms,
             }  # fmt: skip
 
     # What follows runs in the thread, or under its lock.

@@ -89,6 +89,13 @@ class ExampleSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class LabSettings:
+    """How the page reads the database."""
+
+    wait_s: float = 2.0  #: for others to end; then the page is told who keeps it waiting
+
+
+@dataclass(frozen=True, slots=True)
 class PageSettings:
     """What pages may ask of the live line, and how much they get."""
 
@@ -111,4 +118,4 @@ class TouchLogSettings:
 TRIGGER, RECOGNITION, SESSION = TriggerSettings(), RecognitionSettings(), SessionSettings()
 TOUCHES = TouchLogSettings()
 GUIDE, REPLAY, PRESS = GuideSettings(), ReplaySettings(), PressSettings()
-LINE, PAGE, EXAMPLE = LineSettings(), PageSettings(), ExampleSettings()
+LINE, PAGE, EXAMPLE, LAB = LineSettings(), PageSettings(), ExampleSettings(), LabSettings()

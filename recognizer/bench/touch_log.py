@@ -2,7 +2,8 @@
 
 A touch is felt, read, and answered or refused; while it moves it is `moving`, and when the
 probe leaves it is no longer in `contact`. An answer belongs to its record alone: a new touch
-begins without one. Pages are told the newest record (topic `touch`); the others can be asked for.
+begins without one. Pages are told the newest record (topic `touch`), and when others were named or
+deleted (topic `touches`); these can be asked for.
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ class TouchLog:
         self._broker = broker
         self._turn = threading.Lock()
         self._records: OrderedDict[int, TouchRecord] = OrderedDict()
-        self._number = 0
+        self._number = self._changes = 0
 
     @property
     def newest(self) -> int:
@@ -143,7 +144,8 @@ class TouchLog:
             raise BenchError(f"a name of {len(name)} characters",
                              fix=f"give at most {TOUCHES.name}")  # fmt: skip
         with self._turn:
-            record = self._records[number] = replace(self._known(number), name=name)
+            record = replace(self._known(number), name=name)
+            self._put(record)
             return record.as_json()
 
     def delete(self, number: int) -> None:
@@ -157,6 +159,7 @@ class TouchLog:
         with self._turn:
             self._known(number)
             del self._records[number]
+            self._tell_change()
 
     def frames(self) -> list[Frame]:
         """Return the frames that were read, oldest first."""
@@ -171,6 +174,11 @@ class TouchLog:
         with self._turn:
             table.writerows(_row(record) for record in self._records.values())
         return text.getvalue()
+
+    def _tell_change(self) -> None:
+        """Tell the pages to ask for the records again: one that is not the newest has changed."""
+        self._changes += 1
+        self._broker.publish("touches", {"changes": self._changes})
 
     def _known(self, number: int) -> TouchRecord:
         record = self._records.get(number)
@@ -187,7 +195,9 @@ class TouchLog:
     def _put(self, record: TouchRecord) -> None:
         before = self._records.get(record.number)
         self._records[record.number] = record
-        if before is None or before.as_json() != record.as_json():
+        if record.number != self._number:
+            self._tell_change()
+        elif before is None or before.as_json() != record.as_json():
             self._broker.publish("touch", record.as_json())
 
 

@@ -30,7 +30,7 @@ def touch_routes(session: Session) -> APIRouter:
 
     @routes.get("/touches")
     def touches() -> dict[str, Any]:
-        return {"touches": log.all()}
+        return {"touches": log.all(), "newest": log.newest}
 
     @routes.get("/touches/{number}")
     def one(number: int) -> dict[str, Any]:

@@ -7,6 +7,8 @@ import sys
 from contextlib import contextmanager
 
 import pytest
+from bench_page import CHROMIUM, FLAGS
+from playwright.sync_api import sync_playwright
 
 ENDED_S = 30.0
 
@@ -51,3 +53,12 @@ def served(lab):
                 assert process.wait(ENDED_S) == 0
 
     return running
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """Chromium, without a window."""
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
+        yield chromium
+        chromium.close()

@@ -3,24 +3,15 @@
 from __future__ import annotations
 
 import re
-import time
-from contextlib import contextmanager
 
 import httpx
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import expect, sync_playwright
+from bench_page import PATIENCE_S, opened, rest, shown, touched, until
+from playwright.sync_api import expect
 
 from probe.recording.read import Recording
-
-CHROMIUM = "/usr/bin/chromium"
-FLAGS = (
-    "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-quic",
-    "--no-first-run", "--disable-background-networking", "--disable-component-update",
-    "--disable-sync",
-)  # fmt: skip
-PATIENCE_S = 30.0  #: for anything, on a busy machine
 
 
 @pytest.fixture(scope="module")
@@ -30,61 +21,12 @@ def bench(served):
         yield address
 
 
-@pytest.fixture(scope="module")
-def browser():
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
-        yield chromium
-        chromium.close()
-
-
-@contextmanager
-def opened(browser, address, **look):
-    """Open the page; nothing may be asked of anybody else, and nothing go wrong in it."""
-    look = {"viewport": {"width": 1440, "height": 900}} | look
-    page = browser.new_page(**look)
-    asked, wrong = [], []
-    page.on("request", lambda request: asked.append(request.url))
-    page.on("pageerror", lambda error: wrong.append(str(error)))
-    page.goto(address)
-    until(page, "bench.shown !== '' && bench.frames > 0")
-    yield page
-    host = address.split("/")[2]
-    assert {re.split("[/?]", url)[2] for url in asked if not url.startswith("blob:")} == {host}
-    assert wrong == []
-    page.close()
-
-
 @pytest.fixture
 def page(browser, bench):
     with opened(browser, bench) as page:
         rest(page)
         shown(page, "Cube")
         yield page
-
-
-def until(page, wanted):
-    """Wait until an expression holds in the page."""
-    end_s = time.monotonic() + PATIENCE_S
-    while not page.evaluate(wanted):
-        assert time.monotonic() < end_s, wanted
-        time.sleep(0.05)
-
-
-def rest(page):
-    """Wait until nothing is touched any more, and the film has forgotten it."""
-    until(page, "bench.contact === false")
-    page.wait_for_timeout(500)
-    until(page, "bench.contact === false")
-
-
-def touched(page, x=0.42, y=0.55):
-    """Click on the part; returns what the page then says."""
-    before = page.evaluate("bench.answers")
-    box = page.get_by_test_id("part").bounding_box()
-    page.mouse.click(box["x"] + x * box["width"], box["y"] + y * box["height"])
-    until(page, f"bench.answers > {before}")
-    return page.get_by_test_id("answer").inner_text()
 
 
 def heat(page):
@@ -113,12 +55,6 @@ def test_a_click_touches_there_and_the_face_is_lit(page):
     assert re.search("needed|no other", page.locator("#margin-text").inner_text())
     expect(page.get_by_test_id("mosaic-text")).to_contain_text(f"Cube {face}")
     assert "Cube" in page.locator("#map-text").inner_text()
-
-
-def shown(page, name):
-    """Show an object of the lab, seen from a side."""
-    page.get_by_test_id("object").select_option(name)
-    until(page, f"bench.shown === '{name}'")
 
 
 @pytest.mark.parametrize("place", [(0.5, 0.5), (0.42, 0.55), (0.46, 0.6)])

@@ -215,6 +215,21 @@ def test_touches_are_named_deleted_and_told_as_a_table():
         log.rename(2, "x" * 81)
 
 
+def test_pages_are_told_when_an_older_touch_changes():
+    board = Broker()
+    log = TouchLog(board)
+    for value in (1, 2):
+        log.begin(frame_of(value), 1e3)
+        log.read(frame_of(value))
+    assert board.newest("touches") is None
+    log.rename(2, "the newest")  # told as what it is
+    assert (board.newest("touches"), newest(board)["name"]) == (None, "the newest")
+    log.rename(1, "older")
+    assert (json.loads(board.newest("touches"))["changes"], newest(board)["number"]) == (1, 2)
+    log.delete(1)
+    assert json.loads(board.newest("touches"))["changes"] == 2
+
+
 def test_the_oldest_touches_are_forgotten(monkeypatch):
     monkeypatch.setattr("recognizer.bench.touch_log.TOUCHES", TouchLogSettings(kept=3))
     log = TouchLog(Broker())

@@ -56,5 +56,5 @@ export function showError(text: string): void {
   box.textContent = text;
   box.hidden = false;
   clearTimeout(errorTimer);
-  errorTimer = setTimeout(() => { box.hidden = true; }, 7000);
+  errorTimer = setTimeout(() => { box.hidden = true; }, 12000);
 }

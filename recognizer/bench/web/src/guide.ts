@@ -15,12 +15,12 @@ export class GuideDialog {
       say(element("guide-result"), "");
       this.dialog.showModal();
     });
-    element("guide-start").addEventListener("click", () => void this.begin());
-    element("guide-read").addEventListener("click", () => void post("calibration", { do: "read" }));
-    element("guide-again").addEventListener("click", () => void post("calibration", { do: "again" }));
-    element("guide-load").addEventListener("click", () => void post("load", { newtons: this.status?.guide?.newtons ?? 0 }));
-    element("guide-finish").addEventListener("click", () => void this.finish());
-    this.dialog.addEventListener("close", () => void this.close());
+    element("guide-start").addEventListener("click", () => void this.begin().catch(() => undefined));
+    element("guide-read").addEventListener("click", () => void post("calibration", { do: "read" }).catch(() => undefined));
+    element("guide-again").addEventListener("click", () => void post("calibration", { do: "again" }).catch(() => undefined));
+    element("guide-load").addEventListener("click", () => void post("load", { newtons: this.status?.guide?.newtons ?? 0 }).catch(() => undefined));
+    element("guide-finish").addEventListener("click", () => void this.finish().catch(() => undefined));
+    this.dialog.addEventListener("close", () => void this.close().catch(() => undefined));
   }
 
   tell(status: Status): void {

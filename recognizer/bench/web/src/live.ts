@@ -10,12 +10,15 @@ export interface Listeners {
 }
 
 const AGAIN_MS = 1000;
+const SILENT_MS = 6000; // the state is told four times a second: a line that is silent for so long is dead
 
 export class Live {
   private line: WebSocket | null = null;
+  private heard = 0;
 
   constructor(private readonly to: Listeners, private filter: string) {
     this.open();
+    setInterval(() => this.listen(), AGAIN_MS);
   }
 
   choose(filter: string): void {
@@ -27,15 +30,32 @@ export class Live {
     const line = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
     line.binaryType = "arraybuffer";
     line.onopen = () => {
+      this.heard = performance.now();
       this.to.connected(true);
       this.choose(this.filter);
     };
-    line.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.take(event.data);
-    line.onclose = () => {
-      this.to.connected(false);
-      setTimeout(() => this.open(), AGAIN_MS);
+    line.onmessage = (event: MessageEvent<string | ArrayBuffer>) => {
+      this.heard = performance.now();
+      this.take(event.data);
     };
+    line.onclose = () => this.lose(line);
     this.line = line;
+  }
+
+  /** Give up a line that is open and says nothing: its other end is gone without a word. */
+  private listen(): void {
+    const { line } = this;
+    if (line?.readyState !== WebSocket.OPEN || performance.now() - this.heard < SILENT_MS) return;
+    line.onclose = line.onmessage = null;
+    line.close();
+    this.lose(line);
+  }
+
+  private lose(line: WebSocket): void {
+    if (line !== this.line) return;
+    this.line = null;
+    this.to.connected(false);
+    setTimeout(() => this.open(), AGAIN_MS);
   }
 
   private take(data: string | ArrayBuffer): void {

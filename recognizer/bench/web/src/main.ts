@@ -27,10 +27,10 @@ async function begin(): Promise<void> {
   const heat = new Heat(sensor), surface = new Surface(sensor), mosaic = new MosaicPanel(sensor);
   const answers = new AnswerPanel(info.margin), work = new Work(info), guide = new GuideDialog(), replay = new Replay();
   const part = new Part(sensor, (place) => void touch(place).catch(() => undefined));
-  const map = new MapPanel((name) => void show(name));
+  const map = new MapPanel((name) => look(name));
   const touches = new Touches((one, past) => void take(one, past));
   let newest: Frame | null = null, painting = false, simulated = false, past = false, asked = "";
-  let record: TouchRecord | null = null, clicked: number | null = null, painted = 0, read = 0;
+  let record: TouchRecord | null = null, clicked: number | null = null, painted = 0, read = 0, started = 0, ready = false;
 
   const line = new Live({
     frame(frame) {
@@ -46,7 +46,8 @@ async function begin(): Promise<void> {
     told,
     connected: (there) => {
       for (const id of ["touch", "work-body"]) element(id).inert = !there;
-      if (there) void touches.load().catch(() => undefined);
+      document.body.dataset["line"] = there ? "there" : "gone";
+      if (there) void touches.load().then(() => { ready = true; }).catch(() => undefined);
       else work.gone();
     },
   }, "bias-free");
@@ -67,6 +68,8 @@ async function begin(): Promise<void> {
 
   function told(topic: Told): void {
     if (topic.topic === "status") {
+      if (started && topic.started_ms !== started) location.reload(); // its touches are numbered anew
+      started = topic.started_ms;
       simulated = topic.simulated;
       work.tell(topic);
       guide.tell(topic);
@@ -74,8 +77,9 @@ async function begin(): Promise<void> {
       element("touch").querySelector("button")!.disabled = !simulated;
       element("next-go").hidden = !simulated;
     } else if (topic.topic === "touch") touches.tell(topic);
+    else if (topic.topic === "touches") void touches.load().catch(() => undefined);
     else if (topic.topic === "mosaic-of") mosaic.told(topic);
-    else void reader(topic);
+    else void reader(topic).catch(() => undefined);
   }
 
   /** Show one record in all panels; null: nothing was touched yet. */
@@ -83,7 +87,7 @@ async function begin(): Promise<void> {
     record = one;
     past = ofPast;
     const answer = one?.answer ?? null;
-    if (one && !one.contact && figures.touch < one.number) read = Math.max(read, answer?.read ?? 0); // it was over before the page knew of it
+    if (!ready) read = Math.max(read, answer?.read ?? 0); // it was there before the page
     const fresh = answer !== null && !past && answer.read > read;
     let since: number | null = null;
     if (fresh) {
@@ -99,8 +103,8 @@ async function begin(): Promise<void> {
     answers.tell(one, since, past);
     heat.answer = past || (one?.contact && !one.moving) ? answer : null;
     map.tell(answer);
-    if (past) void image(one!.number);
-    if (answer?.object && (fresh || past) && answer.object !== part.shape?.name && element<HTMLInputElement>("follow").checked) void show(answer.object);
+    if (past) void image(one!.number).catch(() => undefined);
+    if (answer?.object && (fresh || past) && answer.object !== part.shape?.name && element<HTMLInputElement>("follow").checked) look(answer.object);
     else lights();
   }
 
@@ -137,10 +141,17 @@ async function begin(): Promise<void> {
     });
   }
 
+  function look(name: string): void {
+    void show(name).catch(() => undefined); // why not was told
+  }
+
   /** Show an object; the last one asked for wins, and one shown again keeps the form as it was filled in. */
   async function show(name: string): Promise<void> {
     asked = name;
-    const shape = await get<ObjectShape>(`objects/${encodeURIComponent(name)}`);
+    const shape = await get<ObjectShape>(`objects/${encodeURIComponent(name)}`).catch((error: unknown) => {
+      if (asked === name) element<HTMLSelectElement>("object").value = figures.shown;
+      throw error;
+    });
     if (asked !== name) return;
     const again = figures.shown === name, face = element<HTMLSelectElement>("touch-face").value;
     part.show(shape);
@@ -223,8 +234,8 @@ async function begin(): Promise<void> {
   filter.addEventListener("change", () => { heat.top = 0; line.choose(filter.value); });
   element("show-symbols").addEventListener("change", (event) => { heat.symbols = (event.target as HTMLInputElement).checked; });
   element("show-probe").addEventListener("change", (event) => part.withProbe((event.target as HTMLInputElement).checked));
-  element("object").addEventListener("change", (event) => void show((event.target as HTMLSelectElement).value));
-  element("encoding").addEventListener("change", (event) => void array(Number((event.target as HTMLSelectElement).value)));
+  element("object").addEventListener("change", (event) => look((event.target as HTMLSelectElement).value));
+  element("encoding").addEventListener("change", (event) => void array(Number((event.target as HTMLSelectElement).value)).catch(() => undefined));
   element("touch-face").addEventListener("change", () => middle(part.shape));
   element("touch").addEventListener("submit", (event) => {
     event.preventDefault();
@@ -236,7 +247,7 @@ async function begin(): Promise<void> {
     clicked = performance.now();
     void post("touch/next").catch(() => undefined);
   });
-  element("mosaic-clear").addEventListener("click", () => void post("mosaic"));
+  element("mosaic-clear").addEventListener("click", () => void post("mosaic").catch(() => undefined));
   element("save-picture").addEventListener("click", () => picture());
   element("theme").addEventListener("click", () => {
     const root = document.documentElement;

@@ -13,8 +13,8 @@ export class Replay {
   private held = false;
 
   constructor() {
-    element("play").addEventListener("click", () => void post("replay", { playing: !this.status?.feed.playing }));
-    element("speed").addEventListener("change", (event) => void post("replay", { speed: Number((event.target as HTMLSelectElement).value) }));
+    element("play").addEventListener("click", () => void post("replay", { playing: !this.status?.feed.playing }).catch(() => undefined));
+    element("speed").addEventListener("change", (event) => void post("replay", { speed: Number((event.target as HTMLSelectElement).value) }).catch(() => undefined));
     this.seek.addEventListener("input", () => this.go());
     new ResizeObserver(() => this.paint()).observe(this.canvas);
   }
@@ -34,7 +34,7 @@ export class Replay {
       void get<{ strength: number[] }>("timeline").then((line) => {
         this.strength = line.strength;
         this.paint();
-      });
+      }).catch(() => undefined);
     }
     const { at = 0, seconds = 0 } = status.feed;
     if (!this.held) this.seek.value = String(seconds ? Math.round((1000 * at) / seconds) : 0);
@@ -51,7 +51,7 @@ export class Replay {
     this.held = true;
     clearTimeout(this.asked);
     this.asked = setTimeout(() => {
-      void post("replay", { at_s }).finally(() => { this.held = false; });
+      void post("replay", { at_s }).catch(() => undefined).finally(() => { this.held = false; });
     }, 100);
   }
 

@@ -13,20 +13,26 @@ export class Touches {
 
   constructor(private readonly show: (record: TouchRecord | null, past: boolean) => void) {
     element("touch-live").addEventListener("click", () => this.live());
-    element("touch-delete").addEventListener("click", () => void this.forget());
-    element("touch-name").addEventListener("change", (event) => void this.rename((event.target as HTMLInputElement).value));
+    element("touch-delete").addEventListener("click", () => void this.forget().catch(() => undefined));
+    element("touch-name").addEventListener("change", (event) => void this.rename((event.target as HTMLInputElement).value).catch(() => undefined));
     this.list.addEventListener("keydown", (event) => this.key(event));
   }
 
-  /** Take the touches that were made before the page was opened. */
+  /** Take all touches as the server has them: made before the page was opened, named or deleted by others. */
   async load(): Promise<void> {
-    const { touches } = await get<{ touches: TouchRecord[] }>("touches");
-    for (const record of touches) if (!this.records.has(record.number)) this.put(record);
+    const { touches, newest } = await get<{ touches: TouchRecord[]; newest: number }>("touches");
+    const known = new Set(touches.map((record) => record.number));
+    for (const number of [...this.records.keys()]) if (number <= newest && !known.has(number)) this.drop(number);
+    if (this.chosen !== null && !this.records.has(this.chosen)) this.chosen = this.beside = null;
+    for (const record of touches) if (record.number < newest || !this.records.has(record.number)) this.put(record); // the line tells the newest
     for (const number of [...this.records.keys()].sort((a, b) => a - b)) this.list.append(this.buttons.get(number)!.parentElement!);
-    this.now();
+    if (this.chosen === null) this.now();
+    else this.mark();
   }
 
   tell(record: TouchRecord): void {
+    const before = this.newest; // the line tells the newest touch alone: how the one before ended may be missing
+    if (before && before.number < record.number && (before.contact || !before.answer)) void this.load().catch(() => undefined);
     if (record.dropped) this.drop(record.number);
     else this.put(record);
     if (this.chosen === null) this.now();
@@ -97,7 +103,7 @@ export class Touches {
   private key(event: KeyboardEvent): void {
     const by = event.key === "ArrowLeft" ? -1 : event.key === "ArrowRight" ? 1 : 0;
     if (event.key === "Escape") this.live();
-    else if (event.key === "Delete") void this.forget();
+    else if (event.key === "Delete") void this.forget().catch(() => undefined);
     else if (by) {
       const numbers = [...this.records.keys()].sort((a, b) => a - b);
       const at = this.chosen === null ? numbers.length - 1 : numbers.indexOf(this.chosen);

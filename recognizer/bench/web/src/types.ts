@@ -34,6 +34,7 @@ export interface Status {
   recordings: string[]; calibrations: string[];
   notices: { number: number; at_ms: number; text: string }[];
   pages: number;
+  started_ms: number; // another one: the server was started anew
 }
 
 export interface Answer {
@@ -62,7 +63,8 @@ export interface TouchRecord {
 
 export interface MosaicOf { topic: "mosaic-of"; object: string | null; face: string | null; touches: number }
 export interface ReaderState { topic: "reader"; state: "preparing" | "ready" | "off"; cause?: string; fix?: string }
-export type Told = Status | TouchRecord | MosaicOf | ReaderState;
+export interface TouchesChanged { topic: "touches"; changes: number }
+export type Told = Status | TouchRecord | TouchesChanged | MosaicOf | ReaderState;
 
 export interface Frame {
   newtons: boolean; filter: number; seq: number; time_s: number; received_ms: number;

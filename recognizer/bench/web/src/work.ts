@@ -1,6 +1,6 @@
 /** Port, sensor, recording, bias, calibration in use; the probe's state and what happened. */
 
-import { get, post, send } from "./api";
+import { get, post, send, silence } from "./api";
 import { choices, element, say, showError } from "./dom";
 import type { BenchInfo, Status } from "./types";
 
@@ -67,7 +67,7 @@ export class Work {
   gone(): void {
     const state = element("state");
     state.dataset["state"] = "server-gone";
-    say(state, "open-bench is not running; it is looked for");
+    say(state, `${silence()}; it is looked for. What is shown is what was there before`);
   }
 
   private state(status: Status): void {
@@ -108,7 +108,7 @@ export class Work {
     input.value = "";
     if (!file) return;
     if (file.size > 64 * 2 ** 20) showError("Recordings of at most 64 MB can be sent in.");
-    else await send(`recordings?name=${encodeURIComponent(file.name)}`, file);
+    else await send(`recordings?name=${encodeURIComponent(file.name)}`, file, () => undefined);
   }
 }
 

@@ -1,0 +1,66 @@
+"""The page of `open-bench` in a real browser, for the tests that work it.
+
+Chromium draws in software. `wait_for_function` would need `eval`, which the page forbids, so what
+is waited for is asked again and again.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from contextlib import contextmanager
+
+CHROMIUM = "/usr/bin/chromium"
+FLAGS = (
+    "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-quic",
+    "--no-first-run", "--disable-background-networking", "--disable-component-update",
+    "--disable-sync",
+)  # fmt: skip
+PATIENCE_S = 30.0  #: for anything, on a busy machine
+
+
+@contextmanager
+def opened(browser, address, **look):
+    """Open the page; nothing may be asked of anybody else, and nothing go wrong in it."""
+    look = {"viewport": {"width": 1440, "height": 900}} | look
+    page = browser.new_page(**look)
+    asked, wrong = [], []
+    page.on("request", lambda request: asked.append(request.url))
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.goto(address)
+    until(page, "bench.shown !== '' && bench.frames > 0")
+    yield page
+    host = address.split("/")[2]
+    assert {re.split("[/?]", url)[2] for url in asked if not url.startswith("blob:")} == {host}
+    assert wrong == []
+    page.close()
+
+
+def until(page, wanted):
+    """Wait until an expression holds in the page."""
+    end_s = time.monotonic() + PATIENCE_S
+    while not page.evaluate(wanted):
+        assert time.monotonic() < end_s, wanted
+        time.sleep(0.05)
+
+
+def rest(page):
+    """Wait until nothing is touched any more, and the film has forgotten it."""
+    until(page, "bench.contact === false")
+    page.wait_for_timeout(500)
+    until(page, "bench.contact === false")
+
+
+def shown(page, name):
+    """Show an object of the lab, seen from a side."""
+    page.get_by_test_id("object").select_option(name)
+    until(page, f"bench.shown === '{name}'")
+
+
+def touched(page, x=0.42, y=0.55):
+    """Click on the part; returns what the page then says."""
+    before = page.evaluate("bench.answers")
+    box = page.get_by_test_id("part").bounding_box()
+    page.mouse.click(box["x"] + x * box["width"], box["y"] + y * box["height"])
+    until(page, f"bench.answers > {before}")
+    return page.get_by_test_id("answer").inner_text()
