@@ -69,11 +69,13 @@ def print_object(
         lines.append(f"  retired      {_minute(e.retired_utc)} UTC; its cells stay taken")
     lines += [f"  warning      {warning}" for warning in held.layout.warnings]
     output.write("\n".join(lines))
-    table = output.table("face", "kind", "area", "symbols", "places", "first cell", broken=())
+    titles = ("face", "kind", "area", "symbols", "places", "at once", "first cell")
+    table = output.table(*titles, broken=())
     for face in _faces(held):
         on = face.layout
         first = f"({on.rows[0]}, {on.columns[0]})" if len(on.rows) else "blank"
-        counts = str(len(on.rows)), str(on.places)
+        share = "" if face.promise is None else f"{100 * face.promise:.0f} %"
+        counts = str(len(on.rows)), str(on.places), share
         row = face.name, face.kind, f"{face.area_mm2:.0f} mm2", *counts, first
         table.add_row(*map(escape, row))
     output.show(table)
@@ -162,14 +164,18 @@ class _Face:
     area_mm2: float  #: of a round face, of all its facets
     placement: Placement | None
     layout: FaceLayout
+    promise: float | None = None  #: share of single touches that are answered; None: not measured
 
 
 def _faces(held: RegisteredObject) -> list[_Face]:
     """Return the faces of an object with their symbols; layouts may be in another order."""
+    from generator.pipeline.registered_promise import registered_promises
+
     layouts = {layout.face: layout for layout in held.layout.faces}
     area = {face.face_id: face.area_mm2 for face in held.faces}
     surfaces = {surface.carrier: surface for surface in surfaces_of(held.spec)}
     facets = {facet for surface in surfaces.values() for facet in surface.facets[1:]}
+    promises = registered_promises(held)
     found = []
     for face in held.faces:
         if face.face_id not in layouts or face.face_id in facets:
@@ -182,6 +188,7 @@ def _faces(held: RegisteredObject) -> list[_Face]:
                 area_mm2=sum(area[n] for n in surface.facets) if surface else face.area_mm2,
                 placement=face.placement,
                 layout=layouts[face.face_id],
+                promise=promises.get(face.face_id),
             )
         )
     return found
@@ -242,6 +249,7 @@ def _face_values(face: _Face) -> dict[str, Any]:
         "area_mm2": face.area_mm2,
         "symbols": len(on.labels),
         "places": on.places,
+        "promise": None if face.promise is None else {"at_once": face.promise},
         "placement": None
         if place is None
         else {

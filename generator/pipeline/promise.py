@@ -59,7 +59,7 @@ def promise_faces(plan: ObjectPlan, layout: Layout) -> dict[int, FacePromise]:
         if face.face in plan.blank_faces or face.face in carriers:
             continue
         loops = tuple(face_polygon(plan.polyhedron, face.face))
-        key = _key(loops, face)
+        key = face_key(loops, face)
         if key not in known:
             share, one_row = _share(plan, loops, face, plan.spec.style)
             remedy = ""
@@ -161,7 +161,7 @@ def _tried(plan: ObjectPlan, loops: Loops, region: Region, style: SymbolStyle) -
     return _share(plan, loops, face, style, ViewSettings(PROMISE.tries))[0]
 
 
-def _key(loops: Loops, face: FaceLayout) -> bytes:
+def face_key(loops: Loops, face: FaceLayout) -> bytes:
     """Return the same bytes for faces that show the same at every pose."""
     place = face.placement
     turn = np.array([math.cos(place.rotation_rad), math.sin(place.rotation_rad)])

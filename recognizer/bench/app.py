@@ -5,7 +5,8 @@
     GET   /api/bench                 what there is: ports, sensor, arrays
     POST  /api/port | sensor | bias | record | replay | calibration | mosaic | lab
     POST  /api/touch[/next] | load | unplug                          the simulated probe
-    GET   /api/objects[/NAME[/parts/N]], /api/map/N             what is registered
+    GET   /api/objects[/NAME[/picture.svg|/parts/N]], /api/promise/NAME, /api/map/N
+    GET   /api/mosaics/NAME[/FACE]                              what was felt of its faces
     GET   /api/recordings/NAME, /api/timeline, /api/frame.csv   POST /api/recordings?name=
     GET   /api/touches[/N], /api/touches.csv, /api/touches.h5   POST, DELETE /api/touches/N
 

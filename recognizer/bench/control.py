@@ -196,6 +196,20 @@ def control_routes(session: Session, ports: Ports) -> APIRouter:
         session.recognition.clear()
         return {"cleared": True}
 
+    @routes.get("/mosaics/{name}")
+    def mosaics(name: str) -> dict[str, Any]:
+        return {
+            "faces": {face: len(one) for face, one in session.recognition.mosaics(name).items()}
+        }
+
+    @routes.get("/mosaics/{name}/{face}")
+    def mosaic_of(name: str, face: str) -> Response:
+        known = session.recognition.mosaics(name)
+        if face not in known:
+            raise UnknownError(f"{name} {face} was not touched yet", fix="touch it first")
+        made = session.recognition.picture(known[face]).as_bytes("")
+        return Response(made, media_type="application/octet-stream")
+
     @routes.get("/recordings/{name}")
     def recording(name: str) -> Response:
         path = find_file(session.folder, name, ".h5")

@@ -8,6 +8,7 @@ is tangent there. mm; lists of numbers for JSON.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -59,15 +60,35 @@ def mesh_json(held: RegisteredObject, face: RegisteredFace) -> dict[str, Any]:
 
 def stands_json(face: RegisteredFace, centres_mm: Array) -> list[list[float]]:
     """Return the pose of every symbol on the object, the first three rows of 4 x 4 in turn."""
+    poses = stand_poses(face, centres_mm)
+    return [nested_lists(pose[:3].ravel(), 6) for pose in poses]
+
+
+def stand_poses(face: RegisteredFace, centres_mm: Array) -> Array:
+    """Return T_object_symbol of every symbol of a face, (S, 4, 4); none where it is blank."""
     if face.placement is None:
-        return []
+        return np.zeros((0, 4, 4))
     c, s = math.cos(-face.placement.rotation_rad), math.sin(-face.placement.rotation_rad)
-    stands = []
-    for x, y in centres_mm.tolist():
-        T = face.T_object_face if face.round is None else face.round.tangent(x, y)
-        T_plane_symbol = np.array([[c, -s, 0, x], [s, c, 0, y], [0, 0, 1, 0], [0, 0, 0, 1]])
-        stands.append(nested_lists((T @ T_plane_symbol)[:3].ravel(), 6))
-    return stands
+    T_plane_symbol = np.tile(np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]]),
+                             (len(centres_mm), 1, 1))  # fmt: skip
+    T_plane_symbol[:, :2, 3] = centres_mm
+    if face.round is None:
+        return np.asarray(face.T_object_face @ T_plane_symbol)
+    tangents = np.array([face.round.tangent(x, y) for x, y in centres_mm.tolist()])
+    return np.asarray(tangents.reshape(-1, 4, 4) @ T_plane_symbol)
+
+
+def face_sheets(face: RegisteredFace) -> Iterator[list[Array]]:
+    """Yield the flat sheets of a face as loops (k, 3), object frame: of a round face its facets."""
+    if face.round is None:
+        yield [_seated(face.T_object_face, loop) for loop in face.polygon_mm]
+        return
+    d = face.round.development
+    for T, low, high in zip(
+        d.T_object_flat, np.stack([d.low[:-1], d.low[1:]], axis=1),
+        np.stack([d.high[1:], d.high[:-1]], axis=1), strict=True,
+    ):  # fmt: skip
+        yield [_seated(T, np.concatenate([low, high]))]
 
 
 def nested_lists(values: Array, digits: int = DIGITS) -> Any:

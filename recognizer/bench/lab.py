@@ -5,22 +5,25 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Response
 from fastapi.responses import FileResponse
 
 from generator.database.entries import object_entry
 from generator.database.open import open_database
-from generator.database.read import read_parts
+from generator.database.read import read_object, read_parts
 from generator.database.transaction import read_transaction
 from recognizer.bench.errors import BusyError, UnknownError
 from recognizer.bench.example import make_example
 from recognizer.bench.files import part_folder, part_to_send
 from recognizer.bench.lab_json import arrays_json, map_json, object_json, objects_json
+from recognizer.bench.picture import object_svg
+from recognizer.bench.promise import face_promises
 from recognizer.bench.session import Session
 from recognizer.bench.settings import LAB
 from recognizer.bench.simulated import SCHEME
 
 NEW_LAB = "lab.db"  #: in the folder where the bench was started, where no database was named
+KEPT = {"cache-control": "private, max-age=86400"}  #: its address tells when it was registered
 
 
 def lab_routes(session: Session, parts: Path | None) -> APIRouter:
@@ -55,6 +58,18 @@ def lab_routes(session: Session, parts: Path | None) -> APIRouter:
         if session.simulation is not None:
             session.simulation.prepare(name)
         return held
+
+    @routes.get("/objects/{name}/picture.svg")
+    def picture(name: str) -> Response:
+        with read_transaction(engine()) as connection:
+            drawn = object_svg(read_object(connection, name))
+        return Response(drawn, media_type="image/svg+xml", headers=KEPT)
+
+    @routes.get("/promise/{name}")
+    def promise(name: str) -> dict[str, Any]:
+        with read_transaction(engine()) as connection:
+            registered = object_entry(connection, name).utc
+        return {"faces": face_promises(session.database, name, registered)}
 
     @routes.get("/objects/{name}/parts/{number}")
     def part(name: str, number: int) -> FileResponse:

@@ -178,6 +178,11 @@ class RecognitionThread:
         )
         self._broker.publish("mosaic", self.picture(mosaic))
 
+    def mosaics(self, object_name: str) -> dict[str, Mosaic]:
+        """Return the mosaics of an object's faces."""
+        with self._news:
+            return {face: one for (held, face), one in self._mosaics.items() if held == object_name}
+
     def picture(self, mosaic: Mosaic) -> MosaicMessage:
         """Return a mosaic for the pages."""
         return mosaic_message(mosaic.image, len(mosaic))

@@ -93,6 +93,8 @@ class LabSettings:
     """How the page reads the database."""
 
     wait_s: float = 2.0  #: for others to end; then the page is told who keeps it waiting
+    promise_s: float = 60.0  #: that `encode-object show` may take
+    promises: int = 512  #: objects whose promises are kept
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,7 +79,7 @@ function frameOf(data: ArrayBuffer): Frame {
   };
 }
 
-function mosaicOf(data: ArrayBuffer): MosaicImage {
+export function mosaicOf(data: ArrayBuffer): MosaicImage {
   const head = new DataView(data);
   return {
     rows: head.getUint32(4, true),

@@ -3,6 +3,7 @@
 import { get, post } from "./api";
 import { AnswerPanel } from "./answer";
 import { choices, element, isDark, say } from "./dom";
+import { Gallery } from "./gallery";
 import { GuideDialog } from "./guide";
 import { Heat } from "./heat";
 import { Live } from "./live";
@@ -11,6 +12,7 @@ import { MosaicPanel } from "./mosaic";
 import { Part, type Place } from "./part";
 import { Replay } from "./replay";
 import { Surface } from "./surface";
+import { Tint } from "./tint";
 import { Touches } from "./touches";
 import type { ArrayMap, BenchInfo, Encoding, Frame, ObjectEntry, ObjectShape, ReaderState, Told, TouchRecord } from "./types";
 import { Work } from "./work";
@@ -27,8 +29,10 @@ async function begin(): Promise<void> {
   const heat = new Heat(sensor), surface = new Surface(sensor), mosaic = new MosaicPanel(sensor);
   const answers = new AnswerPanel(info.margin), work = new Work(info), guide = new GuideDialog(), replay = new Replay();
   const part = new Part(sensor, (place) => void touch(place).catch(() => undefined));
+  new Gallery((name) => look(name), () => figures.shown);
   const map = new MapPanel((name) => look(name));
   const touches = new Touches((one, past) => void take(one, past));
+  const tint = new Tint(part, sensor, () => touches.all);
   let newest: Frame | null = null, painting = false, simulated = false, past = false, asked = "";
   let record: TouchRecord | null = null, clicked: number | null = null, painted = 0, read = 0, started = 0, ready = false;
 
@@ -42,7 +46,10 @@ async function begin(): Promise<void> {
         requestAnimationFrame(paint);
       }
     },
-    mosaic: (image) => mosaic.show(image),
+    mosaic: (image) => {
+      mosaic.show(image);
+      tint.touched();
+    },
     told,
     connected: (there) => {
       for (const id of ["touch", "work-body"]) element(id).inert = !there;
@@ -77,7 +84,7 @@ async function begin(): Promise<void> {
       element("touch").querySelector("button")!.disabled = !simulated;
       element("next-go").hidden = !simulated;
     } else if (topic.topic === "touch") touches.tell(topic);
-    else if (topic.topic === "touches") void touches.load().catch(() => undefined);
+    else if (topic.topic === "touches") void touches.load().then(() => tint.touched()).catch(() => undefined);
     else if (topic.topic === "mosaic-of") mosaic.told(topic);
     else void reader(topic).catch(() => undefined);
   }
@@ -95,6 +102,7 @@ async function begin(): Promise<void> {
       figures.answers++;
       since = clicked === null ? null : performance.now() - clicked;
       clicked = null;
+      tint.touched();
       if (since !== null) requestAnimationFrame(() => keep(figures.click_ms, since!));
     }
     figures.contact = !past && (one?.contact ?? false);
@@ -155,6 +163,7 @@ async function begin(): Promise<void> {
     if (asked !== name) return;
     const again = figures.shown === name, face = element<HTMLSelectElement>("touch-face").value;
     part.show(shape);
+    tint.show(shape);
     figures.shown = name;
     element<HTMLSelectElement>("object").value = name;
     choices(element("touch-face"), shape.faces.filter((one) => !one.blank).map((one) => [one.name, one.name]));

@@ -34,16 +34,7 @@ export class MosaicPanel {
   show(image: MosaicImage): void {
     this.image = image;
     this.picture = null;
-    if (image.rows && image.columns) {
-      const picture = new OffscreenCanvas(image.columns, image.rows), ink = picture.getContext("2d")!;
-      const pixels = ink.createImageData(image.columns, image.rows);
-      image.values.forEach((value, i) => {
-        for (let c = 0; c < 3; c++) pixels.data[4 * i + c] = TABLE[3 * Math.max(0, value - 1) + c]!;
-        pixels.data[4 * i + 3] = value ? 255 : 0;
-      });
-      ink.putImageData(pixels, 0, 0);
-      this.picture = picture;
-    }
+    if (image.rows && image.columns) this.picture = mosaicPicture(image);
     this.paint();
   }
 
@@ -95,4 +86,16 @@ export class MosaicPanel {
     if (!xs.length) return null;
     return { x0: Math.min(...xs), x1: Math.max(...xs), y0: Math.min(...ys), y1: Math.max(...ys) };
   }
+}
+
+/** A mosaic in colours, a pixel a cell; what was not felt is left out. */
+export function mosaicPicture(image: MosaicImage): OffscreenCanvas {
+  const picture = new OffscreenCanvas(image.columns, image.rows), ink = picture.getContext("2d")!;
+  const pixels = ink.createImageData(image.columns, image.rows);
+  image.values.forEach((value, i) => {
+    for (let c = 0; c < 3; c++) pixels.data[4 * i + c] = TABLE[3 * Math.max(0, value - 1) + c]!;
+    pixels.data[4 * i + 3] = value ? 255 : 0;
+  });
+  ink.putImageData(pixels, 0, 0);
+  return picture;
 }

@@ -1,12 +1,13 @@
 /** The part with its embossed faces, the recognised face lit, the probe standing on it. */
 
 import {
-  BoxGeometry, BufferAttribute, BufferGeometry, Color, DoubleSide, EdgesGeometry, Float32BufferAttribute, Group,
-  InstancedMesh, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshLambertMaterial, Object3D, Raycaster,
-  RingGeometry, Sphere, Triangle, Vector2, Vector3,
+  BoxGeometry, BufferAttribute, BufferGeometry, CanvasTexture, Color, DoubleSide, EdgesGeometry, Float32BufferAttribute,
+  Group, InstancedMesh, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, Object3D,
+  Raycaster, RingGeometry, SRGBColorSpace, Sphere, Triangle, Vector2, Vector3,
 } from "three";
 import { element, isDark } from "./dom";
 import { Stage } from "./stage";
+import type { FacePicture } from "./tint";
 import type { Answer, FaceShape, Matrix, ObjectShape, Sensor } from "./types";
 
 const STILL_PX = 5; // farther, a press of the button is a turn and no click
@@ -25,6 +26,8 @@ export class Part {
   private lit = -1;
   private told: [Answer | null, boolean] = [null, false];
   private stands = true;
+  private colours = new Map<string, string>(); // of faces by name
+  private painted: Mesh[] = [];
   shape: ObjectShape | null = null;
 
   constructor(sensor: Sensor, private readonly touched: (place: Place) => void) {
@@ -53,6 +56,7 @@ export class Part {
     held.add(...this.symbols.map((one) => one.mesh));
     this.held = held;
     this.stage.scene.add(held);
+    this.tint(new Map(), new Map(), false);
     const ball = new Sphere();
     this.faces.geometry.computeBoundingSphere();
     ball.copy(this.faces.geometry.boundingSphere!);
@@ -87,6 +91,25 @@ export class Part {
     this.tell(...this.told);
   }
 
+  /** Colour faces, and lay pictures on them; symbols may be left out where a picture shows them. */
+  tint(colours: Map<string, string>, pictures: Map<string, FacePicture>, bare: boolean): void {
+    this.colours = colours;
+    for (const mesh of this.painted) {
+      mesh.geometry.dispose();
+      const material = mesh.material as MeshBasicMaterial;
+      material.map?.dispose();
+      material.dispose();
+      mesh.removeFromParent();
+    }
+    this.painted = (this.shape?.faces ?? []).flatMap((face) => {
+      const picture = pictures.get(face.name);
+      return picture ? [laid(picture, face)] : [];
+    });
+    if (this.painted.length) this.held?.add(...this.painted);
+    for (const { mesh } of this.symbols) mesh.visible = !bare;
+    this.colour();
+  }
+
   get litFace(): string { return this.shape?.faces[this.lit]?.name ?? ""; }
 
   /** Turn the part so that a place on it is seen, as the probe stands there. */
@@ -117,8 +140,12 @@ export class Part {
     const plain = new Color(dark ? 0x4c5867 : 0xd5dce4), lit = new Color(dark ? 0xb06d14 : 0xf4b45f);
     const symbol = new Color(dark ? 0x8d9bac : 0x8fa1b3), litSymbol = new Color(dark ? 0xffc46f : 0xb25f00);
     const colours = this.faces.geometry.getAttribute("color");
+    const own = (this.shape?.faces ?? []).map((one) => {
+      const name = this.colours.get(one.name);
+      return name === undefined ? undefined : new Color(name);
+    });
     this.faceOf.forEach((face, triangle) => {
-      const { r, g, b } = face === this.lit ? lit : plain;
+      const { r, g, b } = own[face] ?? (face === this.lit ? lit : plain);
       for (let k = 0; k < 3; k++) colours.setXYZ(3 * triangle + k, r, g, b);
     });
     colours.needsUpdate = true;
@@ -180,6 +207,17 @@ export class Part {
     share.toArray().forEach((part, i) => at.addScaledVector(new Vector2().fromArray(face.places, 6 * k + 2 * i), part));
     return at;
   }
+}
+
+/** A picture on the triangles of a face. */
+function laid(picture: FacePicture, face: FaceShape): Mesh {
+  const { canvas, x0, x1, y0, y1 } = picture, geometry = new BufferGeometry();
+  geometry.setAttribute("position", new Float32BufferAttribute(face.corners, 3));
+  geometry.setAttribute("uv", new Float32BufferAttribute(
+    face.places.map((mm, i) => (i % 2 ? (mm - y0) / (y1 - y0) : (mm - x0) / (x1 - x0))), 2));
+  const map = new CanvasTexture(canvas);
+  map.colorSpace = SRGBColorSpace;
+  return new Mesh(geometry, new MeshBasicMaterial({ map, transparent: true, alphaTest: 0.02, depthWrite: false }));
 }
 
 function matrixOf(rows: Matrix): Matrix4 {

@@ -43,6 +43,8 @@ export class Touches {
     return [...this.records.values()].reduce<TouchRecord | null>((a, b) => (a && a.number > b.number ? a : b), null);
   }
 
+  get all(): TouchRecord[] { return [...this.records.values()]; }
+
   live(): void {
     this.chosen = this.beside = null;
     this.now();

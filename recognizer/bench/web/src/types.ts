@@ -88,7 +88,12 @@ export interface ObjectShape {
   parts: { number: number; name: string; format: string }[];
 }
 
-export interface ObjectEntry { name: string; type: string; faces: number; symbols: number; retired: boolean }
+export interface ObjectEntry {
+  name: string; type: string; faces: number; symbols: number; retired: boolean; profile: string; registered: string;
+}
+
+/** Shares of touches of a face, the sensor's centre on it. */
+export interface Promised { at_once: number; within_three?: number | null }
 
 export interface Encoding {
   rows: number; columns: number; alphabet: string; pitch_mm: number; stroke_mm: number; cells: number;

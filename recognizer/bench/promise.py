@@ -1,0 +1,46 @@
+"""What the faces of an object promise, as `encode-object show` tells it.
+
+Run as the command that it is, since what makes objects and what reads them share the database
+alone; an object's promise is asked for once.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from functools import lru_cache
+from typing import Any
+
+from recognizer.bench.errors import BenchError
+from recognizer.bench.settings import LAB
+
+
+@lru_cache(maxsize=LAB.promises)
+def face_promises(database: str, name: str, registered: str) -> dict[str, dict[str, Any]]:  # noqa: ARG001 - a new object of this name is another one
+    """Return the promise of each face by its name; faces of which nothing is said are left out.
+
+    Parameters
+    ----------
+    database
+        URL or file.
+    name, registered
+        Of the object, and when it was registered.
+
+    Raises
+    ------
+    BenchError
+        `encode-object` could not tell; says why.
+    """
+    words = [sys.executable, "-c", "from generator.command import main; main()", "show", name,
+             "--database", database, "--json"]  # fmt: skip
+    try:
+        done = subprocess.run(  # noqa: S603, our own command
+            words, capture_output=True, text=True, timeout=LAB.promise_s, check=False
+        )
+        told = json.loads(done.stdout)
+    except (OSError, ValueError, subprocess.TimeoutExpired) as error:
+        raise BenchError(f"the promise of {name} is not known: {error}", fix="try again") from error
+    if "error" in told:
+        raise BenchError(told["error"].get("cause", "no promise"), fix=told["error"].get("fix", ""))
+    return {face["name"]: face["promise"] for face in told["faces"] if face["promise"]}
