@@ -3,10 +3,12 @@
 ::
 
     __init__.py       which exit code an error, a signal or a closed pipe means
+    help_page.py      the page of --help, without what it does not need
     output.py         results to stdout, messages to stderr, as text and as JSON
     progress.py       a bar on a terminal, notices beside it
     interruption.py   Ctrl-C as an event
     files.py          files that are whole or not there
+    cache.py          what takes long to compute, kept between runs
 
 A command is a typer application whose functions read options and return an `Action`; the
 action does the work and returns the exit code, or raises an `EncodedObjectsError`.
@@ -90,7 +92,7 @@ def run(
     """Run one command; returns its exit code. Errors are reported, not raised."""
     from typer import BadParameter, Exit
 
-    from encoded_objects.console import output
+    from encoded_objects.console import help_page, output
     from encoded_objects.errors import EncodedObjectsError
 
     usage_error: type[Exception] = BadParameter.__mro__[1]  # of every misused option
@@ -100,7 +102,10 @@ def run(
     try:
         asked = [*arguments, "--help"] if unsaid else arguments
         app = chosen(arguments)
-        action = app(asked, prog_name=name, standalone_mode=False)
+        if any(word in help_page.HELP for word in asked):
+            action = help_page.show_help(app, name, asked)
+        else:
+            action = app(asked, prog_name=name, standalone_mode=False)
         code = action() if callable(action) else int(action or 0)
         return BAD_INPUT if unsaid else code
     except Exit as leaving:

@@ -9,7 +9,6 @@ edges only name the lines, and vertices are their intersections.
 from __future__ import annotations
 
 import numpy as np
-from manifold3d import CrossSection, OpType
 from numpy.typing import NDArray
 
 Lines = NDArray[np.float64]  # (k, 3): unit normal out of the material, and offset in mm
@@ -39,6 +38,8 @@ def nib_outline(strokes: NDArray[np.float64], width_mm: float) -> list[Lines]:
         Outer rings counter-clockwise and holes clockwise, in no order; no two
         neighbouring edges are parallel.
     """
+    from manifold3d import CrossSection, OpType
+
     radius = width_mm / 2
     hulls, lines = [], []
     for a, b in strokes:

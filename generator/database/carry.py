@@ -25,9 +25,10 @@ from generator.database.carry_check import (
     same_object,
 )
 from generator.database.entries import find_object, list_objects, object_entry
+from generator.database.insert import insert_rows
 from generator.database.occupancy import take_cells
 from generator.database.registered import ObjectEntry
-from generator.database.rows import definition_number, definition_of, insert_rows
+from generator.database.rows import definition_number, definition_of
 from generator.database.transaction import place_of
 from generator.database.url import part_file, part_path
 from generator.errors import DatabaseError

@@ -14,7 +14,7 @@ import numpy as np
 from sqlalchemy import Connection, and_, bindparam, select, update
 
 from generator.database import tables
-from generator.database.rows import insert_rows
+from generator.database.insert import insert_rows
 from generator.layout.occupancy import TILE, Cells, Tiles, tiles_of
 
 _CHUNK = 256  # tile rows looked up in one statement

@@ -30,10 +30,11 @@ from generator.database import tables
 from generator.database.canonical import canonical, digest
 from generator.database.cells import array_key, cells_of
 from generator.database.entries import find_object
+from generator.database.insert import insert_rows
 from generator.database.occupancy import free_cells, take_cells
 from generator.database.read import read_layout
 from generator.database.registered import ObjectEntry, RegisteredPart
-from generator.database.rows import definition_number, insert_rows, layout_rows, polyhedron_rows
+from generator.database.rows import definition_number, layout_rows, polyhedron_rows
 from generator.database.transaction import place_of
 from generator.errors import DatabaseError
 from generator.layout.occupancy import Cells

@@ -8,17 +8,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from sqlalchemy import Connection, Table, bindparam, func, insert, select
-from sqlalchemy.dialects.postgresql import ARRAY
+from sqlalchemy import Connection, Table, insert, select
 
 from generator.database import tables
 from generator.database.face_type import face_type
+from generator.database.insert import Row, Rows
 from generator.layout.placement import FaceLayout, Layout
 from generator.polyhedron.frame import edge_length, face_area, face_polygon
 from generator.polyhedron.winged import Polyhedron
-
-Row = dict[str, Any]
-Rows = list[Row]
 
 
 def polyhedron_rows(object_id: int, polyhedron: Polyhedron) -> Iterator[tuple[Table, Rows]]:
@@ -105,25 +102,6 @@ def layout_rows(object_id: int, array_id: int, layout: Layout) -> Iterator[tuple
     )
     for face in layout.faces:
         yield tables.cells, _cell_rows(object_id, array_id, face)
-
-
-def insert_rows(connection: Connection, table: Table, rows: Rows) -> None:
-    """Insert rows of one table, all of which name the same columns; none is well, too.
-
-    A server gets one statement with an array per column: a message per row costs it twice
-    the time, and its driver complains aloud when one of them is refused.
-    """
-    if not rows:
-        return
-    if connection.dialect.name != "postgresql":
-        connection.execute(insert(table), rows)
-        return
-    names = list(rows[0])
-    columns = [
-        bindparam(None, [row[name] for row in rows], type_=ARRAY(table.c[name].type))
-        for name in names
-    ]
-    connection.execute(insert(table).from_select(names, select(*map(func.unnest, columns))))
 
 
 def definition_number(connection: Connection, table: Table, **values: Any) -> int:

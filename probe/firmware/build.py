@@ -15,6 +15,7 @@ import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from encoded_objects.console.cache import cache_folder
 from probe.errors import PortError
 
 SOURCES = Path(__file__).parent
@@ -91,17 +92,10 @@ def build_emulator() -> Path:
     return _build_cached("emulator", (), SOURCES.glob("emulator/*.[ch]"), _HOST_TOOLS)
 
 
-def cache_folder() -> Path:
-    """Return the folder that keeps the builds."""
-    given = os.environ.get("XDG_CACHE_HOME")
-    root = Path(given) if given and Path(given).is_absolute() else Path.home() / ".cache"
-    return root / "encoded-objects" / "firmware"
-
-
 def _build_cached(
     target: str, settings: Sequence[str], sources: Iterable[Path], tools: Sequence[str]
 ) -> Path:
-    folder = cache_folder() / f"{target}-{_key(settings, sources)}"
+    folder = cache_folder("firmware") / f"{target}-{_key(settings, sources)}"
     if folder.is_dir():
         return folder
     missing = [tool for tool in tools if shutil.which(tool) is None]

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
+from encoded_objects.console.cache import cache_folder
 from probe.errors import PortError
-from probe.firmware.build import cache_folder
 from probe.firmware.settings import EMULATOR
 
 _SHOWN = 500  # characters of its log
@@ -97,7 +97,8 @@ class Host:
         said = self._log.read_text(errors="replace").strip() if self._log.exists() else ""
         return PortError(
             f"the emulator ended or does not answer: {said[-_SHOWN:] or 'it says nothing'}",
-            fix=f"if libraries of the system changed, remove {cache_folder()}: it is built anew",
+            fix="if libraries of the system changed, remove "
+            f"{cache_folder('firmware')}: it is built anew",
             place=self._place,
         )
 
@@ -115,5 +116,6 @@ def _start_process(command: Sequence[str], log: Path) -> subprocess.Popen[bytes]
             )
     except OSError as failed:
         raise PortError(
-            f"{command[0]} cannot be started: {failed.strerror}", fix=f"remove {cache_folder()}"
+            f"{command[0]} cannot be started: {failed.strerror}",
+            fix=f"remove {cache_folder('firmware')}",
         ) from failed

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from encoded_objects.console.output import warning
 from probe.frame import Frame
-from recognizer.command.in_base import object_in_base
 from recognizer.command.learning import SensorLearning
 from recognizer.command.scanning import (
     Belief,
@@ -24,11 +23,11 @@ from recognizer.command.scanning import (
 )
 from recognizer.touch.contacts import TouchImage
 from recognizer.touch.recognition import Recognition
-from recognizer.touch.robot import ObjectPose
 from recognizer.touch.source import TouchSource
 
 if TYPE_CHECKING:
     from recognizer.thesis.edges.line import Edge
+    from recognizer.touch.robot import ObjectPose
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,8 +134,13 @@ def _answer(
     Joint angles are those of the touch (`own`), if there are such.
     """
     joints = own[0] if own else options.joints_deg
+    touches = None if belief is None else belief.touches
+    if joints is None and touch.pose is None:
+        return Answer(touch, found, None, touches), ""
+    from recognizer.command.in_base import object_in_base
+
     in_base, trouble = object_in_base(touch, found, joints, options.joint_error_deg)
-    return Answer(touch, found, in_base, None if belief is None else belief.touches), trouble
+    return Answer(touch, found, in_base, touches), trouble
 
 
 def _frames_until(interrupted: Event, frames: Iterator[Frame]) -> Iterator[Frame]:

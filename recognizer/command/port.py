@@ -9,8 +9,6 @@ from pathlib import Path
 from threading import Event
 
 from encoded_objects.console.output import message
-from probe.calibration import read_calibration
-from probe.client.stream import Stream, name_of
 from probe.frame import Frame
 from probe.port.typed import typed_port
 from probe.port.url import address_of
@@ -42,6 +40,8 @@ def source_at(
             recording, sensor_type, overlay=overlay, calibration=calibration, every=every
         )
         return replace(source, place=url, frames=None)
+    from probe.calibration import read_calibration
+
     place, known = typed_port(url, sensor_type)
     sensor = known or SensorType()
     return TouchSource(
@@ -66,6 +66,9 @@ def listen(
     CalibrationError
         The calibration is another sensor's.
     """
+    from probe.calibration import read_calibration
+    from probe.client.stream import Stream, name_of
+
     with Stream(source.place, sensor=number) as stream:
         if calibration is not None:
             read_calibration(calibration, sensor=name_of(stream.ident(), source.place) or None)

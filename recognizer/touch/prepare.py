@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 
-from generator.alphabet import Alphabet, SymbolStyle
 from probe.sensor import SensorType
 from recognizer.touch.lab import EmbossedArray, Lab
-from recognizer.touch.settings import DEFAULTS, ReaderSettings, SearchSettings, TemplateSettings
-from recognizer.touch.symbols.search import Bank, bank_of
-from recognizer.touch.symbols.template import ResponseTemplate, template_of
+from recognizer.touch.settings import DEFAULTS, ReaderSettings
+from recognizer.touch.symbols.search import Bank
+from recognizer.touch.symbols.template import ResponseTemplate
+from recognizer.touch.template_cache import template_and_bank
 
 Prepared = tuple[EmbossedArray, ResponseTemplate, Bank]
 
@@ -29,7 +28,7 @@ class PreparedLab:
         object.__setattr__(self, "settings", settings_for(self.lab, self.sensor, self.settings))
         settings = self.settings.template, self.settings.search
         made = tuple(
-            (each, *_template_and_bank(each.alphabet, each.style, self.sensor, *settings))
+            (each, *template_and_bank(each.alphabet, each.style, self.sensor, *settings))
             for each in self.lab.arrays
         )
         object.__setattr__(self, "prepared", made)
@@ -56,15 +55,3 @@ def settings_for(lab: Lab, sensor: SensorType, settings: ReaderSettings) -> Read
             hypotheses, corner=share * hypotheses.corner, heavy=share * hypotheses.heavy
         ),
     )
-
-
-@lru_cache(maxsize=16)
-def _template_and_bank(
-    alphabet: Alphabet,
-    style: SymbolStyle,
-    sensor: SensorType,
-    template: TemplateSettings,
-    search: SearchSettings,
-) -> tuple[ResponseTemplate, Bank]:
-    felt = template_of(alphabet, style, sensor, template)
-    return felt, bank_of(felt, sensor, search)

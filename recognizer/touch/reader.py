@@ -6,11 +6,11 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from probe.calibration import Calibration, calibrate_image
 from probe.recording.read import Recording
 from recognizer.errors import SensorStateError, TouchError
 from recognizer.touch.prepare import PreparedLab
@@ -19,6 +19,9 @@ from recognizer.touch.recognition import Recognition
 from recognizer.touch.sensor_state import SensorState, invert_floating
 from recognizer.touch.signal import Signal, signal_of
 from recognizer.touch.source import source_of
+
+if TYPE_CHECKING:
+    from probe.calibration import Calibration
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -125,6 +128,8 @@ class Reader(PreparedLab):
             )
         newtons = calibration is not None
         if calibration is not None:
+            from probe.calibration.apply import calibrate_image
+
             found = calibrate_image(values, calibration)
             values = found.values
             known = np.where(found.bad, 0.0, 1.0) * (1.0 if known is None else known)

@@ -13,7 +13,6 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.circuit.floating import solve_floating
 from probe.errors import CircuitError
 from probe.sensor import SensorType
 from recognizer.errors import SensorStateError
@@ -132,6 +131,8 @@ def invert_floating(readings: Array) -> Array:
     supply nor the background matters (`docs/recognizer.md`). Readings that no network can give
     are returned as they are.
     """
+    from probe.circuit.floating import solve_floating
+
     over = np.maximum(readings, FLOATING.least * float(np.max(readings, initial=1e-12)))
     try:
         return np.asarray(solve_floating(1.0 / over, FLOATING.tolerance).conductance_s)

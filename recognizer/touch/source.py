@@ -10,11 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from probe.calibration import Calibration, calibration_hash, read_calibration
 from probe.errors import CalibrationError, RecordingError
 from probe.frame import Frame
 from probe.recording.layout import RecordingOrigin
@@ -22,6 +21,9 @@ from probe.recording.read import Recording
 from probe.sensor import SensorType
 from recognizer.touch.contacts import TouchImage, cut_touches, every_frame
 from recognizer.touch.settings import DEFAULTS, ReaderSettings
+
+if TYPE_CHECKING:
+    from probe.calibration import Calibration
 
 LARGEST = 4 << 20  #: bytes of a file that may be a calibration
 
@@ -114,6 +116,8 @@ def _calibration_for(
     named = origin.calibration
     if given is None:
         return _calibration_in(folder, named) if named else (None, "")
+    from probe.calibration import calibration_hash, read_calibration
+
     known = read_calibration(given, sensor=origin.sensor or None)
     if named and named != calibration_hash(known):
         raise CalibrationError(
@@ -126,6 +130,8 @@ def _calibration_for(
 
 def _calibration_in(folder: Path, named: str) -> tuple[Calibration | None, str]:
     """Return the calibration of that hash in a folder; None, with a notice, if there is none."""
+    from probe.calibration import calibration_hash, read_calibration
+
     for path in sorted(folder.glob("*.json")):
         try:
             small = path.stat().st_size <= LARGEST

@@ -116,15 +116,13 @@ def _tab_responses(
     settings: TemplateSettings,
 ) -> Array:
     """Return the responses (order, n, n) of tabs."""
-    from scipy.signal import fftconvolve
-
     x, y = np.meshgrid(axis, axis)
     reach = alphabet.reach * style.pitch_mm
     tip = _disc(sensor.overlay.tab_diameter_mm / 2, settings.step_mm)
 
     def felt(strokes: Array) -> Array:
         presence = _presence(_distance(strokes * reach, x, y), style, settings)
-        cover = np.clip(fftconvolve(presence, tip, mode="same"), 0, 1)
+        cover = np.clip(_convolved(presence, tip), 0, 1)
         return np.asarray(cover * (1 + settings.bulge * (1 - cover)))
 
     return np.stack([felt(np.array(glyph.strokes, float)) for glyph in alphabet.glyphs])
@@ -182,10 +180,23 @@ _RESPONSES = {"tab": _tab_responses, "pad": _pad_responses, "gel": _gel_response
 
 def _with_cross_talk(felt: Array, share: float, sensor: SensorType, step: float) -> Array:
     """Return responses of tactels that hear a share of what stands one tactel away, all around."""
-    from scipy.signal import fftconvolve
-
-    around = fftconvolve(felt, _annulus(sensor.pitch_mm, step), mode="same")
+    around = _convolved(felt, _annulus(sensor.pitch_mm, step))
     return np.asarray(np.maximum((1 - share) * felt + share * around, 0.0))
+
+
+def _convolved(values: Array, weights: Array) -> Array:
+    """Return values (n, n) convolved with weights (k, k), as large as the values; 0 beyond them.
+
+    As `scipy.signal.fftconvolve(..., mode="same")`, whose import takes longer than many touches.
+    """
+    from scipy.fft import irfft2, next_fast_len, rfft2
+
+    whole = [a + b - 1 for a, b in zip(values.shape, weights.shape, strict=True)]
+    fast = [next_fast_len(n, real=True) for n in whole]
+    product = irfft2(rfft2(values, fast) * rfft2(weights, fast), fast)
+    row, column = ((n - a) // 2 for n, a in zip(whole, values.shape, strict=True))
+    found = product[row : row + values.shape[0], column : column + values.shape[1]]
+    return np.asarray(found)
 
 
 def _distance(strokes: Array, x: Array, y: Array) -> Array:

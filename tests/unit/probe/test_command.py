@@ -80,6 +80,7 @@ def test_the_help_loads_nothing_heavy():
         "codes = [run(words) for words in (['--help'], ['simulate', '--help'], ['list', '-h'],\n"
         "                                  ['calibrate', 'loads', '--help'])]\n"
         "heavy = 'numpy scipy matplotlib h5py skfem skimage sqlalchemy serial generator'.split()\n"
+        "heavy += ['pydantic', 'markdown_it']\n"
         "print([name for name in heavy if name in sys.modules], codes)\n"
     )
     done = subprocess.run(

@@ -1,0 +1,56 @@
+"""Templates out of the cache are those that were worked out, bit by bit."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from scipy.ndimage import percentile_filter
+from scipy.signal import fftconvolve
+
+from generator.alphabet import SymbolStyle, alphabet_named
+from probe.sensor import SensorType
+from recognizer.touch import template_cache
+from recognizer.touch.settings import DEFAULTS
+from recognizer.touch.symbols.gain import _percentiles_around
+from recognizer.touch.symbols.search import bank_of
+from recognizer.touch.symbols.template import _convolved, template_of
+from recognizer.touch.template_cache import template_and_bank
+
+CASE = (alphabet_named("dense-4"), SymbolStyle(), SensorType(), DEFAULTS.template, DEFAULTS.search)
+
+
+def same(one, other):
+    for field in fields(one):
+        a, b = getattr(one, field.name), getattr(other, field.name)
+        assert np.array_equal(a, b), field.name
+        assert np.asarray(a).dtype == np.asarray(b).dtype, field.name
+
+
+def test_kept_as_worked_out(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    felt = template_of(*CASE[:4])
+    bank = bank_of(felt, CASE[2], CASE[4])
+    for _ in range(2):
+        template_and_bank.cache_clear()
+        kept, kept_bank = template_and_bank(*CASE)
+        same(kept, felt)
+        same(kept_bank, bank)
+        assert not kept.rimmed.flags.writeable
+        monkeypatch.setattr(template_cache, "template_of", None)  # the second time it is read
+    template_and_bank.cache_clear()
+
+
+@pytest.mark.parametrize("shape", [((141, 141), (25, 25)), ((40, 40), (67, 67)), ((9, 12), (4, 5))])
+def test_convolution_as_of_scipy(shape):
+    draw = np.random.default_rng(1)
+    values, weights = (draw.random(size) for size in shape)
+    assert np.array_equal(_convolved(values, weights), fftconvolve(values, weights, mode="same"))
+
+
+@pytest.mark.parametrize("around", [1, 2, 3, 4, 5])
+def test_percentiles_as_of_scipy(around):
+    forces = np.random.default_rng(2).integers(0, 9, (12, 32)).astype(float)
+    shares = (20.0, 50.0, 80.0)
+    expected = [percentile_filter(forces, s, size=around, mode="nearest") for s in shares]
+    found = _percentiles_around(forces, around, shares)
+    assert np.array_equal(found, np.reshape(expected, (3, -1)))
