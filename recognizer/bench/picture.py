@@ -33,7 +33,9 @@ def object_svg(held: RegisteredObject) -> str:
         for depth, text, corners in _drawings(held, held.faces[number], number, axes)
     ]
     corners = np.concatenate([np.zeros((1, 2)), *(each for _, _, each in seen)])[1:]
-    low, high = (corners.min(axis=0), corners.max(axis=0)) if len(corners) else (0, np.ones(2))
+    low, high = (
+        (corners.min(axis=0), corners.max(axis=0)) if len(corners) else (np.zeros(2), np.ones(2))
+    )
     x, y = low - 1.0
     w, h = high - low + 2.0
     body = "".join(text for _, text, _ in sorted(seen, key=lambda one: one[0]))
