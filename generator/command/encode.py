@@ -66,6 +66,12 @@ def encode(
                           help="Of a new database: the same key, the same arrays and bytes; drawn "
                                "if left out. encode-object lab prints it."),
     ] = "",
+    sensor_type: Annotated[
+        str, typer.Option("--sensor-type", metavar="NAME|FILE", show_default=False,
+                          help="What will touch them, in place of sensor_type: in the specs; "
+                               "fsr-16. Decides the pitch that auto takes, and what faces "
+                               "promise."),
+    ] = "",
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Say what would be made; write nothing."),
     ] = False,
@@ -115,11 +121,12 @@ def encode(
         if not specs:
             raise typer.BadParameter("no spec is named")
         if printed_check:
-            _check_printed(specs, folder, database, print_profile, print_faults, as_json=as_json)
+            _check_printed(specs, folder, database, sensor_type, print_profile, print_faults,
+                           as_json=as_json)  # fmt: skip
             return 0
         if print_profile or print_faults:
             raise typer.BadParameter("print profile and faults need --printed-check")
-        _make(specs, folder, formats, database, lab_key=lab_key, dry_run=dry_run,
+        _make(specs, folder, formats, database, sensor_type, lab_key=lab_key, dry_run=dry_run,
               verify=verify, slice_plates=slice_plates, replace=replace, jobs=jobs,
               as_json=as_json)  # fmt: skip
         return 0
@@ -132,6 +139,7 @@ def _make(
     folder: Path | None,
     formats: str,
     database: str,
+    sensor_type: str,
     *,
     lab_key: str,
     dry_run: bool,
@@ -144,12 +152,13 @@ def _make(
     """Make the objects and report them."""
     from encoded_objects.console.progress import progress_bar
     from generator.command.made_report import print_made
-    from generator.spec.option import database_option, format_option
+    from generator.spec.option import database_option, format_option, sensor_type_option
     from generator.spec.read import read_specs
 
     wanted = format_option(formats) if formats else None
     url = database_option(database) if database else None
-    located: tuple[LocatedSpec, ...] = read_specs(specs, database=url)
+    sensor = sensor_type_option(sensor_type) if sensor_type else ""
+    located: tuple[LocatedSpec, ...] = read_specs(specs, database=url, sensor_type=sensor)
 
     from generator.pipeline import encode as make
 
@@ -174,6 +183,7 @@ def _check_printed(
     specs: list[Path],
     folder: Path | None,
     database: str,
+    sensor_type: str,
     profile: str,
     faults: str,
     *,
@@ -184,13 +194,14 @@ def _check_printed(
     from generator.command.printed_report import print_printed
     from generator.pipeline.printed_check import check_printed
     from generator.printed.faults import print_faults
-    from generator.spec.option import database_option
+    from generator.spec.option import database_option, sensor_type_option
     from generator.spec.read import read_specs
 
     url = database_option(database) if database else None
+    sensor = sensor_type_option(sensor_type) if sensor_type else ""
     with progress_bar("reading", 1) as bar:
         objects = check_printed(
-            read_specs(specs, database=url),
+            read_specs(specs, database=url, sensor_type=sensor),
             folder=folder,
             database=url,
             profile=profile,

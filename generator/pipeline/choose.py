@@ -126,9 +126,10 @@ def _larger_note(chosen: Profile, array: SymbolArray, why: str) -> str:
 def _choose_finer(coarse: Choice, blank: int, room: int, solid: Polyhedron | None) -> Choice:
     """Take finer symbols on the same array where they show faces that stay blank otherwise."""
     found, left = coarse, blank
-    for pitch in CHOICE.finer_mm:
+    for share in CHOICE.finer_shares:
+        pitch = _share_mm(share, coarse.specs[0])
         try:
-            finer = tuple(_with_pitch(one, pitch) for one in coarse.specs)
+            finer = tuple(_with_pitch(one, _share_mm(share, one)) for one in coarse.specs)
             needed, now = _count_needs(finer, solid)
         except GeneratorError:  # the printer cannot make them
             break
@@ -217,7 +218,12 @@ def _with_array(
 def _pitch_of_shape(located: LocatedSpec, solid: Polyhedron | None) -> float | None:
     """Return the pitch that an object's faces are read best at; None for the usual one."""
     bent = bool(solid.surfaces) if solid else has_round_faces(located.spec)
-    return CHOICE.round_mm if bent else None
+    return _share_mm(CHOICE.round_share, located) if bent else None
+
+
+def _share_mm(share: float, located: LocatedSpec) -> float:
+    """Return a share of the pitch that the sensor of an object proposes, mm."""
+    return round(share * located.spec.sensor.pitch_mm, 2)
 
 
 def _with_pitch(located: LocatedSpec, pitch_mm: float) -> LocatedSpec:

@@ -110,7 +110,10 @@ def describe_object(
         fit=fit,
         lying=str(overhang_of(plan, layout)) if plan.spec.parts == "whole" else None,
         touches=touches_needed(
-            plan.array.order, plan.array.rows * plan.array.columns, plan.spec.style.pitch_mm
+            plan.array.order,
+            plan.array.rows * plan.array.columns,
+            plan.spec.style.pitch_mm,
+            sensor_mm=plan.spec.sensor.across_mm,
         ),
         face_reports=faces,
     )

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from encoded_objects.sensor_type import USUAL_SENSOR, SensorSize
 from generator.alphabet.outline import SymbolStyle, footprint_half_mm
 from generator.alphabet.printable import check_printable
-from generator.array.touches import SENSOR_MM, touches_needed
+from generator.array.touches import touches_needed
 from generator.errors import GeneratorError
 from generator.layout.footprint import Points, Region, region_of
 from generator.layout.lattice import choose_lattice
@@ -48,8 +49,9 @@ def promise_faces(plan: ObjectPlan, layout: Layout) -> dict[int, FacePromise]:
     plan, layout
         An object and its symbols.
     """
-    array = plan.array
-    if touches_needed(array.order, array.rows * array.columns, layout.pitch_mm) > 1:
+    array, across = plan.array, plan.spec.sensor.across_mm
+    cells = array.rows * array.columns
+    if touches_needed(array.order, cells, layout.pitch_mm, sensor_mm=across) > 1:
         return {}
     carriers = {surface.carrier for surface in plan.polyhedron.surfaces}
     known: dict[bytes, FacePromise] = {}
@@ -65,7 +67,7 @@ def promise_faces(plan: ObjectPlan, layout: Layout) -> dict[int, FacePromise]:
             remedy = ""
             if share < PROMISE.low:  # faces as narrow, longer than a sensor, need the same
                 narrow, wide = sorted(np.ptp(loops[0], axis=0).round(1).tolist())
-                like = narrow, min(wide, 1.5 * SENSOR_MM), is_convex(loops[0])
+                like = narrow, min(wide, 1.5 * across), is_convex(loops[0])
                 if like not in remedies:
                     remedies[like] = _remedy(plan, loops, face.face)
                 remedy = remedies[like]
@@ -84,12 +86,17 @@ def _share(
     """Return the share of touches answered, and whether they show one row of symbols."""
     if not len(face.labels):
         return 0.0, False
-    half = SENSOR_MM / 2
     reach = plan.alphabet.reach * style.pitch_mm + style.stroke_mm / 2
-    view = SensorView((half, half), reach)
+    view = SensorView(plan.spec.sensor.half_mm, reach)
     views = face_views(loops, face, style.pitch_mm, view, settings)
     one_row = bool((views.lines <= 1).mean() >= PROMISE.one_line)
-    return promised_share(views, measured_answers(), style.pitch_mm), one_row
+    pitch = style.pitch_mm / _fineness(plan.spec.sensor)
+    return promised_share(views, measured_answers(), pitch), one_row
+
+
+def _fineness(sensor: SensorSize) -> float:
+    """Return how many times coarser a sensor is than that of the measured table."""
+    return sensor.pitch_mm / USUAL_SENSOR.pitch_mm
 
 
 def _remedy(plan: ObjectPlan, loops: Loops, face: int) -> str:
@@ -100,7 +107,8 @@ def _remedy(plan: ObjectPlan, loops: Loops, face: int) -> str:
     width, factor = _wider(plan, loops, region)
     if width:
         found.append(f"{math.ceil(width * factor - 1e-9):g} mm wide instead of {width:.3g}")
-    for pitch in PROMISE.pitches_mm:
+    for usual in PROMISE.pitches_mm:
+        pitch = round(usual * _fineness(plan.spec.sensor), 1)
         if pitch >= style.pitch_mm:
             continue
         finer = dataclasses.replace(

@@ -10,10 +10,12 @@ class ChoiceSettings:
     """Which array and how many processes."""
 
     larger: int = 4  #: sizes tried beyond `large`
-    round_mm: float = 7.0
-    """Pitch on objects with round faces: on a cylinder of 60 mm 11 of 16 touches are answered,
-    at 5 mm 9, because strokes are bent over as many tactels and more of them."""
-    finer_mm: tuple[float, ...] = (4.5, 4.0)  #: pitches tried where faces stay blank
+    round_share: float = 1.4
+    """Pitch on objects with round faces over that which the sensor proposes, 7 mm: on a cylinder of
+    60 mm 11 of 16 touches are answered, at 5 mm 9, because strokes are bent over as many tactels
+    and more of them."""
+    finer_shares: tuple[float, ...] = (0.9, 0.8)
+    """Pitches tried where faces stay blank, over that which the sensor proposes: 4.5 and 4 mm."""
     first: float = 0.5  #: of an array's room that its first objects may fill
     few: int = 16  #: fewer tasks are done in this process, where nobody asked for others
 

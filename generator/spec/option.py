@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import get_args
 
 from pydantic_core import PydanticCustomError
 
 from encoded_objects.document.problem import Problem, did_you_mean
+from encoded_objects.sensor_type import SENSOR_FILES, sensor_size
 from generator.spec.problem import SpecError
 from generator.spec.settings import Format, database_url
 
@@ -27,6 +29,12 @@ def format_option(text: str) -> tuple[str, ...]:
     if problems:
         raise SpecError(problems)
     return tuple(dict.fromkeys(names))
+
+
+def sensor_type_option(text: str) -> str:
+    """Return `--sensor-type`, a file by its whole path; raises `SensorTypeError`."""
+    sensor_size(text)
+    return str(Path(text).absolute()) if Path(text).suffix in SENSOR_FILES else text
 
 
 def database_option(text: str) -> str:

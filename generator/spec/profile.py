@@ -33,11 +33,10 @@ class SymbolDefaults:
 
 
 PRINTER = "fdm-0.4"
-READ_BEST_MM = 5.0
-"""Pitch that `auto` takes: what touches are read best at, on nozzles of 0.4 and 0.6 mm and CAD
-surfaces alike (docs/pitches.md)."""
-COARSER_MM = (5.5, 6.0, 7.0, 8.0, 10.0, 12.0)
-"""And the first of these that prints, where a spec asks for symbols that need more room."""
+COARSER_MM = (3.5, 4.0, 4.5, 5.0, 5.5, 6.0, 7.0, 8.0, 10.0, 12.0)
+"""`auto` takes the pitch that the sensor type proposes, for `fsr-16` the 5 mm that touches are read
+best at, on nozzles of 0.4 and 0.6 mm and CAD surfaces alike (docs/pitches.md); and the first of
+these beyond it that prints, where a spec or a printer asks for more room."""
 
 _OF_ORDER = {
     2: SymbolDefaults("thesis-2", 12.0, PRINTER),
@@ -53,9 +52,10 @@ def defaults_of_profile(name: str) -> SymbolDefaults:
     return SymbolDefaults(profile.alphabet, profile.pitch_mm, printer)
 
 
-def auto_defaults() -> SymbolDefaults:
-    """Return what `auto` gives."""
-    return SymbolDefaults(PROFILES[SMALLEST].alphabet, READ_BEST_MM, PRINTER, COARSER_MM)
+def auto_defaults(pitch_mm: float) -> SymbolDefaults:
+    """Return what `auto` gives where a sensor type proposes a pitch."""
+    coarser = tuple(pitch for pitch in COARSER_MM if pitch > pitch_mm)
+    return SymbolDefaults(PROFILES[SMALLEST].alphabet, pitch_mm, PRINTER, coarser)
 
 
 def defaults_of_order(order: int) -> SymbolDefaults:

@@ -6,6 +6,7 @@ Files -> Located objects. All problems of all files are reported at once.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -26,7 +27,7 @@ SHARED_BLOCKS = ("symbols", "print", "output")  # merged setting by setting
 
 
 def read_specs(
-    paths: Sequence[Path | str | Tree], *, database: str | None = None
+    paths: Sequence[Path | str | Tree], *, database: str | None = None, sensor_type: str = ""
 ) -> tuple[LocatedSpec, ...]:
     """Read all objects of one run.
 
@@ -36,6 +37,8 @@ def read_specs(
         Spec files, or what was read of them; each holds one object or a set.
     database
         URL that takes the place of the one in the files; they may then name different ones.
+    sensor_type
+        Name or file in place of what the specs say; empty: as they say.
 
     Returns
     -------
@@ -62,7 +65,10 @@ def read_specs(
             continue
         problems += source.problems
         origin = _origin(path, source)
-        for tree in _collect_trees(_objects(source, problems), problems):
+        for said in _collect_trees(_objects(source, problems), problems):
+            tree = said
+            if sensor_type and isinstance(tree.value, dict):
+                tree = replace(tree, value={**tree.value, "sensor_type": sensor_type})
             try:
                 settings = ObjectSettings.model_validate(tree.value)
                 if len(found) + settings.copies <= OBJECTS_MAX:

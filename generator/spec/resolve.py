@@ -11,8 +11,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from encoded_objects.document.problem import Problem
+from encoded_objects.document.problem import DocumentError, Problem
 from encoded_objects.document.tree import Tree
+from encoded_objects.sensor_type import SENSOR_FILES, USUAL_SENSOR, SensorSize, sensor_size
 from generator.alphabet.known import ALPHABETS, Alphabet
 from generator.alphabet.outline import SymbolStyle
 from generator.alphabet.printable import check_printable
@@ -78,9 +79,10 @@ def resolve(
     shape = solid
     if isinstance(settings, ObjectSettings):
         shape = resolved_shape(settings.shape, tree, refuse)
+    sensor = _sensor(settings, tree, problems)
     encoding, order = _array(settings, refuse)
     if settings.encoding is None and _profile(settings) == AUTO:
-        defaults = auto_defaults()
+        defaults = auto_defaults(sensor.pitch_mm)
     elif settings.encoding is None or order is None:
         defaults = defaults_of_profile(_array_profile(settings))
     else:
@@ -134,6 +136,7 @@ def resolve(
         lab_key=settings.output.lab_key or "",
         density_kg_m3=settings.robot.density or printer.density_kg_m3,
         collision=settings.robot.collision,
+        sensor=sensor,
     )
     if settings.copies == 1:
         return (spec,)
@@ -143,6 +146,23 @@ def resolve(
 def folder_name(name: str) -> str:
     """Return the folder of an object's files: names that give the same one are told apart badly."""
     return re.sub(r"[\s-]+", "-", name.lower())
+
+
+def _sensor(settings: NamedSettings, tree: Tree, problems: list[Problem]) -> SensorSize:
+    """Return what will touch the object; problems with its type are added."""
+    name = settings.sensor_type
+    if name is None:
+        return USUAL_SENSOR
+    file = Path(name).suffix in SENSOR_FILES
+    try:
+        return sensor_size(str(tree.folder / name) if file else name)
+    except DocumentError as error:
+        mark = mark_of(tree, "sensor_type")
+        problems += [
+            replace(problem, mark=mark, file="") if problem.mark is None else problem
+            for problem in error.problems
+        ]
+        return USUAL_SENSOR
 
 
 def _printer(

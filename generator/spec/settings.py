@@ -82,6 +82,13 @@ def database_url(value: Any) -> str:
     return value
 
 
+def sensor_type_name(value: Any) -> str:
+    """Return the name of a sensor type, or of its file; which ones there are is told later."""
+    if not isinstance(value, str) or not value.strip() or not value.isprintable():
+        raise refuse("a sensor type is a name or a file", "write, for example, gel-24x32")
+    return value
+
+
 def lab_key(value: Any) -> str:
     """Return a lab's key, as it is written everywhere."""
     if not isinstance(value, str):
@@ -99,6 +106,7 @@ FormatList = Annotated[
     Field(min_length=1),
     BeforeValidator(format_list, json_schema_input_type=list[Format] | str),
 ]
+SensorTypeName = Annotated[str, BeforeValidator(sensor_type_name)]
 DatabaseUrl = Annotated[str, BeforeValidator(database_url)]
 LabKey = Annotated[str, BeforeValidator(lab_key)]
 
@@ -169,6 +177,9 @@ class Defaults(Block):
     room for the objects and more, at the pitch that the printer's prints are read best at."""
     encoding: Encoding | None = None
     """The array, named explicitly, in place of a profile."""
+    sensor_type: SensorTypeName | None = None
+    """What will touch it: a name that probe-sensor types lists, or a YAML file; fsr-16. Its size
+    and its tactels decide the pitch that auto takes and what faces promise."""
     layout: Literal["auto", "net", "faces"] = "auto"
     """net: one lattice runs through the unfolded object; faces: each face alone; auto: what
     shows more places."""

@@ -22,6 +22,7 @@ name: {name}
 {shape}
 
 # profile: auto          # auto | one-touch | large | fine | thesis | product
+# sensor_type: fsr-16    # what will touch it: probe-sensor types lists them; or a YAML file
 # layout: auto           # auto | net (one lattice through the unfolded object) | faces
 # copies: 1              # each copy has cells of its own, so that two are told apart
 

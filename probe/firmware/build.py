@@ -22,7 +22,9 @@ SOURCES = Path(__file__).parent
 BOARDS = ("uno", "mega", "teensy")
 BAUDS = (500_000, 1_000_000, 2_000_000)  #: exact at 16 MHz, and known to every terminal
 LONGEST_SETTLING_US = 63.75
-WIRINGS = ("grounded", "floating")  #: of the rows that are not read
+LINES_MAX = 16  #: rows or columns of the board
+WIRINGS = ("grounded", "floating", "virtual")
+"""Of the rows that are not read: at ground, or open; virtual: at ground, columns held at 0 V."""
 
 PACKAGES = "apt-get install make gcc libc6-dev gcc-avr avr-libc libsimavr-dev libelf-dev"
 _FIRMWARE_TOOLS = ("make", "avr-gcc", "avr-objcopy")
@@ -37,6 +39,7 @@ def build_firmware(
     settle_us: float = 10.0,
     adc_divider: int = 16,
     wiring: str = "grounded",
+    shape: tuple[int, int] = (LINES_MAX, LINES_MAX),
 ) -> Path:
     """Return the folder with `probe.elf` and `probe.hex`.
 
@@ -52,7 +55,10 @@ def build_firmware(
     adc_divider
         16, 32, 64 or 128: of 16 MHz, the clock of the ADC.
     wiring
-        Of the rows that are not read: grounded, by shift registers, or floating.
+        Of the rows that are not read: grounded, by shift registers, or floating; virtual is driven
+        as grounded is.
+    shape
+        Rows and columns, 2 ... 16 each.
 
     Raises
     ------
@@ -74,9 +80,15 @@ def build_firmware(
             f"the ADC cannot run at 16 MHz / {adc_divider}", fix="take 16, 32, 64 or 128"
         )
     if wiring not in WIRINGS:
-        raise PortError(f"there is no wiring {wiring!r}", fix=f"take {' or '.join(WIRINGS)}")
+        raise PortError(f"there is no wiring {wiring!r}", fix=f"take one of {', '.join(WIRINGS)}")
+    if not all(2 <= lines <= LINES_MAX for lines in shape):
+        raise PortError(
+            f"a board of {shape[0]} x {shape[1]} tactels", fix=f"take 2 ... {LINES_MAX} of each"
+        )
+    driven = "floating" if wiring == "floating" else "grounded"
     settings = (f"BOARD={board}", f"BAUD={baud}", f"SETTLE={int(quarters)}",
-                f"ADC_DIVIDER={adc_divider}", f"WIRING={wiring}")  # fmt: skip
+                f"ADC_DIVIDER={adc_divider}", f"WIRING={driven}",
+                f"ROWS={shape[0]}", f"COLUMNS={shape[1]}")  # fmt: skip
     sources = [*SOURCES.glob("*.[ch]"), *SOURCES.glob("boards/*.h")]
     return _build_cached("firmware", settings, sources, _FIRMWARE_TOOLS)
 

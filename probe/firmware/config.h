@@ -2,11 +2,15 @@
 #ifndef CONFIG_H
 #define CONFIG_H
 
-#define FIRMWARE_MAJOR 1
+#define FIRMWARE_MAJOR 2
 #define FIRMWARE_MINOR 0
 
+#ifndef ROWS
 #define ROWS 16
+#endif
+#ifndef COLUMNS
 #define COLUMNS 16
+#endif
 #define WRIST 4
 #define SENSORS 8
 
@@ -34,6 +38,9 @@
 #endif
 #if F_CPU / 8 % BAUD
 #error "BAUD is not exact at 16 MHz: take 250000, 500000, 1000000 or 2000000"
+#endif
+#if ROWS < 2 || ROWS > 16 || COLUMNS < 2 || COLUMNS > 16
+#error "ROWS and COLUMNS are 2 ... 16: one multiplexer and two shift registers"
 #endif
 #if SETTLE < 0 || SETTLE > 255
 #error "SETTLE counts quarters of a microsecond, 0 ... 255"

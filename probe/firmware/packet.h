@@ -9,10 +9,12 @@
 
 #include <stdint.h>
 
-#define PACKET_VERSION 1
-#define PACKET_BODY 520                              /* 256 tactels and 4 wrist readings, u16 */
-#define PACKET_PLAIN (8 + PACKET_BODY + 2)           /* 530 */
-#define PACKET_WIRE (PACKET_PLAIN + 1 + PACKET_PLAIN / 254 + 1) /* 534 */
+#include "config.h"
+
+#define PACKET_VERSION 2
+#define PACKET_BODY (2 + 2 * ROWS * COLUMNS + 2 * WRIST) /* rows, columns, readings u16 */
+#define PACKET_PLAIN (8 + PACKET_BODY + 2)               /* 532 of 16x16 */
+#define PACKET_WIRE (PACKET_PLAIN + 1 + PACKET_PLAIN / 254 + 1) /* 536 */
 
 typedef struct {
     uint8_t *out;  /* where the next byte goes */

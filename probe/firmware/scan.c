@@ -23,15 +23,26 @@ INLINE void select_tactel(uint8_t row, uint8_t column)
     if (row == driven)
         return;
     driven = row;
-    if (GROUNDED)
+    if (GROUNDED) {
+        for (uint8_t gone = ROWS; row == 0 && gone < 16; gone++)
+            board_shift_rows(0); /* the last row leaves the registers */
         board_shift_rows(row == 0);
-    else
+    } else
         board_select_row(row);
 }
 
 INLINE void select_channel(uint8_t channel)
 {
     ADMUX = _BV(REFS0) | channel;
+}
+
+/* The tactel after one, row by row; 0 after the last. */
+INLINE uint8_t next(uint8_t address)
+{
+    address++;
+    if (COLUMNS < 16 && (address & 15) == COLUMNS)
+        address += 16 - COLUMNS;
+    return ROWS < 16 && address >> 4 == ROWS ? 0 : address;
 }
 
 /* Convert what is selected, select `address` and `channel` for the next conversion, and put the
@@ -62,7 +73,7 @@ void scan_init(void)
 {
     ADCSRA = _BV(ADEN) | ADC_PRESCALER;
     if (GROUNDED)
-        for (uint8_t row = 0; row < ROWS; row++)
+        for (uint8_t row = 0; row < 16; row++)
             board_shift_rows(0); /* what they held at power on */
     driven = ROWS - 1;
     select_tactel(0, 0);
@@ -83,8 +94,11 @@ void scan(uint8_t *wire, uint8_t bits, uint16_t number)
     uint8_t address = 0;
 
     packet_begin(&packet, wire, bits == 8 ? 'B' : 'F', number, clock_us());
-    reading = convert(&packet, 0, 0, ++address, TACTEL);
-    while (++address)
+    packet_u8(&packet, ROWS);
+    packet_u8(&packet, COLUMNS);
+    address = next(address);
+    reading = convert(&packet, 0, 0, address, TACTEL);
+    while ((address = next(address)))
         reading = convert(&packet, bits, reading, address, TACTEL);
     /* the last tactel; (0, 0) of the next image settles while the wrist is read */
     reading = convert(&packet, bits, reading, 0, WRIST_1);

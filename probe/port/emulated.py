@@ -30,7 +30,7 @@ from pathlib import Path
 from numpy.typing import ArrayLike
 
 from probe.errors import PortError
-from probe.firmware.build import build_emulator, build_firmware
+from probe.firmware.build import LINES_MAX, build_emulator, build_firmware
 from probe.firmware.host import Host
 from probe.firmware.images import FeltImages
 
@@ -135,6 +135,7 @@ def emulated_probe(
     adc_divider: int = 16,
     wiring: str = "grounded",
     load_ohm: float = 2200.0,
+    shape: tuple[int, int] = (LINES_MAX, LINES_MAX),
     trace: Path | None = None,
 ) -> Iterator[EmulatedProbe]:
     """Run the firmware on an emulated AVR while the block lasts.
@@ -157,9 +158,13 @@ def emulated_probe(
         uno or mega.
     wiring
         Of the rows that are not read: grounded (driven by shift registers) or floating (through a
-        multiplexer, as in figure 4.5 of the thesis).
+        multiplexer, as in figure 4.5 of the thesis); virtual: grounded, and the column that is read
+        is held at 0 V by an amplifier.
     load_ohm
-        From the column that is read to ground, where tactels are shown as conductances.
+        From the column that is read to ground, where tactels are shown as conductances;
+        virtual: the amplifier's feedback.
+    shape
+        Rows and columns that the firmware scans; of smaller ones, the first lines of the images.
     trace
         File that gets a line for every change of a port ("cycle port letter value") and
         every conversion ("cycle convert channel").
@@ -181,8 +186,9 @@ def emulated_probe(
     if not 0 < load_ohm < 1e9:
         raise PortError(f"a load of {load_ohm:g} ohm", fix="give more than 0, say 2200")
     firmware = build_firmware(
-        board=board, baud=baud, settle_us=settle_us, adc_divider=adc_divider, wiring=wiring
-    )
+        board=board, baud=baud, settle_us=settle_us, adc_divider=adc_divider, wiring=wiring,
+        shape=shape,
+    )  # fmt: skip
     command = [
         str(build_emulator() / "emulator"), "--board", board,
         "--firmware", str(firmware / "probe.elf"),

@@ -39,7 +39,7 @@ class Member:
     pitch_mm: float
 
 
-def make_parts(specs: list[Path], folder: Path, database: str) -> None:
+def make_parts(specs: list[Path], folder: Path, database: str, sensor_type: str = "") -> None:
     """Write the STL parts of specs, and register them.
 
     Parameters
@@ -51,6 +51,8 @@ def make_parts(specs: list[Path], folder: Path, database: str) -> None:
     database
         Where they are registered; what is registered already is written again, the same. A new
         one has the key of the specs, or `LAB_KEY`: the same specs, the same touches.
+    sensor_type
+        File of the type that will touch them; empty: as the specs say.
 
     Raises
     ------
@@ -60,6 +62,7 @@ def make_parts(specs: list[Path], folder: Path, database: str) -> None:
     command = [sys.executable, "-c", "from generator.command import main; main()"]
     command += [*map(str, specs), "-o", str(folder), "--database", database]
     command += ["--format", "stl", "--json"]
+    command += ["--sensor-type", sensor_type] if sensor_type else []
     if not (any(map(_says_lab_key, specs)) or database_exists(database)):
         command += ["--lab-key", LAB_KEY]
     done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603

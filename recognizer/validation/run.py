@@ -4,6 +4,7 @@ Folder of a run::
 
     asked.json               what decides the results, and where the set is (`record`)
     lab.db, parts/           the set, if it was made from specs
+    sensor.yaml              the sensor type that it was made for, where it is not the usual one
     shards/, times/          a file for a thousand touches (`shards`)
     trials.parquet           all touches
     results.json             what the report says, the same on every run
@@ -21,9 +22,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from probe.sensor import SensorType
+from probe.sensor_types import sensor_type_text
 from recognizer.validation.campaign import Campaign, batches_of, series_of, shards_of
+from recognizer.validation.draw import sensor_of
 from recognizer.validation.encoded_set import LAB, PARTS, make_parts, set_digest
 from recognizer.validation.errors import ValidationError
+from recognizer.validation.files import write_text
 from recognizer.validation.made_kinds import make_for_kinds, refuse_without_specs
 from recognizer.validation.progress import TouchProgress
 from recognizer.validation.record import (
@@ -38,6 +43,8 @@ from recognizer.validation.record import (
 from recognizer.validation.rows import CpuTime, Row
 from recognizer.validation.shards import done_shards, write_shard
 from recognizer.validation.work import Workers, code_digest
+
+SENSOR = "sensor.yaml"
 
 
 def prepare_run(
@@ -78,7 +85,8 @@ def prepare_run(
         name = relative_database(database or str(folder / LAB), folder)
         kinds = [kind for kind, _ in campaign.kinds]
         if specs:
-            make_parts(specs, folder / PARTS, absolute_database(name, folder))
+            sensor = _sensor_file(campaign, folder)
+            make_parts(specs, folder / PARTS, absolute_database(name, folder), sensor)
         elif database:
             refuse_without_specs(kinds)
         else:
@@ -92,6 +100,15 @@ def prepare_run(
     else:
         check_same(before, record, folder)
     return record
+
+
+def _sensor_file(campaign: Campaign, folder: Path) -> str:
+    """Write the type that touches where it is not the usual one; returns its file, or ""."""
+    sensor = sensor_of(campaign.sensor_type, campaign.overlay)
+    if sensor == SensorType():
+        return ""
+    write_text(folder / SENSOR, sensor_type_text(sensor))
+    return str(folder / SENSOR)
 
 
 def touch_all(record: RunRecord, folder: Path, workers: Workers, progress: TouchProgress) -> None:

@@ -112,7 +112,7 @@ def test_ident_says_what_it_is(line):
     assert (ident.rows, ident.columns, ident.sensors) == (16, 16, 8)
     assert (ident.bits, ident.sensor) == (8, 5)
     assert (ident.baud, ident.settling_us) == (1_000_000, 10.0)
-    assert (ident.firmware, ident.name) == ((1, 0), "FSR-uno")
+    assert (ident.firmware, ident.name) == ((2, 0), "FSR-uno")
 
 
 def test_every_frame_is_the_image_that_was_felt_whole(probe, line):
@@ -352,13 +352,27 @@ def test_pins_move_as_documented(board, wiring, tmp_path):
     assert min(early[-255:]) >= 2.5 * ADC_CLOCK
 
 
-@pytest.mark.parametrize("wiring", ["grounded", "floating"])
+def test_frames_are_of_version_2_and_tell_their_shape():
+    mv = np.arange(256.0).reshape(16, 16) * 15
+    with emulated_probe(tau_us=0, paced=False, shape=(8, 12)) as probe, Line(probe.url) as line:
+        probe.show(mv)
+        line.ask(b"g", FramePacket)
+        frame = line.ask(b"g", FramePacket)
+        ident = line.ask(b"i", IdentPacket)
+    assert (ident.rows, ident.columns, ident.firmware) == (8, 12, (2, 0))
+    assert frame.counts.shape == (8, 12)
+    assert np.abs(frame.counts - np.floor(mv[:8, :12] * 1024 / 5000)).max() <= 1
+
+
+@pytest.mark.parametrize("wiring", ["grounded", "floating", "virtual"])
 def test_a_matrix_of_resistors_reads_as_its_network(wiring):
     rng = np.random.default_rng(4)
     g = np.full((16, 16), 1e-7)
     g[rng.integers(16, size=40), rng.integers(16, size=40)] = 10.0 ** rng.uniform(-5, -3, 40)
-    board = Electronics(readout=wiring, reference_v=5.0, bias_lsb=0.0, coupling=0.0, noise=QUIET)
-    running = emulated_probe(wiring=wiring, load_ohm=board.load_ohm, tau_us=0, paced=False)
+    board = Electronics(readout=wiring, reference_v=5.0, bias_lsb=0.0, coupling=0.0, noise=QUIET,
+                        feedback_ohm=1000.0)  # fmt: skip
+    load = board.feedback_ohm if wiring == "virtual" else board.load_ohm
+    running = emulated_probe(wiring=wiring, load_ohm=load, tau_us=0, paced=False)
     with running as probe, Line(probe.url) as line:
         probe.show_conductances(g)
         line.ask(b"g", FramePacket)
@@ -367,9 +381,9 @@ def test_a_matrix_of_resistors_reads_as_its_network(wiring):
     assert np.abs(counts - expected).max() <= 1
     found = invert_readings(counts, board).conductance_s
     seen = g > 1e-4
-    assert np.abs(found[seen] / g[seen] - 1).max() < (0.1 if wiring == "grounded" else 0.5)
+    assert np.abs(found[seen] / g[seen] - 1).max() < (0.5 if wiring == "floating" else 0.1)
     ghosts = counts[(g < 1e-6)].max()
-    assert ghosts <= 1 if wiring == "grounded" else ghosts > 100
+    assert ghosts > 100 if wiring == "floating" else ghosts <= 1
 
 
 @pytest.mark.parametrize("board", ["uno", "mega"])

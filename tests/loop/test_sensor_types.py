@@ -9,7 +9,6 @@ import pytest
 
 from encoded_objects import encode
 from probe.command import run as probe_sensor
-from probe.sensor_types import proposed_pitch_mm
 from probe.sensor_types.read import sensor_type_named, shipped_names
 from recognizer.command import run as recognize_object
 
@@ -18,13 +17,11 @@ from recognizer.command import run as recognize_object
 def test_a_type_reads_its_symbols(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     sensor = sensor_type_named(name)
-    pitch = proposed_pitch_mm(sensor)
     spec = {
         "name": "Box",
         "shape": {"box": ["90 mm", "80 mm", "70 mm"]},
-        "profile": "large",
-        "symbols": {"pitch": f"{pitch} mm"},
-        "print": {"printer": "resin" if pitch < 5 else "fdm-0.4"},
+        "sensor_type": name,
+        "print": {"printer": "resin"},
     }
     encode(spec, database="lab.db", formats=())
     force = 80 * math.prod(sensor.half_mm) / 12.7**2 / (4 if sensor.value == "depth" else 1)

@@ -57,9 +57,11 @@ static double tactel_mv(void)
     double ratio;
 
     if (image.kind == SIEMENS) {
-        if (readout.floating)
+        if (readout.wiring == FLOATING)
             ratio = network_floating(&network, tactels, image.number, sensor, rows, column,
                                      1 / readout.load_ohm);
+        else if (readout.wiring == VIRTUAL)
+            ratio = network_virtual(tactels, rows, column, 1 / readout.load_ohm);
         else
             ratio = network_grounded(tactels, rows, column, 1 / readout.load_ohm);
         return REFERENCE_MV * ratio;
@@ -111,7 +113,7 @@ static uint16_t rows_now(void)
 {
     unsigned clock, latch;
 
-    if (readout.floating)
+    if (readout.wiring == FLOATING)
         return (uint16_t)(1u << address(wiring->row, 4));
     clock = address(wiring->row + 1, 1);
     latch = address(wiring->row + 2, 1);
@@ -213,7 +215,7 @@ void electric_reset(void)
     memset(ports, 0, sizeof ports);
     column = sensor = 0;
     clock_was = latch_was = 0;
-    rows = readout.floating ? 1 : 0xA53C;
+    rows = readout.wiring == FLOATING ? 1 : 0xA53C;
     shifted = 0x5AC3; /* at power on registers hold anything */
     from_mv = 0;
     since = held = 0;

@@ -33,8 +33,8 @@ typedef struct {
 } wiring_t;
 
 typedef struct {
-    bool floating; /* rows that are not read */
-    double load_ohm;
+    enum { GROUNDED, FLOATING, VIRTUAL } wiring; /* rows that are not read; columns held at 0 V */
+    double load_ohm; /* of the column; virtual: of the amplifier's feedback */
 } readout_t;
 
 /* The wiring of a board, or 0. */

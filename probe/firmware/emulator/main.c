@@ -1,7 +1,7 @@
 /* Runs the probe's firmware on an emulated AVR, with its circuit, serial line and faults.
  *
  *   emulator --board uno --firmware probe.elf --images FILE --link PATH
- *            [--wiring grounded|floating] [--load OHM] [--tau US] [--noise MV] [--seed N] [--trace FILE] [--free]
+ *            [--wiring grounded|floating|virtual] [--load OHM] [--tau US] [--noise MV] [--seed N] [--trace FILE] [--free]
  *
  * Says "ready" on standard output, then obeys the lines of control.h. Paced at 16 MHz of real
  * time, with --free as fast as it goes. Ends with its standard input.
@@ -109,9 +109,14 @@ static void read_options(int count, char **values)
         case 'r': options.free = true; break;
         case 'o': options.readout.load_ohm = atof(optarg); break;
         case 'w':
-            options.readout.floating = !strcmp(optarg, "floating");
-            if (!options.readout.floating && strcmp(optarg, "grounded"))
-                fail("the wiring '%s' is not known: take grounded or floating", optarg);
+            if (!strcmp(optarg, "grounded"))
+                options.readout.wiring = GROUNDED;
+            else if (!strcmp(optarg, "floating"))
+                options.readout.wiring = FLOATING;
+            else if (!strcmp(optarg, "virtual"))
+                options.readout.wiring = VIRTUAL;
+            else
+                fail("the wiring '%s' is not known: take grounded, floating or virtual", optarg);
             break;
         default: exit(2);
         }

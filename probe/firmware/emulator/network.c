@@ -6,18 +6,35 @@
 #define NODES (2 * LINES - 1) /* rows, then columns; the last column is the reference */
 #define LEAK 1e-9             /* S of every tactel: a network without it falls apart */
 
-double network_grounded(const float *tactels, uint16_t rows, unsigned column, double load_s)
+/* Conductance of a column to the driven rows, and to all of them. */
+static double driven_of(const float *tactels, uint16_t rows, unsigned column, double *all)
 {
-    double driven = 0, all = load_s;
+    double driven = 0;
+
+    *all = 0;
 
     for (unsigned row = 0; row < LINES; row++) {
         double conductance = tactels[LINES * row + column] + LEAK;
 
-        all += conductance;
+        *all += conductance;
         if (rows >> row & 1)
             driven += conductance;
     }
-    return driven / all;
+    return driven;
+}
+
+double network_grounded(const float *tactels, uint16_t rows, unsigned column, double load_s)
+{
+    double all, driven = driven_of(tactels, rows, column, &all);
+
+    return driven / (all + load_s);
+}
+
+double network_virtual(const float *tactels, uint16_t rows, unsigned column, double feedback_s)
+{
+    double all;
+
+    return fmin(driven_of(tactels, rows, column, &all) / feedback_s, 1);
 }
 
 /* Invert a symmetric positive definite matrix in place, by sweeps. */

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from encoded_objects.sensor_type import SensorSize, sensor_size
 from probe.command import run
 from probe.frame import frame_from
 from probe.recording.read import Recording
@@ -121,11 +122,21 @@ def test_which_type_images_are_of():
 
 
 def test_the_pitch_that_is_proposed():
-    assert proposed_pitch_mm(SensorType()) == 7.0
+    assert proposed_pitch_mm(SensorType()) == 5.0
+    assert proposed_pitch_mm(SensorType().with_overlay("pad")) == 7.0
+    assert proposed_pitch_mm(sensor_type_named("flexitac-12x32")) == 6.0
     assert proposed_pitch_mm(sensor_type_named("gel-24x32")) == 3.0
-    half = tuple((row, column) for row in range(16) for column in range(0, 16, 2))
-    small, sparse = SensorType(8, 8, 1.5875), SensorType(missing=half)
-    assert proposed_pitch_mm(small) < proposed_pitch_mm(sparse) < 7.0
+    few = tuple((row, column) for row in range(16) for column in range(16) if column % 8)
+    small, sparse = SensorType(8, 8, 1.5875), SensorType(missing=few)
+    assert proposed_pitch_mm(small) < proposed_pitch_mm(SensorType())
+    assert proposed_pitch_mm(sparse) < proposed_pitch_mm(SensorType())
+
+
+def test_making_knows_the_usual_type_without_loading_it():
+    sensor = SensorType()
+    usual = SensorSize()
+    assert (usual.name, usual.half_mm) == (sensor.name, sensor.half_mm)
+    assert sensor_size(sensor.name) == usual
 
 
 def test_an_overlay_is_taken_as_usual():

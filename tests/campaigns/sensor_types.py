@@ -1,0 +1,145 @@
+"""Every shipped sensor type on symbols of the pitch that it proposes: right, wrong, refused.
+
+    python tests/campaigns/sensor_types.py -o out/types                # hours; goes on where it was
+    python tests/campaigns/sensor_types.py -o out/types --rounds 1 fsr-8x8  # 500 touches of a type
+    python tests/campaigns/sensor_types.py -o out/types --table             # of what is there
+
+Rounds of 500 touches a type, each with its own seed, so that all types have about as many whenever
+it is stopped: the usual kinds (faces, edges, corners, worn, blank and foreign surfaces) and levels
+of `validate-set` on written files; and 40 of faces in MuJoCo, where the type has tabs. 5,000
+touches each are ten rounds. Interrupted by Ctrl-C it goes on with the touches that are there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+
+from probe.sensor_types import proposed_pitch_mm
+from probe.sensor_types.read import sensor_type_named, shipped_names
+
+SHAPES = {
+    "Cube": "{cube: 80 mm}",
+    "Box": "{box: [90 mm, 70 mm, 60 mm]}",
+    "Prism": "{triangular_prism: {side: 80 mm, height: 90 mm}}",
+    "Pyramid": "{pyramid: {sides: 4, side: 90 mm, height: 70 mm}}",
+}
+KEY = "VA11-DATE-0000-0002"  #: of the labs, so that a run can be repeated
+FINE_MM = 4.0  #: below this filament printers make no strokes
+INSIDE = 7.815  #: chi square of three numbers at 95 %
+WORLDS: dict[str, tuple[int, tuple[str, ...]]] = {
+    "own": (500, ()),
+    "mujoco": (40, ("--engine", "mujoco", "--kinds", "face", "--levels", "typical")),
+}
+
+
+def make_lab(folder: Path, name: str) -> Path:
+    """Make the parts of a type and return their database."""
+    place = folder / name
+    database = place / "lab.db"
+    if not (place / "made").exists():
+        place.mkdir(parents=True, exist_ok=True)
+        pitch = proposed_pitch_mm(sensor_type_named(name))
+        printer = "resin" if pitch < FINE_MM else "fdm-0.4"
+        objects = [f"  - {{name: {key}, shape: {shape}}}" for key, shape in SHAPES.items()]
+        lines = [f"sensor_type: {name}", f"print: {{printer: {printer}}}", "objects:"]
+        spec = place / "set.yaml"
+        spec.write_text("\n".join([*lines, *objects, ""]))
+        _run("generator", str(spec), "-o", str(place / "parts"), "--database", str(database),
+             "--format", "stl", "--lab-key", KEY)  # fmt: skip
+        (place / "made").touch()
+    return database
+
+
+def touch(folder: Path, name: str, world: str, number: int) -> None:
+    """Do a round of a type in a world, or go on with it."""
+    touches, options = WORLDS[world]
+    here = folder / name / f"{world}-{number}"
+    if not (here / "results.json").exists():
+        _run("recognizer.validation", "--database", str(make_lab(folder, name)), "--sensor-type",
+             name, "--touches", str(touches), "--seed", str(100 + number), "--shard", "100",
+             "--study", "0", "--resume", "-o", str(here), *options)  # fmt: skip
+
+
+def _run(package: str, *arguments: str) -> None:
+    code = f"from {package}.command import main; main()"
+    subprocess.run([sys.executable, "-c", code, *arguments], check=True, stdout=subprocess.DEVNULL)
+
+
+def rows_of(folder: Path, name: str, world: str) -> tuple[pa.Table, float] | None:
+    """Return all touches of a type in a world, and the mean CPU time of reading one, ms."""
+    done = sorted(at.parent for at in (folder / name).glob(f"{world}-*/results.json"))
+    if not done:
+        return None
+    tables = [pq.read_table(here / "trials.parquet") for here in done]
+    times = [json.loads((here / "times.json").read_text())["reading"]["mean"] for here in done]
+    return pa.concat_tables(tables), float(np.mean(times))
+
+
+def lines_of(rows: pa.Table) -> Iterator[tuple[str, pa.Table]]:
+    """Yield what is told apart: faces by level, other kinds, what no database knows."""
+    known = pc.not_equal(rows["object"], "")
+    face = pc.and_(known, pc.equal(rows["kind"], "face"))
+    for level in dict.fromkeys(("low", "typical", "hard", "mismatch")):
+        yield f"faces, {level}", rows.filter(pc.and_(face, pc.equal(rows["level"], level)))
+    for kind in ("edge", "corner", "worn"):
+        yield f"{kind}, all levels", rows.filter(pc.and_(known, pc.equal(rows["kind"], kind)))
+    yield "blank and foreign", rows.filter(pc.invert(known))
+
+
+def table(folder: Path, names: list[str]) -> None:
+    """Print what became of the touches, as Markdown."""
+    print("| type | world | touches | right | wrong | refused | rms mm / degrees | inside | ms |")
+    print("| --- " * 9 + "|")
+    for name in names:
+        for world in WORLDS:
+            found = rows_of(folder, name, world)
+            if found is None:
+                continue
+            rows, ms = found
+            for label, some in [*lines_of(rows), ("all", rows)]:
+                if len(some):
+                    _line(name, f"{world}, {label}", some, f"{ms:.0f}" if label == "all" else "")
+
+
+def _line(name: str, label: str, rows: pa.Table, ms: str) -> None:
+    verdicts = rows["verdict"].to_pylist()
+    counts = " | ".join(str(verdicts.count(one)) for one in ("right", "wrong", "rejected"))
+    right = rows.filter(pc.equal(rows["verdict"], "right"))
+    errors = inside = ""
+    if len(right):
+        mm, deg, chi2 = (right[key].to_numpy() for key in ("error_mm", "error_deg", "chi2"))
+        errors = f"{np.sqrt(np.mean(mm**2)):.3f} / {np.sqrt(np.mean(deg**2)):.2f}"
+        inside = f"{100 * np.mean(chi2 < INSIDE):.0f} %"
+    print(f"| {name} | {label} | {len(rows)} | {counts} | {errors} | {inside} | {ms} |")
+
+
+def main() -> None:
+    """Run what is asked for and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("types", nargs="*", default=list(shipped_names()))
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser.add_argument("--rounds", type=int, default=10)
+    parser.add_argument("--table", action="store_true", help="of the runs that are there")
+    asked = parser.parse_args()
+    folder = asked.output.absolute()
+    for number in range(0 if asked.table else asked.rounds):
+        for world in WORLDS:
+            for name in asked.types:
+                if world == "own" or sensor_type_named(name).overlay.kind == "tab":
+                    print(f"round {number + 1} of {asked.rounds}: {name}, {world}", flush=True)
+                    touch(folder, name, world, number)
+    table(folder, asked.types)
+
+
+if __name__ == "__main__":
+    main()
