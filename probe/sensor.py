@@ -16,6 +16,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from probe.errors import ContactError
+
 OverlayKind = Literal["tab", "pad", "gel"]
 Value = Literal["counts", "conductance", "force", "depth"]
 Wiring = Literal["grounded", "floating", "virtual"]
@@ -54,7 +56,7 @@ class SensorType:
 
     rows: int = 16
     columns: int = 16
-    pitch_mm: float = 1.5875  #: from tactel to tactel, both ways
+    pitch_mm: float = 1.5875  #: from column to column, and from row to row
     overlay: Overlay = field(default_factory=Overlay)
     name: str = "fsr-16"
     value: Value = "counts"  #: what a reading is
@@ -64,6 +66,16 @@ class SensorType:
     wiring: Wiring = "grounded"  #: of the rows that are not read
     noise: float = 0.3  #: counts, standard deviation of a tactel at rest
     missing: tuple[tuple[int, int], ...] = ()  #: (row, column) of places without a tactel
+    row_pitch_mm: float = 0.0  #: from row to row where it is another; 0: the same
+
+    def __post_init__(self) -> None:
+        """See to it that rows as far apart as columns stand under a pad or a gel."""
+        if self.row_pitch_mm and self.overlay.kind != "tab":
+            raise ContactError(
+                f"rows {self.row_pitch_mm:g} mm and columns {self.pitch_mm:g} mm apart under a "
+                f"{self.overlay.kind}",
+                fix="take tabs, or one pitch for both",
+            )
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -76,9 +88,14 @@ class SensorType:
         return (1 << self.bits) - 1
 
     @property
+    def step_mm(self) -> tuple[float, float]:
+        """From column to column (x) and from row to row (y), mm."""
+        return self.pitch_mm, self.row_pitch_mm or self.pitch_mm
+
+    @property
     def half_mm(self) -> tuple[float, float]:
         """Half the width (x) and half the height (y) of the matrix, mm."""
-        return self.columns * self.pitch_mm / 2, self.rows * self.pitch_mm / 2
+        return self.columns * self.step_mm[0] / 2, self.rows * self.step_mm[1] / 2
 
     @property
     def reach_mm(self) -> float:
@@ -87,8 +104,8 @@ class SensorType:
 
     def centres_mm(self) -> NDArray[np.float64]:
         """Return the tactels' centres, (rows, columns, 2), sensor frame."""
-        x = (np.arange(self.columns) - (self.columns - 1) / 2) * self.pitch_mm
-        y = ((self.rows - 1) / 2 - np.arange(self.rows)) * self.pitch_mm
+        x = (np.arange(self.columns) - (self.columns - 1) / 2) * self.step_mm[0]
+        y = ((self.rows - 1) / 2 - np.arange(self.rows)) * self.step_mm[1]
         centres = np.empty((self.rows, self.columns, 2))
         centres[..., 0] = x
         centres[..., 1] = y[:, None]

@@ -76,7 +76,7 @@ def tabs(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips | None
     stiffness = min(touch.wrist.tilt_x_nmm_rad, touch.wrist.tilt_y_nmm_rad)
     if touch.force_n * sensor.reach_mm > TABS.hopeless_rad * stiffness > 0:
         # Springs tell for any force whether it would turn the plate over.
-        law = Linear(overlay.young_mpa * sensor.pitch_mm**2 / overlay.height_mm)
+        law = Linear(overlay.young_mpa * math.prod(sensor.step_mm) / overlay.height_mm)
         _require_stable(
             rest(points.reshape(-1, 2), heights.ravel(), law, load).pose, TABS.hopeless_rad
         )

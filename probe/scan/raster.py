@@ -89,7 +89,9 @@ def raster(
         raise SurfaceError("a face without a loop", fix="give its corners")
     half = np.array(sensor.half_mm)
     low, high = polygons[0].min(axis=0), polygons[0].max(axis=0)
-    xs, ys = (_positions(low[i], high[i], half[i], step_tactels * sensor.pitch_mm) for i in (0, 1))
+    xs, ys = (
+        _positions(low[i], high[i], half[i], step_tactels * sensor.step_mm[i]) for i in (0, 1)
+    )
     places, cover, lines = [], [], []
     for line, y in enumerate(ys[::-1]):
         strips = [_clip_polygon(p, 1, y - half[1], y + half[1]) for p in polygons]

@@ -41,7 +41,7 @@ def proposed_pitch_mm(sensor: SensorType, settings: ProposalSettings = PROPOSAL)
     5.0
     """
     tactels = settings.pad_tactels if sensor.overlay.kind == "pad" else settings.tactels
-    area = float(sensor.present().sum()) * sensor.pitch_mm**2
-    most = min(tactels * sensor.pitch_mm, math.sqrt(area / settings.cells))
+    area = float(sensor.present().sum()) * math.prod(sensor.step_mm)
+    most = min(tactels * max(sensor.step_mm), math.sqrt(area / settings.cells))
     steps = math.floor(most / settings.grid_mm + 1e-9)
     return max(settings.least_mm, steps * settings.grid_mm)

@@ -108,7 +108,9 @@ class SensorTypeSettings(Block):
     columns: _Lines
     """Columns, the left one first, seen through the sensor's back."""
     pitch: Length
-    """From tactel to tactel, both ways, mm."""
+    """From column to column, and from row to row, mm."""
+    row_pitch: Length | None = None
+    """From row to row where it is another than `pitch`, mm; under tabs alone."""
     overlay: OverlaySettings = OverlaySettings()
     """What stands between the sensor and the object."""
     value: Value = _PLAIN.value
@@ -152,7 +154,19 @@ class SensorTypeSettings(Block):
                     ),
                 )
             )
+        if self._row_pitch() and self.overlay.kind != "tab":
+            found.append(
+                (
+                    ("row_pitch",),
+                    f"rows as far apart as no columns under a {self.overlay.kind}",
+                    "leave row_pitch out, or write overlay: {kind: tab}",
+                )
+            )
         return found
+
+    def _row_pitch(self) -> float:
+        """Return the pitch of rows where it is another, else 0."""
+        return 0.0 if self.row_pitch in (None, self.pitch) else float(self.row_pitch or 0.0)
 
     def sensor_type(self) -> SensorType:
         """Return the type."""
@@ -175,6 +189,7 @@ class SensorTypeSettings(Block):
             wiring=self.wiring,
             noise=self.noise,
             missing=tuple(sorted(missing)),
+            row_pitch_mm=self._row_pitch(),
         )
 
 

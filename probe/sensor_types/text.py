@@ -21,6 +21,7 @@ def sensor_type_text(sensor: SensorType) -> str:
         f"rows: {sensor.rows}",
         f"columns: {sensor.columns}",
         f"pitch: {sensor.pitch_mm!r} mm",
+        *([f"row_pitch: {sensor.row_pitch_mm!r} mm"] if sensor.row_pitch_mm else []),
         "overlay:",
         f"  kind: {overlay.kind}",
         f"  height: {overlay.height_mm!r} mm",

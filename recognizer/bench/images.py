@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from probe.sensor import SensorType
 from recognizer.thesis.filters import median, sobel, subtract_bias
-from recognizer.touch.tactile_image import touch_image
+from recognizer.touch.tactile_image import tactile_image
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ def filter_image(
     """
     if filter_name == "raw":
         return readings
-    image = subtract_bias(touch_image(sensor, readings), bias)
+    image = subtract_bias(tactile_image(readings, step_mm=sensor.pitch_mm), bias)
     if filter_name == "bias-free":
         return image.values
     image = median(image)

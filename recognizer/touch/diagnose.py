@@ -83,7 +83,7 @@ def image_features(
     good = signal.trust > 0
     forces = np.where(good, signal.forces, 0.0)
     noise = signal.noise
-    reach = max(1, round(pitch_mm / sensor.pitch_mm) // 2)
+    reach = max(1, round(pitch_mm / max(sensor.step_mm)) // 2)
     padded = np.pad(forces, reach)
     windows = np.lib.stride_tricks.sliding_window_view(padded, (2 * reach + 1,) * 2)
     envelope = windows.max(axis=(-2, -1))

@@ -92,6 +92,17 @@ def tactile_image(
 def touch_image(
     sensor: SensorType, readings: ArrayLike, trust: ArrayLike | None = None
 ) -> TactileImage:
-    """Return the image of one touch, in the sensor frame; tactels without trust are undefined."""
+    """Return the image of one touch, in the sensor frame; tactels without trust are undefined.
+
+    Raises
+    ------
+    ImageError
+        Rows that stand farther apart than columns: samples of an image are as far apart both ways.
+    """
+    if sensor.row_pitch_mm:
+        raise ImageError(
+            f"rows are {sensor.row_pitch_mm:g} mm apart, columns {sensor.pitch_mm:g} mm",
+            fix="read single touches (Reader); images and mosaics need one pitch",
+        )
     defined = None if trust is None else np.asarray(trust) > 0
     return tactile_image(readings, step_mm=sensor.pitch_mm, defined=defined)

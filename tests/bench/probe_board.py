@@ -2,6 +2,7 @@
 
     python tests/bench/probe_board.py                    # rates, free-running, by device time
     python tests/bench/probe_board.py --database lab.db  # and touches of its faces, read
+    python tests/bench/probe_board.py --minutes 10       # frames lost or damaged in ten minutes
 
 Every tactel is a resistor of the film under a simulated touch; counts are what the firmware sends.
 Touches are read as counts at face value, and inverted: of floating rows by a sensor type that
@@ -20,16 +21,16 @@ from probe.client.client import Client
 from probe.contact.press import press
 from probe.port import open_port
 from probe.port.emulated import EmulatedProbe, emulated_probe
-from probe.protocol import Command, FramePacket, Splitter, decode
+from probe.protocol import Command, Damage, FramePacket, Splitter, decode
 from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from probe.simulate.touch import TouchRanges, random_touches
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 
-WIRINGS = ("grounded", "floating")
-LOADS_OHM = {"grounded": 1000.0, "floating": 2200.0}
-READINGS = ("as they are", "inverted")  #: grounded: the column's sum; floating: the network
+WIRINGS = ("grounded", "floating", "virtual")
+LOADS_OHM = {"grounded": 1000.0, "floating": 2200.0, "virtual": 330.0}
+READINGS = ("as they are", "inverted")  #: the column's sum, the network
 
 
 def take_frames(probe: EmulatedProbe, number: int) -> list[FramePacket]:
@@ -56,6 +57,38 @@ def print_rates(frames: int) -> None:
             print(f"{wiring:10} {baud:9,} {(len(got) - 1) / seconds:9.1f} {lost:5}")
 
 
+def print_endurance(minutes: float, baud: int) -> None:
+    """Print what is lost, damaged or wrong in so many minutes of device time, grounded rows."""
+    rng = np.random.default_rng(7)
+    image = rng.uniform(0, 5000, (16, 16))
+    asked, frames, lost, bad, wrong = minutes * 60e6, 0, 0, 0, 0
+    with emulated_probe(baud=baud, paced=False, tau_us=0.0) as probe:
+        probe.show(image)
+        splitter, port = Splitter(), open_port(probe.url)
+        port.write(Command.START)
+        first = before = None
+        expected = None
+        while first is None or before is None or (before.t_us - first.t_us) % 2**32 < asked:
+            for block in splitter.feed(port.read(1.0)):
+                packet = decode(block)
+                if isinstance(packet, Damage):
+                    bad += 1
+                if not isinstance(packet, FramePacket):
+                    continue
+                if before is not None:
+                    lost += (packet.seq - before.seq - 1) % 2**16
+                before = packet
+                if expected is None and frames > 2:
+                    first, expected = packet, packet.counts
+                wrong += expected is not None and not np.array_equal(packet.counts, expected)
+                frames += 1
+        port.close()
+    print(
+        f"{minutes:g} min of device time at {baud:,} baud: {frames} frames, "
+        f"{frames / minutes / 60:.1f} a second, {lost} lost, {bad} damaged, {wrong} wrong"
+    )
+
+
 def print_answers(database: str, touches: int, seed: int) -> None:
     """Print how many touches are answered right, by wiring and by what the reader knows of it."""
     lab = open_lab(database)
@@ -80,7 +113,8 @@ def print_answers(database: str, touches: int, seed: int) -> None:
                             images.append((touch, frame.counts))
                             break
         board = Electronics(
-            "grounded", reference_v=5.0, load_ohm=LOADS_OHM[wiring], bias_lsb=0, coupling=0,
+            "virtual" if wiring == "virtual" else "grounded", reference_v=5.0,
+            load_ohm=LOADS_OHM[wiring], feedback_ohm=LOADS_OHM[wiring], bias_lsb=0, coupling=0,
             noise=QUIET,
         )  # fmt: skip
         for reading in READINGS:
@@ -106,7 +140,12 @@ def main() -> None:
     parser.add_argument("--database", default="")
     parser.add_argument("--touches", type=int, default=14)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--minutes", type=float, default=0.0)
+    parser.add_argument("--baud", type=int, default=1_000_000)
     given = parser.parse_args()
+    if given.minutes:
+        print_endurance(given.minutes, given.baud)
+        return
     print_rates(given.frames)
     if given.database:
         print_answers(given.database, given.touches, given.seed)

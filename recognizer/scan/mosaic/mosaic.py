@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from probe.sensor import SensorType
 from recognizer.scan.mosaic.canvas import Canvas, CanvasEntry, empty_canvas
+from recognizer.scan.mosaic.errors import MosaicError
 from recognizer.scan.mosaic.graph import Constraint
 from recognizer.scan.mosaic.image import GlobalImage, image_of
 from recognizer.scan.mosaic.patch import TouchPatch
@@ -81,7 +82,18 @@ class Outlier:
 
 
 def no_touches(sensor: SensorType, settings: MosaicSettings | None = None) -> Mosaic:
-    """Return the mosaic of nothing, to grow from."""
+    """Return the mosaic of nothing, to grow from.
+
+    Raises
+    ------
+    MosaicError
+        Rows that stand farther apart than columns.
+    """
+    if sensor.row_pitch_mm:
+        raise MosaicError(
+            f"rows are {sensor.row_pitch_mm:g} mm apart, columns {sensor.pitch_mm:g} mm",
+            fix="read single touches (Reader), or scans by poses; mosaics need one pitch",
+        )
     return Mosaic(
         sensor=sensor,
         settings=settings or MosaicSettings(),

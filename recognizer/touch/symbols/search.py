@@ -38,15 +38,15 @@ def bank_of(
 ) -> Bank:
     """Return the tables of a search."""
     rotations, phases, shifts = settings.rotations, settings.phases, settings.shifts
-    d = sensor.pitch_mm
+    across, down = sensor.step_mm
     turns = np.arange(rotations) * 2 * np.pi / rotations
-    reach = math.ceil(template.half_mm * settings.reach / d)
+    reach = math.ceil(template.half_mm * settings.reach / min(across, down))
     rim = math.ceil(settings.rim)
     offset = (np.arange(phases) + 0.5) / phases - 0.5  # of a place from its tactel, tactels
     k = np.arange(-reach, reach + 1)
     # tactel minus place, sensor frame: [ky, kx, py, px]
-    dx = (k[None, :, None, None] - offset[None, None, None, :]) * d
-    dy = (-k[:, None, None, None] + offset[None, None, :, None]) * d
+    dx = (k[None, :, None, None] - offset[None, None, None, :]) * across
+    dy = (-k[:, None, None, None] + offset[None, None, :, None]) * down
     dx, dy = np.broadcast_arrays(dx, dy)
     kernels = np.empty((2, len(k) ** 2, template.order, rotations, phases * phases), np.float32)
     for i, turn in enumerate(turns):
@@ -76,11 +76,11 @@ def _lookups(
     shifts: int,
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """Return which place each cell of each lattice falls on."""
-    p, d = template.pitch_mm, sensor.pitch_mm
+    p, (across, down) = template.pitch_mm, sensor.step_mm
     step = (np.arange(shifts) + 0.5) / shifts * p
     shifts_mm = np.stack(np.meshgrid(step, step), axis=-1).reshape(-1, 2)
     half_x, half_y = sensor.half_mm
-    most = math.ceil((sensor.reach_mm + 2 * d) / p) + 1
+    most = math.ceil((sensor.reach_mm + 2 * max(across, down)) / p) + 1
     cell = (np.arange(-most, most + 1) + 0.5) * p
     cells = np.stack(np.meshgrid(cell, cell), axis=-1).reshape(-1, 2)
     width, height = (sensor.columns + 2 * rim) * phases, (sensor.rows + 2 * rim) * phases
@@ -90,8 +90,8 @@ def _lookups(
         c, s = math.cos(turn), math.sin(turn)
         u = cells[None] - shifts_mm[:, None]
         x, y = c * u[..., 0] + s * u[..., 1], -s * u[..., 0] + c * u[..., 1]
-        ix = np.floor((x + half_x + rim * d) / d * phases).astype(np.int64)
-        iy = np.floor((half_y + rim * d - y) / d * phases).astype(np.int64)
+        ix = np.floor((x + half_x + rim * across) / across * phases).astype(np.int64)
+        iy = np.floor((half_y + rim * down - y) / down * phases).astype(np.int64)
         inside = (ix >= 0) & (ix < width) & (iy >= 0) & (iy < height)
         table[i][inside] = (iy * width + ix)[inside]
     used = int((table < none).sum(axis=2).max())

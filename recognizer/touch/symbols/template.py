@@ -136,16 +136,17 @@ def _pad_responses(
     settings: TemplateSettings,
 ) -> Array:
     """Return the responses (order, n, n) of a pad, 1 where they are highest."""
-    from scipy.ndimage import uniform_filter
+    from scipy.ndimage import correlate1d
 
     from recognizer.touch.symbols.pad import pad_responses
 
-    wide, step = sensor.pitch_mm / 2, settings.step_mm
-    beyond = np.arange(axis[0] - wide, axis[-1] + wide + step / 2, step)
+    step = settings.step_mm
+    tactel = _line(sensor.pitch_mm, step)
+    cut = len(tactel) // 2
+    beyond = axis[0] + np.arange(-cut, len(axis) + cut) * step
     base = pad_responses(alphabet, style, sensor, beyond, settings)
-    size = round(sensor.pitch_mm / step)
-    tactels = np.array([uniform_filter(one, size, mode="nearest") for one in base])
-    cut = (tactels.shape[1] - len(axis)) // 2
+    across = correlate1d(base, tactel, axis=1, mode="nearest")
+    tactels = correlate1d(across, tactel, axis=2, mode="nearest")
     tactels = tactels[:, cut : cut + len(axis), cut : cut + len(axis)]
     return np.asarray(tactels / np.percentile(tactels, settings.pad_peak))
 
@@ -180,7 +181,7 @@ _RESPONSES = {"tab": _tab_responses, "pad": _pad_responses, "gel": _gel_response
 
 def _with_cross_talk(felt: Array, share: float, sensor: SensorType, step: float) -> Array:
     """Return responses of tactels that hear a share of what stands one tactel away, all around."""
-    around = _convolved(felt, _annulus(sensor.pitch_mm, step))
+    around = _convolved(felt, _annulus(math.sqrt(math.prod(sensor.step_mm)), step))
     return np.asarray(np.maximum((1 - share) * felt + share * around, 0.0))
 
 
@@ -225,7 +226,7 @@ def _reach_mm(alphabet: Alphabet, style: SymbolStyle, sensor: SensorType) -> flo
     if overlay.kind == "gel":
         blur = math.hypot(overlay.blur_mm, overlay.membrane_mm)
         return strokes + sensor.pitch_mm / 2 + 2.5 * blur
-    return strokes + overlay.tab_diameter_mm / 2 + sensor.pitch_mm
+    return strokes + overlay.tab_diameter_mm / 2 + max(sensor.step_mm)
 
 
 def _disc(radius: float, step: float) -> Array:

@@ -12,6 +12,7 @@ import pytest
 
 from encoded_objects.sensor_type import SensorSize, sensor_size
 from probe.command import run
+from probe.errors import ContactError
 from probe.frame import frame_from
 from probe.recording.read import Recording
 from probe.recording.record import Recorder
@@ -221,3 +222,22 @@ def test_the_usual_type_loads_no_reader_of_yaml():
     )
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ran.stdout == "set()\n"
+
+
+UNEQUAL = "name: cloth\nrows: 14\ncolumns: 20\npitch: 1.5 mm\nrow_pitch: 2.1 mm\n"
+
+
+def test_rows_may_stand_farther_apart_than_columns():
+    cloth = parse_sensor_type(UNEQUAL, "cloth.yaml")
+    assert cloth.half_mm == pytest.approx((15.0, 14.7))
+    centres = cloth.centres_mm()
+    assert centres[0, 1, 0] - centres[0, 0, 0] == pytest.approx(1.5)
+    assert centres[0, 0, 1] - centres[1, 0, 1] == pytest.approx(2.1)
+    assert parse_sensor_type(sensor_type_text(cloth), "text") == cloth
+    assert proposed_pitch_mm(cloth) == 6.5
+    same = parse_sensor_type(UNEQUAL.replace("2.1", "1.5"), "cloth.yaml")
+    assert same.row_pitch_mm == 0
+    with pytest.raises(SensorTypeError, match=r"cloth.yaml:5:12(?s:.*)under a pad"):
+        parse_sensor_type(UNEQUAL + "overlay: {kind: pad}\n", "cloth.yaml")
+    with pytest.raises(ContactError, match=r"rows 2\.1 mm and columns 1\.5 mm apart"):
+        cloth.with_overlay("pad")
