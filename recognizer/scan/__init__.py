@@ -7,6 +7,8 @@ up, and the sum is located like a single touch.
 settings    when touches agree and how much they may say
 views       touch -> the few lattices that it may show, and where the touch stands
 lattice     views -> the lattice of the plane that most of them agree with
+steps       what is known of steps, and what the touches themselves leave open
+path        views of touches whose steps nobody measured -> where they stand in the array
 composite   what they say of each cell, summed into one fit
 answer      composites -> places of the database -> Recognition
 belief      what the touches of a face say, and what it rests on

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.scan.composite import Composite
+from recognizer.scan.path import ScanPath
 from recognizer.scan.settings import ScanSettings
 from recognizer.touch.belief import null_log_likelihood, unworn_labels_at, weigh_cells
 from recognizer.touch.chance import expected_matches
@@ -63,6 +64,7 @@ class LocatedComposite:
     fit: Fit  #: of the composite, with the pose of the last touch
     score: float  #: log-likelihood of all touches, nats
     explained: float = math.nan  #: share of the last image's variance; NaN: not asked
+    path: ScanPath | None = None  #: that the touches were followed along; None: somebody knew it
 
     @property
     def embossed(self) -> EmbossedArray:
@@ -170,13 +172,11 @@ def answer_scan(
     found: Sequence[LocatedComposite],
     limits: ScanSettings,
     seq: int,
-    *,
-    by_hand: bool = False,
 ) -> Recognition:
     """Return the answer; `found` are the places of `distinct_places`, the first of them posed.
 
-    Where nobody measured the steps (`by_hand`), a touch may lie whole pitches from where images
-    lay it, and several touches must agree with the database the better.
+    Where nobody measured the steps, several touches must agree with the database the better, paths
+    that end elsewhere count as places, and each path that the touches allow matches by chance.
     """
     if not found:
         return refusal(seq, TOO_FEW)
@@ -186,58 +186,30 @@ def answer_scan(
     runner_up = None
     if other is not None:
         runner_up = RunnerUp(*other.face, other.index)
-    if by_hand:
-        margin = min(margin, _shift_margin(best, limits, reader.settings.hypotheses))
+    if best.path is not None:
+        margin = min(margin, best.path.margin)
     answer = answer_at(
         best.encoding, best.fit, best.place, reader.settings, seq,
-        reason=_reject_reason(reader, best, margin, limits, by_hand=by_hand),
+        reason=_reject_reason(reader, best, margin, limits),
         margin=margin, runner_up=runner_up,
     )  # fmt: skip
     if not answer:
         return answer
     arrays, settings = reader.lab.arrays, reader.settings
     doubt = expected_matches(arrays, best.encoding, best.fit, best.place, settings)
+    if best.path is not None:
+        doubt *= math.exp(best.path.log_freedom)
     if doubt > limits.doubt:
         return refusal(seq, BY_CHANCE, margin=margin, runner_up=runner_up, doubt=doubt)
     return replace(answer, doubt=doubt)
 
 
-def _shift_margin(
-    best: LocatedComposite, limits: ScanSettings, settings: HypothesisSettings
-) -> float:
-    """Return by how many nats the last touch's own cells tell its place from whole pitches beside.
-
-    The cells of all touches say where the face was touched, not whether the last image was laid
-    on them in the right place; only its own cells do.
-    """
-    last, place, array = best.composite.last, best.place, best.encoding.array
-    if last is None:
-        return 0.0
-    reach = range(-limits.shifts_by_hand, limits.shifts_by_hand + 1)
-    scores = {
-        (down, along): log_likelihood(
-            best.encoding,
-            last,
-            replace(
-                place,
-                row=(place.row + down) % array.rows,
-                column=(place.column + along) % array.columns,
-            ),
-            settings,
-        )
-        for down in reach
-        for along in reach
-    }
-    own = scores.pop((0, 0))
-    return own - max(scores.values())
-
-
 def _reject_reason(
-    reader: Reader, best: LocatedComposite, margin: float, limits: ScanSettings, *, by_hand: bool
+    reader: Reader, best: LocatedComposite, margin: float, limits: ScanSettings
 ) -> str:
     """Return why the best place may not be believed; nothing if it may."""
     encoding, fit, place = best.encoding, best.fit, best.place
-    belief = reader.settings.belief
+    belief, by_hand = reader.settings.belief, best.path is not None
     cells = weigh_cells(encoding, fit, place, belief)
     told = int(cells.agree.sum())
     chance = null_log_likelihood(encoding, fit)

@@ -77,10 +77,10 @@ def extend_scan(scan: ScanBelief, touch: PlacedTouch) -> ScanBelief:
     touches = (*scan.touches, replace(touch, decoded=None))
     finest = min(encoding.style.pitch_mm for encoding in reader.lab.arrays)
     by_hand = any(is_unmeasured(each, limits.loose * finest) for each in touches)
-    touch_poses = stands_of(reader, touches, scan.touch_poses, limits)
-    joined = join_touch(scan, touch, touch_poses, by_hand=by_hand, expected=not by_hand)
+    stand = None if by_hand else stands_of(reader, touches, scan.touch_poses, limits)
+    joined = join_touch(scan, touches, stand, expected=not by_hand)
     if joined.seen.alone is None and not joined.agrees:  # not what was expected: what does it say?
-        joined = join_touch(scan, touch, touch_poses, by_hand=by_hand, expected=False)
+        joined = join_touch(scan, touches, stand, expected=False)
     answer, agrees, alone = joined.answer, joined.agrees, joined.seen.alone
     if alone and scan.touches and answer and not _says_the_same(answer, alone, finest):
         if scan.told is not None:
@@ -96,12 +96,12 @@ def extend_scan(scan: ScanBelief, touch: PlacedTouch) -> ScanBelief:
         return _begin_anew(scan, *touches[-astray:])
     answer, told = _believable_answer(scan, answer, astray, 0 if by_hand else limits.patience)
     rivals: Sequence[PlaceHypothesis] = found if agrees or not seen.rivals else seen.rivals
-    step = propose_next(reader, touch.signal, answer, rivals, _earlier(touches, touch_poses))
+    step = propose_next(reader, touch.signal, answer, rivals, _earlier(touches, joined.touch_poses))
     return ScanBelief(
         reader=reader,
         settings=limits,
         touches=touches,
-        touch_poses=touch_poses,
+        touch_poses=joined.touch_poses,
         views=seen.views,
         lattices=joined.lattices,
         astray=astray,

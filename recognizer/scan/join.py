@@ -6,6 +6,7 @@ otherwise. Its lattices join theirs, and what all say of each cell is located.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,7 +29,9 @@ from recognizer.scan.lattice import (
     seed_lattice,
 )
 from recognizer.scan.mosaic.touch import PlacedTouch
-from recognizer.scan.settings import ScanSettings
+from recognizer.scan.path import follow_path, path_touch_poses
+from recognizer.scan.settings import LATTICES, ScanSettings
+from recognizer.scan.steps import steps_of
 from recognizer.scan.views import (
     LatticeView,
     LatticeViews,
@@ -67,6 +70,7 @@ class JoinedTouch:
     """What the last touch and those before say together."""
 
     seen: SeenTouch
+    touch_poses: TouchPoses  #: of all touches
     lattices: tuple[tuple[PlaneLattice, ...], ...]  #: as `ScanBelief.lattices`
     found: list[LocatedComposite]  #: places, best first
     answer: Recognition
@@ -74,37 +78,56 @@ class JoinedTouch:
 
 
 def join_touch(
-    scan: ScanBelief, touch: PlacedTouch, touch_poses: TouchPoses, *, by_hand: bool, expected: bool
+    scan: ScanBelief,
+    touches: Sequence[PlacedTouch],
+    touch_poses: TouchPoses | None,
+    *,
+    expected: bool,
 ) -> JoinedTouch:
-    """Return what the touches so far and one more say together.
+    """Return what touches say together, the last of which is new.
 
     Parameters
     ----------
+    touch_poses
+        Where they stand; None: a step was made that nobody measured.
     expected
         Whether the touch may be taken for what the others lead to expect, if it looks like that.
     """
-    reader, limits = scan.reader, scan.settings
-    seen = _see_touch(scan, touch, touch_poses, expected=expected)
+    reader, limits, seq = scan.reader, scan.settings, touches[-1].seq
+    seen = _see_touch(scan, touches[-1], touch_poses, expected=expected)
+    steps = steps_of(touches, limits)
     lattices: list[tuple[PlaneLattice, ...]] = []
+    stand: list[TouchPoses] = []
     found: list[LocatedComposite] = []
     for k, (encoding, _, _) in enumerate(reader.prepared):
-        pitch = encoding.style.pitch_mm
-        sums = _composites(views_of(seen.views[k]), touch_poses, scan.lattices[k], pitch, limits)
+        pitch, views = encoding.style.pitch_mm, views_of(seen.views[k])
+        path = None
+        if touch_poses is None:
+            path = follow_path(encoding, seen.views[k], steps, reader.settings.hypotheses, limits)
+            stand.append(path_touch_poses(path, steps))
+            sums = _composites_along(views, stand[k], pitch, limits)
+        else:
+            stand.append(touch_poses)
+            sums = _composites(views, touch_poses, scan.lattices[k], pitch, limits)
         lattices.append(tuple(item.agreement.lattice for item in sums))
-        found += locate_composites(encoding, sums, limits, reader.settings.hypotheses)
+        located = locate_composites(encoding, sums, limits, reader.settings.hypotheses)
+        found += [replace(item, path=path) for item in located]
     found = distinct_places(found)
-    answer, agrees = refusal(touch.seq, TOO_FEW), False
+    answer, agrees, at = refusal(seq, TOO_FEW), False, stand[0]
+    if found:
+        at = next(poses for each, poses in zip(reader.prepared, stand, strict=True)
+                  if each[0] is found[0].encoding)  # fmt: skip
     if found and (found[0].composite.agreement.chosen >= 0).sum() > 1:
-        answer = answer_scan(reader, found, limits, touch.seq, by_hand=by_hand)
+        answer = answer_scan(reader, found, limits, seq)
         agrees = bool(found[0].composite.agreement.chosen[-1] >= 0)
         if answer:
-            found[0], agrees = _pose_last_touch(reader, seen.images, found[0], touch_poses, limits)
-            answer = answer_scan(reader, found, limits, touch.seq, by_hand=by_hand)
-    return JoinedTouch(seen, tuple(lattices), found, answer, agrees)
+            found[0], agrees = _pose_last_touch(reader, seen.images, found[0], at, limits)
+            answer = answer_scan(reader, found, limits, seq)
+    return JoinedTouch(seen, at, tuple(lattices), found, answer, agrees)
 
 
 def _see_touch(
-    scan: ScanBelief, touch: PlacedTouch, touch_poses: TouchPoses, *, expected: bool
+    scan: ScanBelief, touch: PlacedTouch, touch_poses: TouchPoses | None, *, expected: bool
 ) -> SeenTouch:
     """Return what the last touch shows: what is expected of it, or what it says by itself."""
     reader, limits = scan.reader, scan.settings
@@ -156,13 +179,25 @@ def _image(reader: Reader, touch: PlacedTouch, height_mm: float) -> Image:
     return image_of_signal(reader.sensor, signal, height_mm, reader.settings)
 
 
-def _expected_poses(lattices: tuple[PlaneLattice, ...], touch_poses: TouchPoses) -> Array:
+def _expected_poses(lattices: tuple[PlaneLattice, ...], touch_poses: TouchPoses | None) -> Array:
     """Return where (k, 3) lattices lead to expect the last touch."""
+    if touch_poses is None:
+        return np.zeros((0, 3))
     at = [
         expected_at(each, touch_poses.poses[-1], touch_poses.covariances[-1])[0]
         for each in lattices
     ]
     return np.array(at).reshape(-1, 3)
+
+
+def _composites_along(
+    views: LatticeViews, touch_poses: TouchPoses, pitch_mm: float, limits: ScanSettings
+) -> list[Composite]:
+    """Return the sum of what agrees with the array that a path runs through; none, if nothing."""
+    along = PlaneLattice(np.zeros(3), LATTICES.least * np.eye(3))
+    agreement = refine_agreement(views, touch_poses, along, pitch_mm, limits)
+    summed = composite(views, touch_poses, agreement, pitch_mm, limits)
+    return [] if summed is None else [summed]
 
 
 def _composites(

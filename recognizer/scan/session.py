@@ -1,8 +1,9 @@
 """A scan as a program has it: touches in, the belief so far out. Thesis 4.3, 6.3.
 
 Where a touch stands against the first one of its face is what the arm says (its pose, with a
-covariance where it gives one), or what a hand may have done since the touch before; then
-overlapping images tell, see `recognizer.scan.mosaic`. A pose that does not lie in the plane of
+covariance where it gives one), where overlapping images show it if that is vague
+(`recognizer.scan.mosaic`), or, where nobody measured a step, on a path through registered places
+(`path`). A pose that does not lie in the plane of
 the touches so far is of another face; what faces say of the object is joined (`faces`).
 """
 
@@ -99,7 +100,7 @@ class Scan:
         touch
             Of the same object as those before: counts (rows, columns), a signal, or a touch of
             `recognizer.touch.contacts`. Where nobody knows how the probe moved, touches of a face
-            must overlap by a third or more unless each of them is answered by itself.
+            should lie within 8 mm or so of the one before (`ScanSettings.by_hand`).
         pose
             (4, 4) T_base_sensor, mm, in any fixed frame; with the arm's own covariance if it
             is a `SensorPose`; by default the touch's own, if it has one. It tells when another

@@ -52,12 +52,7 @@ class ScanSettings:
     #: of a step from touch to touch that nobody measured. Wide: one of 14 mm must not look less
     #: likely than one of 2 mm, a pitch beside it
     by_hand: tuple[float, float, float] = (8.0, 8.0, math.radians(2))
-    #: With steps that nobody measured: nats over the next place that images must tell, and
-    #: nats over symbols of no registered place that several touches must. With 8 and 3, 9 of 60
-    #: scans of profile thesis held a wrong answer; with 10 and 8, 1 of 40, in which 3 of 11 touches
-    #: agreed, as more than half of them must now.
-    margin_by_hand: float = 10.0
-    shifts_by_hand: int = 3  #: pitches, each way, by which the last touch must lie no better
+    #: nats over symbols of no registered place that touches must tell whose steps nobody measured
     surprise_by_hand: float = 8.0
 
 
@@ -84,4 +79,15 @@ class LatticeViewSettings:
     most: int = 6  #: fits of a touch by itself that are views
 
 
-LATTICES, VIEWS = LatticeAgreementSettings(), LatticeViewSettings()
+@dataclass(frozen=True, slots=True)
+class PathSettings:
+    """How touches are followed whose motion nobody measured."""
+
+    places: int = 200  #: that each of them may be at by itself, at most
+    skipped: int = 3  #: touches in a row that may be left out
+    shifts: int = 3  #: pitches, each way, by which a touch might lie beside
+    #: standard deviations of x, y (mm) and the turn (rad) of a touch whose place is followed
+    sure: tuple[float, float, float] = (0.4, 0.4, 0.01)
+
+
+LATTICES, VIEWS, PATHS = LatticeAgreementSettings(), LatticeViewSettings(), PathSettings()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from recognizer.scan.mosaic.grow import add_touch
 from recognizer.scan.mosaic.mosaic import Mosaic, MosaicSettings, no_touches
 from recognizer.scan.mosaic.planar import wrap_angle
-from recognizer.scan.mosaic.settings import ImageSearchSettings
 from recognizer.scan.mosaic.touch import PlacedTouch
 from recognizer.scan.settings import VIEWS, ScanSettings
 from recognizer.touch.lab import EmbossedArray
@@ -83,10 +82,7 @@ def stands_of(
         poses = np.concatenate([before.poses, pose])
         return TouchPoses(poses, np.concatenate([before.covariances, covariance]), None)
     if mosaic is None:
-        search = ImageSearchSettings()
-        if any(is_unmeasured(touch, loose_mm) for touch in touches):
-            search = replace(search, margin_beyond=limits.margin_by_hand)
-        mosaic = no_touches(reader.sensor, MosaicSettings(search=search, period_mm=pitch))
+        mosaic = no_touches(reader.sensor, MosaicSettings(period_mm=pitch))
         for touch in touches[:-1]:
             mosaic = add_touch(mosaic, touch)
     mosaic = add_touch(mosaic, last)
