@@ -20,6 +20,7 @@ Bytes = NDArray[np.uint8]
 
 NUMBER, DECIMAL = "\x01", "\x02"  #: marks of the bytes of number and decimal fields
 NAMES = "\x03\x04\x05"  #: marks of up to three kinds of names
+REFERENCE = "\x06"  #: before the digits that say which of a file's own entities is meant
 _SPACE, _ZERO, _POINT, _MINUS = 32, 48, 46, 45
 
 
@@ -44,6 +45,21 @@ def template_of(text: str, numbers: list[int]) -> TextTemplate:
         np.flatnonzero(array == ord(DECIMAL)),
         tuple(np.flatnonzero(array == ord(mark)) for mark in NAMES),
     )
+
+
+def reference_field(number: int, width: int) -> str:
+    """Return the field of the entity `number` of a list, as long as `#` and `width` digits."""
+    return f"{REFERENCE}{number:0{width}}"
+
+
+def with_references(text: Bytes, references: list[str], width: int) -> Bytes:
+    """Return a text whose reference fields hold the references, each `#` and `width` digits."""
+    at = np.flatnonzero(text == ord(REFERENCE))[:, None] + np.arange(width + 1)
+    given = np.frombuffer("".join(references).encode("ascii"), np.uint8).reshape(-1, width + 1)
+    digits = text[at[:, 1:]].astype(np.int64) - _ZERO
+    filled = text.copy()
+    filled[at] = given[digits @ 10 ** np.arange(width - 1, -1, -1)]
+    return filled
 
 
 def stamp(

@@ -42,11 +42,19 @@ class Entities:
 
     def direction(self, unit: NDArray[np.float64]) -> str:
         """Return the direction `unit`, (3,), written once however often it is used."""
-        return self._once(f"DIRECTION('',{triple(unit, _UNIT_PLACES)})")
+        return self.direction_along(unit_text(unit))
+
+    def direction_along(self, components: str) -> str:
+        """Return the direction with these components, as `unit_text` writes them."""
+        return self._once(f"DIRECTION('',{components})")
 
     def vector(self, unit: NDArray[np.float64]) -> str:
         """Return the vector of length 1 along `unit`."""
-        return self._once(f"VECTOR('',{self.direction(unit)},1.)")
+        return self.vector_along(unit_text(unit))
+
+    def vector_along(self, components: str) -> str:
+        """Return the vector of length 1 with these components, as `unit_text` writes them."""
+        return self._once(f"VECTOR('',{self.direction_along(components)},1.)")
 
     def reserve(self, count: int) -> int:
         """Return the first of `count` numbers that the caller writes himself."""
@@ -71,6 +79,11 @@ def unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return `vector` (..., 3) scaled to length 1."""
     length: NDArray[np.float64] = np.linalg.norm(vector, axis=-1, keepdims=True)
     return vector / length
+
+
+def unit_text(unit: NDArray[np.float64]) -> str:
+    """Return the components of a unit vector (3,) as STEP writes them."""
+    return triple(unit, _UNIT_PLACES)
 
 
 def triple(values: NDArray[np.float64], places: int) -> str:
@@ -108,6 +121,8 @@ def step_string(text: str) -> str:
     >>> print(step_string("Würfel"))
     W\X2\00FC\X0\rfel
     """
+    if text.isascii() and text.isprintable() and "'" not in text and "\\" not in text:
+        return text
     return "".join(_step_character(character) for character in text)
 
 

@@ -1,9 +1,10 @@
 """One symbol as a template of STEP entities: points, edges, sides, top.
 
-The points of a symbol are numbered tier by tier and ring by ring. Point i is entity i of
-the template and its vertex entity n + i, so that the coordinates of all symbols of one
-outline are filled in as one array. The footprint (the outer ring of the first tier, seen
-as a hole of the facet) is a bound that the facet refers to.
+Panels of an object share their templates: what a template refers to in a file, directions and
+colours, is filled in for each file. The points of a symbol are numbered tier by tier and ring by
+ring. Point i is entity i of the template and its vertex entity n + i, so that the coordinates of
+all symbols of one outline are filled in as one array. The footprint (the outer ring of the first
+tier, seen as a hole of the facet) is a bound that the facet refers to.
 
 Engraved symbols have the same topology: with falling z the same vertex order turns the
 sides towards the cavity, which is outside the material.
@@ -11,17 +12,28 @@ sides towards the cavity, which is outside the material.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from generator.alphabet.outline import Tiers
-from generator.export.fixed_text import DECIMAL, NAMES, NUMBER, TextTemplate, template_of
-from generator.export.step_entities import Entities, unit
+from generator.export.fixed_text import (
+    DECIMAL,
+    NAMES,
+    NUMBER,
+    TextTemplate,
+    reference_field,
+    template_of,
+    with_references,
+)
+from generator.export.step_entities import Entities, unit, unit_text
 
 KINDS = ("top", "side", "inside")  #: of a symbol's faces; "inside": the facet within a ring
+
+_DIRECTION, _VECTOR, _STYLE = "direction", "vector", "style"  # of a file, that a symbol refers to
 
 _Term = int | str  # a number of the template, or literal text such as "#100017"
 
@@ -75,35 +87,97 @@ def symbol_template(
     style
         Reference to the colour of tops and sides, "" for none.
     """
-    return _SymbolBuilder(tiers, axes, entities, decimal_width, name_widths, style).built()
+    sizes = tuple(tuple(len(ring) for ring in rings) for rings in tiers.rings)
+    points = outline_points(tiers) @ axes
+    shape = points.tobytes(), sizes, axes[[2, 0]].tobytes()
+    pattern = _pattern(*shape, entities.width, decimal_width, name_widths, bool(style))
+    return pattern.bound(entities, style)
+
+
+@dataclass(frozen=True, slots=True)
+class _SymbolPattern:
+    """The entities of a symbol in any file: what they refer to in it is asked for by `bound`."""
+
+    symbol: SymbolTemplate
+    referred: tuple[tuple[str, str], ...]  #: kind and components, in the order of their first use
+    width: int  #: digits of a number
+
+    def bound(self, entities: Entities, style: str) -> SymbolTemplate:
+        """Return the template in a file; directions that it has not yet are written to it."""
+        find = {_DIRECTION: entities.direction_along, _VECTOR: entities.vector_along}
+        references = [
+            style if kind == _STYLE else find[kind](components)
+            for kind, components in self.referred
+        ]
+        template = self.symbol.template
+        text = with_references(template.text, references, self.width)
+        return replace(self.symbol, template=replace(template, text=text))
+
+
+@lru_cache(maxsize=128)  # a template takes some .1 MB; panels of an object share theirs
+def _pattern(
+    points: bytes,
+    sizes: tuple[tuple[int, ...], ...],
+    axes: bytes,
+    width: int,
+    decimal_width: int,
+    name_widths: tuple[int, ...],
+    coloured: bool,
+) -> _SymbolPattern:
+    """Return the entities of an outline.
+
+    Parameters
+    ----------
+    points, sizes
+        (n, 3) mm, part frame; how many of them each ring of each tier has.
+    axes
+        (2, 3) the symbol's z and x axis in the part frame.
+    width
+        Digits of a number.
+    """
+    builder = _SymbolBuilder(
+        np.frombuffer(points).reshape(-1, 3), sizes, np.frombuffer(axes).reshape(2, 3),
+        width, decimal_width, name_widths, coloured,
+    )  # fmt: skip
+    return _SymbolPattern(builder.built(), tuple(builder.referred), width)
 
 
 class _SymbolBuilder:
     def __init__(
         self,
-        tiers: Tiers,
+        points: NDArray[np.float64],
+        sizes: tuple[tuple[int, ...], ...],
         axes: NDArray[np.float64],
-        entities: Entities,
+        width: int,
         decimal_width: int,
         name_widths: tuple[int, ...],
-        style: str,
+        coloured: bool,
     ) -> None:
-        self.points = outline_points(tiers) @ axes
-        self.sizes = [[len(ring) for ring in rings] for rings in tiers.rings]
-        self.normal, self.along = entities.direction(axes[2]), entities.direction(axes[0])
-        self.file = entities
-        self.number = NUMBER * entities.width
+        self.points = points
+        self.sizes = sizes
+        self.width = width
+        self.referred: dict[tuple[str, str], int] = {}
+        self.normal, self.along = self.direction(axes[0]), self.direction(axes[1])
+        self.number = NUMBER * width
         self.names = {
             kind: mark * width for kind, mark, width in zip(KINDS, NAMES, name_widths, strict=True)
         }
         self.coordinates = ",".join([DECIMAL * decimal_width] * 3)
-        self.style = style
+        self.style = self.reference(_STYLE, "") if coloured else ""
         self.text: list[str] = []
         self.numbers: list[int] = []
         self.count = 0
         self.edges: dict[tuple[int, int], int] = {}
         self.faces: list[int] = []
         self.coloured: list[int] = []
+
+    def reference(self, kind: str, components: str) -> str:
+        """Return the field that refers to an entity of the file."""
+        number = self.referred.setdefault((kind, components), len(self.referred))
+        return reference_field(number, self.width)
+
+    def direction(self, along: NDArray[np.float64]) -> str:
+        return self.reference(_DIRECTION, unit_text(along))
 
     def built(self) -> SymbolTemplate:
         n = len(self.points)
@@ -159,7 +233,7 @@ class _SymbolBuilder:
         low, high = min(start, end), max(start, end)
         edge = self.edges.get((low, high))
         if edge is None:
-            along = self.file.vector(unit(self.points[high] - self.points[low]))
+            along = self.reference(_VECTOR, unit_text(unit(self.points[high] - self.points[low])))
             line = self.add("LINE('',", low, f",{along})")
             n = len(self.points)
             edge = self.add("EDGE_CURVE('',", n + low, ",", n + high, ",", line, ",.T.)")
@@ -188,8 +262,8 @@ class _SymbolBuilder:
             j = (i + 1) % len(low)
             self.face(
                 [[point, low[j], high[j], high[i]]],
-                self.file.direction(normals[i]),
-                self.file.direction(along[i]),
+                self.direction(normals[i]),
+                self.direction(along[i]),
                 "side",
             )
 
