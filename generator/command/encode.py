@@ -54,8 +54,8 @@ def encode(
     ] = None,
     formats: Annotated[
         str, typer.Option("--format", metavar="LIST", show_default=False,
-                          help="step, stl, 3mf, glb, mjcf, urdf, sdf, usd: files to write, with "
-                               "commas between."),
+                          help="step, stl, 3mf, glb, stpz (STEP, gzipped), mjcf, urdf, "
+                               "sdf, usd: files to write, with commas between."),
     ] = "",
     database: Annotated[
         str, typer.Option(metavar="URL", show_default=False,

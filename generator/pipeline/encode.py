@@ -59,7 +59,7 @@ def encode(
     folder
         For the files, in place of the specs' own; several objects get a folder each in it.
     formats
-        In place of the specs' own: step, stl, 3mf, glb, mjcf, urdf, sdf, usd.
+        In place of the specs' own: step, stl, 3mf, glb, stpz, mjcf, urdf, sdf, usd.
     database
         URL in place of the specs' own.
     lab_key

@@ -1,7 +1,7 @@
 """Parts -> files: everything that belongs to one object, staged to appear together.
 
 `NAME-F1.step`, `NAME-F1.stl`, ... one per part in its local origin; `NAME.step`, the panels as an
-assembly; `NAME.3mf` and
+assembly (`.stpz`: the same, gzipped); `NAME.3mf` and
 `NAME-prusaslicer.3mf` for each plate of the printer; `NAME.glb` assembled; `NAME.xml`,
 `NAME.urdf`, `NAME.sdf` with their meshes and `NAME.usda` for robots; `NAME.png`, the picture;
 `NAME-build.html`, the build sheet; `NAME-array.svg`, the faces on the array.
@@ -23,7 +23,7 @@ from generator.export.preview import preview_png
 from generator.export.robot.files import ROBOT_FORMATS, robot_files
 from generator.export.robot.model import robot_model
 from generator.export.slicer_settings import SlicerSettings, slicer_settings
-from generator.export.step import assembly_chunks, step_chunks
+from generator.export.step import assembly_chunks, gzip_chunks, step_chunks
 from generator.export.stl import stl_chunks
 from generator.export.threemf import print_files
 from generator.layout.object_code import object_code
@@ -34,7 +34,6 @@ from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress
 from generator.pipeline.sheet import SheetPlate, build_sheet
 from generator.polyhedron import face_polygon
-from generator.printed.sliced_plate import slice_plate
 from generator.solid import Mesh, Part, emboss_whole, panels, prove_closed, triangles, volume
 
 
@@ -66,7 +65,7 @@ def stage(
     plan, layout
         The object and its symbols.
     formats
-        Of step, stl, 3mf, glb, mjcf, urdf, sdf, usd; the pictures are always made.
+        Of step, stl, 3mf, glb, stpz, mjcf, urdf, sdf, usd; the pictures are always made.
     verify
         Read files back by independent programs before anything is kept.
     slice_plates
@@ -107,9 +106,14 @@ def stage(
                 step=step.staged if step else None,
                 stl=stl.staged if stl else None,
             )
-    if "step" in formats and len(parts) > 1:
+        if "stpz" in formats:
+            staging.write(f"{part.name}.stpz", gzip_chunks(step_chunks(part)))
+    if len(parts) > 1:
         progress("writing the assembly", 0.7)
-        staging.write(f"{spec.name}.step", assembly_chunks(spec.name, parts))
+        if "step" in formats:
+            staging.write(f"{spec.name}.step", assembly_chunks(spec.name, parts))
+        if "stpz" in formats:
+            staging.write(f"{spec.name}.stpz", gzip_chunks(assembly_chunks(spec.name, parts)))
     fit = None
     if verify and len(panel_files) > 1:
         progress("putting the panels together", 0.7)
@@ -124,6 +128,8 @@ def stage(
             twin = staging.write(f"{spec.name}{suffix}-prusaslicer.3mf", plate.prusaslicer)
             cost = None
             if slice_plates:
+                from generator.printed.sliced_plate import slice_plate
+
                 progress(f"slicing plate {number}", 0.7)
                 cost = slice_plate(twin.staged)
             on_sheet.append(SheetPlate(f"{spec.name}{suffix}.3mf", plate.plate, cost))

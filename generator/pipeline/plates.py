@@ -13,6 +13,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from generator.export.atomic import Staging
 from generator.export.bed import Plate, arrange_plates
@@ -29,9 +30,11 @@ from generator.pipeline.files import parts_of, settings_of
 from generator.pipeline.parallel import Task, Workers
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress, part_of_progress
-from generator.printed.sliced_plate import PlateCost, slice_plate
 from generator.printers import Printer
 from generator.solid import Part, box
+
+if TYPE_CHECKING:
+    from generator.printed.sliced_plate import PlateCost
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +123,8 @@ def write_set(
                 twin = staging.write(file, content.prusaslicer)
                 if slice_plates:
                     progress(f"slicing plate {number}", 0.9)
+                    from generator.printed.sliced_plate import slice_plate
+
                     costs[number - 1] = slice_plate(twin.staged)
         page = _set_sheet(name, objects, sheets, folder, plates, costs)
         staging.write(f"{name}-build.html", page.encode())

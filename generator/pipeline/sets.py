@@ -139,9 +139,10 @@ def _make(url: str, order: Order, place: ObjectPlacement) -> Product:
 def _intact_product(connection: Connection, order: Order) -> Product | None:
     """Return the object if it is registered from the same spec and all its files stand.
 
-    What robots load is no part of a registered spec, so it is always written anew.
+    What robots load is no part of a registered spec, and gzipped STEP is not registered, so both
+    are always written anew.
     """
-    if not set(ROBOT_FORMATS).isdisjoint(order.formats):
+    if not {*ROBOT_FORMATS, "stpz"}.isdisjoint(order.formats):
         return None
     plan, url = order.plan, connection.engine.url
     known = find_object(connection, plan.spec.name)

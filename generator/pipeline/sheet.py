@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +23,10 @@ from generator.pipeline.plan import ObjectPlan
 from generator.polyhedron import face_polygon
 from generator.polyhedron.assembly import AssemblyStep, assembly_order, telling_faces
 from generator.polyhedron.frame import face_frame
-from generator.printed.sliced_plate import PlateCost
 from generator.solid import Part, box, volume
+
+if TYPE_CHECKING:
+    from generator.printed.sliced_plate import PlateCost
 
 Floats = NDArray[np.float64]
 

@@ -8,7 +8,6 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from encoded_objects.document.tree import Tree
-from generator.polyhedron.read import MESHES, STEP
 from generator.spec.resolved import ShapeSpec
 from generator.spec.shape import EXAMPLES, KINDS, Shape
 
@@ -77,6 +76,8 @@ def _check_faces(faces: list[tuple[tuple[int, ...], ...]], vertices: int, refuse
 
 def _model_file(name: str, scale: float, folder: Path, refuse: Refuse) -> ShapeSpec | None:
     """Return a shape that is read from a model file, which must be there."""
+    from generator.polyhedron.read import MESHES, STEP
+
     path = folder / name
     if path.suffix.lower() not in (*STEP, *MESHES):
         refuse(
@@ -98,6 +99,8 @@ def _model_file(name: str, scale: float, folder: Path, refuse: Refuse) -> ShapeS
 
 def _similar_model(path: Path) -> str:
     """Return a fix that names models like `path` beside it."""
+    from generator.polyhedron.read import MESHES, STEP
+
     try:
         models = [f.name for f in path.parent.iterdir() if f.suffix.lower() in (*STEP, *MESHES)]
     except (OSError, ValueError):

@@ -61,7 +61,7 @@ class ObjectSpec:
     wall_mm: float  #: thickness of panels
     gap_mm: float  #: between panels where they meet in the finished object
     printer: Printer
-    formats: tuple[str, ...]  #: of step, stl, 3mf, glb, mjcf, urdf, sdf, usd
+    formats: tuple[str, ...]  #: of step, stl, 3mf, glb, stpz, mjcf, urdf, sdf, usd
     folder: Path  #: for the files; relative to the current folder
     database: str  #: URL
     lab_key: str = ""  #: of the database, where the spec says it

@@ -30,7 +30,7 @@ COPIES_MAX = 1000
 SCHEMES = ("sqlite", "postgresql", "postgres", "postgresql+psycopg")  #: of databases
 
 ProfileName = Literal["one-touch", "thesis", "product", "large", "fine", "auto"]
-Format = Literal["step", "stl", "3mf", "glb", "mjcf", "urdf", "sdf", "usd"]
+Format = Literal["step", "stl", "3mf", "glb", "stpz", "mjcf", "urdf", "sdf", "usd"]
 
 
 def version(value: Any) -> Any:
@@ -159,7 +159,7 @@ class Output(Block):
     folder: PathText | None = None
     """Folder for the files, made if it is not there; out/NAME if left out."""
     formats: FormatList | None = None
-    """Files to write: step, stl, 3mf, glb, mjcf, urdf, sdf, usd; the first three if left out."""
+    """Files to write: step, stl, 3mf, glb, stpz, mjcf, urdf, sdf, usd; else the first three."""
     database: DatabaseUrl | None = None
     """Database that registers the cells: sqlite:///lab.db, postgresql://host/name."""
     lab_key: LabKey | None = None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,9 +15,11 @@ from generator.export.fixed_text import (
     decimal_numbers,
     decimal_width,
     pad,
+    reference_field,
     stamp,
     template_of,
     whole_numbers,
+    with_references,
 )
 from generator.export.step_entities import Entities, numbers_listed, reference_list, step_string
 
@@ -87,3 +91,25 @@ def test_long_lists_break_into_lines() -> None:
     joined = b"".join(numbers_listed(numbers, 5, block=12)).decode("ascii")
     assert joined == reference_list(f"#{number}" for number in numbers.tolist())
     assert joined.count("\n") == 2
+
+
+@given(st.lists(st.integers(0, 4), max_size=30), st.integers(5, 8))
+def test_references_are_filled_in(asked: list[int], width: int) -> None:
+    known = [f"#{10 ** (width - 1) + 7 * k}" for k in range(5)]
+    text = "A(" + "),(".join(reference_field(k, width) for k in asked) + ");"
+    row = with_references(np.frombuffer(text.encode(), np.uint8), known, width)
+    assert row.tobytes().decode() == "A(" + "),(".join(known[k] for k in asked) + ");"
+
+
+@given(st.text(max_size=30))
+def test_step_strings_read_back(text: str) -> None:
+    """Part 21, 6.4.3: doubled quotes and backslashes, hexadecimal beyond printable ASCII."""
+    written = step_string(text)
+    assert written.isascii()
+    assert written.isprintable()
+    back = re.sub(
+        r"\\X[24]\\([0-9A-F]+)\\X0\\|''|\\\\",
+        lambda found: chr(int(found[1], 16)) if found[1] else found[0][0],
+        written,
+    )
+    assert back == text

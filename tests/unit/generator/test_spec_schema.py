@@ -95,7 +95,7 @@ def test_options():
         format_option("step,stel,dwg")
     assert str(caught.value) == (
         "--format: error: unknown format 'stel'\n  fix: did you mean 'stl'?\n\n"
-        "--format: error: unknown format 'dwg'\n  fix: choose from step,stl,3mf,glb,mjcf,"
+        "--format: error: unknown format 'dwg'\n  fix: choose from step,stl,3mf,glb,stpz,mjcf,"
         "urdf,sdf,usd"
     )
     with pytest.raises(SpecError, match="no format is named"):
