@@ -167,4 +167,4 @@ def test_scores_are_rounded_by_the_grain_that_is_set(small):
 
 
 def test_the_limit_and_the_grain():
-    assert (SETTINGS.belief.doubt, SETTINGS.belief.grain) == (1e-2, 0.25)
+    assert (SETTINGS.belief.doubt, SETTINGS.belief.grain) == (1e-4, 0.25)

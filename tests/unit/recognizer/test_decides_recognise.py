@@ -80,7 +80,7 @@ def reads(small, lab, monkeypatch):
         covariance=np.diag([1.0, 2.0, 3.0]),
     )  # fmt: skip
 
-    def read(first, second=None, signal=TOUCHED, doubt=1e-3):
+    def read(first, second=None, signal=TOUCHED, doubt=1e-5):
         tries = []
 
         def matches(arrays, embossed, fit, hypothesis, settings):
@@ -302,7 +302,7 @@ def test_an_answer_says_how_the_print_was_felt(reads):
     assert (refused(reads).scale, refused(reads).stroke_mm) == (None, None)
 
 
-@pytest.mark.parametrize(("doubt", "reason"), [(0.0, ""), (1e-2, ""), (1.01e-2, BY_CHANCE)])
+@pytest.mark.parametrize(("doubt", "reason"), [(0.0, ""), (1e-4, ""), (1.01e-4, BY_CHANCE)])
 @pytest.mark.parametrize("inliers", [16, 10])
 def test_what_many_places_match_by_chance_is_refused(reads, doubt, reason, inliers):
     found = [reads.one(inliers=inliers), reads.one("rival", -40.0, face=1, index=(9, 12))]

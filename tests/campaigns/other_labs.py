@@ -1,0 +1,158 @@
+"""Parts of other labs, made with the same profile, read against the database of one lab.
+
+    python tests/campaigns/other_labs.py -o out/labs --touches 20000     # 40 min of CPU
+    python tests/campaigns/other_labs.py -o out/labs --own 2000          # its own parts: 4 min
+    python tests/campaigns/other_labs.py -o out/labs --touches 0 --own 0  # the table
+
+Touches are read as `Reader` does but without its limit of doubt, and doubt and margin of each are
+kept, so that the table says how many would be accepted at any limit: of other labs' parts, where
+every answer is wrong, and of the lab's own. What is there is kept, and an interrupted run goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(name, "1")
+
+import numpy as np  # noqa: E402
+
+from encoded_objects import encode  # noqa: E402
+from generator.array.lab_key import lab_key_of  # noqa: E402
+from recognizer.touch.lab import open_lab  # noqa: E402
+from recognizer.touch.reader import Reader  # noqa: E402
+from recognizer.touch.recognise import recognise_with_rivals  # noqa: E402
+from recognizer.touch.settings import DEFAULTS  # noqa: E402
+from recognizer.validation.campaign import LEVEL_SHARES  # noqa: E402
+from recognizer.validation.draw import TouchPlan, draw_touch  # noqa: E402
+from recognizer.validation.trial import judge  # noqa: E402
+
+LABS, OBJECTS, SIZES_MM = 8, 40, (35.0, 75.0)
+KINDS = (("face", 0.5), ("edge", 0.35), ("corner", 0.15))  # nearly as touches fall on such faces
+STYLE = {"profile": "large", "symbols": {"pitch": "5 mm"}}  # what `auto` gives such a set
+OWN = (
+    ("Cube", {"cube": "60 mm"}),
+    ("Prism", {"triangular_prism": {"side": "60 mm", "height": "50 mm"}}),
+    ("Box", {"box": ["80 mm", "60 mm", "40 mm"]}),
+    ("Tetra", {"tetrahedron": "80 mm"}),
+)
+LIMITS = (math.inf, 1e-2, 1e-3, 1e-4)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser.add_argument("--touches", type=int, default=0, help="of other labs' parts")
+    parser.add_argument("--own", type=int, default=0, help="touches of the lab's own parts")
+    parser.add_argument("--seed", type=int, default=18)
+    asked = parser.parse_args()
+    own, others = make_labs(asked.output, asked.seed)
+    belief = replace(DEFAULTS.belief, doubt=math.inf)
+    reader = Reader(open_lab(own), settings=replace(DEFAULTS, belief=belief))
+    for name, labs, number in (("touches", others, asked.touches), ("own", [own], asked.own)):
+        kept = asked.output / f"{name}.jsonl"
+        kept.touch()
+        done = len(kept.read_text().splitlines())
+        with kept.open("a", encoding="utf-8") as file:
+            for row in touch_labs(
+                reader, labs, range(done, number), asked.seed, registered=name == "own"
+            ):
+                file.write(json.dumps(row) + "\n")
+                file.flush()
+        print(f"\n{name}")
+        table([json.loads(line) for line in kept.read_text().splitlines()])
+
+
+def make_labs(folder: Path, seed: int) -> tuple[str, list[str]]:
+    """Make the databases that are not there yet, and return their names."""
+    folder.mkdir(parents=True, exist_ok=True)
+    own = folder / "own.db"
+    if not own.exists():
+        specs = [{"name": name, "shape": shape, "copies": 10} for name, shape in OWN]
+        _make(own, specs)
+    others = []
+    for number in range(LABS):
+        lab = folder / f"lab-{number + 1}.db"
+        if not lab.exists():
+            _make(lab, list(_random_objects(np.random.default_rng([seed, number, 5]))))
+        others.append(str(lab))
+    return str(own), others
+
+
+def _make(database: Path, specs: list[dict[str, Any]]) -> None:
+    """Make a lab with a key of its own, as a new database draws it; whole or not at all."""
+    unfinished = database.with_suffix(".part")
+    unfinished.unlink(missing_ok=True)
+    objects = [STYLE | one for one in specs]
+    key = np.random.default_rng(list(database.stem.encode())).bytes(16)
+    whole = {"version": 1, "objects": objects, "output": {"lab_key": lab_key_of(key)}}
+    encode(whole, database=str(unfinished), formats=())
+    unfinished.rename(database)
+    print(f"{database.name}: {len(objects)} specs", flush=True)
+
+
+def _random_objects(rng: np.random.Generator) -> Iterator[dict[str, Any]]:
+    for k in range(OBJECTS):
+        x, y, z = (f"{size:.1f} mm" for size in rng.uniform(*SIZES_MM, 3))
+        shapes: tuple[dict[str, Any], ...] = (
+            {"box": [x, y, z]},
+            {"triangular_prism": {"side": x, "height": y}},
+            {"cube": x},
+        )
+        yield {"name": f"Other {k + 1}", "shape": shapes[k % 3]}
+
+
+def touch_labs(
+    reader: Reader, labs: list[str], numbers: range, seed: int, *, registered: bool
+) -> Iterator[dict[str, Any]]:
+    """Yield what became of touches of labs' parts; each is drawn from seed and number alone."""
+    makers = [Reader(open_lab(lab)) for lab in labs]
+    for number in numbers:
+        rng = np.random.default_rng([seed, number, 8])
+        lab = int(rng.integers(len(labs)))
+        kind, level = (_choose(rng, shares) for shares in (KINDS, LEVEL_SHARES))
+        plan = TouchPlan(labs[lab], seed, level, kind)
+        drawn = draw_touch(plan, number, makers[lab])
+        answer, _ = recognise_with_rivals(reader, reader.signal(drawn.counts), number)
+        if not registered:  # every answer is wrong
+            drawn = replace(drawn, scene=None)
+        yield {
+            "number": number, "lab": lab + 1, "kind": kind, "level": level,
+            "verdict": judge(plan, number, drawn, answer, 0.0).verdict,
+            "answer": f"{answer.object}/{answer.face}" if answer else "",
+            "reason": answer.reason, "doubt": answer.doubt if answer else None,
+            "margin": answer.margin,
+        }  # fmt: skip
+
+
+def _choose(rng: np.random.Generator, shares: tuple[tuple[str, float], ...]) -> str:
+    names, weights = zip(*shares, strict=True)
+    return str(rng.choice(names, p=weights))
+
+
+def table(rows: list[dict[str, Any]]) -> None:
+    """Print how many touches are accepted at each limit, by kind, and why others are not."""
+    print("| touches of | number | " + " | ".join(f"accepted at {x:g}" for x in LIMITS) + " |")
+    print("| --- " * (2 + len(LIMITS)) + "|")
+    for kind in ("all", *(kind for kind, _ in KINDS)):
+        some = [row for row in rows if kind in ("all", row["kind"])]
+        doubts = [row["doubt"] for row in some if row["answer"]]
+        counts = " | ".join(str(sum(doubt <= limit for doubt in doubts)) for limit in LIMITS)
+        print(f"| {kind} | {len(some)} | {counts} |")
+    reasons = [row["reason"] for row in rows if row["reason"]]
+    print({reason: reasons.count(reason) for reason in sorted(set(reasons))})
+    for row in rows:
+        if row["answer"] and row.get("verdict") != "right":
+            print(row)
+
+
+if __name__ == "__main__":
+    main()
