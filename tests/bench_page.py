@@ -10,20 +10,25 @@ import re
 import time
 from contextlib import contextmanager
 
+from playwright.sync_api import expect
+
 CHROMIUM = "/usr/bin/chromium"
 FLAGS = (
     "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-quic",
     "--no-first-run", "--disable-background-networking", "--disable-component-update",
     "--disable-sync",
 )  # fmt: skip
-PATIENCE_S = 30.0  #: for anything, on a busy machine
+PATIENCE_S = 60.0  #: for anything, on a busy machine
+expect.set_options(timeout=1e3 * PATIENCE_S)
 
 
 @contextmanager
-def opened(browser, address, **look):
+def opened(browser, address, *, tour=False, **look):
     """Open the page; nothing may be asked of anybody else, and nothing go wrong in it."""
     look = {"viewport": {"width": 1440, "height": 900}} | look
     page = browser.new_page(**look)
+    if not tour:
+        page.add_init_script("localStorage.setItem('toured', 'yes')")
     asked, wrong = [], []
     page.on("request", lambda request: asked.append(request.url))
     page.on("pageerror", lambda error: wrong.append(str(error)))

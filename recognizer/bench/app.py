@@ -3,7 +3,9 @@
     GET   /                          the page        /static/...
     WS    /live                      frames, mosaics (bytes) and topics (JSON); takes {"filter"}
     GET   /api/bench                 what there is: ports, sensor, arrays
+    GET   /api/clock                 its clock, for pages on machines with another
     POST  /api/port | sensor | bias | record | replay | calibration | mosaic | lab
+    POST  /api/scan | flip | mounting | learned | as-built       (`checks`)
     POST  /api/touch[/next] | load | unplug                          the simulated probe
     GET   /api/objects[/NAME[/picture.svg|/parts/N]], /api/promise/NAME, /api/map/N
     GET   /api/mosaics/NAME[/FACE]                              what was felt of its faces
@@ -32,6 +34,7 @@ from starlette.middleware.gzip import GZipMiddleware
 
 from encoded_objects.errors import EncodedObjectsError
 from recognizer.bench.broker import Broker, Subscriber
+from recognizer.bench.checks import check_routes
 from recognizer.bench.control import control_routes
 from recognizer.bench.images import FILTERS
 from recognizer.bench.lab import lab_routes
@@ -66,6 +69,7 @@ def app_for(bench: BenchContext) -> FastAPI:
     app.add_exception_handler(EncodedObjectsError, _error_response)
     app.add_exception_handler(RequestValidationError, _invalid_response)
     app.include_router(control_routes(bench.session, bench.ports))
+    app.include_router(check_routes(bench.session))
     app.include_router(lab_routes(bench.session, bench.parts))
     app.include_router(touch_routes(bench.session))
     page = Path(str(resources.files("recognizer.bench").joinpath("static")))

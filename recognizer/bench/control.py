@@ -6,18 +6,19 @@ are JSON; unknown names in them are refused.
 
 from __future__ import annotations
 
+import time
 from typing import Any, Literal
 
 from fastapi import APIRouter, Request, Response
-from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from probe.port.listing import list_ports
 from recognizer.bench.errors import UnknownError
-from recognizer.bench.files import find_file, store_recording
+from recognizer.bench.files import find_file
 from recognizer.bench.images import FILTERS
 from recognizer.bench.session import Session
+from recognizer.bench.uploads import Uploads
 from recognizer.touch.settings import DEFAULTS
 
 Ports = tuple[tuple[str, str], ...]
@@ -91,6 +92,7 @@ class CalibrationRequest(_Request):
 def control_routes(session: Session, ports: Ports) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/api")
+    uploads = Uploads(session.folder)
 
     def port_list() -> list[dict[str, Any]]:
         there = [(entry.url, f"{entry.device} {entry.vendor} {entry.product}".strip())
@@ -133,7 +135,7 @@ def control_routes(session: Session, ports: Ports) -> APIRouter:
 
     @routes.post("/bias")
     def bias(body: SwitchRequest) -> dict[str, Any]:
-        session.bias(on=body.on)
+        session.calibrations.bias(on=body.on)
         return session.as_json()
 
     @routes.post("/record")
@@ -179,36 +181,35 @@ def control_routes(session: Session, ports: Ports) -> APIRouter:
     @routes.post("/calibration")
     def calibration(body: CalibrationRequest) -> dict[str, Any]:
         if body.do == "begin":
-            session.calibrate(body.newtons, body.seconds, simulated_board=body.simulated_board)
+            session.calibrations.begin(
+                body.newtons, body.seconds, simulated_board=body.simulated_board
+            )
         elif body.do == "finish":
-            return session.finish_calibration()
+            return session.calibrations.finish()
         elif body.do == "cancel":
-            session.cancel_calibration()
+            session.calibrations.cancel()
         elif body.do == "use":
-            session.use_calibration(body.name)
+            session.calibrations.use(body.name)
         else:
-            with session.guide() as guide:
+            with session.calibrations.guide() as guide:
                 guide.read() if body.do == "read" else guide.again()
         return session.as_json()
 
     @routes.post("/mosaic")
     def mosaic() -> dict[str, Any]:
-        session.recognition.clear()
+        session.recognition.mosaics.clear()
         return {"cleared": True}
 
     @routes.get("/mosaics/{name}")
     def mosaics(name: str) -> dict[str, Any]:
-        return {
-            "faces": {face: len(one) for face, one in session.recognition.mosaics(name).items()}
-        }
+        return {"faces": session.recognition.mosaics.touches(name)}
 
     @routes.get("/mosaics/{name}/{face}")
     def mosaic_of(name: str, face: str) -> Response:
-        known = session.recognition.mosaics(name)
-        if face not in known:
+        found = session.recognition.mosaics.picture(name, face)
+        if found is None:
             raise UnknownError(f"{name} {face} was not touched yet", fix="touch it first")
-        made = session.recognition.picture(known[face]).as_bytes("")
-        return Response(made, media_type="application/octet-stream")
+        return Response(found.as_bytes(""), media_type="application/octet-stream")
 
     @routes.get("/recordings/{name}")
     def recording(name: str) -> Response:
@@ -217,9 +218,12 @@ def control_routes(session: Session, ports: Ports) -> APIRouter:
 
     @routes.post("/recordings")
     async def upload(name: str, request: Request) -> dict[str, Any]:
-        body = await request.body()  # bounded by the guard
-        frames = await run_in_threadpool(store_recording, session.folder, name, body)
+        frames = await uploads.take(name, request.stream())
         return {"name": name, "frames": frames}
+
+    @routes.get("/clock")
+    def clock() -> dict[str, float]:
+        return {"now_ms": time.time() * 1e3}
 
     @routes.get("/frame.csv")
     def frame() -> Response:

@@ -7,14 +7,13 @@ only where they lie in its folder.
 from __future__ import annotations
 
 import re
-import tempfile
 from pathlib import Path
 
 from generator.database.registered import RegisteredPart
 from generator.database.url import normal_url, part_path
 from probe.errors import RecordingError
 from probe.recording.read import Recording
-from recognizer.bench.errors import BenchError, UnknownError
+from recognizer.bench.errors import UnknownError
 from recognizer.bench.settings import PAGE
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}")
@@ -57,36 +56,29 @@ def list_files(folder: Path, suffix: str) -> list[str]:
     found = [
         path
         for path in folder.iterdir()
-        if path.suffix == suffix and not path.stem.endswith(".part") and _NAME.fullmatch(path.name)
+        if path.name.endswith(suffix)
+        and not path.stem.endswith(".part")
+        and _NAME.fullmatch(path.name)
     ]
     dated = sorted((-path.stat().st_mtime, path.name) for path in found)
     return [name for _, name in dated[: PAGE.listed]]
 
 
-def store_recording(folder: Path, name: str, content: bytes) -> int:
-    """Keep a recording that was sent in, if it is one; returns its frames.
+def keep_recording(draft: Path, path: Path) -> int:
+    """Give a file that was sent in its name, if it is a recording; returns its frames.
 
     Raises
     ------
-    BenchError, UnknownError
-        When there is one of this name, or the name is none.
     RecordingError
-        When it is no recording; nothing is kept.
+        It is none.
     """
-    path = folder / checked_name(name, ".h5")
-    if path.exists():
-        raise BenchError(f"there is a recording {name} already", fix="give another name")
-    folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".coming-", dir=folder) as place:
-        draft = Path(place) / path.name
-        draft.write_bytes(content)
-        try:
-            recording = Recording(draft)
-            for _ in recording.blocks():  # every value is looked at
-                pass
-        except RecordingError as error:
-            raise RecordingError(error.cause, fix=error.fix, place=name) from error
-        draft.rename(path)
+    try:
+        recording = Recording(draft)
+        for _ in recording.blocks():  # every value is looked at
+            pass
+    except RecordingError as error:
+        raise RecordingError(error.cause, fix=error.fix, place=path.name) from error
+    draft.rename(path)
     return len(recording)
 
 

@@ -26,6 +26,7 @@ from recognizer.bench.calibration_state import CalibrationState, values_or_count
 from recognizer.bench.errors import BusyError
 from recognizer.bench.message import FrameMessage
 from recognizer.bench.recognition_thread import PendingFrame, RecognitionThread
+from recognizer.sensor.wiring import Wiring
 
 Array = NDArray[np.float64]
 
@@ -52,6 +53,8 @@ class FrameHandler:
     ) -> None:
         self.guide: CalibrationGuide | None = None
         self.state = CalibrationState()
+        self.replayed = ("", 0)  #: recording that the frames are of, and its first time (ns)
+        self.wiring = Wiring()  #: of images as they come; recordings keep these
         self._sensor, self._broker, self._recognition = sensor, broker, recognition
         self._note = note
         self._newest: Frame | None = None
@@ -78,6 +81,8 @@ class FrameHandler:
         for frame in frames:
             if self._recorder is not None:
                 self._record(self._recorder, frame)
+        frames = [self.wiring.frame(frame, self._sensor.full) for frame in frames]
+        for frame in frames:
             if self.guide is not None:
                 self.guide.take(frame)
             for notice in self.state.take(frame):
@@ -95,7 +100,12 @@ class FrameHandler:
         )
         self._broker.publish("frame", shown)
         load = self.guide is not None
-        self._recognition.offer(PendingFrame(frame, self.state.calibration, received_ms, load))
+        recording, began_ns = self.replayed
+        at_s = 1e-9 * (frame.t_ns - began_ns) if recording else 0.0
+        calibration = self.state.calibration
+        self._recognition.offer(
+            PendingFrame(frame, calibration, received_ms, load, recording, at_s)
+        )
 
     def newest(self) -> tuple[Frame, Array, str]:
         """Return the newest frame, what is shown of it, and its unit.
@@ -145,6 +155,7 @@ class FrameHandler:
         """Forget the sensor; its recording is complete."""
         self.end_recording()
         self._newest = self.guide = None
+        self.replayed = ("", 0)
         self.state = CalibrationState()
 
     def as_json(self) -> dict[str, Any]:

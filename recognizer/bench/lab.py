@@ -19,10 +19,10 @@ from recognizer.bench.lab_json import arrays_json, map_json, object_json, object
 from recognizer.bench.picture import object_svg
 from recognizer.bench.promise import face_promises
 from recognizer.bench.session import Session
-from recognizer.bench.settings import LAB
+from recognizer.bench.settings import DATABASE
 from recognizer.bench.simulated import SCHEME
 
-NEW_LAB = "lab.db"  #: in the folder where the bench was started, where no database was named
+LAB = "lab.db"  #: in the folder where the bench was started, where no database was named
 KEPT = {"cache-control": "private, max-age=86400"}  #: its address tells when it was registered
 
 
@@ -33,7 +33,7 @@ def lab_routes(session: Session, parts: Path | None) -> APIRouter:
     def engine() -> Any:
         if not session.database:
             raise UnknownError("no database is open", fix="start with --database lab.db")
-        return open_database(session.database, writable=False, wait_s=LAB.wait_s)
+        return open_database(session.database, writable=False, wait_s=DATABASE.wait_s)
 
     @routes.get("/objects")
     def objects() -> dict[str, Any]:
@@ -46,8 +46,8 @@ def lab_routes(session: Session, parts: Path | None) -> APIRouter:
     def example() -> dict[str, Any]:
         if session.database and objects()["objects"]:
             raise BusyError("objects are registered already", fix="touch one of these")
-        name = make_example(Path.cwd(), session.database or NEW_LAB)
-        session.use_database(session.database or NEW_LAB)
+        name = make_example(Path.cwd(), session.database or LAB)
+        session.use_database(session.database or LAB)
         session.open(SCHEME)
         return {"object": name}
 

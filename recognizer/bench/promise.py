@@ -13,10 +13,10 @@ from functools import lru_cache
 from typing import Any
 
 from recognizer.bench.errors import BenchError
-from recognizer.bench.settings import LAB
+from recognizer.bench.settings import DATABASE
 
 
-@lru_cache(maxsize=LAB.promises)
+@lru_cache(maxsize=DATABASE.promises)
 def face_promises(database: str, name: str, registered: str) -> dict[str, dict[str, Any]]:  # noqa: ARG001 - a new object of this name is another one
     """Return the promise of each face by its name; faces of which nothing is said are left out.
 
@@ -36,7 +36,7 @@ def face_promises(database: str, name: str, registered: str) -> dict[str, dict[s
              "--database", database, "--json"]  # fmt: skip
     try:
         done = subprocess.run(  # noqa: S603, our own command
-            words, capture_output=True, text=True, timeout=LAB.promise_s, check=False
+            words, capture_output=True, text=True, timeout=DATABASE.promise_s, check=False
         )
         told = json.loads(done.stdout)
     except (OSError, ValueError, subprocess.TimeoutExpired) as error:

@@ -1,38 +1,36 @@
 """Touch -> answer -> mosaic, in a thread of its own: the newest frame wins.
 
 A frame is read when `ReadTrigger` says so; its answer is published at once, then the first answered
-frame of a touch goes into the mosaic of its face. Thesis 4.3, 6.3.
+frame of a touch goes into the mosaic of its face (`face_mosaics`), the first one read into the
+scan (`scan_mode`). Loads of a calibration are no touches, nor what is left of the last of them.
+Thesis 4.3, 6.3.
 """
 
 from __future__ import annotations
 
 import threading
 import time
-from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.errors import EncodedObjectsError
-from probe.calibration import Calibration, calibrate_image
+from probe.calibration import Calibration
 from probe.errors import ProbeError
 from probe.frame import Frame
 from probe.sensor import SensorType
 from recognizer.bench.answers import answer_json
 from recognizer.bench.broker import Broker
-from recognizer.bench.message import MosaicMessage, mosaic_message
+from recognizer.bench.face_mosaics import FaceMosaics
 from recognizer.bench.read_trigger import Phase, ReadTrigger
-from recognizer.bench.settings import RECOGNITION
+from recognizer.bench.scan_mode import ScanMode
 from recognizer.bench.touch_log import TouchLog
-from recognizer.scan.mosaic.grow import add_touch
-from recognizer.scan.mosaic.mosaic import Mosaic, no_touches
-from recognizer.scan.mosaic.touch import PlacedTouch, decoded_place
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
-from recognizer.touch.recognition import Recognition
+from recognizer.touch.sensor_state import SensorState
 from recognizer.touch.signal import Signal, signal_of
 
 
@@ -44,10 +42,12 @@ class PendingFrame:
     calibration: Calibration | None
     received_ms: float
     load: bool = False  #: of a calibration: nothing that is to be read
+    recording: str = ""  #: that is replayed
+    at_s: float = 0.0  #: when in it
 
 
 class RecognitionThread:
-    """The thread. `offer`, `reload` and `clear` may be called from any other."""
+    """The thread. `offer`, `reload` and `use_state` may be called from any other."""
 
     def __init__(self, database: str, sensor: SensorType, broker: Broker) -> None:
         self.database, self.sensor = database, sensor
@@ -59,8 +59,11 @@ class RecognitionThread:
         self._watch = ReadTrigger()
         self.touches = TouchLog(broker)
         self._answers = 0
-        self._mosaics: OrderedDict[tuple[str, str], Mosaic] = OrderedDict()
-        self._grown = 0  #: touch that went into a mosaic last
+        self.mosaics = FaceMosaics(sensor, broker)
+        self.scan = ScanMode(sensor, broker)
+        self._grown = self._fused = 0  #: touches that went into a mosaic, into a scan, last
+        self._loaded = False  #: what is felt is still a load of a calibration
+        self._state: SensorState | None = None
         self._thread = threading.Thread(target=self._run, name="reading", daemon=True)
         self._thread.start()
 
@@ -70,19 +73,23 @@ class RecognitionThread:
             self._pending = pending
             self._news.notify()
 
+    def use_state(self, state: SensorState | None) -> None:
+        """Read by what was learned of the sensor from now on; None: by its type alone.
+
+        Raises
+        ------
+        SensorStateError
+            It is a state of another sensor.
+        """
+        if self.reader is not None:
+            self.reader = replace(self.reader, state=state)
+        self._state = state
+
     def reload(self) -> None:
         """Read the database again."""
         with self._news:
             self._reload = True
             self._news.notify()
-
-    def clear(self) -> None:
-        """Forget the mosaics."""
-        with self._news:
-            self._mosaics.clear()
-        image = no_touches(self.sensor).image
-        self._broker.publish("mosaic-of", {"object": None, "face": None, "touches": 0})
-        self._broker.publish("mosaic", mosaic_message(image, 0))
 
     def close(self) -> None:
         """End the thread."""
@@ -111,7 +118,7 @@ class RecognitionThread:
             return
         self._tell("preparing")
         try:
-            self.reader = Reader(open_lab(self.database), self.sensor)
+            self.reader = Reader(open_lab(self.database), self.sensor, state=self._state)
         except EncodedObjectsError as error:
             self.reader = None
             self._tell("off", cause=error.cause, fix=error.fix)
@@ -122,9 +129,10 @@ class RecognitionThread:
         self._broker.publish("reader", {"state": state, **more})
 
     def _look(self, pending: PendingFrame) -> None:
-        signal = _signal(pending, self.sensor)
+        signal = _signal(pending, self.reader, self.sensor)
         now_s = time.monotonic()
-        contact = signal.contact and not pending.load
+        self._loaded = pending.load or (self._loaded and signal.contact)
+        contact = signal.contact and not self._loaded
         phase = self._watch.phase(signal.forces, contact=contact, now_s=now_s)
         self._follow(phase, pending)
         if phase not in ("read", "again") or self.reader is None:
@@ -145,8 +153,13 @@ class RecognitionThread:
             },
             answered=bool(answer),
         )
-        if answer and self._grown != self.touches.newest:
-            self._grow(answer, signal)
+        number = self.touches.newest
+        if phase == "read" and self._fused != number:
+            self._fused = number
+            self.scan.add(self.reader, signal, number)
+        if answer and self._grown != number:
+            self._grown = number
+            self.mosaics.grow(answer, signal)
 
     def _follow(self, phase: Phase, pending: PendingFrame) -> None:
         """Begin, move and end records as the touch does."""
@@ -155,46 +168,15 @@ class RecognitionThread:
         elif phase == "moving":
             self.touches.move()
         elif phase in ("felt", "read") and not self.touches.is_new():
-            self.touches.begin(pending.frame, pending.received_ms)
-
-    def _grow(self, answer: Recognition, signal: Signal) -> None:
-        place = decoded_place(answer)
-        if place is None or answer.object is None or answer.face is None:
-            return
-        self._grown = self.touches.newest
-        key = (answer.object, answer.face)
-        with self._news:
-            mosaic = self._mosaics.get(key) or no_touches(self.sensor)
-        if len(mosaic) < RECOGNITION.touches:
-            mosaic = add_touch(mosaic, PlacedTouch(signal, decoded=place, seq=answer.seq))
-        with self._news:
-            self._mosaics[key] = mosaic
-            self._mosaics.move_to_end(key)
-            while len(self._mosaics) > RECOGNITION.faces:
-                self._mosaics.popitem(last=False)
-        self._broker.publish(
-            "mosaic-of",
-            {"object": key[0], "face": key[1], "touches": len(mosaic), "most": RECOGNITION.touches},
-        )
-        self._broker.publish("mosaic", self.picture(mosaic))
-
-    def mosaics(self, object_name: str) -> dict[str, Mosaic]:
-        """Return the mosaics of an object's faces."""
-        with self._news:
-            return {face: one for (held, face), one in self._mosaics.items() if held == object_name}
-
-    def picture(self, mosaic: Mosaic) -> MosaicMessage:
-        """Return a mosaic for the pages."""
-        return mosaic_message(mosaic.image, len(mosaic))
+            self.touches.begin(pending.frame, pending.received_ms, pending.recording, pending.at_s)
 
 
-def _signal(pending: PendingFrame, sensor: SensorType) -> Signal:
+def _signal(pending: PendingFrame, reader: Reader | None, sensor: SensorType) -> Signal:
+    """Return the signal as the reader has it; without a database the image alone."""
     counts: NDArray[np.float64] = pending.frame.counts.astype(np.float64)
-    if pending.calibration is None:
+    if reader is None:
         return signal_of(counts, sensor=sensor)
     try:
-        found = calibrate_image(counts, pending.calibration)
+        return reader.signal(counts, calibration=pending.calibration)
     except ProbeError:  # another sensor's readings: beyond the board's range
-        return signal_of(counts, sensor=sensor)
-    trust = 1.0 - found.bad.astype(np.float64)
-    return signal_of(found.values, trust=trust, floor=0.0, newtons=True, sensor=sensor)
+        return reader.signal(counts)

@@ -36,6 +36,7 @@ class ReplayFeed:
         t_ns, self.strength = _times_and_strengths(recording)
         pauses = np.clip(np.diff(t_ns, prepend=t_ns[:1]) * 1e-9, 0.0, REPLAY.jump_s)
         self._at_s = np.cumsum(pauses)
+        self.began_ns = int(t_ns[0]) if len(t_ns) else 0  #: time of the first frame
         self.seconds = float(self._at_s[-1]) if len(t_ns) else 0.0
         self._playing, self._speed = bool(len(t_ns)), 1.0
         self._place_s = 0.0

@@ -1,38 +1,37 @@
 """One probe and all that is done with it. Every page sees and works the same session.
 
+What is done with a calibration stands in `calibration_desk`, what is learned of the sensor in
+`sensor_desk`; both work on the session under its lock, `turn`.
+
 A thread takes the frames of the feed and hands them on (`frames`). Requests come from other
 threads, one at a time.
 """
 
 from __future__ import annotations
 
-import datetime
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.calibration import read_calibration
-from probe.circuit import Electronics
 from probe.frame import Frame
 from probe.port.url import address_of
 from probe.recording.read import Recording
 from probe.sensor import SensorType
 from recognizer.bench.broker import Broker
-from recognizer.bench.calibration_guide import CalibrationGuide, forces_given
+from recognizer.bench.calibration_desk import CalibrationDesk
 from recognizer.bench.calibration_state import CalibrationState
-from recognizer.bench.errors import BenchError, BusyError
+from recognizer.bench.errors import BusyError
 from recognizer.bench.feed import Feed, NoFeed, ProbeFeed
 from recognizer.bench.files import find_file, list_files
 from recognizer.bench.frames import FrameHandler
 from recognizer.bench.recognition_thread import RecognitionThread
 from recognizer.bench.replay import ReplayFeed
+from recognizer.bench.sensor_desk import STATE, SensorDesk
 from recognizer.bench.settings import SESSION
 from recognizer.bench.simulated import SCHEME, TouchProbe
 
@@ -59,13 +58,14 @@ class Session:
         self.recognition = RecognitionThread(database, sensor, broker)
         self.simulation: TouchProbe | None = None
         self._broker = broker
-        self._turn = threading.RLock()
-        self._feed: Feed = NoFeed()
+        self.turn = threading.RLock()
+        self.feed: Feed = NoFeed()
         self._url = ""
-        self._frames = FrameHandler(sensor, broker, self.recognition, self._note)
+        self.frames = FrameHandler(sensor, broker, self.recognition, self.note)
         self._notices: deque[tuple[int, float, str]] = deque(maxlen=SESSION.notices)
         self._noted = 0
         self._started_ms = time.time() * 1e3
+        self.calibrations, self.desk = CalibrationDesk(self), SensorDesk(self)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="bench", daemon=True)
         self._thread.start()
@@ -74,7 +74,7 @@ class Session:
         """End everything in order; a recording is complete."""
         self._stop.set()
         self._thread.join()
-        with self._turn:
+        with self.turn:
             self._leave()
         self.recognition.close()
 
@@ -88,21 +88,22 @@ class Session:
         BenchError, PortError, RecordingError, SensorTypeError
             When the URL cannot be read, names no recording, or one of another sensor type.
         """
-        with self._turn:
+        with self.turn:
             self._leave()
             if url.startswith(SCHEME):
                 self.simulation = TouchProbe(url, self.database, self.sensor)
-                self._feed = ProbeFeed(self.simulation.url, sensor)
+                self.feed = ProbeFeed(self.simulation.url, sensor)
             elif url.startswith("file:"):
                 target = address_of(url).target
                 recording = Recording(target)
                 recording.sensor_type(self.sensor)  # of another shape: refused
-                self._feed = ReplayFeed(url, recording)
+                self.feed = feed = ReplayFeed(url, recording)
+                self.frames.replayed = (Path(target).name, feed.began_ns)
             elif url:
                 address_of(url)
-                self._feed = ProbeFeed(url, sensor)
+                self.feed = ProbeFeed(url, sensor)
             self._url = url
-            self._report()
+            self.report()
 
     def replay(self, name: str) -> None:
         """Play a recording of the folder."""
@@ -117,19 +118,19 @@ class Session:
         BusyError
             When none is.
         """
-        feed = self._feed
+        feed = self.feed
         if not isinstance(feed, ReplayFeed):
             raise BusyError("no recording is played", fix="choose a recording first")
         return feed
 
     def select(self, sensor: int) -> None:
         """Read another sensor of the board."""
-        with self._turn:
-            if not isinstance(self._feed, ProbeFeed):
+        with self.turn:
+            if not isinstance(self.feed, ProbeFeed):
                 raise BusyError("no probe is connected", fix="choose a port first")
-            self._feed.select(sensor)
-            self._frames.state = CalibrationState()
-            self._report()
+            self.feed.select(sensor)
+            self.frames.state = CalibrationState()
+            self.report()
 
     def simulated(self) -> TouchProbe:
         """Return the simulated probe.
@@ -148,11 +149,11 @@ class Session:
 
     def use_database(self, database: str) -> None:
         """Read the objects of a database from now on."""
-        with self._turn:
+        with self.turn:
             self.database = self.recognition.database = database
             self.recognition.reload()
-            self._note(f"objects are those of {database}")
-            self._report()
+            self.note(f"objects are those of {database}")
+            self.report()
 
     def touch_next(self) -> None:
         """Let the simulated probe make the step that the newest answer proposes.
@@ -169,12 +170,6 @@ class Session:
             proposed["dx_mm"], proposed["dy_mm"], proposed["turn_deg"], proposed["force_n"]
         )
 
-    def bias(self, *, on: bool) -> None:
-        """Take the bias of the unloaded sensor, or do without it."""
-        with self._turn:
-            self._note(self._frames.state.switch_bias(on=on))
-            self._report()
-
     def record(self, *, on: bool) -> None:
         """Start or end a recording.
 
@@ -183,70 +178,14 @@ class Session:
         BusyError, RecordingError
             When there is nothing to record, or no place for it.
         """
-        with self._turn:
+        with self.turn:
             if not on:
-                self._frames.end_recording()
-            elif not isinstance(self._feed, ProbeFeed):
+                self.frames.end_recording()
+            elif not isinstance(self.feed, ProbeFeed):
                 raise BusyError("no probe is connected", fix="choose a port first")
             else:
-                self._frames.start_recording(self.folder, self.sensor_name(), self._url)
-            self._report()
-
-    def calibrate(self, forces_n: list[float], seconds: float, *, simulated_board: bool) -> None:
-        """Begin a calibration."""
-        low, high = SESSION.calibration_s
-        if not low <= seconds <= high:
-            raise BenchError(f"{seconds:g} s for a load", fix=f"give {low:g} to {high:g} s")
-        now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
-        board = Electronics() if simulated_board else None
-        with self._turn:
-            if not isinstance(self._feed, ProbeFeed):
-                raise BusyError("no probe is connected", fix="choose a port first")
-            forces = forces_given(forces_n)
-            self._frames.guide = CalibrationGuide(self.sensor_name(), forces, seconds, board, now)
-            self._report()
-
-    @contextmanager
-    def guide(self) -> Iterator[CalibrationGuide]:
-        """Work on the calibration that is being made.
-
-        Raises
-        ------
-        BusyError
-            When none is.
-        """
-        with self._turn:
-            if self._frames.guide is None:
-                raise BusyError("no calibration is being made", fix="begin one first")
-            yield self._frames.guide
-            self._report()
-
-    def finish_calibration(self) -> dict[str, Any]:
-        """Fit the laws, write and use them; returns what they say of the sensor."""
-        with self.guide() as guide:
-            return self._frames.finish_calibration(guide, self.folder)
-
-    def cancel_calibration(self) -> None:
-        """Forget the calibration that is being made."""
-        with self._turn:
-            self._frames.guide = None
-            self._report()
-
-    def use_calibration(self, name: str) -> None:
-        """Read newtons by a calibration of the folder; counts if the name is empty.
-
-        Raises
-        ------
-        CalibrationError
-            When it is none, or another sensor's.
-        """
-        with self._turn:
-            found = None
-            if name:
-                path = find_file(self.folder, name, ".json")
-                found = read_calibration(path, sensor=self.sensor_name() or None)
-            self._note(self._frames.state.use(found, name))
-            self._report()
+                self.frames.start_recording(self.folder, self.sensor_name(), self._url)
+            self.report()
 
     def newest(self) -> tuple[Frame, Array, str]:
         """Return the newest frame, what is shown of it, and its unit.
@@ -256,19 +195,22 @@ class Session:
         BusyError
             When none came yet.
         """
-        with self._turn:
-            return self._frames.newest()
+        with self.turn:
+            return self.frames.newest()
 
     def as_json(self) -> dict[str, Any]:
         """Return the state for the page."""
-        with self._turn:
+        with self.turn:
             return {
                 "port": self._url,
-                "feed": self._feed.as_json(),
+                "feed": self.feed.as_json(),
                 "simulated": self.simulation is not None,
-                **self._frames.as_json(),
+                **self.frames.as_json(),
                 "recordings": list_files(self.folder, ".h5"),
-                "calibrations": list_files(self.folder, ".json"),
+                "calibrations": [
+                    name for name in list_files(self.folder, ".json") if not name.endswith(STATE)
+                ],
+                **self.desk.as_json(),
                 "notices": [
                     {"number": n, "at_ms": at_ms, "text": text} for n, at_ms, text in self._notices
                 ],
@@ -281,25 +223,25 @@ class Session:
     def _run(self) -> None:
         due_s, wanted_s = 0.0, time.monotonic()
         while not self._stop.is_set():
-            feed = self._feed
+            feed = self.feed
             frames = feed.take(SESSION.wait_s)
             now_s = time.monotonic()
-            with self._turn:
-                if self._broker.subscribers or self._frames.busy:
+            with self.turn:
+                if self._broker.subscribers or self.frames.busy:
                     wanted_s = now_s
                 feed.rest(wanted=now_s - wanted_s < SESSION.idle_s)
-                if feed is self._feed:
-                    self._frames.take(frames)
+                if feed is self.feed:
+                    self.frames.take(frames)
                     for notice in feed.notices():
-                        self._note(notice)
+                        self.note(notice)
                 if now_s >= due_s:
                     due_s = now_s + SESSION.status_s
-                    self._report()
+                    self.report()
 
     def _leave(self) -> None:
         """Let go of what is connected."""
-        self._frames.leave()
-        feed, self._feed = self._feed, NoFeed()
+        self.frames.leave()
+        feed, self.feed = self.feed, NoFeed()
         feed.close()
         if self.simulation is not None:
             self.simulation.close()
@@ -308,15 +250,17 @@ class Session:
 
     def sensor_name(self) -> str:
         """Return device and sensor, as recordings name them; empty where nothing is connected."""
-        feed = self._feed.as_json()
-        if isinstance(self._feed, ReplayFeed):
+        feed = self.feed.as_json()
+        if isinstance(self.feed, ReplayFeed):
             return str(feed["device"])
         device = feed.get("device", "")
         return f"{device}/{feed['sensor']}" if device else ""
 
-    def _note(self, text: str) -> None:
+    def note(self, text: str) -> None:
+        """Let the pages know what happened."""
         self._noted += 1
         self._notices.append((self._noted, time.time() * 1e3, text))
 
-    def _report(self) -> None:
+    def report(self) -> None:
+        """Tell the pages the state as it is now."""
         self._broker.publish("status", self.as_json())

@@ -29,6 +29,30 @@ class RecognitionSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class ScanModeSettings:
+    """What is told of a belief."""
+
+    told: int = 4  #: likeliest places of a step
+    kept: int = 60  #: newest steps
+
+
+@dataclass(frozen=True, slots=True)
+class SensorDeskSettings:
+    """How much is learned from."""
+
+    most: int = 200  #: newest touches; `recognize-object --learn` takes as many of a recording
+
+
+@dataclass(frozen=True, slots=True)
+class UploadSettings:
+    """Recordings that are sent in; how long one may be stands in `guard.AccessRules`."""
+
+    at_once: int = 2
+    silent_s: float = 15.0  #: without a byte of one that comes it is given up
+    quota: int = 2 * 1024**3  #: bytes of all recordings in the folder; beyond, none is taken
+
+
+@dataclass(frozen=True, slots=True)
 class SessionSettings:
     """How often the session looks about."""
 
@@ -89,7 +113,7 @@ class ExampleSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class LabSettings:
+class DatabaseSettings:
     """How the page reads the database."""
 
     wait_s: float = 2.0  #: for others to end; then the page is told who keeps it waiting
@@ -118,6 +142,7 @@ class TouchLogSettings:
 
 
 TRIGGER, RECOGNITION, SESSION = TriggerSettings(), RecognitionSettings(), SessionSettings()
-TOUCHES = TouchLogSettings()
+TOUCHES, SCAN, DESK = TouchLogSettings(), ScanModeSettings(), SensorDeskSettings()
 GUIDE, REPLAY, PRESS = GuideSettings(), ReplaySettings(), PressSettings()
-LINE, PAGE, EXAMPLE, LAB = LineSettings(), PageSettings(), ExampleSettings(), LabSettings()
+LINE, PAGE, UPLOAD = LineSettings(), PageSettings(), UploadSettings()
+EXAMPLE, DATABASE = ExampleSettings(), DatabaseSettings()

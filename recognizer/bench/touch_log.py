@@ -38,6 +38,8 @@ class TouchRecord:
     moving: bool = False  #: what is felt now is not what was read
     answer: dict[str, Any] | None = None
     name: str = ""
+    recording: str = ""  #: that is replayed; empty: it was felt just now
+    at_s: float = 0.0  #: when in the recording
 
     def as_json(self) -> dict[str, Any]:
         """Return all but the image, for the page."""
@@ -50,6 +52,8 @@ class TouchRecord:
             "moving": self.moving,
             "answer": self.answer,
             "name": self.name,
+            "recording": self.recording,
+            "at_s": round(self.at_s, 3),
         }
 
     def image_json(self) -> dict[str, Any]:
@@ -77,11 +81,11 @@ class TouchLog:
             held = self._records.get(self._number)
             return held is not None and held.contact and held.state == "felt"
 
-    def begin(self, frame: Frame, felt_ms: float) -> None:
-        """Begin a touch: its record knows nothing yet."""
+    def begin(self, frame: Frame, felt_ms: float, recording: str = "", at_s: float = 0.0) -> None:
+        """Begin a touch, of a recording if one is named: its record knows nothing yet."""
         with self._turn:
             self._number += 1
-            self._put(TouchRecord(self._number, felt_ms, frame))
+            self._put(TouchRecord(self._number, felt_ms, frame, recording=recording, at_s=at_s))
             while len(self._records) > TOUCHES.kept:
                 self._records.popitem(last=False)
 
@@ -161,10 +165,22 @@ class TouchLog:
             del self._records[number]
             self._tell_change()
 
-    def frames(self) -> list[Frame]:
-        """Return the frames that were read, oldest first."""
+    def frame(self, number: int) -> Frame:
+        """Return the frame of a touch that was read.
+
+        Raises
+        ------
+        UnknownError
+            There is none of this number.
+        """
         with self._turn:
-            return [one.frame for one in self._records.values() if one.state != "felt"]
+            return self._known(number).frame
+
+    def frames(self, after: int = 0) -> list[Frame]:
+        """Return the frames that were read of touches after a number, oldest first."""
+        with self._turn:
+            read = [one for one in self._records.values() if one.state != "felt"]
+            return [one.frame for one in read if one.number > after]
 
     def as_csv(self) -> str:
         """Return a line for each touch."""

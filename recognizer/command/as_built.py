@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,9 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from encoded_objects.console.progress import ProgressBar
-    from generator.database.as_built import AsBuilt
     from recognizer.as_built.estimate import FeltPrint
-    from recognizer.as_built.verdict import PrintVerdict
     from recognizer.touch.contacts import TouchImage
 
 HELP = """Say how a part came out of the printer: its scale both ways, skew, and stroke width.
@@ -72,9 +70,16 @@ def as_built(
 
     def action() -> int:
         from encoded_objects.console.output import message, write, write_json
+        from recognizer.as_built.parts import estimate_parts
+        from recognizer.as_built.words import (
+            as_built_entry,
+            as_built_numbers,
+            as_built_sentences,
+            as_built_sizes,
+        )
 
         felt = _feel(recording, database, sensor_type, overlay, calibration)
-        prints, too_few = _estimate(felt, database, material)
+        prints, too_few = estimate_parts(felt, database, material)
         for words in too_few:
             message(words)
         printer = None
@@ -83,16 +88,16 @@ def as_built(
 
             printer = keep_prints(database, [found for found, _ in prints])
         if as_json:
-            parts = [_entry(found, verdict) for found, verdict in prints]
-            told = None if printer is None else _numbers(printer)
+            parts = [as_built_entry(found, verdict) for found, verdict in prints]
+            told = None if printer is None else as_built_numbers(printer)
             write_json({"object": felt[0].object, "parts": parts, "stored": store, "printer": told})
             return 0
         for found, verdict in prints:
-            write(_sentences(found, verdict))
+            write(as_built_sentences(found, verdict))
         if printer is not None:
             name = " ".join(filter(None, (printer.printer or "its printer", printer.material)))
             message(f"kept in {database}; parts of {name} that are not known by touches of their "
-                    f"own: {_sizes(printer)}")  # fmt: skip
+                    f"own: {as_built_sizes(printer)}")  # fmt: skip
         return 0
 
     return action
@@ -126,73 +131,3 @@ def _show_count(touches: Iterator[TouchImage], bar: ProgressBar) -> Iterator[Tou
     for number, touch in enumerate(touches, start=1):
         yield touch
         bar.show(touch.seq + touch.frames, f"{number:,} touches")
-
-
-def _estimate(
-    felt: tuple[FeltPrint, ...], database: str, material: str
-) -> tuple[list[tuple[AsBuilt, PrintVerdict]], list[str]]:
-    """Return every part that was touched often enough, and words on those that were not."""
-    from generator.database.open import open_database
-    from generator.database.read import read_object
-    from generator.database.transaction import read_transaction
-    from recognizer.as_built.estimate import estimate_print
-    from recognizer.as_built.settings import ESTIMATE
-    from recognizer.as_built.verdict import judge_print
-    from recognizer.touch.lab import printer_of
-
-    with read_transaction(open_database(database, writable=False)) as connection:
-        held = read_object(connection, felt[0].object)
-    parts: dict[str, list[FeltPrint]] = {}
-    for one in felt:
-        parts.setdefault(one.part, []).append(one)
-    told, few = [], []
-    most = max(parts.values(), key=len)
-    for name, touches in parts.items():
-        if len(touches) < ESTIMATE.least and touches is not most:
-            few.append(f"{name}: {len(touches)} touches are too few")
-            continue
-        found = estimate_print(
-            touches, object_id=held.entry.object_id, printer=printer_of(held), material=material
-        )
-        told.append((found, judge_print(found, held.style.stroke_mm)))
-    return told, few
-
-
-def _numbers(found: AsBuilt) -> dict[str, Any]:
-    """Return the numbers of a print as JSON has them."""
-    from math import degrees, sqrt
-
-    spread = [sqrt(float(found.covariance[k, k])) for k in range(4)]
-    return {
-        "printer": found.printer,
-        "material": found.material,
-        "touches": found.touches,
-        "scale_x": found.scale_x,
-        "scale_y": found.scale_y,
-        "skew_deg": degrees(found.skew_rad),
-        "stroke_mm": found.stroke_mm,
-        "deviation": {
-            "scale_x": spread[0], "scale_y": spread[1], "skew_deg": degrees(spread[2]),
-            "stroke_mm": spread[3],
-        },
-        "covariance": found.covariance,
-    }  # fmt: skip
-
-
-def _entry(found: AsBuilt, verdict: PrintVerdict) -> dict[str, Any]:
-    return {"part": found.part, "verdict": verdict.kind, "words": verdict.words} | _numbers(found)
-
-
-def _sentences(found: AsBuilt, verdict: PrintVerdict) -> str:
-    return f"{found.part}: {verdict.words}\n  {_sizes(found)}; {found.touches} touches"
-
-
-def _sizes(found: AsBuilt) -> str:
-    told = _numbers(found)
-    by = told["deviation"]
-    return (
-        f"scale X {found.scale_x:.4f} +- {by['scale_x']:.4f}, "
-        f"Y {found.scale_y:.4f} +- {by['scale_y']:.4f}, "
-        f"skew {told['skew_deg']:.2f} +- {by['skew_deg']:.2f} degrees, "
-        f"strokes {found.stroke_mm:.2f} +- {by['stroke_mm']:.2f} mm"
-    )

@@ -33,6 +33,16 @@ from recognizer.touch.signal import Signal
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True, slots=True)
+class PlaceShare:
+    """A place that touches may have felt, and the share of the belief that it has."""
+
+    object: str
+    face: str
+    index: tuple[int, int]  #: row and column of the array's cell under the sensor's centre
+    share: float  #: 0 ... 1, as if one of the places that come into question is the right one
+
+
 class Scan:
     """Several touches of one object, read as one belief.
 
@@ -75,6 +85,17 @@ class Scan:
         A later touch that cannot be read does not take it back; one that contradicts it does.
         """
         return self._answer
+
+    @property
+    def places(self) -> tuple[PlaceShare, ...]:
+        """Places of the face touched last that come into question, likeliest first; shares of 1."""
+        found = self._faces[-1].belief.places
+        scores = np.array([one.score for one in found])
+        shares = np.exp(scores - scores.max()) if len(found) else scores
+        return tuple(
+            PlaceShare(*one.face, one.index, share)
+            for one, share in zip(found, (shares / shares.sum()).tolist(), strict=True)
+        )
 
     @property
     def touches(self) -> int:

@@ -54,6 +54,22 @@ class FoundMounting:
         )
 
 
+def simplify_turns(wiring: Wiring, shape: tuple[int, int]) -> Wiring:
+    """Return the one of the eight ways that does the same; the wiring itself if none does.
+
+    Examples
+    --------
+    >>> simplify_turns(Wiring(("quarter",) * 5), (16, 16)).changes
+    ('quarter',)
+    """
+    image = np.arange(shape[0] * shape[1]).reshape(shape)
+    wanted = wiring.apply(image, 0)
+    for way in WAYS if shape[0] == shape[1] else WAYS[:4]:
+        if np.array_equal(Wiring(way).apply(image, 0), wanted):
+            return Wiring(way)
+    return wiring
+
+
 def find_mounting(
     reader: Reader,
     image: ArrayLike,

@@ -79,6 +79,16 @@ class Wiring:
             )
         return np.ascontiguousarray(found)
 
+    def check(self, shape: tuple[int, int]) -> None:
+        """Refuse changes under which an image (rows, columns) would have another shape.
+
+        Raises
+        ------
+        WiringError
+            It would.
+        """
+        self.apply(np.zeros(shape), 0)
+
     def frame(self, frame: Frame, full: int) -> Frame:
         """Return a frame as the sensor has it."""
         if not self.changes:

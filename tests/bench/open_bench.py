@@ -1,7 +1,7 @@
 """Figures of `open-bench`: rates, latency, CPU, memory, many pages, touch to answer.
 
     python tests/bench/open_bench.py --database lab.db
-    python tests/bench/open_bench.py --database lab.db --rates --touches 0 --pages 0 --soak 600
+    python tests/bench/open_bench.py --database lab.db --rates --touches 0 --pages --soak 600
 
 Server, browser (software drawing) and the simulated probe share the machine; CPU is that of the
 server's process, in percent of one core, without the browser. The database needs an object.
@@ -14,6 +14,7 @@ import asyncio
 import json
 import os
 import random
+import socket
 import statistics
 import subprocess
 import sys
@@ -133,11 +134,39 @@ def many(database, pages, seconds):
         return await asyncio.gather(*(listen(address, seconds) for _ in range(pages)))
 
     with served(database, "--port", "touch:?rate=100") as (address, pid):
+        time.sleep(0 if pages else 8)  # until the port is let go
         cpu, began = cpu_s(pid), time.monotonic()
-        got = asyncio.run(all_of_them(address))
+        got = asyncio.run(all_of_them(address)) if pages else [0.0]
+        time.sleep(0 if pages else seconds)
         used = 100 * (cpu_s(pid) - cpu) / (time.monotonic() - began)
         print(f"{pages} pages at 100 Hz: {min(got):.0f} ... {max(got):.0f} frames/s each, "
-              f"server CPU {used:.0f} %, memory {memory_mb(pid):.0f} MB")  # fmt: skip
+              f"server CPU {used:.1f} %, memory {memory_mb(pid):.0f} MB")  # fmt: skip
+
+
+def never_read(database, pages, seconds):
+    """Print what pages cost that never read, and what one that reads gets meanwhile."""
+    with served(database, "--port", "touch:?rate=100") as (address, pid):
+        host = address.split("/")[2]
+        name, port = host.split(":")
+        deaf = []
+        for _ in range(pages):
+            line = socket.create_connection((name, int(port)))
+            line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            line.sendall(
+                f"GET /live HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\n"
+                "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+                "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n".encode()
+            )
+            deaf.append(line)
+        before, cpu, began = memory_mb(pid), cpu_s(pid), time.monotonic()
+        got = asyncio.run(listen(address, seconds))
+        used = 100 * (cpu_s(pid) - cpu) / (time.monotonic() - began)
+        print(
+            f"{pages} pages that never read, 100 Hz: one that reads gets {got:.0f} frames/s, "
+            f"server CPU {used:.1f} %, memory {before:.0f} to {memory_mb(pid):.0f} MB"
+        )
+        for line in deaf:
+            line.close()
 
 
 def soak(database, seconds):
@@ -167,7 +196,7 @@ def soak(database, seconds):
         cpu, began = cpu_s(pid), time.monotonic()
         asyncio.run(one(address))
         used = 100 * (cpu_s(pid) - cpu) / (time.monotonic() - began)
-        print(f"{seconds:.0f} s of touches at 100 Hz: server CPU {used:.0f} %, "
+        print(f"{seconds:.0f} s of touches at 100 Hz: server CPU {used:.1f} %, "
               f"memory {memory_mb(pid):.0f} MB")  # fmt: skip
 
 
@@ -177,7 +206,8 @@ def main():
     asked.add_argument("--seconds", type=float, default=15.0)
     asked.add_argument("--rates", type=float, nargs="*", default=[50, 100, 200])
     asked.add_argument("--touches", type=int, default=20)
-    asked.add_argument("--pages", type=int, default=20)
+    asked.add_argument("--pages", type=int, nargs="*", default=[0, 1, 20])
+    asked.add_argument("--deaf", type=int, default=63, help="pages that never read")
     asked.add_argument("--browser", default="/usr/bin/chromium")
     asked.add_argument("--soak", type=float, default=0.0, metavar="SECONDS")
     given = asked.parse_args()
@@ -191,8 +221,10 @@ def main():
         browser.close()
     if given.soak:
         soak(given.database, given.soak)
-    if given.pages:
-        many(given.database, given.pages, min(given.seconds, 15.0))
+    for pages in given.pages:
+        many(given.database, pages, min(given.seconds, 15.0))
+    if given.deaf:
+        never_read(given.database, given.deaf, given.seconds)
 
 
 if __name__ == "__main__":

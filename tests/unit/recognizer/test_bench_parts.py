@@ -7,6 +7,7 @@ import hashlib
 import json
 import struct
 import time
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
@@ -29,15 +30,15 @@ from recognizer.bench.files import (
     find_file,
     list_files,
     part_to_send,
-    store_recording,
 )
 from recognizer.bench.images import FILTERS, filter_image
 from recognizer.bench.message import FrameMessage, mosaic_message
 from recognizer.bench.read_trigger import ReadTrigger
 from recognizer.bench.replay import ReplayFeed
-from recognizer.bench.settings import TRIGGER, TouchLogSettings
+from recognizer.bench.settings import TRIGGER, TouchLogSettings, UploadSettings
 from recognizer.bench.simulated import parse_simulation
 from recognizer.bench.touch_log import TouchLog
+from recognizer.bench.uploads import Uploads, folder_bytes
 from recognizer.scan.mosaic.image import GlobalImage
 
 
@@ -78,16 +79,56 @@ def test_files_of_the_folder_and_no_others(tmp_path):
     assert list_files(tmp_path / "nowhere", ".h5") == []
 
 
+async def pieces(content, size=700):
+    for start in range(0, len(content), size):
+        yield content[start : start + size]
+
+
+def taken_in(uploads, name, content):
+    return asyncio.run(uploads.take(name, pieces(content)))
+
+
 def test_a_recording_that_is_sent_in_is_kept_only_if_it_is_one(tmp_path):
     content = recorded(tmp_path / "mine.h5", [0, 9]).read_bytes()
-    folder = tmp_path / "kept"
-    assert store_recording(folder, "a.h5", content) == 2
+    uploads = Uploads(tmp_path / "kept")
+    assert taken_in(uploads, "a.h5", content) == 2
     with pytest.raises(BenchError, match="already"):
-        store_recording(folder, "a.h5", content)
+        taken_in(uploads, "a.h5", content)
     for bad in (b"", b"no recording", content[:-900]):
         with pytest.raises(RecordingError):
-            store_recording(folder, "b.h5", bad)
-    assert [path.name for path in folder.iterdir()] == ["a.h5"]
+            taken_in(uploads, "b.h5", bad)
+    assert [path.name for path in (tmp_path / "kept").iterdir()] == ["a.h5"]
+    assert (tmp_path / "kept" / "a.h5").read_bytes() == content
+
+
+def test_recordings_that_are_sent_in_have_a_quota_a_number_and_a_time(tmp_path, monkeypatch):
+    content = recorded(tmp_path / "mine.h5", [0, 9]).read_bytes()
+    kept = tmp_path / "kept"
+    taken_in(Uploads(kept), "a.h5", content)
+    assert folder_bytes(kept) == len(content)
+    room = UploadSettings(at_once=1, silent_s=0.05, quota=2 * len(content) - 1)
+    monkeypatch.setattr("recognizer.bench.uploads.UPLOAD", room)
+    with pytest.raises(BenchError, match="GB already"):
+        taken_in(Uploads(kept), "b.h5", content)
+
+    async def stuck():
+        yield content[:500]
+        await asyncio.sleep(60)
+        yield b""
+
+    async def two_at_once():
+        uploads = Uploads(kept)
+        first = asyncio.create_task(uploads.take("c.h5", stuck()))
+        await asyncio.sleep(0)
+        with pytest.raises(BusyError):
+            await uploads.take("d.h5", pieces(content))
+        with pytest.raises(BenchError, match="nothing came"):
+            await first
+        monkeypatch.setattr("recognizer.bench.uploads.UPLOAD", replace(room, quota=10**9))
+        return await uploads.take("d.h5", pieces(content))
+
+    assert asyncio.run(two_at_once()) == 2
+    assert sorted(path.name for path in kept.iterdir()) == ["a.h5", "d.h5"]
 
 
 def test_parts_are_sent_from_their_folder_alone(tmp_path):

@@ -1,5 +1,6 @@
 /** One touch in words: what it is doing, object and face, margin, pose, or why there is no answer. */
 
+import { timeOf } from "./clock";
 import { element, say } from "./dom";
 import type { Answer, TouchRecord } from "./types";
 
@@ -95,7 +96,12 @@ export class AnswerPanel {
 function heading(record: TouchRecord, past: boolean): string {
   const now = past ? "seen again" : !record.contact ? "lifted" : record.moving ? "moving" : "";
   const name = record.name ? `“${record.name}”` : "";
-  return [`touch ${record.number}`, name, new Date(record.felt_ms).toLocaleTimeString("en-GB"), now].filter(Boolean).join(" · ");
+  return [`touch ${record.number}`, name, when(record), now].filter(Boolean).join(" · ");
+}
+
+/** When a touch was made: by the clock, or in the recording that it is of. */
+export function when(record: TouchRecord): string {
+  return record.recording ? `${record.recording} at ${record.at_s.toFixed(2)} s` : timeOf(record.felt_ms);
 }
 
 /** A step in the sensor's frame, in words. */

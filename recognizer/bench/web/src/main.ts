@@ -2,6 +2,8 @@
 
 import { get, post } from "./api";
 import { AnswerPanel } from "./answer";
+import { type Bench, MountingCheck, PrintCheck } from "./checks";
+import { setClock, since as sinceServer } from "./clock";
 import { choices, element, isDark, say } from "./dom";
 import { Gallery } from "./gallery";
 import { GuideDialog } from "./guide";
@@ -9,10 +11,13 @@ import { Heat } from "./heat";
 import { Live } from "./live";
 import { MapPanel } from "./map";
 import { MosaicPanel } from "./mosaic";
+import { Panes } from "./panes";
 import { Part, type Place } from "./part";
 import { Replay } from "./replay";
+import { ScanPanel } from "./scan";
 import { Surface } from "./surface";
 import { Tint } from "./tint";
+import { Tour } from "./tour";
 import { Touches } from "./touches";
 import type { ArrayMap, BenchInfo, Encoding, Frame, ObjectEntry, ObjectShape, ReaderState, Told, TouchRecord } from "./types";
 import { Work } from "./work";
@@ -33,6 +38,10 @@ async function begin(): Promise<void> {
   const map = new MapPanel((name) => look(name));
   const touches = new Touches((one, past) => void take(one, past));
   const tint = new Tint(part, sensor, () => touches.all);
+  const scan = new ScanPanel(), bench: Bench = { shape: () => part.shape, touches: () => touches.all, press };
+  const mounting = new MountingCheck(bench), prints = new PrintCheck(bench);
+  new Tour();
+  new Panes();
   let newest: Frame | null = null, painting = false, simulated = false, past = false, asked = "";
   let record: TouchRecord | null = null, clicked: number | null = null, painted = 0, read = 0, started = 0, ready = false;
 
@@ -54,6 +63,7 @@ async function begin(): Promise<void> {
     connected: (there) => {
       for (const id of ["touch", "work-body"]) element(id).inert = !there;
       document.body.dataset["line"] = there ? "there" : "gone";
+      if (there) void setClock().catch(() => undefined);
       if (there) void touches.load().then(() => { ready = true; }).catch(() => undefined);
       else work.gone();
     },
@@ -65,7 +75,7 @@ async function begin(): Promise<void> {
     heat.paint(newest);
     surface.paint(newest, heat.top);
     figures.paints++;
-    keep(figures.latency_ms, performance.timeOrigin + performance.now() - newest.received_ms);
+    keep(figures.latency_ms, sinceServer(newest.received_ms));
     if (performance.now() - painted > 1000) {
       painted = performance.now();
       const last = figures.latency_ms.slice(-60).sort((a, b) => a - b);
@@ -79,11 +89,18 @@ async function begin(): Promise<void> {
       started = topic.started_ms;
       simulated = topic.simulated;
       work.tell(topic);
+      work.learnable(touches.all.filter((one) => one.answer).length);
       guide.tell(topic);
+      mounting.status(topic);
+      prints.status(topic);
       replay.tell(topic);
       element("touch").querySelector("button")!.disabled = !simulated;
       element("next-go").hidden = !simulated;
-    } else if (topic.topic === "touch") touches.tell(topic);
+    } else if (topic.topic === "touch") {
+      touches.tell(topic);
+      mounting.tell(topic);
+      prints.tell();
+    } else if (topic.topic === "scan") scan.tell(topic);
     else if (topic.topic === "touches") void touches.load().then(() => tint.touched()).catch(() => undefined);
     else if (topic.topic === "mosaic-of") mosaic.told(topic);
     else void reader(topic).catch(() => undefined);
@@ -141,12 +158,15 @@ async function begin(): Promise<void> {
   async function touch(place: Place): Promise<void> {
     element<HTMLSelectElement>("touch-face").value = place.face;
     for (const [id, value] of [["touch-x", place.x_mm], ["touch-y", place.y_mm]] as const) element<HTMLInputElement>(id).value = value.toFixed(1);
+    const number = (id: string): number => Number(element<HTMLInputElement>(id).value);
+    await press(place.face, place.x_mm, place.y_mm, number("touch-theta"), number("touch-force"));
+  }
+
+  /** Let the simulated probe come down on the object that is shown. */
+  async function press(face: string, x_mm: number, y_mm: number, theta_deg: number, force_n: number): Promise<void> {
     touches.live();
     clicked = performance.now();
-    await post("touch", {
-      object: part.shape?.name ?? "", ...place,
-      theta_deg: Number(element<HTMLInputElement>("touch-theta").value), force_n: Number(element<HTMLInputElement>("touch-force").value),
-    });
+    await post("touch", { object: part.shape?.name ?? "", face, x_mm, y_mm, theta_deg, force_n });
   }
 
   function look(name: string): void {

@@ -1,6 +1,7 @@
 /** The time line of touches: every touch an event to go back to, name, compare, delete or export. */
 
 import { get, post, remove } from "./api";
+import { when } from "./answer";
 import { element, say } from "./dom";
 import type { TouchRecord } from "./types";
 
@@ -72,7 +73,7 @@ export class Touches {
     const { answer } = record;
     const what = record.state === "answered" ? `${answer!.object} ${answer!.face}` : record.state === "refused" ? answer!.reason : "…";
     say(button, `${record.number}  ${record.name || what}`);
-    button.title = `${new Date(record.felt_ms).toLocaleTimeString("en-GB")}  ${what}`;
+    button.title = `${when(record)}  ${what}`;
   }
 
   private drop(number: number): void {

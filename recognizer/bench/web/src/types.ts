@@ -33,6 +33,7 @@ export interface Status {
   guide: GuideStep | null;
   recordings: string[]; calibrations: string[];
   notices: { number: number; at_ms: number; text: string }[];
+  flip: string; learning: number | null; learned: { name: string; words: string } | null; states: string[]; least: number;
   pages: number;
   started_ms: number; // another one: the server was started anew
 }
@@ -59,12 +60,21 @@ export interface TouchRecord {
   state: "felt" | "reading" | "answered" | "refused";
   contact: boolean; moving: boolean; answer: Answer | null; name: string;
   dropped?: boolean;
+  recording: string; at_s: number; // of a replay: its file, and when in it
 }
 
 export interface MosaicOf { topic: "mosaic-of"; object: string | null; face: string | null; touches: number }
 export interface ReaderState { topic: "reader"; state: "preparing" | "ready" | "off"; cause?: string; fix?: string }
+/** What touches since the scan began say together; a step each. */
+export interface ScanTold {
+  topic: "scan"; on: boolean; touches: number; changes: number; answer: Answer | null;
+  steps: {
+    touch: number; places: number | null; answered: boolean; doubt: number | null;
+    likeliest: { object: string; face: string; index: [number, number]; share: number }[];
+  }[];
+}
 export interface TouchesChanged { topic: "touches"; changes: number }
-export type Told = Status | TouchRecord | TouchesChanged | MosaicOf | ReaderState;
+export type Told = Status | TouchRecord | TouchesChanged | ScanTold | MosaicOf | ReaderState;
 
 export interface Frame {
   newtons: boolean; filter: number; seq: number; time_s: number; received_ms: number;

@@ -1,6 +1,7 @@
 /** Port, sensor, recording, bias, calibration in use; the probe's state and what happened. */
 
 import { get, post, send, silence } from "./api";
+import { timeOf } from "./clock";
 import { choices, element, say, showError } from "./dom";
 import type { BenchInfo, Status } from "./types";
 
@@ -25,6 +26,9 @@ export class Work {
     on("calibrations", "change", () => post("calibration", { do: "use", name: value("calibrations") }));
     on("reload", "click", () => post("lab"));
     on("upload", "change", () => this.upload());
+    on("flip", "change", () => post("flip", { changes: value("flip") }));
+    on("states", "change", () => post("learned", { do: "use", name: value("states") }));
+    on("learn", "click", () => post("learned", { do: "learn" }));
     choices(element("port"), this.options());
   }
 
@@ -60,7 +64,18 @@ export class Work {
     say(bias, { none: "Take bias", taking: "Taking bias…", taken: "Bias off" }[status.bias]);
     element("unplug").hidden = !status.simulated;
     element<HTMLButtonElement>("replay").disabled = !status.recordings.length;
+    choices(element("flip"), FLIPS.some(([changes]) => changes === status.flip) ? FLIPS : [...FLIPS, twice(status.flip)], status.flip);
+    choices(element("states"), [["", "nothing: by its type"], ...status.states.map(twice)], status.learned?.name ?? "");
+    element("states").title = status.learned?.words ?? "";
     this.notices(status);
+  }
+
+  /** Say whether the sensor can be learned from the touches that were read. */
+  learnable(touches: number): void {
+    if (!this.status) return;
+    const { learning, least } = this.status, button = element<HTMLButtonElement>("learn");
+    button.disabled = learning !== null || touches < least;
+    say(button, learning !== null ? `Learning ${(100 * learning).toFixed(0)} %` : touches < least ? `Learn (${touches} of ${least} touches)` : `Learn from ${touches} touches`);
   }
 
   /** What the server says when it cannot be reached. */
@@ -88,7 +103,7 @@ export class Work {
       if (number <= this.shown) continue;
       this.shown = number;
       const item = document.createElement("p");
-      item.textContent = `${new Date(at_ms).toLocaleTimeString("en-GB")}  ${text}`;
+      item.textContent = `${timeOf(at_ms)}  ${text}`;
       list.prepend(item);
       while (list.children.length > 60) list.lastElementChild?.remove();
     }
@@ -107,12 +122,22 @@ export class Work {
     const input = element<HTMLInputElement>("upload"), file = input.files?.[0];
     input.value = "";
     if (!file) return;
+    const bar = element<HTMLProgressElement>("upload-share"), told = (share: number): void => {
+      bar.hidden = false;
+      bar.value = share;
+    };
     if (file.size > 64 * 2 ** 20) showError("Recordings of at most 64 MB can be sent in.");
-    else await send(`recordings?name=${encodeURIComponent(file.name)}`, file, () => undefined);
+    else await send(`recordings?name=${encodeURIComponent(file.name)}`, file, told).finally(() => { bar.hidden = true; });
   }
 }
 
 const SENSORS = Array.from({ length: 8 }, (_, i): [string, string] => [String(i), String(i)]);
+
+const FLIPS: [string, string][] = [
+  ["", "as they come"], ["columns", "columns reversed"], ["rows", "rows reversed"], ["quarter,quarter", "half a turn"],
+  ["quarter", "a quarter turn left"], ["quarter,quarter,quarter", "a quarter turn right"], ["transpose", "transposed"],
+  ["column-halves", "column halves swapped"], ["row-halves", "row halves swapped"], ["values", "falling with force"],
+];
 
 function twice(name: string): [string, string] {
   return [name, name];

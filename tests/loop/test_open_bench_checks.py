@@ -1,0 +1,260 @@
+"""Guided work on the page of `open-bench`: scan, mounting, learning, print check; tour, panes."""
+
+from __future__ import annotations
+
+import random
+import re
+
+import httpx
+import pytest
+from bench_page import PATIENCE_S, opened, rest, shown, touched, until
+from playwright.sync_api import expect
+
+from generator.database.as_built import read_as_built
+from generator.database.entries import object_entry
+from generator.database.open import open_database
+from generator.database.transaction import read_transaction
+from probe.recording.read import Recording
+
+PATIENCE_MS = 1e3 * PATIENCE_S
+
+
+@pytest.fixture(scope="module")
+def bench(served):
+    with served("--port", "touch:?hold=0.4&rate=50") as address:
+        yield address
+
+
+@pytest.fixture(scope="module")
+def work(browser, bench):
+    with opened(browser, bench) as page:
+        shown(page, "Cube")
+        yield page
+
+
+@pytest.fixture
+def page(work):
+    """Return the page as the last test left it, without its dialogs."""
+    work.evaluate("document.querySelectorAll('dialog[open]').forEach((one) => one.close())")
+    rest(work)
+    return work
+
+
+def at(page, x, y, theta=15, face="F1"):
+    """Touch a place of a face of the cube by the form; returns what the page then says."""
+    page.get_by_test_id("touch-face").select_option(face)
+    for name, value in (("x", x), ("y", y), ("theta", theta)):
+        page.locator(f"#touch-{name}").fill(str(value))
+    answers = page.evaluate("bench.answers")
+    page.get_by_test_id("touch-go").click()
+    until(page, f"bench.answers > {answers}")
+    said = page.get_by_test_id("answer").inner_text()
+    rest(page)
+    return said
+
+
+def test_touches_are_fused_and_the_belief_shrinks(page):
+    scan = page.get_by_test_id("scan")
+    scan.click()
+    expect(scan).to_have_attribute("aria-pressed", "true")
+    expect(page.get_by_test_id("scan-text")).to_contain_text("Touch the same object")
+    steps = page.get_by_test_id("scan-steps").locator("li")
+    at(page, 24.0, 28.0)
+    expect(steps).to_have_count(1)
+    one = float(re.search(r"by chance (\S+)", steps.nth(0).inner_text()).group(1))
+    for x in (28.0, 32.0):
+        at(page, x, 30.0)
+    expect(steps).to_have_count(3)
+    expect(page.get_by_test_id("scan-text")).to_contain_text("3 touches together: Cube F1")
+    three = float(re.search(r"by chance (\S+)", steps.nth(2).inner_text()).group(1))
+    assert three < 0.01 * one
+    expect(steps.nth(2)).to_contain_text("one place comes into question; Cube F1 100 %")
+    scan.click()
+    expect(page.locator("#scan-box")).to_be_hidden()
+
+
+def test_a_wrong_mounting_is_found_and_undone(page, bench):
+    httpx.post(f"{bench}api/flip", json={"changes": "quarter"})  # as if it were wired so
+    expect(page.get_by_test_id("flip")).to_have_value("quarter")
+    page.get_by_test_id("mounting-open").click()
+    expect(page.get_by_test_id("mounting-ask")).to_contain_text("Touch Cube F1 near its middle")
+    page.get_by_test_id("mounting-press").click()
+    told = page.get_by_test_id("mounting-told")
+    expect(told).to_contain_text(
+        "mounted a quarter turn off, the other way", timeout=4 * PATIENCE_MS
+    )
+    page.get_by_test_id("mounting-use").click()
+    expect(told).to_contain_text("turned back")
+    page.locator("#mounting button[value=close]").click()
+    expect(page.get_by_test_id("flip")).to_have_value("")
+    rest(page)
+    said = at(page, 30, 30, 20)
+    assert said.startswith("Cube F1")
+    turn = re.search(r"(-?[\d.]+)°", page.locator("#pose").inner_text()).group(1)
+    assert float(turn) == pytest.approx(20, abs=1)
+    httpx.post(f"{bench}api/flip", json={"changes": ""})
+    expect(page.get_by_test_id("flip")).to_have_value("")
+    assert httpx.post(f"{bench}api/flip", json={"changes": "sideways"}).status_code == 400
+
+
+def test_the_print_is_checked_and_the_sensor_learned_from_touches(page, bench, lab):
+    learn = page.get_by_test_id("learn")
+    expect(learn).to_be_disabled()
+    expect(learn).to_contain_text("of 16 touches")
+    page.get_by_test_id("print-open").click()
+    expect(page.get_by_test_id("print-estimate")).to_be_disabled()
+    page.get_by_test_id("print-press").click()
+    expect(page.get_by_test_id("print-ask")).to_contain_text(
+        re.compile("^1[2-9] of 25 touches"), timeout=4 * PATIENCE_MS
+    )
+    page.get_by_test_id("print-estimate").click()
+    parts = page.get_by_test_id("print-parts")
+    expect(parts).to_contain_text("scale X", timeout=2 * PATIENCE_MS)
+    scale = re.search(r"scale X ([\d.]+)", parts.inner_text()).group(1)
+    assert float(scale) == pytest.approx(1.0, abs=0.004)  # touched as designed
+    page.get_by_test_id("print-store").click()
+    expect(page.get_by_test_id("print-told")).to_contain_text("Kept in the database")
+    engine = open_database(str(lab / "lab.db"), writable=False)
+    with read_transaction(engine) as connection:
+        kept = read_as_built(connection, object_entry(connection, "Cube").object_id)
+    assert [one.touches >= 12 for one in kept if one.part] == [True]
+    page.locator("#print button[value=close]").click()
+    until(page, "!document.getElementById('learn').disabled")
+    learn.click()
+    expect(page.get_by_test_id("states")).to_have_value(
+        "sensor-001.state.json", timeout=8 * PATIENCE_MS
+    )
+    assert (lab / "recordings" / "sensor-001.state.json").exists()
+    assert "gains differ" in page.get_by_test_id("states").get_attribute("title")
+    assert at(page, 31, 29).startswith("Cube F1")
+    page.get_by_test_id("states").select_option("")
+    assert at(page, 31, 29).startswith("Cube F1")
+
+
+def test_what_is_left_of_a_load_is_no_touch_and_the_scale_follows(page):
+    kept = page.get_by_test_id("touch-list").locator("button").count()
+    page.get_by_test_id("calibrate").click()
+    page.get_by_test_id("guide-loads").fill("80, 200, 600")
+    page.get_by_test_id("guide-seconds").fill("0.3")
+    page.get_by_test_id("guide-start").click()
+    for step in range(4):
+        expect(page.get_by_test_id("guide-ask")).to_contain_text(f"{step + 1} of 4")
+        page.get_by_test_id("guide-load").click()
+        page.wait_for_timeout(200)
+        page.get_by_test_id("guide-read").click()
+        expect(page.locator("#guide-felt li")).to_have_count(step + 1, timeout=PATIENCE_MS)
+    page.get_by_test_id("guide-finish").click()  # 600 N are still on it
+    expect(page.get_by_test_id("guide-result")).to_contain_text("tactels are sound")
+    frames = page.evaluate("bench.frames")
+    until(page, f"bench.frames > {frames + 40}")
+    assert page.evaluate("bench.contact") is False
+    assert page.get_by_test_id("touch-list").locator("button").count() == kept
+    page.locator("#guide-close").click()
+    page.wait_for_timeout(400)
+    answers = page.evaluate("bench.answers")
+    page.get_by_test_id("touch-go").click()
+    until(page, f"bench.answers > {answers} && bench.contact")
+    assert page.get_by_test_id("answer").inner_text().startswith("Cube")
+    expect(page.locator("#scale")).to_contain_text(re.compile(r"0 to \d\.\d+ N"))
+    rest(page)
+    page.get_by_test_id("calibrations").select_option("")
+    expect(page.get_by_test_id("calibration-age")).to_have_text("none")
+    expect(page.locator("#scale")).to_contain_text("counts")
+
+
+def test_a_recording_is_sent_in_with_progress_and_times_are_its_own(page, lab, tmp_path):
+    page.get_by_test_id("record").click()
+    expect(page.get_by_test_id("record")).to_have_attribute("aria-pressed", "true")
+    at(page, 30, 30)
+    page.get_by_test_id("record").click()
+    expect(page.get_by_test_id("record")).to_have_attribute("aria-pressed", "false")
+    name = page.get_by_test_id("recordings").input_value()
+    sent = tmp_path / f"sent-{random.randrange(10**6)}.h5"
+    sent.write_bytes((lab / "recordings" / name).read_bytes())
+    page.evaluate(
+        """() => { window.shares = []; const bar = document.getElementById('upload-share');
+        new MutationObserver(() => window.shares.push(bar.value))
+        .observe(bar, { attributes: true }); }"""
+    )
+    page.get_by_test_id("upload").set_input_files(sent)
+    expect(page.get_by_test_id("recordings")).to_contain_text(sent.name, timeout=PATIENCE_MS)
+    until(page, "window.shares.some((share) => share === 1)")
+    expect(page.get_by_test_id("upload-share")).to_be_hidden()
+    page.get_by_test_id("upload").set_input_files(sent)
+    expect(page.get_by_test_id("error")).to_contain_text("there is a recording")
+    page.get_by_test_id("recordings").select_option(sent.name)
+    answers = page.evaluate("bench.answers")
+    page.get_by_test_id("replay").click()
+    until(page, f"bench.answers > {answers}")
+    told = re.search(rf"{sent.name} at ([\d.]+) s", page.get_by_test_id("answer-of").inner_text())
+    frames = list(Recording(lab / "recordings" / name).frames())
+    assert 0 < float(told.group(1)) < 1e-9 * (frames[-1].t_ns - frames[0].t_ns)
+    page.get_by_test_id("leave").click()
+    expect(page.get_by_test_id("state")).to_contain_text("probe is there", timeout=PATIENCE_MS)
+
+
+def test_the_tour_comes_once_and_by_its_button(browser, bench):
+    with opened(browser, bench, tour=True) as page:
+        tour = page.get_by_test_id("tour")
+        expect(tour).to_contain_text("1 of 4: Touch the part")
+        rest(page)
+        shown(page, "Cube")
+        assert touched(page).startswith("Cube")  # it is in nobody's way
+        page.locator("#tour-next").focus()
+        for step in ("2 of 4: Read the answer", "3 of 4: Go back", "4 of 4: Work with"):
+            page.keyboard.press("Enter")
+            expect(tour).to_contain_text(step)
+            assert page.locator(".panel.toured").count() == 1
+        page.keyboard.press("Enter")
+        expect(tour).to_be_hidden()
+        page.reload()
+        until(page, "bench.shown !== ''")
+        expect(tour).to_be_hidden()
+        page.get_by_test_id("tour-open").click()
+        expect(tour).to_be_visible()
+        page.keyboard.press("Escape")
+        expect(tour).to_be_hidden()
+
+
+def test_columns_are_as_wide_as_one_wants_by_mouse_and_keys(browser, bench):
+    with opened(browser, bench) as page:
+        part, handle = page.locator(".panel.part"), page.get_by_test_id("pane-1")
+        before = part.bounding_box()["width"]
+        handle.focus()
+        for _ in range(4):
+            page.keyboard.press("ArrowRight")
+        wider = part.bounding_box()["width"]
+        assert wider > before + 40
+        box = handle.bounding_box()
+        page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 200)
+        page.mouse.down()
+        page.mouse.move(box["x"] + box["width"] / 2 - 120, box["y"] + 200, steps=6)
+        page.mouse.up()
+        assert part.bounding_box()["width"] < wider - 80
+        kept = part.bounding_box()["width"]
+        page.reload()
+        until(page, "bench.shown !== ''")
+        assert part.bounding_box()["width"] == pytest.approx(kept, abs=2)
+        handle.focus()
+        page.keyboard.press("Home")
+        assert part.bounding_box()["width"] == pytest.approx(before, abs=2)
+
+
+def test_at_200_percent_everything_is_there_and_the_answer_first(browser, bench):
+    look = {"viewport": {"width": 720, "height": 450}, "device_scale_factor": 2}
+    with opened(browser, bench, **look) as page:
+        rest(page)
+        shown(page, "Cube")
+        page.get_by_test_id("touch-go").click()
+        until(page, "bench.answers > 0")
+        assert page.evaluate("document.documentElement.scrollWidth") <= 720
+        page.evaluate("scrollTo(0, 0)")
+        name = page.locator("#answer .name").bounding_box()
+        assert name["y"] + name["height"] <= 450
+        cut = page.evaluate(
+            """() => [...document.querySelectorAll('button, select, input, h2')]
+            .filter((one) => one.checkVisibility() && one.type !== 'file'
+              && (one.getBoundingClientRect().left < 0 || one.getBoundingClientRect().right > 720))
+            .map((one) => one.outerHTML)"""
+        )
+        assert cut == []
