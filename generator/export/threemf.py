@@ -114,6 +114,24 @@ def print_files(
     return tuple(_plate(title, printed, plate, settings) for plate in plates)
 
 
+def mesh_print_files(
+    title: str,
+    meshes: Sequence[tuple[str, Mesh]],
+    bed_mm: Size,
+    settings: SlicerSettings | None = None,
+    gap_mm: float = 5.0,
+) -> tuple[PrintFile, ...]:
+    """Arrange meshes without symbols, each with its name, as `print_files` arranges parts."""
+    printed = []
+    for name, mesh in meshes:
+        shape = _join_meshes((mesh,))
+        low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
+        size = float(high[0] - low[0]), float(high[1] - low[1])
+        printed.append(_Printed(name, shape, None, low, size))
+    plates = arrange_plates([part.size for part in printed], bed_mm, gap_mm)
+    return tuple(_plate(title, printed, plate, settings) for plate in plates)
+
+
 def print_file(
     title: str, parts: Sequence[Part], plate: Plate, settings: SlicerSettings | None = None
 ) -> PrintFile:

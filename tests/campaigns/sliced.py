@@ -1,6 +1,7 @@
 """Slice every panel of the thesis's four objects, and each object whole, with PrusaSlicer.
 
     python tests/campaigns/sliced.py
+    python tests/campaigns/sliced.py kit/*.stl       # files of probe-kit, or others
 
 Prints, per part, what `prusa-slicer --info` and `admesh` say of the mesh (manifold, open
 edges, anything repaired) and how many overhang and support segments the G-code holds.
@@ -61,10 +62,18 @@ def sliced(stl: Path) -> Sliced:
 def main() -> int:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--profile", default="one-touch")
+    options.add_argument("files", nargs="*", type=Path, help="STL files in place of the objects")
     options.add_argument("--whole", action="store_true", help="slice the whole bodies too")
     chosen = options.parse_args()
     bad = 0
     print(f"{'part':32s} manifold open repaired overhang support")
+    for stl in chosen.files:
+        part = sliced(stl)
+        bad += not part.manifold or part.open_edges > 0 or part.repaired > 0
+        print(f"{stl.stem:32s} {part.manifold!s:8} {part.open_edges:4} {part.repaired:8} "
+              f"{part.overhang:8} {part.support:7}", flush=True)  # fmt: skip
+    if chosen.files:
+        return int(bad > 0)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         kinds = ("panels", "whole") if chosen.whole else ("panels",)

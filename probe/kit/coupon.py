@@ -1,0 +1,60 @@
+"""A small encoded plate for the first touch: one panel of a flat box, with a database of its own.
+
+Its lab has a key of its own, the same for everybody: every coupon of a type is alike, and is found
+in `coupon.db` alone. A lab's own parts are made in the lab's own database.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from generator.cad.encode import encode
+from generator.solid import Part
+from probe.kit.sizes import KitSizes
+
+KEY = "V2DC-7EWP-B45S-77XC"  #: of the lab of all coupons
+NAME, DATABASE = "Coupon", "coupon.db"
+
+
+@dataclass(frozen=True, slots=True)
+class Coupon:
+    """A plate that is printed, and what it is registered as."""
+
+    part: Part
+    face: str
+    side_mm: float
+    symbols: int
+    pitch_mm: float
+    printer: str
+
+
+def make_coupon(k: KitSizes, pitch_mm: float, printer: str, database: Path) -> Coupon:
+    """Register a coupon, and return its plate.
+
+    Parameters
+    ----------
+    k
+        Sizes of the kit.
+    pitch_mm
+        Of its symbols.
+    printer
+        That makes them.
+    database
+        File for it.
+    """
+    from build123d import Box
+
+    side = k.coupon_mm
+    made = encode(
+        Box(side, side, k.settings.coupon_mm),
+        name=NAME,
+        database=str(database),
+        folder=database.parent,
+        formats=(),
+        symbols={"pitch": pitch_mm},
+        print={"printer": printer},
+        output={"lab_key": KEY},
+    )
+    best = max(made.parts, key=lambda part: (part.symbols, -part.T_object_part[2, 2]))
+    return Coupon(best, best.name, side, best.symbols, pitch_mm, printer)

@@ -1,0 +1,162 @@
+"""A sensor type -> the folder of a kit: parts, coupon and its database, parts list, wiring, sheet.
+
+All files appear together, or none. The same type gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from encoded_objects.errors import require
+from generator.export.atomic import Staging
+from generator.export.slicer_settings import slicer_settings
+from generator.export.step import step_chunks
+from generator.export.stl import stl_chunks
+from generator.export.threemf import mesh_print_files, print_files
+from generator.printers import printer_named
+from generator.solid import Mesh, triangles
+from probe.kit.board import (
+    Item,
+    connections,
+    electric_items,
+    has_board,
+    mechanical_items,
+    wiring_svg,
+)
+from probe.kit.coupon import DATABASE, Coupon, make_coupon
+from probe.kit.mesh import KitPartReport, check_part, mesh_of, step_text
+from probe.kit.model import PARTS
+from probe.kit.settings import KIT
+from probe.kit.sheet import PrintedPart, sheet_html
+from probe.kit.sizes import KitSizes, kit_sizes
+from probe.sensor import SensorType
+from probe.sensor_types import proposed_pitch_mm, sensor_type_text
+
+FINE_MM = 4.0  #: pitch below which the coupon is printed in resin
+FILAMENT, RESIN = "fdm-0.4", "resin"
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Kit:
+    """What was made."""
+
+    folder: Path
+    files: tuple[Path, ...]
+    parts: tuple[PrintedPart, ...]
+    coupon: Coupon
+    reports: tuple[KitPartReport, ...]  #: none unless it was verified
+
+
+def make_kit(
+    sensor: SensorType,
+    folder: Path,
+    *,
+    verify: bool = False,
+    progress: Progress = lambda _what, _share: None,
+) -> Kit:
+    """Make the parts of a probe and everything that is said of them.
+
+    Parameters
+    ----------
+    sensor
+        Its type.
+    folder
+        Made if it is not there; files of these names are replaced.
+    verify
+        Read every STEP and STL back by the CAD kernel and the mesh library before they stay.
+    progress
+        Called with what is being done and the share that is done.
+
+    Raises
+    ------
+    MissingExtraError
+        The CAD kernel is not installed.
+    SolidError
+        A part that cannot be made, or did not pass its check.
+    WriteError
+        The folder cannot be written.
+    """
+    require("build123d", extra="cad", purpose="probe-kit")
+    pitch = proposed_pitch_mm(sensor)
+    k = kit_sizes(sensor, pitch)
+    parts, meshes, reports = [], [], []
+    with Staging(folder) as staging, tempfile.TemporaryDirectory() as beside:
+        for number, (name, (what, model, resin)) in enumerate(PARTS.items()):
+            progress(name, number / (len(PARTS) + 1))
+            if not _is_needed(name, k):
+                continue
+            solid = model(k)
+            mesh = mesh_of(solid, KIT)
+            step = staging.write(f"{name}.step", step_text(solid, name))
+            stl = staging.write(f"{name}.stl", stl_chunks(mesh))
+            if verify:
+                reports.append(check_part(name, solid, step.staged, stl.staged))
+            size = mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)
+            x, y, z = size.tolist()
+            parts.append(PrintedPart(name, what, (x, y, z), float(solid.volume), resin))
+            meshes.append((name, mesh, resin))
+        progress("coupon", len(PARTS) / (len(PARTS) + 1))
+        database = Path(beside) / DATABASE
+        coupon = make_coupon(k, pitch, RESIN if pitch < FINE_MM else FILAMENT, database)
+        staging.write("coupon.step", step_chunks(coupon.part))
+        staging.write("coupon.stl", stl_chunks(triangles(coupon.part)))
+        staging.write(DATABASE, database.read_bytes())
+        for name, content in _plates(sensor.name, meshes, coupon):
+            staging.write(name, content)
+        items = [*mechanical_items(k), *electric_items(sensor)]
+        wiring = wiring_svg(sensor) if has_board(sensor) else ""
+        staging.write("parts-list.csv", _csv(items).encode())
+        if wiring:
+            staging.write("wiring.svg", wiring.encode())
+            staging.write("wiring.csv", _wires(sensor).encode())
+        staging.write("sensor.yaml", sensor_type_text(sensor).encode())
+        staging.write("sheet.html", sheet_html(k, parts, items, coupon, wiring).encode())
+        files = tuple(file.path for file in staging.commit())
+    return Kit(folder, files, tuple(parts), coupon, tuple(reports))
+
+
+def _is_needed(name: str, k: KitSizes) -> bool:
+    """Whether a part serves a type: layers have a closed mould, images need no weights."""
+    if name == "mould-base":
+        return bool(k.tip_mm)
+    return name != "calibration-cap" or k.sensor.value != "depth"
+
+
+def _plates(
+    title: str, meshes: list[tuple[str, Mesh, bool]], coupon: Coupon
+) -> Iterator[tuple[str, bytes]]:
+    """Yield the plates as 3MF, in PrusaSlicer's dialect: filament, resin, and the coupon."""
+    for printer_name in (FILAMENT, RESIN):
+        printer = printer_named(printer_name)
+        settings = slicer_settings(printer, supports=False)
+        some = [(n, mesh) for n, mesh, resin in meshes if resin == (printer_name == RESIN)]
+        plates = mesh_print_files(title, some, printer.bed_mm, settings) if some else ()
+        for number, file in enumerate(plates):
+            more = f"-{number + 1}" if len(plates) > 1 else ""
+            yield f"{printer_name}{more}.3mf", file.prusaslicer
+    printer = printer_named(coupon.printer)
+    settings = slicer_settings(printer, supports=False)
+    (file,) = print_files("coupon", [coupon.part], printer.bed_mm, settings)
+    yield "coupon.3mf", file.prusaslicer
+
+
+def _csv(items: list[Item]) -> str:
+    out = io.StringIO()
+    table = csv.writer(out, lineterminator="\n")
+    table.writerow(("part", "value", "quantity", "for"))
+    table.writerows((i.what, i.value, i.quantity, i.use) for i in items)
+    return out.getvalue()
+
+
+def _wires(sensor: SensorType) -> str:
+    out = io.StringIO()
+    table = csv.writer(out, lineterminator="\n")
+    table.writerow(("from", "pin", "to", "pin"))
+    table.writerows(connections(sensor))
+    return out.getvalue()
