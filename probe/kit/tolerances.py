@@ -39,4 +39,26 @@ TOLERANCES: tuple[Tolerance, ...] = (
         "every place is off by as much: .1 mm: .107 mm; .25 mm: .250 mm; .5 mm: .493 mm, all 60 of "
         "60 right; a touch at a known place tells it",
     ),
+    Tolerance(
+        "size of the overlay (shrinkage of the silicone)",
+        "0.3 %",
+        ".3 %: .077 mm; .6 %: .132 mm; 1 %: .212 mm; 2 %: .424 mm; all 60 of 60 right, from .6 % "
+        "on beyond the stated error: print the mould larger by what your silicone shrinks",
+    ),
+    Tolerance(
+        "diameter of the tips",
+        "30 %",
+        "30 % smaller: 60 of 60, .042 mm; 30 % larger: 60 of 60, .051 mm",
+    ),
+    Tolerance(
+        "Young's modulus of the silicone",
+        "half to double",
+        "half or double: 60 of 60, .043 mm; four times: 60 of 60, .054 mm",
+    ),
+    Tolerance("roundness of the tips", "0.5 mm", "domes of .2 to .5 mm: 60 of 60, .040 mm"),
+    Tolerance(
+        "housing against the face",
+        "3 degrees",
+        "wrist tilts up to 3 degrees: 60 of 60, .041 mm",
+    ),
 )

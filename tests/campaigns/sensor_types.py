@@ -13,7 +13,6 @@ touches each are ten rounds. Interrupted by Ctrl-C it goes on with the touches t
 from __future__ import annotations
 
 import argparse
-import json
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -77,12 +76,14 @@ def _run(package: str, *arguments: str) -> None:
 
 def rows_of(folder: Path, name: str, world: str) -> tuple[pa.Table, float] | None:
     """Return all touches of a type in a world, and the mean CPU time of reading one, ms."""
-    done = sorted(at.parent for at in (folder / name).glob(f"{world}-*/results.json"))
-    if not done:
+    found = []
+    for what in ("shards", "times"):
+        files = sorted((folder / name).glob(f"{world}-*/{what}/touches/*.parquet"))
+        found.append([pq.read_table(file) for file in files])
+    rows, times = found
+    if not rows:
         return None
-    tables = [pq.read_table(here / "trials.parquet") for here in done]
-    times = [json.loads((here / "times.json").read_text())["reading"]["mean"] for here in done]
-    return pa.concat_tables(tables), float(np.mean(times))
+    return pa.concat_tables(rows), 1e3 * float(pc.mean(pa.concat_tables(times)["reading"]).as_py())
 
 
 def lines_of(rows: pa.Table) -> Iterator[tuple[str, pa.Table]]:
