@@ -21,7 +21,7 @@ from generator.export.fixed_text import (
     whole_numbers,
     with_references,
 )
-from generator.export.step_entities import Entities, numbers_listed, reference_list, step_string
+from generator.export.step.entities import Entities, numbers_listed, reference_list, step_string
 
 lengths = st.floats(-1e6, 1e6, allow_nan=False)
 

@@ -29,7 +29,7 @@ from generator.export.fixed_text import (
     template_of,
     with_references,
 )
-from generator.export.step_entities import Entities, unit, unit_text
+from generator.export.step.entities import Entities, unit, unit_text
 
 KINDS = ("top", "side", "inside")  #: of a symbol's faces; "inside": the facet within a ring
 
@@ -59,7 +59,7 @@ def outline_points(tiers: Tiers) -> NDArray[np.float64]:
     return np.concatenate(blocks)
 
 
-def entities_at_most(tiers: Tiers) -> int:
+def symbol_entities(tiers: Tiers) -> int:
     """Return a bound on the entities of one symbol and on the directions it needs."""
     return 40 * sum(len(ring) for rings in tiers.rings for ring in rings)
 

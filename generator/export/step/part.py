@@ -1,0 +1,133 @@
+"""One part in STEP: symbols stamped from templates, the body, the product that it is."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.export.fixed_text import decimal_numbers, decimal_width, pad, stamp
+from generator.export.step.body import StepBody
+from generator.export.step.entities import PLACES, Entities, numbers_listed, step_string
+from generator.export.step.product import Product, Shared, write_product
+from generator.export.step.symbol import KINDS, outline_points, symbol_entities, symbol_template
+from generator.solid.emboss import turn
+from generator.solid.part import Embossing, Part
+
+_CHUNK_BYTES = 4_000_000
+
+
+def write_part(
+    part: Part, entities: Entities, shared: Shared, body_style: str
+) -> Generator[bytes, None, Product]:
+    """Write one part and the product that it is the shape of."""
+    name, units, style = step_string(part.name), shared.units, shared.symbols
+    body = StepBody(part, entities)
+    shell: list[NDArray[np.int64]] = []
+    coloured: list[NDArray[np.int64]] = []
+    for embossing in part.embossings:
+        yield from _write_symbols(part, embossing, entities, style, body, shell, coloured)
+    shell.append(body.faces())
+    coloured.append(_wrapped_colour(part, shell[-1], entities, style))
+    yield entities.taken()
+    number = entities.reserve(1)
+    yield f"#{number}=CLOSED_SHELL('',(\n".encode("ascii")
+    yield from numbers_listed(np.concatenate(shell), entities.width)
+    yield b"));\n"
+    solid = entities.add(f"MANIFOLD_SOLID_BREP('{name}',#{number})")
+    if body_style:
+        coloured.append(np.array([entities.next]))
+        entities.add(f"STYLED_ITEM('',({body_style}),{solid})")
+    product = write_product(entities, name, solid, units, shared.origin)
+    yield entities.taken()
+    if any(map(len, coloured)):
+        head = f"#{entities.reserve(1)}=MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION"
+        yield f"{head}('',(\n".encode("ascii")
+        yield from numbers_listed(np.concatenate(coloured), entities.width)
+        yield f"),{units});\n".encode("ascii")
+    return product
+
+
+def _write_symbols(
+    part: Part,
+    embossing: Embossing,
+    entities: Entities,
+    style: str,
+    body: StepBody,
+    shell: list[NDArray[np.int64]],
+    coloured: list[NDArray[np.int64]],
+) -> Iterator[bytes]:
+    """Write the symbols of one embossing; append to the lists what refers to them."""
+    facet_axes = embossing.T_part_facet[:3, :3].T
+    axes = np.vstack([turn(embossing.rotation_rad).T @ facet_axes[:2], facet_axes[2:]])
+    centres = embossing.centres_mm @ facet_axes[:2] + embossing.T_part_facet[:3, 3]
+    prefix = part.facets[embossing.facet].name
+    names = tuple(
+        pad([f"'{step_string(f'{prefix}/{name}/{kind}')}'" for name in embossing.names])
+        for kind in KINDS
+    )
+    width = decimal_width(_largest_mm(part), PLACES)
+    for label in np.unique(embossing.labels).tolist():
+        tiers = embossing.tiers[label]
+        symbol = symbol_template(
+            tiers,
+            axes,
+            entities,
+            width,
+            tuple(rows.shape[1] for rows in names),
+            style if embossing.face is not None else "",
+        )
+        yield entities.taken()
+        points = outline_points(tiers) @ axes
+        chosen = np.flatnonzero(embossing.labels == label)
+        step = max(1, _CHUNK_BYTES // len(symbol.template.text))
+        for start in range(0, len(chosen), step):
+            some = chosen[start : start + step]
+            first = entities.reserve(symbol.entities * len(some)) + symbol.entities * np.arange(
+                len(some), dtype=np.int64
+            )
+            coordinates = decimal_numbers(points + centres[some, None, :], width, PLACES)
+            rows = tuple(kind[some] for kind in names)
+            yield stamp(symbol.template, first, entities.width, coordinates, rows)
+            shell.append((first[:, None] + symbol.faces).ravel())
+            coloured.append((first[:, None] + symbol.coloured).ravel())
+            footprints = (first + symbol.footprint).tolist()
+            body.bounds[embossing.facet] += [f"#{number}" for number in footprints]
+
+
+def _wrapped_colour(
+    part: Part, faces: NDArray[np.int64], entities: Entities, style: str
+) -> NDArray[np.int64]:
+    """Give the facets of wrapped symbols their colour; return the styled items."""
+    numbers = []
+    for wrapped in part.wrapped:
+        own = faces[wrapped.first : wrapped.first + len(wrapped.symbols)]
+        for face in own.tolist():
+            numbers.append(entities.next)
+            entities.add(f"STYLED_ITEM('',({style}),#{face})")
+    return np.array(numbers, np.int64)
+
+
+def entities_at_most(part: Part) -> int:
+    """Return a bound on the entities of a part."""
+    corners = sum(len(loop) for facet in part.facets for loop in facet.loops)
+    count = 1000 + 20 * corners + 2 * len(part.vertices) + 11 * len(part.facets)
+    for embossing in part.embossings:
+        numbers = np.bincount(embossing.labels, minlength=len(embossing.tiers)).tolist()
+        for tiers, symbols in zip(embossing.tiers, numbers, strict=True):
+            count += symbol_entities(tiers) * (symbols + 1) if symbols else 0
+    return count
+
+
+def _largest_mm(part: Part) -> float:
+    """Return a bound on every coordinate of the part."""
+    reach = max(
+        (
+            float(np.abs(outline_points(tiers)).sum(axis=1).max())
+            for embossing in part.embossings
+            for tiers in embossing.tiers
+        ),
+        default=0.0,
+    )
+    return float(np.abs(part.vertices).max()) + 2.0 * reach
