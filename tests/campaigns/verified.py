@@ -1,24 +1,26 @@
 """Read back, by independent programs, what is made of fixtures and random polyhedra.
 
-    python tests/campaigns/verified.py --convex 300 --other 50 --seed 1 -j 2
+    python tests/campaigns/verified.py --convex 300 --other 50 --seed 1 -j 2 -o verified.jsonl
 
-Random shapes are made as panels and as whole bodies in turn. Every part is written as STEP
-and STL and read back: STEP by the CAD kernel (one valid solid, volume against the closed
+Random shapes are made as panels, every second one as a whole body too. Every part is written as
+STEP and STL and read back: STEP by the CAD kernel (one valid solid, volume against the closed
 form), STL by pymeshlab (closed, two-manifold, no triangle cuts another);
 panels are put together by `T_object_part` and may neither overlap nor come nearer than the gap.
 Shapes that the tool refuses (too small for the wall, say) are counted with their reason. Exit
-code 1 when a written part fails.
+code 1 when a written part fails. What stands in the file of outcomes is not made again.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -54,14 +56,13 @@ class Outcome:
     failed: str
     panels: int = 0  #: of an object made of panels
     overlap_mm3: float = 0.0  #: that two of its panels both fill
-    gap_mm: float = np.inf  #: smallest distance of two of its panels
+    gap_mm: float | None = None  #: smallest distance of two of its panels, where any are near
 
 
-def random_spec(kind: str, seed: int, number: int, folder: Path) -> Path:
-    """Write the spec of one random shape: even ones as panels, odd ones as a whole body."""
+def random_spec(kind: str, seed: int, number: int, folder: Path, parts: str = "panels") -> Path:
+    """Write the spec of one random shape, made of panels or whole."""
     rng = np.random.default_rng([seed, number, kind == "convex"])
     shape = random_convex(rng) if kind == "convex" else random_nonconvex(rng)
-    parts = "whole" if number % 2 else "panels"
     path = folder / f"{kind}-{number:03d}-{parts}.yaml"
     path.write_text(spec_text(path.stem, shape, parts))
     return path
@@ -118,10 +119,29 @@ def outcome(located: LocatedSpec) -> Outcome:
             return Outcome(name, len(parts), symbols, step_error, mesh_error, "", str(error))
     if fit is None:
         return Outcome(name, len(parts), symbols, step_error, mesh_error, "", "")
-    gap = np.inf if fit.gap_mm is None else fit.gap_mm
     return Outcome(
-        name, len(parts), symbols, step_error, mesh_error, "", "", len(parts), fit.overlap_mm3, gap
-    )
+        name, len(parts), symbols, step_error, mesh_error, "", "",
+        len(parts), fit.overlap_mm3, fit.gap_mm,
+    )  # fmt: skip
+
+
+def outcomes_of(
+    paths: list[Path], workers: int, kept: Path | None
+) -> Iterable[tuple[str, list[Outcome]]]:
+    """Give name and outcomes of every spec file, first those that stand in `kept`."""
+    known: set[str] = set()
+    if kept and kept.exists():
+        for line in kept.read_text().splitlines():
+            name, some = json.loads(line)
+            known.add(name)
+            yield name, [Outcome(**fields) for fields in some]
+    left = [path for path in paths if path.stem not in known]
+    with ProcessPoolExecutor(workers) as pool:
+        for path, some in zip(left, pool.map(checked, left), strict=True):
+            if kept:
+                with kept.open("a") as lines:
+                    lines.write(json.dumps([path.stem, [asdict(each) for each in some]]) + "\n")
+            yield path.stem, some
 
 
 def main() -> int:
@@ -131,16 +151,19 @@ def main() -> int:
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("-j", type=int, default=2)
     options.add_argument("--no-fixtures", action="store_true")
+    options.add_argument("-o", type=Path, metavar="FILE", help="outcomes, a line a spec file")
     chosen = options.parse_args()
     began = time.monotonic()
-    with tempfile.TemporaryDirectory() as name, ProcessPoolExecutor(chosen.j) as pool:
+    with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         paths = [] if chosen.no_fixtures else sorted((FIXTURES / "specs").glob("*.yaml"))
-        for kind, count in (("convex", chosen.convex), ("other", chosen.other)):
+        for kind, count in (("other", chosen.other), ("convex", chosen.convex)):
             for number in range(count):
                 paths.append(random_spec(kind, chosen.seed, number, folder))
+                if number % 2:
+                    paths.append(random_spec(kind, chosen.seed, number, folder, "whole"))
         outcomes: list[Outcome] = []
-        for done, some in enumerate(pool.map(checked, paths), 1):
+        for done, (_, some) in enumerate(outcomes_of(paths, chosen.j, chosen.o), 1):
             outcomes += some
             if sys.stderr.isatty() or done % 50 == 0:
                 print(f"{done}/{len(paths)} {time.monotonic() - began:.0f} s", file=sys.stderr)
@@ -154,9 +177,10 @@ def main() -> int:
     mesh = max((o.mesh_error for o in made), default=0.0)
     print(f"largest relative volume error: STEP {step:.1e}, STL {mesh:.1e}")
     fitted = [o for o in made if o.panels]
+    gaps = [o.gap_mm for o in fitted if o.gap_mm is not None]
     print(f"{len(fitted)} objects of {sum(o.panels for o in fitted)} panels put together: overlap "
           f"{sum(o.overlap_mm3 for o in fitted):.6f} mm3, smallest gap "
-          f"{min((o.gap_mm for o in fitted), default=np.inf):.6f} mm")  # fmt: skip
+          f"{min(gaps, default=np.inf):.6f} mm")  # fmt: skip
     for reason, count in refused.most_common():
         print(f"  refused {count}: {reason} ...")
     for o in failed:
