@@ -34,7 +34,16 @@ from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress
 from generator.pipeline.sheet import SheetPlate, build_sheet
 from generator.polyhedron import face_polygon
-from generator.solid import Mesh, Part, emboss_whole, panels, prove_closed, triangles, volume
+from generator.solid import (
+    Mesh,
+    Part,
+    emboss_whole,
+    panels,
+    prove_closed,
+    round_volume,
+    triangles,
+    volume,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +114,7 @@ def stage(
                 volume(part),
                 step=step.staged if step else None,
                 stl=stl.staged if stl else None,
+                round_mm3=round_volume(part),
             )
         if "stpz" in formats:
             staging.write(f"{part.name}.stpz", gzip_chunks(step_chunks(part)))

@@ -9,6 +9,7 @@ from generator.solid.part import Embossing, Facet, Part
 from generator.solid.plate import cut_corners, plain_panels, top_insets_mm
 from generator.solid.triangulate import Mesh, body_mesh, symbol_meshes, triangles
 from generator.solid.whole import emboss_whole
+from generator.solid.wrap import round_volume
 
 __all__ = [
     "Embossing",
@@ -25,6 +26,7 @@ __all__ = [
     "panels",
     "plain_panels",
     "prove_closed",
+    "round_volume",
     "symbol_clearance_mm",
     "symbol_meshes",
     "top_inset_mm",

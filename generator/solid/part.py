@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.alphabet.outline import Tiers
+from generator.solid.analytic import AnalyticFace
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +70,7 @@ class Part:
     embossings: tuple[Embossing, ...]
     T_object_part: NDArray[np.float64]  #: (4, 4)
     wrapped: tuple[WrappedSymbols, ...] = ()
+    analytic: tuple[AnalyticFace, ...] = ()  #: what some of the facets stand for
 
     @property
     def symbols(self) -> int:

@@ -74,6 +74,20 @@ class EmbossingSettings:
     bent_flat: float = 1e-5
     """As `flat`, for pieces of symbols on round faces."""
 
+    # analytic.py
+    least_analytic_facets: int = 3
+    """Fewer facets than these do not tell an axis."""
+    on_circle: float = 1e-6
+    """Vertices that lie off their circle by less, as a share of the size, lie on it."""
+
+    # bend.py
+    bend_error_mm: float = 2e-6
+    """Outlines of symbols in STEP lie this near to the round face: CAD programs keep 1e-4."""
+    bend_degrees: tuple[int, int] = (2, 9)
+    """Of their Bezier curves; the highest is for symbols at the tip of a cone."""
+    bend_samples: int = 12
+    """Points of a curve at which that is checked."""
+
     # cut.py
     nudge_mm: float = 0.005
     """Far below what prints or is felt, far above the rounding of STL."""

@@ -17,6 +17,7 @@ from generator.polyhedron.winged import Polyhedron
 from generator.solid.emboss import embossing_of
 from generator.solid.measure import box
 from generator.solid.part import Facet, Part
+from generator.solid.wrap.analytic import analytic_faces
 from generator.solid.wrap.wrapped import Body, wrapped_onto
 
 
@@ -50,9 +51,14 @@ def emboss_whole(
     body = Body([polyhedron.vertices], len(polyhedron.vertices), facets)
     round_faces = {surface.carrier: surface for surface in polyhedron.surfaces}
     embossings = []
+    owned = {surface.carrier: surface.facets for surface in polyhedron.surfaces}
+    bent = {}
     for face in layout.faces:
         if len(face.labels) and face.face in round_faces:
+            first = len(body.facets)
             wrapped_onto(body, polyhedron, round_faces[face.face], face, tiers)
+            owned[face.face] += tuple(range(first, len(body.facets)))
+            bent[face.face] = face
         elif len(face.labels):
             frame = face_frame(polyhedron, face.face)
             embossings.append(embossing_of(face, tiers, face.face, frame, layout.pitch_mm))
@@ -63,6 +69,7 @@ def emboss_whole(
         embossings=tuple(embossings),
         T_object_part=np.eye(4),
         wrapped=tuple(body.wrapped),
+        analytic=analytic_faces(polyhedron, bent, tiers, owned),
     )
     low, high = box(part)
     return move_part(part, -np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]))
@@ -80,6 +87,9 @@ def move_part(part: Part, by_mm: NDArray[np.float64]) -> Part:
         embossings=tuple(
             replace(embossing, T_part_facet=T_new_old @ embossing.T_part_facet)
             for embossing in part.embossings
+        ),
+        analytic=tuple(
+            replace(face, T_part_axis=T_new_old @ face.T_part_axis) for face in part.analytic
         ),
         T_object_part=T_object_part,
     )

@@ -14,7 +14,8 @@ ISO 10303-21 (text), -42 (geometry and topology), -46 (colour), -214 (applicatio
 
     entities.py  the running list of entities, numbers and directions
     product.py   header, units, colours, products, assembly
-    body.py      points, edges and facets of the plain body
+    body.py      points, edges and planar facets of the plain body, rims of round faces
+    curved.py    round faces as cylinders and cones, with the symbols on them
     symbol.py    one symbol as a template
     part.py      one part, its symbols stamped
 """

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from generator.export.fixed_text import decimal_numbers, decimal_width, pad, stamp
 from generator.export.step.body import StepBody
+from generator.export.step.curved import round_entities, write_round_faces
 from generator.export.step.entities import PLACES, Entities, numbers_listed, step_string
 from generator.export.step.product import Product, Shared, write_product
 from generator.export.step.symbol import KINDS, outline_points, symbol_entities, symbol_template
@@ -29,7 +30,10 @@ def write_part(
     for embossing in part.embossings:
         yield from _write_symbols(part, embossing, entities, style, body, shell, coloured)
     shell.append(body.faces())
-    coloured.append(_wrapped_colour(part, shell[-1], entities, style))
+    coloured.append(_wrapped_colour(part, body.planar, shell[-1], entities, style))
+    faces, styled = write_round_faces(body, entities, style)
+    shell.append(faces)
+    coloured.append(styled)
     yield entities.taken()
     number = entities.reserve(1)
     yield f"#{number}=CLOSED_SHELL('',(\n".encode("ascii")
@@ -97,15 +101,16 @@ def _write_symbols(
 
 
 def _wrapped_colour(
-    part: Part, faces: NDArray[np.int64], entities: Entities, style: str
+    part: Part, planar: list[int], faces: NDArray[np.int64], entities: Entities, style: str
 ) -> NDArray[np.int64]:
-    """Give the facets of wrapped symbols their colour; return the styled items."""
+    """Give those facets of wrapped symbols that are planes their colour; return styled items."""
+    number_of = dict(zip(planar, faces.tolist(), strict=True))
     numbers = []
     for wrapped in part.wrapped:
-        own = faces[wrapped.first : wrapped.first + len(wrapped.symbols)]
-        for face in own.tolist():
-            numbers.append(entities.next)
-            entities.add(f"STYLED_ITEM('',({style}),#{face})")
+        for facet in range(wrapped.first, wrapped.first + len(wrapped.symbols)):
+            if facet in number_of:
+                numbers.append(entities.next)
+                entities.add(f"STYLED_ITEM('',({style}),#{number_of[facet]})")
     return np.array(numbers, np.int64)
 
 
@@ -113,6 +118,7 @@ def entities_at_most(part: Part) -> int:
     """Return a bound on the entities of a part."""
     corners = sum(len(loop) for facet in part.facets for loop in facet.loops)
     count = 1000 + 20 * corners + 2 * len(part.vertices) + 11 * len(part.facets)
+    count += sum(map(round_entities, part.analytic))
     for embossing in part.embossings:
         numbers = np.bincount(embossing.labels, minlength=len(embossing.tiers)).tolist()
         for tiers, symbols in zip(embossing.tiers, numbers, strict=True):

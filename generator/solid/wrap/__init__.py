@@ -6,10 +6,13 @@
     cut.py      a symbol in the plane, cut along the lines between facets
     walk.py     directed edges -> loops with their holes
     wrapped.py  Development + symbols -> facets of the part
+    analytic.py the face as a cylinder or cone, for CAD
+    bend.py     straight lines of the plane on it
     limits.py   what the bend leaves of strokes and gaps
 """
 
+from generator.solid.wrap.analytic import analytic_faces, round_volume
 from generator.solid.wrap.limits import bend_problem
 from generator.solid.wrap.wrapped import Body, wrapped_onto
 
-__all__ = ["Body", "bend_problem", "wrapped_onto"]
+__all__ = ["Body", "analytic_faces", "bend_problem", "round_volume", "wrapped_onto"]

@@ -5,8 +5,8 @@ import re
 
 import numpy as np
 
-from generator.export import step_symbol
 from generator.export.step import assembly_chunks, gzip_chunks, step_chunks
+from generator.export.step.symbol import _pattern
 from generator.pipeline.files import parts_of
 from generator.pipeline.place import place_object
 from generator.pipeline.plan import plan_object
@@ -28,12 +28,12 @@ def test_shared_templates_change_no_byte(tmp_path):
     parts = panels_of(tmp_path)
     alone = []
     for part in parts:
-        step_symbol._pattern.cache_clear()
+        _pattern.cache_clear()
         alone.append(whole_text(step_chunks(part)))
-    step_symbol._pattern.cache_clear()
+    _pattern.cache_clear()
     shared = [whole_text(step_chunks(part)) for part in parts]
     assert shared == alone
-    assert step_symbol._pattern.cache_info().hits > 0
+    assert _pattern.cache_info().hits > 0
 
 
 def test_every_reference_is_to_an_entity_of_the_file(tmp_path):

@@ -1,0 +1,219 @@
+"""Round faces as cylinders and cones, with symbols bent onto them: what CAD programs want.
+
+The printed form of a round face is a strip of facets; here is the face that they stand for.
+Symbols are bent onto it by `bend`.
+
+A face stays a strip where a CAD program could not close it up with its neighbours: a rim that
+two planar faces share, or that borders on facets of a blank face. Lengths in mm, angles in rad.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from generator.alphabet.outline import Tiers
+from generator.layout.placement import FaceLayout
+from generator.polyhedron.developable import Developable
+from generator.polyhedron.development import Development, development
+from generator.polyhedron.surface import directed_edges
+from generator.polyhedron.winged import Polyhedron
+from generator.solid.analytic import AnalyticFace, BentSymbol, Points, Rim
+from generator.solid.emboss import turn
+from generator.solid.part import Part
+from generator.solid.settings import EMBOSS
+from generator.solid.wrap.bend import Bend, bend_lines
+
+
+def analytic_faces(
+    polyhedron: Polyhedron,
+    layouts: Mapping[int, FaceLayout],
+    tiers: tuple[Tiers, ...],
+    facets: Mapping[int, tuple[int, ...]],
+) -> tuple[AnalyticFace, ...]:
+    """Return the round faces that can be written as cylinders and cones.
+
+    Parameters
+    ----------
+    polyhedron
+        Its vertices and faces are the first ones of the part; mm, object frame.
+    layouts
+        Symbols of a face, by its carrier.
+    tiers
+        One outline per label.
+    facets
+        Facets of the part that belong to a round face and its symbols, by its carrier.
+    """
+    found = []
+    for surface in polyhedron.surfaces:
+        face = _plain_face(polyhedron, surface, facets[surface.carrier])
+        if face is not None:
+            found.append((face, surface))
+    holders = _planar_holders(polyhedron)
+    while True:
+        faces = [face for face, _ in found]
+        closing = [pair for pair in found if _closes(pair[0], faces, holders)]
+        if len(closing) == len(found):
+            break
+        found = closing
+    return tuple(
+        _with_symbols(face, polyhedron, surface, layouts[surface.carrier], tiers)
+        if surface.carrier in layouts
+        else face
+        for face, surface in found
+    )
+
+
+def round_volume(part: Part) -> float | None:
+    """Return by how much the body of a part is larger than its mesh, mm^3; None if nowhere round.
+
+    Closed form: circular sectors less triangles, at every height a quadratic of the radius.
+    """
+    if not part.analytic:
+        return None
+    return sum(_sector_volume(part.vertices, face) for face in part.analytic)
+
+
+def _sector_volume(vertices: Points, face: AnalyticFace) -> float:
+    """Return what round sectors hold more than their triangles."""
+    T = np.linalg.inv(face.T_part_axis)
+    low = vertices[list(face.low.vertices)] @ T[:2, :3].T + T[:2, 3]
+    reach = np.hypot(*low.T)
+    angles = np.unwrap(np.arctan2(low[:, 1], low[:, 0]))
+    a, b = face.low.radius_mm, face.high.radius_mm
+    squares = (a * a + a * b + b * b) / 3.0 * (face.high.height_mm - face.low.height_mm)
+    steps = np.abs(np.diff(angles))
+    total = 0.5 * squares * float((steps - (reach[1:] / a) ** 2 * np.sin(steps)).sum())
+    return -total if face.concave else total
+
+
+def _plain_face(
+    polyhedron: Polyhedron, surface: Developable, facets: tuple[int, ...]
+) -> AnalyticFace | None:
+    """Return a round face without its symbols; None where its vertices are not on circles."""
+    d = development(polyhedron, surface)
+    if len(surface.facets) < EMBOSS.least_analytic_facets:
+        return None
+    axis = _axis(polyhedron.vertices, d, surface)
+    if axis is None:
+        return None
+    T, reach = axis
+    closed = surface.closed
+    inverse = np.linalg.inv(T)
+    ends = polyhedron.vertices[d.vertices] @ inverse[:3, :3].T + inverse[:3, 3]
+    angles = np.unwrap(np.arctan2(ends[:, 0, 1], ends[:, 0, 0]))
+    height = float(ends[:, 1, 2].mean())
+    # Lines of a named shape stand outside its round face, see `polyhedron.round`.
+    pushed = reach[0] - surface.radius_mm if surface.radius_mm < reach[0] and closed else 0.0
+    grown = 1.0 - pushed / reach[0]
+    slack = EMBOSS.on_circle * max(1.0, *reach, height)
+    off = np.ptp(np.hypot(ends[:, :, 0], ends[:, :, 1]), axis=0).max()
+    if off > slack or np.ptp(ends[:, :, 2], axis=0).max() > slack:
+        return None
+    low, high = ([*d.vertices[:, k].tolist()] for k in (0, 1))
+    return AnalyticFace(
+        name=polyhedron.faces[surface.carrier].name,
+        facets=facets,
+        T_part_axis=T,
+        low=Rim(tuple(low), reach[0] * grown, 0.0),
+        high=Rim(tuple(high), reach[1] * grown, height),
+        angle_rad=2.0 * math.pi * float(np.sign(angles[-1] - angles[0]))
+        if closed
+        else float(angles[-1] - angles[0]),
+        concave=surface.concave,
+        symbols=(),
+    )
+
+
+def _axis(
+    vertices: Points, d: Development, surface: Developable
+) -> tuple[Points, tuple[float, float]] | None:
+    """Return the axis' frame, and the radii of the rings of vertices below and above."""
+    low, high = vertices[d.vertices[:, 0]], vertices[d.vertices[:, 1]]
+    up = high - low
+    up /= np.linalg.norm(up, axis=1)[:, None]
+    z = up.mean(axis=0)
+    if surface.kind == "cone":  # all lines lean to the axis by one angle
+        across = np.linalg.svd(up - z)[2][2]
+        z = across * np.sign(across @ z)
+    z /= np.linalg.norm(z)
+    x = low[0] - low[1] - ((low[0] - low[1]) @ z) * z
+    x /= np.linalg.norm(x)
+    flat = (low - low[0]) @ np.column_stack([x, np.cross(z, x)])
+    # |p|^2 = 2 p c + const for all points of a circle about c.
+    rows = np.column_stack([2.0 * flat, np.ones(len(flat))])
+    answer, _, rank, _ = np.linalg.lstsq(rows, (flat**2).sum(axis=1), rcond=None)
+    if rank < 3:
+        return None
+    centre = low[0] + answer[0] * x + answer[1] * np.cross(z, x)
+    arm = low[0] - centre
+    reach = float(np.linalg.norm(arm))
+    T = np.eye(4)
+    T[:3, 0] = arm / reach
+    T[:3, 1] = np.cross(z, T[:3, 0])
+    T[:3, 2], T[:3, 3] = z, centre
+    above = high[0] - centre
+    pointed = (d.vertices[:, 1] == d.vertices[0, 1]).all()
+    return T, (reach, 0.0 if pointed else float(np.linalg.norm(above - (above @ z) * z)))
+
+
+def _closes(
+    face: AnalyticFace, faces: Sequence[AnalyticFace], holders: Mapping[tuple[int, int], int]
+) -> bool:
+    """Whether each rim borders on one planar face, or on the whole rim of another round face."""
+    others = [
+        rim.vertices for other in faces if other is not face for rim in (other.low, other.high)
+    ]
+    for rim, seen in ((face.low, face.low.vertices[::-1]), (face.high, face.high.vertices)):
+        if rim.radius_mm > 0.0 and seen not in others:
+            beside = {holders.get(step) for step in pairwise(seen)}
+            if len(beside) != 1 or None in beside:
+                return False
+    return True
+
+
+def _planar_holders(polyhedron: Polyhedron) -> dict[tuple[int, int], int]:
+    """Return the planar face at each directed edge."""
+    bent = {facet for surface in polyhedron.surfaces for facet in surface.facets}
+    return {
+        step: number
+        for number, face in enumerate(polyhedron.faces)
+        if number not in bent
+        for step in directed_edges(face.loops)
+    }
+
+
+def _with_symbols(
+    face: AnalyticFace,
+    polyhedron: Polyhedron,
+    surface: Developable,
+    layout: FaceLayout,
+    tiers: tuple[Tiers, ...],
+) -> AnalyticFace:
+    """Bend the symbols of a face onto it."""
+    place = Bend(face, development(polyhedron, surface))
+    R = turn(-layout.placement.rotation_rad)
+    labels = layout.labels.tolist()
+    starts, steps, heights, walls, first = [], [], [], [], 0
+    for centre, label in zip(layout.centres_mm, labels, strict=True):
+        for z, tier in zip(tiers[label].z_mm, tiers[label].rings, strict=True):
+            corners = [ring @ R.T for ring in tier]
+            starts += [ring + centre for ring in corners]
+            steps += [np.roll(ring, -1, axis=0) - ring for ring in corners]
+            count = sum(map(len, tier))
+            heights.append(np.full(count, z))
+            walls.append(first + np.arange(count))
+        first += count
+    curves = iter(bend_lines(place, *map(np.concatenate, (starts, steps, heights, walls))))
+    cells = zip(layout.rows.tolist(), layout.columns.tolist(), strict=True)
+    shapes = []
+    for (row, column), label in zip(cells, labels, strict=True):
+        rings = tuple(
+            tuple(tuple(next(curves) for _ in ring) for ring in tier) for tier in tiers[label].rings
+        )
+        shapes.append(BentSymbol(f"r{row}c{column}", tiers[label].z_mm, rings))
+    return replace(face, symbols=tuple(shapes))
