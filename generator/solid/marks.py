@@ -12,22 +12,20 @@ from __future__ import annotations
 
 import itertools
 import math
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.alphabet.figures import BAR, FIGURES, figures_of, needs_bar
-from generator.alphabet.outline import Tiers, engrave
-from generator.plane.rings import boxes_inside
+from generator.alphabet.figures import needs_bar
+from generator.alphabet.outline import Tiers
 from generator.printers import Printer
-from generator.solid.emboss import turn
+from generator.solid.mark_groove import groove_embossing
+from generator.solid.mark_name import NameMark, name_places
+from generator.solid.mark_room import Pen, Ring, TextBox, closer_than, has_room
 from generator.solid.part import Embossing
 from generator.solid.settings import EMBOSS
-
-Ring = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,69 +38,12 @@ class EdgeMark:
 
 
 @dataclass(frozen=True, slots=True)
-class NameMark:
-    """What a panel is called: ways to write it in lines, the best ways first.
-
-    The ways of one rank are as good as each other: the largest that finds room is taken.
-    """
-
-    ranks: tuple[tuple[tuple[str, ...], ...], ...]
-
-    @classmethod
-    def of(cls, name: str | None, code: str, face: str) -> NameMark:
-        """Return the mark of a face: the object's name in capitals, or its code."""
-        ranks: list[tuple[tuple[str, ...], ...]] = []
-        if name is not None:
-            ranks.append(((name, face), (f"{name} {face}",), *_broken(name, face)))
-        if code:
-            ranks.append(((code, face), (f"{code} {face}",), (f"{code}{face}",)))
-        return cls((*ranks,) if ranks else (((face,),),))
-
-
-@dataclass(frozen=True, slots=True)
 class BackMarks:
     """What found room on a back."""
 
     embossings: tuple[Embossing, ...]
     missing: tuple[str, ...]  #: numbers of edges without room
     named: bool  #: whether the name, or its code, found room
-
-
-@dataclass(frozen=True, slots=True)
-class _Pen:
-    """Sizes of the figures, mm."""
-
-    unit: float
-    stroke: float
-    clear: float
-
-    def half_size(self, text: str, *, bar: bool = False) -> tuple[float, float]:
-        """Half width and half height of a text, with its bar."""
-        width = len(text) * (2 * self.unit + self.stroke) + (len(text) - 1) * self.clear
-        height = 4 * self.unit + self.stroke
-        return width / 2, (height + (2 * self.stroke if bar else 0.0)) / 2
-
-    def half_block(self, lines: Sequence[str]) -> tuple[float, float]:
-        """Half width and half height of several lines."""
-        sizes = [self.half_size(line) for line in lines]
-        return max(x for x, _ in sizes), sum(y for _, y in sizes) + (len(lines) - 1) * self.gap / 2
-
-    @property
-    def gap(self) -> float:
-        """Between two lines."""
-        return 2 * self.clear
-
-
-@dataclass(frozen=True, slots=True)
-class _Box:
-    """A text's place: centre, direction of reading, half sizes."""
-
-    text: str
-    centre: Ring
-    angle: float
-    half: tuple[float, float]
-    pen: _Pen
-    bar: bool = False  #: below, to tell which way up it is
 
 
 def marks_on(
@@ -133,13 +74,13 @@ def marks_on(
     """
     stroke = printer.stroke_min_mm
     depth = min(EMBOSS.mark_depth * stroke, wall_mm / 3)
-    pens = [_Pen(size * stroke, stroke, stroke) for size in EMBOSS.mark_sizes]
+    pens = [Pen(size * stroke, stroke, stroke) for size in EMBOSS.mark_sizes]
     numbers = _place_numbers(edges, rings, pens)
-    written = next(_name_places(name, rings, pens, numbers), [])
+    written = next(name_places(name, rings, pens, numbers), [])
     if not written:  # the name goes first, where it leaves most numbers their room
         most = -1
         code = NameMark(name.ranks[-1:])
-        for block in itertools.islice(_name_places(code, rings, pens[-1:], ()), EMBOSS.name_tries):
+        for block in itertools.islice(name_places(code, rings, pens[-1:], ()), EMBOSS.name_tries):
             left = _place_edges(edges, rings, pens[-1], block)
             if len(left) > most:
                 most, written, numbers = len(left), block, left
@@ -149,32 +90,18 @@ def marks_on(
     done = [box.text for box in numbers]
     return BackMarks(
         tuple(
-            _mark_embossing(box, depth, facet, T_part_facet, tiers) for box in [*numbers, *written]
+            groove_embossing(box, depth, facet, T_part_facet, tiers) for box in [*numbers, *written]
         ),
         tuple(edge.text for edge in edges if edge.text not in done),
         bool(written),
     )
 
 
-def _broken(name: str, face: str) -> list[tuple[str, ...]]:
-    """Return a name broken into two or three lines at spaces and dashes, its face below.
-
-    A number stays with the word before it: it may be that of a copy.
-    """
-    words = re.split(r" (?!\d)|(?<=-)(?!\d)", name)
-    found: list[tuple[str, ...]] = []
-    for count in range(2, min(3, len(words)) + 1):
-        lines = [words[k * len(words) // count : (k + 1) * len(words) // count]
-                 for k in range(count)]  # fmt: skip
-        found.append((*(" ".join(line).replace("- ", "-") for line in lines), face))
-    return found
-
-
 def _place_numbers(
-    edges: Sequence[EdgeMark], rings: Sequence[Ring], pens: Sequence[_Pen]
-) -> list[_Box]:
+    edges: Sequence[EdgeMark], rings: Sequence[Ring], pens: Sequence[Pen]
+) -> list[TextBox]:
     """Return places for the numbers of edges, in the largest size at which most find room."""
-    best: list[_Box] = []
+    best: list[TextBox] = []
     for pen in pens:
         boxes = _place_edges(edges, rings, pen, ())
         if len(boxes) > len(best):
@@ -185,9 +112,9 @@ def _place_numbers(
 
 
 def _place_edges(
-    edges: Sequence[EdgeMark], rings: Sequence[Ring], pen: _Pen, taken: Sequence[_Box]
-) -> list[_Box]:
-    placed: list[_Box] = []
+    edges: Sequence[EdgeMark], rings: Sequence[Ring], pen: Pen, taken: Sequence[TextBox]
+) -> list[TextBox]:
+    placed: list[TextBox] = []
     for mark in edges:
         bar = needs_bar(mark.text)
         half = pen.half_size(mark.text, bar=bar)
@@ -196,112 +123,11 @@ def _place_edges(
         angle = math.atan2(axis[1], axis[0])
         lift = (half[1] + pen.clear * (1 + 1e-6)) * np.array([-axis[1], axis[0]])
         centres = mark.start + np.array(EMBOSS.mark_places)[:, None] * along + lift
-        for centre in centres[_has_room(centres, angle, half, pen.clear, rings)]:
-            box = _Box(mark.text, centre, angle, half, pen, bar)
-            near = any(_closer_than(box, other, pen.clear) for other in placed)
+        for centre in centres[has_room(centres, angle, half, pen.clear, rings)]:
+            box = TextBox(mark.text, centre, angle, half, pen, bar)
+            near = any(closer_than(box, other, pen.clear) for other in placed)
             apart = EMBOSS.name_apart * pen.clear
-            if not near and not any(_closer_than(box, other, apart) for other in taken):
+            if not near and not any(closer_than(box, other, apart) for other in taken):
                 placed.append(box)
                 break
     return placed
-
-
-def _name_places(
-    name: NameMark, rings: Sequence[Ring], pens: Sequence[_Pen], taken: Sequence[_Box]
-) -> Iterator[list[_Box]]:
-    """Yield the lines of a name where they find room: best rank, largest size, middle first."""
-    sides = np.roll(rings[0], -1, axis=0) - rings[0]
-    longest = sides[np.argmax(np.round(np.hypot(*sides.T), 6))]
-    slant = math.atan2(longest[1], longest[0])
-    angles = [0.0, math.pi / 2]
-    if min(abs(math.remainder(slant - angle, math.pi)) for angle in angles) > 1e-6:
-        angles.append(slant)
-    centres = _middles((rings[0].min(axis=0) + rings[0].max(axis=0)) / 2, rings)
-    for ways, pen in itertools.product(name.ranks, pens):
-        apart = EMBOSS.name_apart * pen.clear
-        for angle, lines in itertools.product(angles, ways):
-            half = pen.half_block(lines)
-            for centre in centres[_has_room(centres, angle, half, pen.clear, rings)]:
-                block = _Box("", centre, angle, half, pen)
-                if not any(_closer_than(block, other, apart) for other in taken):
-                    yield _lines_of(block, lines)
-
-
-def _lines_of(block: _Box, lines: Sequence[str]) -> list[_Box]:
-    """Return the lines of a block, from the top."""
-    pen, up = block.pen, turn(block.angle)[:, 1]
-    top = block.half[1]
-    found = []
-    for line in lines:
-        half = pen.half_size(line)
-        found.append(_Box(line, block.centre + (top - half[1]) * up, block.angle, half, pen))
-        top -= 2 * half[1] + pen.gap
-    return found
-
-
-def _middles(centre: Ring, rings: Sequence[Ring]) -> Ring:
-    """Return points to try for the name: the middle of the back, then a grid by distance."""
-    low, high = rings[0].min(axis=0), rings[0].max(axis=0)
-    shares = np.linspace(0.1, 0.9, 9)
-    grid = np.stack(np.meshgrid(shares, shares), axis=-1).reshape(-1, 2) * (high - low) + low
-    order = np.argsort(np.round(((grid - centre) ** 2).sum(axis=1), 9), kind="stable")
-    return np.concatenate([centre[None], grid[order]])
-
-
-def _has_room(
-    centres: Ring, angle: float, half: tuple[float, float], clear: float, rings: Sequence[Ring]
-) -> NDArray[np.bool_]:
-    """Whether rectangles at `centres` keep clear of all edges and lie inside."""
-    R = turn(angle)
-    return boxes_inside(centres @ R, np.array(half) + clear, [ring @ R for ring in rings])
-
-
-def _closer_than(one: _Box, other: _Box, clear: float) -> bool:
-    """Whether two turned rectangles are closer than `clear`, by separating axes."""
-    between = other.centre - one.centre
-    for angle in (one.angle, other.angle):
-        axes = turn(angle)
-        for axis in axes.T:
-            reach = clear
-            for box in (one, other):
-                reach += float(np.abs(axis @ turn(box.angle)) @ np.array(box.half))
-            if abs(float(axis @ between)) >= reach:
-                return False
-    return True
-
-
-def _mark_embossing(
-    box: _Box,
-    depth: float,
-    facet: int,
-    T_part_facet: NDArray[np.float64],
-    tiers: dict[tuple[int, float], Tiers],
-) -> Embossing:
-    """Return one text as an embossing: a label for each figure, then the bars."""
-    pen = box.pen
-    step = 2 * pen.unit + pen.stroke + pen.clear
-    letters = [k for k, letter in enumerate(box.text) if letter != " "]
-    figures = figures_of(box.text.replace(" ", ""))
-    x = (np.array(letters) - (len(box.text) - 1) / 2) * step
-    y = np.full(len(figures), pen.stroke if box.bar else 0.0)
-    local = np.stack([x, y], axis=1)
-    names = [f"{box.text} figure {k + 1}" for k in range(len(figures))]
-    if box.bar:
-        figures = figures + [BAR] * len(figures)
-        low = np.stack([x, np.full(len(x), pen.stroke / 2 - box.half[1])], axis=1)
-        local = np.concatenate([local, low])
-        names += [f"{box.text} bar {k + 1}" for k in range(len(x))]
-    used = sorted(set(figures))
-    for figure in used:
-        if (figure, pen.unit) not in tiers:
-            tiers[figure, pen.unit] = engrave(FIGURES[figure], pen.unit, pen.stroke, depth)
-    return Embossing(
-        facet=facet,
-        face=None,
-        T_part_facet=T_part_facet,
-        rotation_rad=box.angle,
-        centres_mm=box.centre + local @ turn(box.angle).T,
-        labels=np.array([used.index(figure) for figure in figures], dtype=np.int64),
-        names=tuple(names),
-        tiers=tuple(tiers[figure, pen.unit] for figure in used),
-    )

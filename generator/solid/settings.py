@@ -40,13 +40,15 @@ class EmbossingSettings:
     flat_turn_rad: float = math.radians(15)
     """Neighbours that turn by less share one inset where theirs would push the corner far."""
 
-    # marks.py
+    # marks.py, mark_name.py
     mark_sizes: tuple[float, ...] = (2.0, 1.5, 1.25, 1.0)
     """Lattice unit of a back's figures, in strokes; the smallest keeps a gap of one stroke."""
     mark_places: tuple[float, ...] = (0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.1, 0.9)
     """Where along its edge a number may stand, best first."""
     name_apart: float = 2.0
     """Between a name and a number, in gaps of two figures: they are not read as one."""
+    name_angles: int = 6
+    """Directions of edges, upright ones first, in which a name may be read."""
     name_tries: int = 200
     """Places of a code that are tried where it takes the room of numbers."""
     mark_depth: float = 0.4
