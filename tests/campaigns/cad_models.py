@@ -103,9 +103,10 @@ def scale_of(solid: Polyhedron) -> float:
 
 def volume_problem(model: Path, solid: Polyhedron, scale: float) -> str:
     """Compare the volume that was read with that of the kernel or mesh library."""
-    if model.suffix == ".obj":
+    suffix = model.suffix.lower()
+    if suffix == ".obj":
         return ""
-    report = (read_stl if model.suffix == ".stl" else read_step)(model)
+    report = (read_stl if suffix == ".stl" else read_step)(model)
     exact = abs(report.volume_mm3) * scale**3
     bent = {facet for surface in solid.surfaces for facet in surface.facets} | {*solid.blank}
     allowed = PLANAR * exact + CHORD_MM * sum(face_area(solid, facet) for facet in bent)

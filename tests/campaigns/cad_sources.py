@@ -67,6 +67,21 @@ SOURCES = (
         "*/DWM1000.step", "*/Diodes_DFN1006-3.step", "*/Converter_DCDC_RECOM_R-78B-2.0_THT.step",
         "*/Filter_Mini-Circuits_FV1206.step", "*/SW_SPST_EVQPE1.step",
     )),
+    Source("apt", "assimp-testmodels", "5.2.5~ds0-1", (
+        "*/models/OBJ/*.obj", "*/models/STL/*.stl", "*/models/STL/*.STL", "*/models/invalid/*.obj",
+    )),
+    Source("apt", "admesh", "0.98.4-2", ("*/examples/block.stl",)),
+    Source("apt", "cura", "4.13.0-1", tuple(
+        f"*/meshes/{name}" for name in (
+            "3di_d300_platform.STL", "BIQU_BX_PLATE.stl", "Hellbot_Magna_2_230.obj",
+            "STREAM20PRO_platform.STL", "anycubic_*.obj", "anycubic_*.stl", "cremaker_platform_200.obj",
+            "eryone_er20_plateform.stl", "flyingbear_platform.obj", "hellbot_*.obj",
+            "inat_proton_x_buildplate.stl", "jgaurora_a6_platform.stl", "koonovo.obj", "moai.obj",
+            "pbr3d_g1_buildplate.stl", "sapphirepro_platform.stl", "tinyboy_*.stl", "tinyboy_*.obj",
+            "twotrees235x235_generic.stl", "twotrees_platform.stl", "ultimaker_s3_platform.obj",
+            "uni_*_platform.stl",
+        )
+    )),
 )  # fmt: skip
 
 
