@@ -74,7 +74,8 @@ SOURCES = (
     Source("apt", "cura", "4.13.0-1", tuple(
         f"*/meshes/{name}" for name in (
             "3di_d300_platform.STL", "BIQU_BX_PLATE.stl", "Hellbot_Magna_2_230.obj",
-            "STREAM20PRO_platform.STL", "anycubic_*.obj", "anycubic_*.stl", "cremaker_platform_200.obj",
+            "STREAM20PRO_platform.STL", "anycubic_*.obj", "anycubic_*.stl",
+            "cremaker_platform_200.obj",
             "eryone_er20_plateform.stl", "flyingbear_platform.obj", "hellbot_*.obj",
             "inat_proton_x_buildplate.stl", "jgaurora_a6_platform.stl", "koonovo.obj", "moai.obj",
             "pbr3d_g1_buildplate.stl", "sapphirepro_platform.stl", "tinyboy_*.stl", "tinyboy_*.obj",
