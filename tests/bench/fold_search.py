@@ -18,20 +18,24 @@ within two symbols, a share below 1e-4 counted as that.
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 from math import gcd, log
+from pathlib import Path
 
 import numpy as np
 
 from generator.array.field import field_of_order
 from generator.array.notation import format_polynomial
 from generator.array.primitive import primitive_polynomial, search_primitive
-from generator.array.rivals import RivalShares, code_shares
 from generator.array.sequence import Sequence
 from generator.array.size import folds
-from generator.array.visible import PoseGrid, VisibleSet, visible_sets
 from generator.array.window import null_space
 from generator.errors import ArrayError
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from reference.rivals import RivalShares, code_shares
+from reference.visible import PoseGrid, VisibleSet, visible_sets
 
 PITCHES_MM = (7.0, 6.0, 5.5, 5.0)
 SENSOR_HALF_MM = (12.7, 12.7)

@@ -9,20 +9,24 @@ Symbols reach .36 of the pitch from their centre (dense-4), the sensor is 25.4 m
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 from collections.abc import Iterable
+from pathlib import Path
 
 import numpy as np
 
 from generator.array import FoldedArray, array_from, next_larger, profile
 from generator.array.profiles import Profile
-from generator.array.rivals import rival_shares
-from generator.array.visible import visible_sets
 from generator.layout.layout import lay_out
 from generator.layout.placement import FaceLayout
-from generator.layout.promise import measured_answers, promised_share
+from generator.layout.promise import measured_answers, promised_shares
 from generator.layout.views import FaceViews, SensorView, ViewSettings, face_views
 from generator.polyhedron import face_polygon, shapes
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from reference.rivals import rival_shares
+from reference.visible import visible_sets
 
 PITCHES_MM = (7.0, 6.0, 5.5, 5.0, 4.5)
 CHANCE_PITCHES_MM = (4.0, 4.5, 5.0, 5.5, 6.0, 7.0, 8.0)
@@ -140,7 +144,7 @@ def promise() -> Iterable[str]:
         start = time.process_time()
         for _ in range(6):
             _, views = square_face(pitch, ViewSettings(), laid=True)
-            share = promised_share(views, measured_answers(), pitch)
+            share, _ = promised_shares(views, measured_answers(), pitch)
         spent = time.process_time() - start
         yield (
             f"| {pitch:g} mm | {views.seen.mean():.1f} | {views.loaded.mean():.2f} | "

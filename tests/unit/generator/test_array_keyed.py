@@ -4,6 +4,8 @@ from math import gcd
 
 import numpy as np
 import pytest
+from reference.rivals import rival_shares
+from reference.visible import PoseGrid, visible_sets
 
 from generator.array import FoldedArray, Sequence, array_from, profile
 from generator.array.field import field_of_order
@@ -13,8 +15,6 @@ from generator.array.labelling import translation
 from generator.array.polynomial import is_primitive
 from generator.array.primitive import primitive_polynomial
 from generator.array.profiles import PROFILES, next_larger
-from generator.array.rivals import rival_shares
-from generator.array.visible import PoseGrid, visible_sets
 from generator.array.window import windows_are_unique
 from generator.database.cells import array_key
 from generator.errors import ArrayError

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reference.rivals import RankTest, light_words, rival_shares, serves
+from reference.visible import PoseGrid, VisibleSet, visible_sets
 
 from generator.array import array_from, next_larger, profile
 from generator.array.field import field_of_order
-from generator.array.rivals import RankTest, light_words, rival_shares, serves
-from generator.array.visible import PoseGrid, VisibleSet, visible_sets
 from generator.array.window import echelon
 
 SENSOR = (12.7, 12.7)

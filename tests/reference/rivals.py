@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from generator.array.field import Field, Labels
 from generator.array.fold import FoldedArray
-from generator.array.visible import PoseGrid, VisibleSet, visible_sets
+from reference.visible import PoseGrid, VisibleSet, visible_sets
 
 
 @dataclass(frozen=True, slots=True)
