@@ -58,7 +58,10 @@ def _object_text(made: MadeObject, dry_run: bool) -> str:
             size, least = (
                 " x ".join(f"{v:.3g}" for v in each) for each in (face.size_mm, face.smallest_mm)
             )
-            answered = f"{face.promise.at_once:.0%} answered at once, " if face.promise else ""
+            answered = ""
+            if face.promise is not None:
+                once, within = face.promise.at_once, face.promise.within_three
+                answered = f"{once:.0%} answered at once, {within:.0%} within three, "
             lines.append(
                 f"  {face.name:6} {size} mm, {_count(face.symbols, 'symbol')}, "
                 f"{answered}it could be as small as {least} mm"

@@ -20,7 +20,10 @@ def promise_lines(faces: Sequence[FaceReport]) -> list[str]:
         return []
     area = sum(face.area_mm2 for face, _ in promised)
     share = sum(face.area_mm2 * promise.at_once for face, promise in promised) / area
-    lines = [f"  {_percent(share)} of touches are answered at once"]
+    within = sum(face.area_mm2 * promise.within_three for face, promise in promised) / area
+    lines = [
+        f"  {_percent(share)} of touches are answered at once, {_percent(within)} within three"
+    ]
     alike: dict[tuple[str, ...], list[FaceReport]] = {}
     for face, promise in sorted(promised, key=lambda one: one[1].at_once):
         if promise.at_once < PROMISE.low:
@@ -43,9 +46,10 @@ def _why(face: FaceReport, promise: FacePromise) -> str:
 
 def _low_text(why: str, remedy: str, faces: Sequence[FaceReport]) -> str:
     """Return what is said of faces as narrow as the first of them."""
-    shares = [face.promise.at_once for face in faces if face.promise is not None]
-    low, high = _percent(min(shares)), _percent(max(shares))
-    share = f"{high if low == high else f'{low} to {high}'} of touches are answered"
+    promises = [face.promise for face in faces if face.promise is not None]
+    shares = [promise.at_once for promise in promises]
+    share = f"{_range(shares)} of touches are answered at once"
+    share += f", {_range([promise.within_three for promise in promises])} within three"
     others = f" (and {', '.join(f.name for f in faces[1:])}, as narrow)" if faces[1:] else ""
     said = why if not max(shares) else f"{why}; {share}" if why else share
     help_ = f"; would help: {remedy}" if remedy else ""
@@ -63,6 +67,11 @@ def face_values(face: FaceReport) -> dict[str, Any]:
             "remedy": face.promise.remedy,
         }
     return values
+
+
+def _range(shares: Sequence[float]) -> str:
+    low, high = _percent(min(shares)), _percent(max(shares))
+    return high if low == high else f"{low} to {high}"
 
 
 def _percent(share: float) -> str:

@@ -94,9 +94,10 @@ def write_lettering(
 def write_legend(image: Image.Image, font: Font) -> None:
     """Say at the top what the colours of faces mean."""
     draw = ImageDraw.Draw(image)
-    left, y, step = 3 * image.size[0] // 5, 58, LEGEND[0] // LEGEND[1]
+    left, y, step = image.size[0] // 2, 58, LEGEND[0] // LEGEND[1]
     draw.text((left - 8, y + 8), "touches answered at once: 0 %", GREY, font, anchor="rm")
     for k in range(LEGEND[1]):
         x = left + k * step
         draw.rectangle((x, y, x + step - 1, y + 15), answered_rgb(k / (LEGEND[1] - 1)))
-    draw.text((left + LEGEND[1] * step + 8, y + 8), "100 %", GREY, font, anchor="lm")
+    over = "100 %  (at once / within three)"
+    draw.text((left + LEGEND[1] * step + 8, y + 8), over, GREY, font, anchor="lm")

@@ -44,7 +44,9 @@ from generator.solid.triangulate import Mesh
 Points = NDArray[np.float64]
 Colours = NDArray[np.uint32]  # 0xXXBBGGRR
 
-NOTHING_KNOWN: Mapping[str, float] = MappingProxyType({})
+Shares = tuple[float, float]  #: of touches answered at once, and within three
+
+NOTHING_KNOWN: Mapping[str, Shares] = MappingProxyType({})
 
 # Directions towards the eye, the best first; the second view looks from the opposite side.
 _EYES = tuple(np.array([x, -1.0, z]) for z in (0.62, 0.45, 0.8) for x in (0.62, 0.45, 0.8, 0.3))
@@ -69,7 +71,7 @@ def preview_png(
     size_mm: Sequence[float],
     parts: Sequence[Part],
     meshes: Sequence[Mesh],
-    answered: Mapping[str, float] = NOTHING_KNOWN,
+    answered: Mapping[str, Shares] = NOTHING_KNOWN,
 ) -> bytes:
     """Return the picture.
 
@@ -82,7 +84,8 @@ def preview_png(
     parts, meshes
         The parts and the mesh of each, part frame, mm.
     answered
-        Share of touches that are answered, by the name of a face: its colour, and in its label.
+        Shares of touches that are answered at once, and within three, by the name of a face: its
+        label, and by the first its colour.
     """
     samples, width, top = PREVIEW.samples, PREVIEW.width, PREVIEW.top
     bottom = PREVIEW.height - PREVIEW.bottom
@@ -219,7 +222,7 @@ def _draw_view(
     box: tuple[int, int, int, int],
     memory: NDArray[np.int64],
     font: Font,
-    answered: Mapping[str, float],
+    answered: Mapping[str, Shares],
 ) -> list[Label]:
     """Draw one view into its box (pixels); return the names of the faces seen."""
     left, top, right, bottom = (PREVIEW.samples * value for value in box)
@@ -237,7 +240,7 @@ def _draw_view(
     seen.paint(view, _shade(scene, flat, answered))
     _draw_edges(view, screen(scene.edges @ axes.T), seen, 0.6 * fine)
     texts = [
-        transliterate(name) + (f" {answered[name]:.0%}" if name in answered else "")
+        transliterate(name) + (_percents(answered[name]) if name in answered else "")
         for name in scene.names
     ]
     halves = [font.getlength(text) / 2 + 9 for text in texts]
@@ -256,10 +259,17 @@ def _draw_view(
     ]
 
 
-def _shade(scene: _Scene, flat: Points, answered: Mapping[str, float]) -> Colours:
+def _percents(shares: Shares) -> str:
+    """Return what a label says of a face: at once / within three, per cent."""
+    return f" {100 * shares[0]:.0f}/{100 * shares[1]:.0f}%"
+
+
+def _shade(scene: _Scene, flat: Points, answered: Mapping[str, Shares]) -> Colours:
     """Return the colour of each triangle under the light; `flat` in screen axes."""
     light = np.array(PREVIEW.light) / np.linalg.norm(PREVIEW.light)
-    faces = [answered_rgb(answered[name]) if name in answered else BODY_RGB for name in scene.names]
+    faces = [
+        answered_rgb(answered[name][0]) if name in answered else BODY_RGB for name in scene.names
+    ]
     tints = np.array([*faces, BODY_RGB, SYMBOL_RGB], np.float64)  # the face -1 is the body
     tint_of = np.where(scene.symbols, len(faces) + 1, scene.faces % (len(faces) + 1))
     colours = np.empty(len(scene.triangles), np.uint32)

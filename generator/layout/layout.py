@@ -18,8 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 from generator.array.contract import SymbolArray
 from generator.errors import LayoutError
 from generator.layout.blank import Request, describe_blank, remedies
-from generator.layout.footprint import region_of
-from generator.layout.piece import Piece, turn_piece
+from generator.layout.footprint import Region, region_of
+from generator.layout.lattice import choose_lattice
+from generator.layout.piece import Piece, PiecePose, piece_of, turn_piece
 from generator.layout.placement import FaceLayout, Layout, Placement
 from generator.layout.places import rank_test
 from generator.layout.plan import (
@@ -139,6 +140,27 @@ def lay_out(
     raise _full_array_error(plans[0], occupied)
 
 
+def lay_out_face(
+    region: Region, array: SymbolArray, pitch_mm: float, footprint_half_mm: float
+) -> FaceLayout:
+    """Return how one face would be laid out by itself at the array's first cell.
+
+    Parameters
+    ----------
+    region
+        The face with its clearances, mm.
+    array, pitch_mm, footprint_half_mm
+        As for `lay_out`.
+    """
+    identifies = rank_test(array)
+    lattice = choose_lattice(
+        [region], footprint_half_mm, pitch_mm, array.window, identifies, search=False
+    )
+    pose = PiecePose(0.0, 0.0, 0.0)
+    piece = piece_of((0,), (pose,), lattice, pitch_mm, array.window, identifies)
+    return _face_layout(array, pitch_mm, piece, 0, Spot(0, 0, 0))
+
+
 def _without_place(task: LayoutTask, plan: LayoutPlan, allowed: bool) -> tuple[str, ...]:
     """Return the warning about faces without a place; raise it unless they are allowed."""
     shown = {
@@ -198,14 +220,15 @@ def _layout(
             lying = turn_piece(piece, spot.quarter, task.request.pitch_mm)
             for k, face in enumerate(piece.faces):
                 if piece.places[k]:
-                    faces[face] = _face_layout(task, lying, k, spot)
+                    pitch = task.request.pitch_mm
+                    faces[face] = _face_layout(task.array, pitch, lying, k, spot)
     blank = tuple(face.face for face in faces if len(face.rows) == 0)
     return Layout(plan.kind, task.request.pitch_mm, tuple(faces), blank, warnings)
 
 
-def _face_layout(task: LayoutTask, piece: Piece, k: int, spot: Spot) -> FaceLayout:
+def _face_layout(array: SymbolArray, pitch: float, piece: Piece, k: int, spot: Spot) -> FaceLayout:
     """Return one face of a piece that has been turned and has its spot."""
-    pitch, array, pose = task.request.pitch_mm, task.array, piece.poses[k]
+    pose = piece.poses[k]
     r, c = (index.astype(np.int64) for index in np.nonzero(piece.owner == k))
     rotation = math.remainder(pose.rotation_rad, 2 * math.pi)
     cosine, sine = math.cos(rotation), math.sin(rotation)

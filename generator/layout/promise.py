@@ -1,8 +1,9 @@
 """What a face promises: the share of its touches that a sensor's reader would answer.
 
-Views of a face + a table of measured answers -> the share of touches that are answered at once.
-`answers.json` is that table, measured (docs/folds.md): flat faces, a sensor of 25.4 mm whose
-centre lies on the face and whose plate rests there, 20 to 120 N, symbols of 4.5 to 7 mm.
+Views of a face + a table of measured answers -> the share of touches that are answered at once,
+and within three, each where the answer before says. `answers.json` is that table, measured
+(docs/folds.md): flat faces, a sensor of 25.4 mm whose centre lies on the face and whose plate
+rests there, 20 to 120 N, symbols of 4.5 to 7 mm.
 """
 
 from __future__ import annotations
@@ -34,10 +35,12 @@ class PromiseSettings:
     a bar 12 mm wide (7 mm), 84 % on an L of such bars."""
     tries: int = 150
     """Poses on each face that is tried as a remedy."""
-    pitches_mm: tuple[float, ...] = (6.5, 6.0, 5.5, 5.0, 4.5)
-    """Tried as remedies; the table was measured from 4.5 to 7 mm."""
+    pitches_mm: tuple[float, ...] = (6.5, 6.0, 5.5, 5.0, 4.5, 4.0)
+    """Tried as remedies; the table was measured from 4 to 7 mm."""
     wider: float = 3.0
     """Times the width that is tried at most."""
+    thicker_mm: tuple[int, ...] = (2, 3, 4, 5, 6, 8, 10, 12, 15)
+    """That bars of faces which are not convex are made wider."""
 
 
 PROMISE = PromiseSettings()
@@ -47,13 +50,16 @@ PROMISE = PromiseSettings()
 class AnswerTable:
     """How often a reader answers, measured: pitch x symbols seen whole x loaded share.
 
-    Between its entries it is linear, beyond them constant.
+    Between its entries it is linear, beyond them constant. What is not answered at once is
+    answered by the second or third touch the likelier, the more symbols stand around beside those
+    that are seen whole already.
     """
 
     pitch_mm: tuple[float, ...]  #: rising
     seen: tuple[float, ...]  #: rising
     loaded: tuple[float, ...]  #: rising
     probability: NDArray[np.float64]  #: (pitch, seen, loaded)
+    again: tuple[float, float, float]  #: its logit: constant, of log(1 + around), of log(1 + seen)
 
     def at(self, pitch_mm: float, seen: NDArray[np.int64], loaded: Points) -> Points:
         """Return the probability of an answer at each pose, (P,)."""
@@ -64,6 +70,12 @@ class AnswerTable:
         pose = np.arange(len(seen))
         return np.asarray(rows[below, pose] * (1 - share) + rows[above, pose] * share)
 
+    def later(self, seen: NDArray[np.int64], around: NDArray[np.int64]) -> Points:
+        """Return the probability that a touch is answered by the third, if not at once, (P,)."""
+        constant, by_around, by_seen = self.again
+        logit = constant + by_around * np.log1p(around) + by_seen * np.log1p(seen)
+        return np.asarray(np.where(around > 0, 1 / (1 + np.exp(-logit)), 0.0))
+
 
 def _between(value: Any, steps: Sequence[float]) -> tuple[Any, Any, Any]:
     """Return the entries around values, and how far each lies from the lower to the upper."""
@@ -72,8 +84,8 @@ def _between(value: Any, steps: Sequence[float]) -> tuple[Any, Any, Any]:
     return low, np.minimum(low + 1, len(steps) - 1), place - low
 
 
-def promised_share(views: FaceViews, table: AnswerTable, pitch_mm: float) -> float:
-    """Return the share of touches of a face that will be answered at once.
+def promised_shares(views: FaceViews, table: AnswerTable, pitch_mm: float) -> tuple[float, float]:
+    """Return the shares of touches of a face that will be answered at once, and within three.
 
     Parameters
     ----------
@@ -84,7 +96,9 @@ def promised_share(views: FaceViews, table: AnswerTable, pitch_mm: float) -> flo
     pitch_mm
         Of its symbols.
     """
-    return float(table.at(pitch_mm, views.seen, views.loaded).mean())
+    once = table.at(pitch_mm, views.seen, views.loaded)
+    within = once + (1 - once) * table.later(views.seen, views.around)
+    return float(once.mean()), float(within.mean())
 
 
 @lru_cache(maxsize=1)
@@ -93,4 +107,5 @@ def measured_answers() -> AnswerTable:
     text = (resources.files("generator.layout") / "answers.json").read_text(encoding="utf-8")
     values = json.loads(text)
     pitch, seen, loaded = (tuple(values[name]) for name in ("pitch_mm", "seen", "loaded"))
-    return AnswerTable(pitch, seen, loaded, np.array(values["probability"]))
+    again = tuple(values["again"])
+    return AnswerTable(pitch, seen, loaded, np.array(values["probability"]), again)

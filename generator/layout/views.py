@@ -4,8 +4,9 @@ Outline + symbols of a face (mm, cells) + sensor -> symbols seen whole, and the 
 share, at many poses.
 
 A pose is a place of the sensor's centre on the face, and a turn. They are spread evenly, the
-same every time (an additive recurrence). Seen whole as in `generator.array.visible`. The loaded
-share is exact: the sensor's rectangle cut by the outline, holes and all. Thesis 6.3.
+same every time (an additive recurrence). Seen whole is a symbol whose centre lies at least the
+symbol's half size inside the sensor's rectangle. The loaded share is exact: the sensor's rectangle
+cut by the outline, holes and all. Thesis 6.3.
 
 M. Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018), for the recurrence.
 """
@@ -23,6 +24,7 @@ from generator.layout.footprint import Points
 from generator.layout.placement import FaceLayout
 from generator.plane.polygon import points_inside, signed_area
 
+_STRIPS = 64  # poses looked at together
 _STEPS = 1.2207440846057596 ** -np.arange(1.0, 4.0)  # of x, y and turn: 1.22^4 = 1.22 + 1
 
 
@@ -33,6 +35,8 @@ class ViewSettings:
     poses: int = 1000
     """On each face: shares within .008 of those of 40,000 on faces of 28 to 60 mm (pitch 7 and
     4.5 mm); 6 to 10 ms a face."""
+    around_mm: float = 20.0
+    """From the sensor's centre to what another touch beside may show: half its width and a step."""
 
 
 VIEWS = ViewSettings()
@@ -55,6 +59,7 @@ class FaceViews:
     seen: NDArray[np.int64]  #: (P,) symbols seen whole
     lines: NDArray[np.int64]  #: (P,) rows or columns in which these stand, the fewer of both
     loaded: Points  #: (P,) share of the sensor's rectangle that lies on the face
+    around: NDArray[np.int64]  #: (P,) symbols that stand within `ViewSettings.around_mm`
 
 
 def face_views(
@@ -78,7 +83,7 @@ def face_views(
         How many poses.
     """
     centre, turn = _poses_on(loops, settings.poses)
-    return views_at(loops, face, pitch_mm, view, centre, turn)
+    return views_at(loops, face, pitch_mm, view, centre, turn, settings)
 
 
 def views_at(
@@ -88,12 +93,13 @@ def views_at(
     view: SensorView,
     centre_mm: Points,
     turn_rad: Points,
+    settings: ViewSettings = VIEWS,
 ) -> FaceViews:
     """Return what a sensor meets at given poses of one face.
 
     Parameters
     ----------
-    loops, face, pitch_mm, view
+    loops, face, pitch_mm, view, settings
         As for `face_views`.
     centre_mm, turn_rad
         (P, 2) and (P,) of the sensor, face frame.
@@ -106,7 +112,28 @@ def views_at(
     loaded = area / (4 * view.half_mm[0] * view.half_mm[1])
     whole = _seen_whole(face, pitch_mm, view, centre_mm, turn_rad)
     rows, columns = whole.any(axis=2).sum(axis=1), whole.any(axis=1).sum(axis=1)
-    return FaceViews(centre_mm, turn_rad, whole.sum(axis=(1, 2)), np.minimum(rows, columns), loaded)
+    lines, around = np.minimum(rows, columns), _around(face, centre_mm, settings.around_mm)
+    return FaceViews(centre_mm, turn_rad, whole.sum(axis=(1, 2)), lines, loaded, around)
+
+
+def _around(face: FaceLayout, centre: Points, reach_mm: float) -> NDArray[np.int64]:
+    """Return how many symbols stand within a distance of each pose, (P,).
+
+    Symbols are sorted by x, so that each pose looks at its strip alone: as many as on a small face.
+    """
+    order = np.argsort(face.centres_mm[:, 0], kind="stable")
+    x, y = face.centres_mm[order].T
+    first, last = (np.searchsorted(x, centre[:, 0] + by) for by in (-reach_mm, reach_mm))
+    found = np.zeros(len(centre), np.int64)
+    for start in range(0, len(centre), _STRIPS):
+        some = slice(start, start + _STRIPS)
+        width = int((last[some] - first[some]).max(initial=0))
+        at = first[some, None] + np.arange(width)
+        within = at < last[some, None]
+        at = np.where(within, at, 0)
+        away = np.hypot(x[at] - centre[some, :1], y[at] - centre[some, 1:])
+        found[some] = (within & (away <= reach_mm)).sum(axis=1)
+    return found
 
 
 def _edges(loops: Sequence[Points]) -> tuple[Points, Points]:

@@ -157,7 +157,11 @@ def stage(
     progress("drawing", 0.85)
     size = np.ptp(plan.polyhedron.vertices, axis=0).tolist()
     faces = face_reports(plan, layout)
-    shares = {face.name: face.promise.at_once for face in faces if face.promise is not None}
+    shares = {
+        face.name: (face.promise.at_once, face.promise.within_three)
+        for face in faces
+        if face.promise is not None
+    }
     staging.write(f"{spec.name}.png", preview_png(spec.name, size, parts, meshes, shares))
     page = build_sheet(plan, layout, parts, on_sheet)
     staging.write(f"{spec.name}-build.html", page.encode())

@@ -1,7 +1,8 @@
 """What the faces of an object promise, and what would help those that promise little.
 
-Plan + layout -> a promise for each flat face: the share of single touches that are answered. A
-remedy has been tried: the face is laid out anew, wider or at another pitch, and looked at again.
+Plan + layout -> a promise for each flat face: the share of touches that are answered at once, and
+within three. A remedy has been tried: the face is laid out anew, wider or at another pitch, and
+looked at again.
 Of round faces, and of arrays that are read by a scan, nothing was measured and nothing is said.
 """
 
@@ -9,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,14 +21,14 @@ from generator.alphabet.printable import check_printable
 from generator.array.touches import touches_needed
 from generator.errors import GeneratorError
 from generator.layout.footprint import Points, Region, region_of
-from generator.layout.lattice import choose_lattice
-from generator.layout.placement import FaceLayout, Layout, Placement
-from generator.layout.places import array_cells, rank_test
-from generator.layout.promise import PROMISE, measured_answers, promised_share
+from generator.layout.layout import lay_out_face
+from generator.layout.placement import FaceLayout, Layout
+from generator.layout.promise import PROMISE, measured_answers, promised_shares
 from generator.layout.views import VIEWS, SensorView, ViewSettings, face_views
 from generator.pipeline.plan import ObjectPlan
 from generator.plane.polygon import is_convex
 from generator.polyhedron import face_polygon
+from generator.solid.inset import inset, regular
 
 Loops = tuple[Points, ...]
 
@@ -36,7 +38,7 @@ class FacePromise:
     """Of one flat face."""
 
     at_once: float  #: share of touches, the sensor's centre on the face, that are answered
-    within_three: float | None = None  #: the same of up to three touches; not modelled yet
+    within_three: float  #: the same of up to three, each where the answer before says
     one_row: bool = False  #: touches show one row of symbols
     remedy: str = ""  #: what would make it answer most touches, where it does not
 
@@ -63,35 +65,36 @@ def promise_faces(plan: ObjectPlan, layout: Layout) -> dict[int, FacePromise]:
         loops = tuple(face_polygon(plan.polyhedron, face.face))
         key = face_key(loops, face)
         if key not in known:
-            share, one_row = _share(plan, loops, face, plan.spec.style)
-            remedy = ""
-            if share < PROMISE.low:  # faces as narrow, longer than a sensor, need the same
+            promise = _promise(plan, loops, face, plan.spec.style)
+            if promise.at_once < PROMISE.low:
+                # faces as narrow, longer than a sensor, need the same
                 narrow, wide = sorted(np.ptp(loops[0], axis=0).round(1).tolist())
                 like = narrow, min(wide, 1.5 * across), is_convex(loops[0])
                 if like not in remedies:
                     remedies[like] = _remedy(plan, loops, face.face)
-                remedy = remedies[like]
-            known[key] = FacePromise(round(share, 3), None, one_row, remedy)
+                promise = dataclasses.replace(promise, remedy=remedies[like])
+            known[key] = promise
         found[face.face] = known[key]
     return found
 
 
-def _share(
+def _promise(
     plan: ObjectPlan,
     loops: Loops,
     face: FaceLayout,
     style: SymbolStyle,
     settings: ViewSettings = VIEWS,
-) -> tuple[float, bool]:
-    """Return the share of touches answered, and whether they show one row of symbols."""
+) -> FacePromise:
+    """Return what a face promises, without a remedy."""
     if not len(face.labels):
-        return 0.0, False
+        return FacePromise(0.0, 0.0)
     reach = plan.alphabet.reach * style.pitch_mm + style.stroke_mm / 2
     view = SensorView(plan.spec.sensor.half_mm, reach)
     views = face_views(loops, face, style.pitch_mm, view, settings)
     one_row = bool((views.lines <= 1).mean() >= PROMISE.one_line)
     pitch = style.pitch_mm / _fineness(plan.spec.sensor)
-    return promised_share(views, measured_answers(), pitch), one_row
+    once, within = promised_shares(views, measured_answers(), pitch)
+    return FacePromise(round(once, 3), round(within, 3), one_row)
 
 
 def _fineness(sensor: SensorSize) -> float:
@@ -107,6 +110,8 @@ def _remedy(plan: ObjectPlan, loops: Loops, face: int) -> str:
     width, factor = _wider(plan, loops, region)
     if width:
         found.append(f"{math.ceil(width * factor - 1e-9):g} mm wide instead of {width:.3g}")
+    elif more := _thicker(plan, loops, plan.clearances_mm[face]):
+        found.append(f"{more:g} mm wider all along")
     for usual in PROMISE.pitches_mm:
         pitch = round(usual * _fineness(plan.spec.sensor), 1)
         if pitch >= style.pitch_mm:
@@ -143,6 +148,22 @@ def _wider(plan: ObjectPlan, loops: Loops, region: Region) -> tuple[float, float
     return float(size[narrow]), high
 
 
+def _thicker(plan: ObjectPlan, loops: Loops, clearances: Sequence[Points]) -> int:
+    """Return by how many mm a face of bars must be thicker, its outline moved outward; 0: none.
+
+    Of faces that are not convex and have no holes: an L, a T, a frame that is cut open.
+    """
+    if len(loops) > 1 or is_convex(loops[0]):
+        return 0
+    for more in PROMISE.thicker_mm:
+        grown = (inset(loops[0], np.full(len(loops[0]), -more / 2)),)
+        if not regular(loops, grown, more):
+            return 0
+        if _tried(plan, grown, region_of(grown, clearances), plan.spec.style) >= PROMISE.low:
+            return more
+    return 0
+
+
 def _prints(plan: ObjectPlan, style: SymbolStyle) -> bool:
     try:
         check_printable(plan.alphabet, style, plan.printer)
@@ -153,20 +174,9 @@ def _prints(plan: ObjectPlan, style: SymbolStyle) -> bool:
 
 def _tried(plan: ObjectPlan, loops: Loops, region: Region, style: SymbolStyle) -> float:
     """Return the promise of a face laid out anew."""
-    array = plan.array
     half = footprint_half_mm(plan.alphabet, style)
-    identifies = rank_test(array)
-    lattice = choose_lattice([region], half, style.pitch_mm, array.window, identifies, search=False)
-    cells, pitch = lattice.cells[0], style.pitch_mm
-    rows, columns = array_cells(cells, 0)
-    c, s = math.cos(lattice.rotation_rad), math.sin(lattice.rotation_rad)
-    centres = (cells[:, ::-1] * pitch + [lattice.x_mm, lattice.y_mm]) @ np.array([[c, -s], [s, c]])
-    place = Placement(
-        0, 0, lattice.rotation_rad, pitch / 2 - lattice.x_mm, -pitch / 2 - lattice.y_mm
-    )
-    none = np.zeros(len(cells), np.int64)
-    face = FaceLayout(0, place, rows, columns, none, centres, lattice.places[0])
-    return _share(plan, loops, face, style, ViewSettings(PROMISE.tries))[0]
+    face = lay_out_face(region, plan.array, style.pitch_mm, half)
+    return _promise(plan, loops, face, style, ViewSettings(PROMISE.tries)).at_once
 
 
 def face_key(loops: Loops, face: FaceLayout) -> bytes:

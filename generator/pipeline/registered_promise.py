@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from generator.array.touches import SENSOR_MM, touches_needed
 from generator.database.registered import RegisteredObject
-from generator.layout.promise import measured_answers, promised_share
+from generator.layout.promise import measured_answers, promised_shares
 from generator.layout.views import SensorView, face_views
 from generator.pipeline.promise import face_key
 
@@ -32,6 +32,7 @@ def registered_promises(held: RegisteredObject) -> dict[int, float]:
         key = face_key(face.polygon_mm, layout)
         if key not in known:
             views = face_views(face.polygon_mm, layout, style.pitch_mm, view)
-            known[key] = round(promised_share(views, measured_answers(), style.pitch_mm), 3)
+            once, _ = promised_shares(views, measured_answers(), style.pitch_mm)
+            known[key] = round(once, 3)
         found[face.face_id] = known[key]
     return found

@@ -47,8 +47,9 @@ class TouchPlan:
     `kind` is `face` (the sensor's centre at least `inside_mm` from the edges), `edge` (nearer
     than that), `corner` (within `inside_mm` of a corner), `worn` (a face with a share of its
     symbols gone), `copy`, `near` or `small` (inside faces of these members, `made_kinds`), `side`
-    (near an edge beside which another object lies), `same_profile` (a part of another lab), or
-    one of the surfaces of `surfaces.FOREIGN`.
+    (near an edge beside which another object lies), `same_profile` (a part of another lab),
+    `anywhere` (all places of a face are alike likely), or one of the surfaces of
+    `surfaces.FOREIGN`.
     """
 
     database: str
@@ -64,6 +65,7 @@ class TouchPlan:
     sensor_per: str = "touch"  #: or `run`: the errors of the sensor stay the same
     labs: tuple[str, ...] = ()  #: databases of other labs, of `same_profile`
     policy: str = "one"  #: or `next`: touches follow until one is answered, `policy`
+    only: str = ""  #: object/face that is touched; empty: any
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,7 +99,7 @@ def draw_touch(plan: TouchPlan, number: int, reader: Reader) -> DrawnTouch:
     arrays = [
         one
         for one in reader.lab.arrays
-        if plan.kind in FOREIGN or _by_name(one, plan.kind, plan.prints)
+        if plan.kind in FOREIGN or _by_name(one, plan.kind, plan.prints, plan.only)
     ]
     if not arrays:
         raise ValidationError(
@@ -178,7 +180,7 @@ def _meet(
             scene, plan.kind, _inradius_mm(lab, name, shown, plan.files), rng, ranges
         )
         return _met_at(lambda at: scene.under(at).surface, touch, scene)
-    known = _by_name(encoding, plan.kind, plan.prints)
+    known = _by_name(encoding, plan.kind, plan.prints, plan.only)
     face = encoding.face(known[int(rng.integers(len(known)))])
     scene = scene_of(plan.database, face.object, face.face, plan.files, plan.prints)
     if plan.kind == SIDE:
@@ -273,11 +275,11 @@ def _copy_of_run(seed: int, sensor: SensorType) -> SensorCopy:
     return draw_copy(sensor, np.random.default_rng([seed, 0, 4]))
 
 
-@lru_cache(maxsize=32)
-def _by_name(encoding: EmbossedArray, kind: str, prints: str = "") -> list[int]:
+@lru_cache(maxsize=512)
+def _by_name(encoding: EmbossedArray, kind: str, prints: str = "", only: str = "") -> list[int]:
     """Return the faces that a kind touches, in the order of their objects' names.
 
-    With prints, those that were printed alone.
+    With prints, those that were printed alone; with a face named, that one.
 
     Their numbers follow the order of registration, which a set made in parallel leaves to chance.
     """
@@ -286,6 +288,9 @@ def _by_name(encoding: EmbossedArray, kind: str, prints: str = "") -> list[int]:
     found = [n for n in found if is_extra(names[faces[n][0]], kind)]
     if kind == SIDE:  # round faces roll away from each other
         found = [n for n in found if encoding.face(n).round is None]
+    if only:
+        whole = {n: encoding.face(n) for n in found if only.startswith(names[faces[n][0]])}
+        found = [n for n, face in whole.items() if f"{face.object}/{face.face}" == only]
     if not prints:
         return found
     from probe.simulate.printed import read_listing
@@ -329,7 +334,7 @@ def _draw_on_face(
         for touch in random_touches(scene.region, rng, ranges):
             if scene.region.distance_mm(np.array([[touch.x_mm, touch.y_mm]]))[0] < inside:
                 return touch
-    margin = min(inside, 0.8 * most)
+    margin = 0.0 if kind == "anywhere" else min(inside, 0.8 * most)
     return next(random_touches(scene.region, rng, replace(ranges, margin_mm=margin)))
 
 

@@ -1,125 +1,271 @@
-"""How often a reader answers, by symbols seen whole and loaded share: promise against reading.
+"""What faces promise, measured with today's reader, and held against faces it was not set on.
 
-    validate-set boxes.yaml --touches 1300 --kinds face=2,edge=2,corner=1 \\
-        --levels typical,mismatch --surfaces database --study 0 -o learn
-    python tests/campaigns/promised.py learn --save generator/layout/answers.json
-    python tests/campaigns/promised.py other_boxes --check
+    python tests/campaigns/promised.py -o out/promised --save    # touches, table, check: an hour
+    python tests/campaigns/promised.py -o out/promised --rounds 0  # of the touches that are there
 
-Each touch of a run on a registered face is looked at as `generator.layout.views` sees it. They
-make a table of answers, for `AnswerTable`; with `--check` the table that ships is compared with
-them instead, by kind of touch, pitch and face.
+Two sets of solids by default: from one the table is made (`generator/layout/answers.json`, with
+`--save`), 60 faces of all sizes of the other it is checked on. In each round every face is touched
+once, anywhere, and in every third round again where the answer's `next` says, up to three times;
+so any number of rounds is a fair sample. A touch is looked at as `generator.layout.views` sees it.
+What is there is kept, and an interrupted run goes on.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
+import os
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
-import numpy as np
-import pyarrow.parquet as pq
-from numpy.typing import ArrayLike, NDArray
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(name, "1")
 
-from generator.array.touches import SENSOR_MM
-from generator.database.open import open_if_there
-from generator.database.read import read_object
-from generator.database.transaction import read_transaction
-from generator.layout.promise import AnswerTable, measured_answers
-from generator.layout.views import SensorView, views_at
+import numpy as np  # noqa: E402
+from numpy.typing import ArrayLike, NDArray  # noqa: E402
 
-KINDS, LEVELS = ("face", "edge", "corner"), ("typical", "mismatch")
-PITCH = (4.5, 5.5, 7.0)  #: mm, of the table's sheets
+from encoded_objects import encode  # noqa: E402
+from generator.array.touches import SENSOR_MM  # noqa: E402
+from generator.database.open import open_if_there  # noqa: E402
+from generator.database.read import read_object  # noqa: E402
+from generator.database.transaction import read_transaction  # noqa: E402
+from generator.layout.placement import FaceLayout  # noqa: E402
+from generator.layout.promise import AnswerTable, measured_answers  # noqa: E402
+from generator.layout.views import SensorView, views_at  # noqa: E402
+from recognizer.touch.lab import open_lab  # noqa: E402
+from recognizer.touch.reader import Reader  # noqa: E402
+from recognizer.validation.draw import TouchPlan  # noqa: E402
+from recognizer.validation.policy import NEXT, touch_until_answered  # noqa: E402
+from recognizer.validation.trial import judge  # noqa: E402
+
+Points = NDArray[np.float64]
+
+LEVELS = ("typical", "mismatch")
+PITCH = (4.5, 5.0, 7.0)  #: mm, of the table's sheets
 SEEN = (0.0, 2.0, 4.0, 6.0, 8.0, 11.0, 15.0, 20.0, 26.0)  #: of its rows
 LOADED = (0.25, 0.4, 0.5, 0.6, 0.7, 0.85, 1.0)  #: and columns
 WEIGHT = 4.0  #: touches that the smooth fit counts for at every entry
+CLASSES_MM = (0.0, 16.0, 22.0, 30.0, 45.0, 1e3)  #: narrower side of a face
+LAB_KEY = "0123-4567-89AB-CDER"
+EVERY = 3  #: rounds, of which one goes on until a touch is answered
+
+Solid = dict[str, Any]
+
+
+def box(x: float, y: float, z: float, **more: Any) -> Solid:
+    sizes = [f"{v:g} mm" for v in (x, y, z)]
+    return {"shape": {"box": sizes}} | more
+
+
+def prism(side: float, height: float, **more: Any) -> Solid:
+    shape = {"triangular_prism": {"side": f"{side:g} mm", "height": f"{height:g} mm"}}
+    return {"shape": shape} | more
+
+
+def bracket(length: float, height: float, leg: float) -> Solid:
+    """Return an L of square bars."""
+    outline = [(0, 0), (length, 0), (length, leg), (leg, leg), (leg, height), (0, height)]
+    vertices = [[x, y, z] for y in (0, leg) for x, z in outline]
+    faces = [[0, 1, 2, 3, 4, 5], [6, 11, 10, 9, 8, 7]]
+    faces += [[k, k + 6, (k + 1) % 6 + 6, (k + 1) % 6] for k in range(6)]
+    return {"shape": {"polyhedron": {"vertices": vertices, "faces": faces}}}
+
+
+COARSE: Solid = {"symbols": {"pitch": "7 mm"}}
+FINE: Solid = {"symbols": {"pitch": "4.5 mm"}}
+SETS: dict[str, list[Solid]] = {
+    "learn": [
+        box(75, 50, 30), box(60, 22, 17), box(42, 36, 26), box(33, 20, 14), box(90, 27, 24),
+        box(29, 18, 12), prism(55, 38), prism(32, 20), bracket(70, 60, 12), bracket(65, 50, 20),
+        box(72, 52, 31, **COARSE), box(61, 27, 21, **COARSE), box(59, 44, 18, **FINE),
+        box(34, 25, 15, **FINE),
+    ],
+    "check": [
+        box(65, 40, 20), box(80, 28, 18), box(70, 60, 12),
+        box(90, 35, 16), box(31, 22, 19), box(26, 21, 13), box(85, 17, 14),
+        box(58, 23, 21), box(62, 54, 46), box(44, 41, 39), box(78, 66, 27),
+        prism(60, 50), prism(45, 24), prism(36, 18), prism(70, 30), prism(28, 26),
+        bracket(72, 55, 12), bracket(60, 48, 16), bracket(80, 64, 24),
+    ],
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Face:
+    """One of a set that is touched."""
+
+    group: str
+    name: str  #: object/face
+    pitch_mm: float
+    size_mm: tuple[float, float]
+    loops: tuple[Points, ...]
+    layout: FaceLayout
+    view: SensorView
 
 
 @dataclass(frozen=True)
 class Touched:
-    """A touch as the promise sees it, and whether it was answered."""
+    """A touch as the promise sees it, and what became of it."""
 
-    kind: str
-    pitch_mm: float
+    group: str
     face: str
+    size_mm: tuple[float, float]
+    pitch_mm: float
+    level: str
+    anew: int  #: times that it was drawn again, because the plate found no rest
+    x_mm: float  #: of the sensor's centre, face frame
+    y_mm: float
+    turn_rad: float
+    edge_mm: float  #: from there
     seen: int
+    lines: int
     loaded: float
-    right: bool
+    around: int  #: symbols that stand about the centre, `views.ViewSettings.around_mm`
+    most: int  #: touches that were allowed
+    touches: int  #: that were made
+    first: str  #: what the first said: right, wrong, rejected
+    last: str
+    reason: str
+
+    @property
+    def right(self) -> bool:
+        """Whether it was answered at once."""
+        return self.first == "right"
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("run", nargs="+", type=Path, help="folder of validate-set")
-    parser.add_argument("--check", action="store_true", help="the table that ships")
-    parser.add_argument("--save", type=Path, help="write the measured table")
-    options = parser.parse_args()
-    touches = [t for run in options.run for t in touches_of(run)]
-    if options.check:
-        compare(touches, measured_answers())
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser.add_argument("--rounds", type=int, default=100, help="touches of each face")
+    parser.add_argument("--seed", type=int, default=25)
+    parser.add_argument("--save", action="store_true", help="the table, as the one that ships")
+    asked = parser.parse_args()
+    kept = asked.output / "touches.jsonl"
+    touch_faces(asked.output, kept, asked.rounds, asked.seed)
+    touches = [_touched(json.loads(line)) for line in kept.read_text().splitlines()]
+    table = measured_table([one for one in touches if one.group == "learn"])
+    if asked.save:
+        text = json_of(table, sum(one.group == "learn" for one in touches))
+        (Path(__file__).parents[2] / "generator/layout/answers.json").write_text(text)
+    for label, one in (("that ships", measured_answers()), ("of these touches", table)):
+        print(f"\nthe table {label}")
+        compare([t for t in touches if t.group == "check"], one)
+
+
+def _touched(values: dict[str, Any]) -> Touched:
+    lists = {k: tuple(v) for k, v in values.items() if isinstance(v, list)}
+    return Touched(**(values | lists))
+
+
+def touch_faces(folder: Path, kept: Path, rounds: int, seed: int) -> None:
+    """Touch every face once a round, the rounds that are not there yet."""
+    folder.mkdir(parents=True, exist_ok=True)
+    kept.touch()
+    done = len(kept.read_text().splitlines())
+    if not rounds:
         return
-    table = measured_table(touches)
-    print("answered share (touches), by symbols seen whole and loaded share")
-    for pitch, sheet in zip(PITCH, table.probability, strict=True):
-        print(f"{pitch:g} mm  " + "".join(f"{x:>12.2f}" for x in LOADED))
-        counts = tally([t for t in touches if t.pitch_mm == pitch])[1]
-        for seen, row, number in zip(SEEN, sheet, counts, strict=True):
-            cells = (f"{p:.2f} ({n:.0f})" for p, n in zip(row, number, strict=True))
-            print(f"{seen:6.0f}  " + "".join(f"{cell:>12}" for cell in cells))
-    if options.save:
-        options.save.write_text(json_of(table, len(touches)))
-    compare(touches, table)
+    readers, faces = {}, []
+    for group, solids in SETS.items():
+        lab = folder / f"{group}.db"
+        if not lab.exists():
+            unfinished = lab.with_suffix(".part")
+            unfinished.unlink(missing_ok=True)
+            for k, solid in enumerate(solids):  # one by one: each has the pitch that suits it
+                spec = {"name": f"{group} {k + 1}", "output": {"lab_key": LAB_KEY}} | solid
+                encode(spec, database=str(unfinished), formats=())
+            unfinished.rename(lab)
+        readers[group] = Reader(open_lab(lab))
+        faces += list(faces_of(lab, group))
+    with kept.open("a", encoding="utf-8") as file:
+        for number in range(done, rounds * len(faces)):
+            face, most = faces[number % len(faces)], 3 if number // len(faces) % EVERY == 0 else 1
+            lab = str(folder / f"{face.group}.db")
+            one = touch_face(face, lab, number, most, readers[face.group], seed)
+            file.write(json.dumps(asdict(one)) + "\n")
+            file.flush()
+
+
+def faces_of(lab: Path, group: str) -> Iterator[Face]:
+    """Yield the faces of a set that bear symbols, one of those that are equal."""
+    engine = open_if_there(f"sqlite:///{lab}", writable=False)
+    assert engine is not None
+    known = set()
+    with read_transaction(engine) as connection:
+        for k in range(len(SETS[group])):
+            held = read_object(connection, f"{group} {k + 1}")
+            pitch = held.style.pitch_mm
+            reach = held.alphabet["reach"] * pitch + held.style.stroke_mm / 2
+            view = SensorView((SENSOR_MM / 2, SENSOR_MM / 2), reach)
+            layouts = {one.face: one for one in held.layout.faces}
+            for face in held.faces:
+                layout = layouts[face.face_id]
+                low, high = sorted(np.ptp(face.polygon_mm[0], axis=0).round(1).tolist())
+                if not len(layout.labels) or (k, low, high) in known:
+                    continue
+                known.add((k, low, high))
+                name = f"{group} {k + 1}/{face.name}"
+                yield Face(group, name, pitch, (low, high), face.polygon_mm, layout, view)
+
+
+def touch_face(face: Face, lab: str, number: int, most: int, reader: Reader, seed: int) -> Touched:
+    level = LEVELS[int(np.random.default_rng([seed, number, 2]).integers(len(LEVELS)))]
+    plan = TouchPlan(lab, seed, level, "anywhere", policy=NEXT, only=face.name)
+    made = list(touch_until_answered(plan, number, reader, most))
+    first, last = (judge(plan, number, one.found, one.answer, 0.0) for one in (made[0], made[-1]))
+    at = np.array([[first.x_mm, first.y_mm]])
+    turn = np.array([np.radians(first.theta_deg)])
+    views = views_at(face.loops, face.layout, face.pitch_mm, face.view, at, turn)
+    return Touched(
+        face.group, face.name, face.size_mm, face.pitch_mm, level,
+        anew=len(made[0].found.drawn_anew), x_mm=round(first.x_mm, 3), y_mm=round(first.y_mm, 3),
+        turn_rad=round(float(turn[0]), 5), edge_mm=round(first.edge_mm, 3),
+        seen=int(views.seen[0]), lines=int(views.lines[0]), loaded=round(float(views.loaded[0]), 4),
+        around=int(views.around[0]), most=most, touches=len(made),
+        first=first.verdict, last=last.verdict, reason=first.reason,
+    )  # fmt: skip
 
 
 def compare(touches: list[Touched], table: AnswerTable) -> None:
-    """Print promise and reading by kind, pitch and face, and how far they lie apart."""
-    print(f"promised and answered, {len(touches)} touches")
-    for label in ("kind", "pitch_mm", "face"):
-        apart, chance = [], []
-        for group in sorted({getattr(t, label) for t in touches}):
-            some = [t for t in touches if getattr(t, label) == group]
-            p = np.array(
-                [float(table.at(t.pitch_mm, np.array([t.seen]), np.array([t.loaded]))[0])
-                 for t in some]
-            )  # fmt: skip
-            right = float(np.mean([t.right for t in some]))
-            error = float(np.sqrt((p * (1 - p)).sum())) / len(some)
-            print(f"{group!s:<28}{len(some):5d}  {p.mean():.3f}  {right:.3f}  +- {error:.3f}")
-            apart.append(float(p.mean()) - right)
-            chance.append(error)
-        rms, expected = (float(np.sqrt(np.mean(np.square(x)))) for x in (apart, chance))
-        print(f"  rms difference by {label} {rms:.3f}; of chance alone {expected:.3f}")
+    """Print promise and reading by size and face, and how far they lie apart."""
+    for title, within in (("at once", False), ("within three", True)):
+        some = [one for one in touches if one.most > 1] if within else touches
+        names = sorted({one.face for one in some})
+        print(f"{title}: promised, answered; {len(some)} touches of {len(names)} faces")
+        for low, high in itertools.pairwise(CLASSES_MM):
+            sized = [one for one in some if low <= min(one.size_mm) < high]
+            if sized:
+                p, right, error = _shares(sized, table, within)
+                faces = len({one.face for one in sized})
+                print(f"  {low:g}-{high:g} mm, {faces:2d} faces, {len(sized):5d}  {p:.3f}"
+                      f"  {right:.3f}  +- {error:.3f}  apart {p - right:+.3f}")  # fmt: skip
+        each = [_shares([t for t in some if t.face == name], table, within) for name in names]
+        apart = np.array([p - right for p, right, _ in each])
+        chance = np.array([error for *_, error in each])
+        near, by_chance = np.abs(apart) <= 0.05, np.abs(apart) <= 0.05 + 2 * chance
+        print(f"  faces within .05: {near.sum()} of {len(names)}, or {by_chance.sum()} with two"
+              f" errors of chance; rms {np.sqrt(np.mean(apart**2)):.3f},"
+              f" of chance alone {np.sqrt(np.mean(chance**2)):.3f}")  # fmt: skip
 
 
-def touches_of(run: Path) -> Iterator[Touched]:
-    """Read the touches of registered faces, whole symbols and all."""
-    rows = pq.read_table(run / "trials.parquet").to_pylist()
-    rows = [r for r in rows if r["object"] and r["kind"] in KINDS and r["level"] in LEVELS]
-    engine = open_if_there(f"sqlite:///{run / 'lab.db'}", writable=False)
-    assert engine is not None
-    with read_transaction(engine) as connection:
-        for name in sorted({row["object"] for row in rows}):
-            known = read_object(connection, name)
-            pitch = known.style.pitch_mm
-            reach = known.alphabet["reach"] * pitch + known.style.stroke_mm / 2
-            view = SensorView((SENSOR_MM / 2, SENSOR_MM / 2), reach)
-            layouts = {one.face: one for one in known.layout.faces}
-            for face in known.faces:
-                some = [r for r in rows if (r["object"], r["face"]) == (name, face.name)]
-                if not some:
-                    continue
-                centre = np.array([(r["x_mm"], r["y_mm"]) for r in some])
-                turn = np.radians([r["theta_deg"] for r in some])
-                views = views_at(face.polygon_mm, layouts[face.face_id], pitch, view, centre, turn)
-                size = " x ".join(f"{v:.0f}" for v in sorted(np.ptp(face.polygon_mm[0], axis=0)))
-                for k, row in enumerate(some):
-                    yield Touched(
-                        row["kind"], pitch, f"{size} mm, pitch {pitch:g}",
-                        int(views.seen[k]), float(views.loaded[k]), row["verdict"] == "right",
-                    )  # fmt: skip
+def _shares(
+    touches: Sequence[Touched], table: AnswerTable, within: bool
+) -> tuple[float, float, float]:
+    """Return what is promised and answered, and the standard error of the second."""
+    p = np.array(
+        [float(table.at(t.pitch_mm, np.array([t.seen]), np.array([t.loaded]))[0]) for t in touches]
+    )
+    right = [t.right for t in touches]
+    if within:
+        later = table.later(*(np.array([(t.seen, t.around) for t in touches]).T))
+        p, right = p + (1 - p) * later, [t.last == "right" for t in touches]
+    error = float(np.sqrt((p * (1 - p)).sum())) / len(touches)
+    return float(p.mean()), float(np.mean(right)), error
 
 
-def tally(touches: Iterable[Touched]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def tally(touches: Iterable[Touched]) -> tuple[Points, Points]:
     """Return answers and touches at the entries of a sheet, each shared by the nearest four."""
     right, number = np.zeros((2, len(SEEN), len(LOADED)))
     for one in touches:
@@ -140,20 +286,23 @@ def measured_table(touches: list[Touched]) -> AnswerTable:
         some = [t for t in touches if t.pitch_mm == pitch]
         right, number = tally(some)
         seen, loaded = np.meshgrid(SEEN, LOADED, indexing="ij")
-        smooth = 1 / (1 + np.exp(-_terms(seen, loaded) @ _fit(some)))
+        terms = _terms([t.seen for t in some], [t.loaded for t in some])
+        weights = _fit(terms, np.array([t.right for t in some], float))
+        smooth = 1 / (1 + np.exp(-_terms(seen, loaded) @ weights))
         sheets.append((right + WEIGHT * smooth) / (number + WEIGHT))
-    return AnswerTable(PITCH, SEEN, LOADED, np.array(sheets))
+    later = [t for t in touches if t.most > 1 and not t.right and t.around > 0]
+    terms = np.array([(1.0, np.log1p(t.around), np.log1p(t.seen)) for t in later])
+    again = _fit(terms, np.array([t.last == "right" for t in later], float))
+    return AnswerTable(PITCH, SEEN, LOADED, np.array(sheets), tuple(again.tolist()))
 
 
-def _terms(seen: ArrayLike, loaded: ArrayLike) -> NDArray[np.float64]:
+def _terms(seen: ArrayLike, loaded: ArrayLike) -> Points:
     seen, loaded = np.asarray(seen, float), np.asarray(loaded, float)
     return np.stack([np.ones_like(loaded), np.log1p(seen), loaded], axis=-1)
 
 
-def _fit(touches: Sequence[Touched], steps: int = 30, ridge: float = 0.02) -> NDArray[np.float64]:
-    """Return the weights of a logistic regression, by Newton's method."""
-    x = _terms([t.seen for t in touches], [t.loaded for t in touches])
-    y = np.array([t.right for t in touches], float)
+def _fit(x: Points, y: Points, steps: int = 30, ridge: float = 0.02) -> Points:
+    """Return the weights of a logistic regression of y (n,) on x (n, k), by Newton's method."""
     weights = np.zeros(x.shape[1])
     for _ in range(steps):
         p = 1 / (1 + np.exp(-np.clip(x @ weights, -30, 30)))
@@ -175,6 +324,7 @@ def json_of(table: AnswerTable, touches: int) -> str:
         f'  "pitch_mm": {json.dumps(list(table.pitch_mm))}',
         f'  "seen": {json.dumps(list(table.seen))}',
         f'  "loaded": {json.dumps(list(table.loaded))}',
+        f'  "again": {json.dumps([round(value, 3) for value in table.again])}',
         f'  "probability": [\n    [{rows}]\n  ]',
     ]
     return "{\n" + ",\n".join(lines) + "\n}\n"

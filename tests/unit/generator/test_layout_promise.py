@@ -6,7 +6,7 @@ import pytest
 from generator.array import profile
 from generator.layout.layout import lay_out
 from generator.layout.placement import FaceLayout, Placement
-from generator.layout.promise import AnswerTable, measured_answers, promised_share
+from generator.layout.promise import AnswerTable, measured_answers, promised_shares
 from generator.layout.views import SensorView, ViewSettings, face_views
 from generator.polyhedron import face_polygon, shapes
 
@@ -74,6 +74,7 @@ def test_views_are_those_of_each_pose_by_itself(loops):
                 part = cut(part, normal, limit)
             on_face += area(part) if len(part) else 0.0
         assert views.loaded[k] == pytest.approx(on_face / (4 * 12.7 * 9.0), abs=1e-9)
+        assert views.around[k] == (np.hypot(*there.T) <= 20.0).sum()
 
 
 def test_centres_lie_on_the_face_evenly():
@@ -119,17 +120,21 @@ def test_a_blank_face_shows_nothing():
 
 def test_a_promise_weighs_measured_answers():
     coarse = np.array([[0.0, 0.2], [0.4, 0.8], [0.8, 1.0]])
-    table = AnswerTable((5.0, 7.0), (4, 8, 12), (0.5, 1.0), np.stack([coarse / 2, coarse]))
+    again = (-1.0, 1.5, -0.5)
+    table = AnswerTable((5.0, 7.0), (4, 8, 12), (0.5, 1.0), np.stack([coarse / 2, coarse]), again)
     seen = np.array([0, 4, 6, 8, 10, 20, 6])
     loaded = np.array([1.0, 0.75, 1.0, 0.5, 0.2, 2.0, 0.75])
     expected = np.array([0.2, 0.1, 0.5, 0.4, 0.6, 1.0, 0.35])
     for pitch, share in ((9.0, 1.0), (7.0, 1.0), (6.5, 0.875), (5.0, 0.5), (3.0, 0.5)):
         assert table.at(pitch, seen, loaded) == pytest.approx(share * expected)
     views = face_views((SQUARE,), lattice(SQUARE), 7.0, VIEW)
-    flat = AnswerTable((7.0,), (1.0,), (1.0,), np.array([[[0.7]]]))
-    assert promised_share(views, flat, 6.0) == pytest.approx(0.7)
-    answered = table.at(6.0, views.seen, views.loaded).mean()
-    assert promised_share(views, table, 6.0) == pytest.approx(answered)
+    flat = AnswerTable((7.0,), (1.0,), (1.0,), np.array([[[0.7]]]), (0.0, 0.0, 0.0))
+    later = 0.3 * 0.5 * (views.around > 0).mean()
+    assert promised_shares(views, flat, 6.0) == pytest.approx((0.7, 0.7 + later))
+    once = table.at(6.0, views.seen, views.loaded)
+    logit = -1.0 + 1.5 * np.log(1 + views.around) - 0.5 * np.log(1 + views.seen)
+    within = once + (1 - once) * np.where(views.around > 0, 1 / (1 + np.exp(-logit)), 0)
+    assert promised_shares(views, table, 6.0) == pytest.approx((once.mean(), within.mean()))
 
 
 def test_the_table_that_ships_was_measured():

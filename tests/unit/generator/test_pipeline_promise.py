@@ -76,10 +76,23 @@ def test_a_large_cube_promises_more_than_a_small_one_and_names_no_face():
         assert len(promised) == 6
         shares.append(promised[0].at_once)
         if side > 28:
-            assert promise_lines(faces) == [
-                f"  {shares[-1]:.0%} of touches are answered at once".replace("%", " %")
-            ]
+            (line,) = promise_lines(faces)
+            assert line.startswith(f"  {shares[-1]:.0%} of touches".replace("%", " %"))
+            assert line.endswith(" of touches are answered at once, over 99 % within three")
+            assert promised[0].within_three > 0.99
     assert shares[0] < 0.6 < shares[1] < 0.9 < shares[2] < 1
+
+
+def test_a_bracket_by_default_says_what_would_help_its_l_faces():
+    faces = reports(BRACKET, "auto")
+    (el, *_) = [face for face in faces if face.name == "F1"]
+    assert el.promise.at_once < PROMISE.low < el.promise.within_three
+    more = int(el.promise.remedy.split(" mm wider all along")[0])
+    leg = 12 + more
+    wide = BRACKET.replace("12]", f"{leg}]").replace("[12,", f"[{leg},").replace(" 12,", f" {leg},")
+    (again, *_) = [face for face in reports(wide, "auto") if face.name == "F1"]
+    assert again.promise.at_once > PROMISE.low - 0.03
+    assert again.promise.remedy == ""
 
 
 def test_files_that_are_made_promise_the_same_and_again_so():
@@ -91,8 +104,7 @@ def test_files_that_are_made_promise_the_same_and_again_so():
     assert again.face_reports == first.face_reports
     assert first.face_reports[0].smallest_mm is None
     values = face_values(first.face_reports[0])["promise"]
-    assert values["within_three"] is None
-    assert 0.5 < values["at_once"] < 0.8
+    assert 0.5 < values["at_once"] < 0.8 < values["within_three"] < 1
 
 
 def test_round_faces_and_scans_promise_nothing():
