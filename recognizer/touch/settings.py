@@ -171,6 +171,10 @@ class CovarianceSettings:
     size: float = 1.1  #: times the variance of an answer's pose (`symbols.posterior`) ...
     blurred: float = 2.5  #: ... and more by this, for what readings hold of their neighbours ...
     usual_blur: float = 0.12  #: ... beyond this share
+    #: times the variance more, for each unit by which the squared distance of the form (width,
+    #: cross-talk, exponent) from what was known beforehand, in deviations, exceeds the usual ...
+    form: float = 0.25
+    usual_form: float = 5.0  #: ... 4.7 in own simulation, 8.8 in MuJoCo (medians)
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,7 +185,7 @@ class SpreadSettings:
     aside_mm: float = 0.08  #: of a tip's place, each way
     touches: float = 4.0  #: tactels that these two weigh as much as
     freedom: float = 8.0  #: of Student's distribution of errors
-    rounds: int = 3  #: of expectation and maximisation, at each step
+    rounds: int = 6  #: of expectation and maximisation, at each step
     unseen: float = 1e-8  #: as that of `CovarianceSettings`
 
 

@@ -11,20 +11,26 @@ from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.validation.draw import TouchPlan, draw_touch
 
-SURE = 0.01  # probability that a true ellipse fails
+#: Probability that a true ellipse fails: of 150 touches 129 must lie within it, which one that
+#: holds 83 % of the errors misses in 8 of 10 draws, one of 81 % in 9.
+SURE = 0.05
 
 
 @pytest.fixture(scope="module")
 def reader(tmp_path_factory):
     folder = tmp_path_factory.mktemp("ellipses")
     encode(
-        {"name": "Box", "shape": {"box": ["70 mm", "55 mm", "45 mm"]}},
+        {
+            "name": "Box",
+            "shape": {"box": ["70 mm", "55 mm", "45 mm"]},
+            "output": {"lab_key": 31},
+        },
         database=f"sqlite:///{folder}/lab.db", folder=folder, formats=("stl",),
     )  # fmt: skip
     return Reader(open_lab(folder / "lab.db"))
 
 
-@pytest.mark.parametrize(("engine", "touches"), [("own", 120), ("mujoco", 30)])
+@pytest.mark.parametrize(("engine", "touches"), [("own", 240), ("mujoco", 150)])
 def test_errors_lie_within_the_ellipse_as_often_as_it_says(reader, engine, touches):
     if engine == "mujoco":
         pytest.importorskip("mujoco")

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from generator.database.registered import Bend
 from probe.sensor import SensorType
+from recognizer.touch.sensor_state import PRIOR
 from recognizer.touch.settings import DEFAULTS, ReaderSettings
 from recognizer.touch.signal import Signal
 from recognizer.touch.symbols.noise import NormalizedImage
@@ -38,6 +39,7 @@ class Image:
     plane: Array  #: (n, 3) basis of planes: 1, x and y over the half widths
     settings: ReaderSettings
     noise: float = 0.0  #: standard deviation of forces where nothing is felt; 0: it is not one
+    aside: Array | float = 1.0  #: (n,) variance of tips' places over that of an unlearned tip
     falls: Array | None = None  #: (1 or b, n) of a round face under b planes, overlay heights
 
 
@@ -48,9 +50,11 @@ def image_of_signal(
 
     The face is taken as flat; `bend_image` gives the same image of a round one.
     """
-    points = sensor.centres_mm().reshape(-1, 2)
+    points, aside = sensor.centres_mm().reshape(-1, 2), np.ones(signal.forces.size)
     if signal.state is not None:
         points = points + signal.state.aside_mm.reshape(-1, 2)
+        learned = signal.state.aside_deviation_mm.reshape(-1, 2) / PRIOR.aside_mm
+        aside = (learned**2).mean(axis=1)
     return Image(
         points_mm=points,
         forces=signal.forces.reshape(-1).astype(np.float64),
@@ -61,6 +65,7 @@ def image_of_signal(
         noise=signal.noise if signal.newtons or sensor.exponent == 1.0 else 0.0,
         plane=np.column_stack([np.ones(len(points)), points / np.array(sensor.half_mm)]),
         settings=settings,
+        aside=aside,
     )
 
 

@@ -135,7 +135,7 @@ def _linearize(
     )
     unit = response_by_psi(response_of(value[:, 0])) * felt.plateau[0] / felt.press[0]
     parts = unit**2 * np.stack(
-        [noise.quiet**2 + value[:, 0] ** 2, value[:, 1] ** 2 + value[:, 2] ** 2]
+        [noise.quiet**2 + value[:, 0] ** 2, image.aside * (value[:, 1] ** 2 + value[:, 2] ** 2)]
     )
     columns = np.column_stack([np.ones_like(force), *blurred])
     left = image.forces - force - columns @ more
@@ -174,9 +174,15 @@ def _precision(image: Image, settings: PosteriorSettings) -> Array:
 def _size(image: Image, at: _Linearized) -> float:
     """Return by how much the covariance is wider than least squares say.
 
-    Readings that hold much of each other do so in a way that no second difference tells.
+    Readings that hold much of each other do so in a way that no second difference tells. And where
+    strokes are felt in another form than was known beforehand, more of the template is wrong than
+    the fitted part of it: what is not fitted moves all symbols alike, so that nothing of it is left
+    over (`docs/recognizer.md`, "How sure it is").
     """
-    settings = image.settings.covariance
+    settings, refine = image.settings.covariance, image.settings.refine
     heard = image.settings.template.cross_talk * (1 + float(at.pose[4]))
     heard += 2 * float(at.more[1:].sum())
-    return settings.size + settings.blurred * max(0.0, heard - settings.usual_blur)
+    blurred = settings.blurred * max(0.0, heard - settings.usual_blur)
+    away = at.pose[3 : POSE - 1] / np.array(refine.prior[3 : POSE - 1])
+    strange = max(0.0, float(away @ away) - settings.usual_form)
+    return (settings.size + blurred) * (1 + settings.form * strange)

@@ -269,6 +269,7 @@ def test_an_image_of_a_signal_has_a_row_for_each_tactel():
     assert found.trust[37] == trust[2, 5]
     assert (found.shape, found.newtons, found.falls) == ((16, 16), True, None)
     assert found.noise == 2.5
+    np.testing.assert_array_equal(found.aside, np.ones(256))
     half = np.array(sensor.half_mm)
     np.testing.assert_allclose(found.plane[37], [1.0, *(found.points_mm[37] / half)])
     assert np.ptp(found.points_mm[:, 0]) == pytest.approx(15 * pitch)
@@ -318,3 +319,22 @@ def test_a_round_face_falls_away_under_the_plate():
     np.testing.assert_allclose(
         two.falls, [0.5 * falls(points) / height, 0.8 * falls(points) / height]
     )
+
+
+def test_tips_of_a_learned_sensor_stand_elsewhere_and_scatter_as_learned():
+    sensor = SensorType()
+    state = unknown_state(sensor)
+    deviation = state.aside_deviation_mm.copy()
+    deviation[2, 5] = 0.03, 0.09  # of .15 each way before
+    aside = np.zeros((16, 16, 2))
+    aside[2, 5] = 0.1, -0.2
+    state = replace(state, aside_mm=aside, aside_deviation_mm=deviation)
+    signal = SimpleNamespace(
+        forces=np.ones((16, 16)), trust=np.ones((16, 16)), newtons=False, state=state, noise=0.0
+    )
+    found = image_of_signal(sensor, signal, 1.0, ReaderSettings())
+    assert found.points_mm[37] - sensor.centres_mm().reshape(-1, 2)[37] == pytest.approx(
+        [0.1, -0.2]
+    )
+    assert found.aside[37] == pytest.approx((0.2**2 + 0.6**2) / 2)
+    assert found.aside[36] == pytest.approx(1.0)

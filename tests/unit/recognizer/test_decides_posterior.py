@@ -125,6 +125,29 @@ def test_much_blur_widens_it_beyond_least_squares(template, touch):
     assert DEFAULTS.template.cross_talk * (1 + even.pose[4]) + 2 * sum(even.blur) < 0.12
 
 
+def test_a_form_far_from_what_was_known_widens_it(template, touch):
+    changed = replace(DEFAULTS.covariance, form=0.0)
+    far = np.array([*TRUE[:3], -1.2, 0.7, 0.4, 0.0])
+    for pose, wider in ((TRUE, False), (far, True)):
+        image = touch(3, 0.05, pose=pose)
+        other = replace(image, settings=replace(DEFAULTS, covariance=changed))
+        plain, found = (fit_posterior(each, template, pose, GAIN, shown) for each in (other, image))
+        strange = ((found.pose[3:6] / np.array(DEFAULTS.refine.prior[3:6])) ** 2).sum()
+        assert (strange > 5.0) == wider
+        factor = 1 + 0.25 * max(0.0, strange - 5.0)
+        np.testing.assert_allclose(found.covariance, factor * plain.covariance, rtol=1e-9)
+
+
+def test_tips_that_were_learned_scatter_less(template, touch):
+    image = touch(3, 0.08)
+    learned = np.where(np.arange(256) % 2 == 0, 0.01, 1.0)
+    forces = np.where(np.arange(256) % 2 == 0, touch(3, 0.0).forces, image.forces)
+    image = replace(image, forces=forces)  # every other tip stands where it is believed to
+    blind, told = fit(template, image), fit(template, replace(image, aside=learned))
+    assert told.covariance[0, 0] < 0.7 * blind.covariance[0, 0]
+    assert told.spread.aside_mm > blind.spread.aside_mm
+
+
 def test_a_scale_is_told_with_its_covariance(template, touch):
     errors, scaled = [], TRUE + np.array([0, 0, 0, 0, 0, 0, 0.004])
     for seed in range(30):
