@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from generator.database.part_state import PartState
     from generator.database.registered import ObjectEntry, RegisteredObject
     from generator.layout.placement import FaceLayout, Placement
+    from generator.pipeline.promise import FacePromise
 
 
 def print_list(
@@ -74,7 +75,7 @@ def print_object(
     for face in _faces(held):
         on = face.layout
         first = f"({on.rows[0]}, {on.columns[0]})" if len(on.rows) else "blank"
-        share = "" if face.promise is None else f"{100 * face.promise:.0f} %"
+        share = "" if face.promise is None else f"{100 * face.promise.at_once:.0f} %"
         counts = str(len(on.rows)), str(on.places), share
         row = face.name, face.kind, f"{face.area_mm2:.0f} mm2", *counts, first
         table.add_row(*map(escape, row))
@@ -164,7 +165,7 @@ class _Face:
     area_mm2: float  #: of a round face, of all its facets
     placement: Placement | None
     layout: FaceLayout
-    promise: float | None = None  #: share of single touches that are answered; None: not measured
+    promise: FacePromise | None = None  #: None: nothing was measured
 
 
 def _faces(held: RegisteredObject) -> list[_Face]:
@@ -249,7 +250,12 @@ def _face_values(face: _Face) -> dict[str, Any]:
         "area_mm2": face.area_mm2,
         "symbols": len(on.labels),
         "places": on.places,
-        "promise": None if face.promise is None else {"at_once": face.promise},
+        "promise": None
+        if face.promise is None
+        else {
+            "at_once": face.promise.at_once,
+            "within_three": face.promise.within_three,
+        },
         "placement": None
         if place is None
         else {

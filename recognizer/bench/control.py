@@ -111,6 +111,7 @@ def control_routes(session: Session, ports: Ports) -> APIRouter:
                 "rows": sensor.rows,
                 "columns": sensor.columns,
                 "pitch_mm": sensor.pitch_mm,
+                "row_pitch_mm": sensor.step_mm[1],
                 "type": sensor.name,
                 "overlay": sensor.overlay.kind,
                 "overlay_mm": sensor.overlay.height_mm,

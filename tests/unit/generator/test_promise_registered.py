@@ -39,6 +39,10 @@ def test_the_database_tells_the_promise_that_was_made(made, name):
     report, held = made[name]
     told = {face.name: face.promise for face in report.objects[0].face_reports}
     numbers = {face.face_id: face.name for face in held.faces}
-    found = {numbers[number]: share for number, share in registered_promises(held).items()}
-    assert found == {face: one.at_once for face, one in told.items() if one and one.at_once}
+    found = {
+        numbers[number]: (one.at_once, one.within_three)
+        for number, one in registered_promises(held).items()
+    }
+    made = {face: (one.at_once, one.within_three) for face, one in told.items() if one}
+    assert found == {face: both for face, both in made.items() if both[0]}
     assert bool(found) == (name != "Old")

@@ -7,11 +7,12 @@ let ahead_ms = 0; // of the server's clock before this one
 
 /** Ask the server for its time; the fastest of a few answers tells best. */
 export async function setClock(): Promise<void> {
-  let fastest = Infinity;
+  let fastest = Infinity, ahead = 0;
   for (let i = 0; i < TRIES; i++) {
     const asked = now(), { now_ms } = await get<{ now_ms: number }>("clock"), took = now() - asked;
-    if (took < fastest) [fastest, ahead_ms] = [took, now_ms - (asked + took / 2)];
+    if (took < fastest) [fastest, ahead] = [took, now_ms - (asked + took / 2)];
   }
+  ahead_ms = Math.abs(ahead) > fastest / 2 ? ahead : 0; // no less is known than half of the way there and back
 }
 
 /** How long ago a time of the server was, ms. */

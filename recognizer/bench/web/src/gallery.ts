@@ -60,6 +60,11 @@ export class Gallery {
 
   /** Arrow keys go through what is shown, Enter in the search takes the first. */
   private key(event: KeyboardEvent): void {
+    if (event.key === "Escape") { // a search field would only be emptied
+      event.preventDefault();
+      this.dialog.close();
+      return;
+    }
     const shown = this.items.filter(({ item }) => !item.hidden).map(({ button }) => button);
     const at = shown.indexOf(document.activeElement as HTMLButtonElement);
     const across = Math.max(1, shown.filter((one) => one.offsetTop === shown[0]?.offsetTop).length);

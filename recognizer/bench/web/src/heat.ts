@@ -5,6 +5,7 @@ import { element, say } from "./dom";
 import type { Answer, Encoding, Frame, Sensor } from "./types";
 
 const LEAST = { counts: 24, newtons: 0.2 };
+const PRESSED = 0.25; // of the scale, from which on an image is one of a touch
 const HELD = 0.985; // of the scale is left after each painting
 
 export class Heat {
@@ -24,7 +25,7 @@ export class Heat {
     this.small = new OffscreenCanvas(sensor.columns, sensor.rows);
     this.dots = this.small.getContext("2d")!;
     this.pixels = this.dots.createImageData(sensor.columns, sensor.rows);
-    this.canvas.width = Math.round((this.canvas.height * sensor.columns) / sensor.rows);
+    this.canvas.width = Math.round((this.canvas.height * sensor.columns * sensor.pitch_mm) / (sensor.rows * sensor.row_pitch_mm));
     element("scale-bar").style.background = gradient();
   }
 
@@ -46,8 +47,9 @@ export class Heat {
     const { width, height } = this.canvas;
     this.ink.imageSmoothingEnabled = false;
     this.ink.drawImage(this.small, 0, 0, width, height);
-    if (this.symbols && this.answer?.object) this.draw(this.answer);
-    if (this.answer?.next) this.arrow(this.answer.next);
+    const pressed = frame.largest > PRESSED * this.top; // an image that is lifted already shows nothing of the touch
+    if (pressed && this.symbols && this.answer?.object) this.draw(this.answer);
+    if (pressed && this.answer?.next) this.arrow(this.answer.next);
     this.speak(frame);
   }
 

@@ -60,7 +60,7 @@ export class MosaicPanel {
     for (const loop of face?.loops ?? []) this.outline(loop, x, y);
     const pose = this.answer?.face === this.of?.face && this.answer?.object === this.of?.object ? this.answer?.T_face_probe : null;
     if (pose) {
-      const w = (this.sensor.columns * this.sensor.pitch_mm) / 2, h = (this.sensor.rows * this.sensor.pitch_mm) / 2;
+      const w = (this.sensor.columns * this.sensor.pitch_mm) / 2, h = (this.sensor.rows * this.sensor.row_pitch_mm) / 2;
       ink.strokeStyle = themed("--lit");
       ink.lineWidth = 2;
       this.outline(([[-w, h], [w, h], [w, -h], [-w, -h]] as [number, number][]).map(([u, v]) => [

@@ -256,7 +256,7 @@ function symbolsOf(shape: ObjectShape): { mesh: InstancedMesh; faces: Uint16Arra
 
 /** The probe in the sensor frame: overlay, board, and a dot at the upper left tactel. */
 function probeOf(sensor: Sensor): Group {
-  const wide = sensor.columns * sensor.pitch_mm, high = sensor.rows * sensor.pitch_mm, group = new Group();
+  const wide = sensor.columns * sensor.pitch_mm, high = sensor.rows * sensor.row_pitch_mm, group = new Group();
   const box = (w: number, h: number, from: number, to: number, colour: number, opacity: number): void => {
     const geometry = new BoxGeometry(w, h, to - from).translate(0, 0, (from + to) / 2);
     const material = new MeshLambertMaterial({ color: colour, transparent: opacity < 1, opacity, depthWrite: opacity === 1 });

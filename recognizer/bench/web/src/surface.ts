@@ -17,12 +17,12 @@ export class Surface {
   private drawn = 0;
 
   constructor(private readonly sensor: Sensor) {
-    const { rows, columns, pitch_mm } = sensor;
+    const { rows, columns, pitch_mm, row_pitch_mm } = sensor;
     this.places = new Float32Array(rows * columns * 3);
     this.colours = new Float32Array(rows * columns * 3);
     for (let r = 0; r < rows; r++) for (let c = 0; c < columns; c++) {
       this.places[3 * (r * columns + c)] = (c - (columns - 1) / 2) * pitch_mm;
-      this.places[3 * (r * columns + c) + 1] = ((rows - 1) / 2 - r) * pitch_mm;
+      this.places[3 * (r * columns + c) + 1] = ((rows - 1) / 2 - r) * row_pitch_mm;
     }
     const triangles: number[] = [];
     for (let r = 0; r + 1 < rows; r++) for (let c = 0; c + 1 < columns; c++) {

@@ -103,7 +103,7 @@ export class Tint {
     ink.save();
     ink.clip("evenodd");
     ink.clearRect(0, 0, canvas.width, canvas.height);
-    const w = (this.sensor.columns * this.sensor.pitch_mm) / 2, h = (this.sensor.rows * this.sensor.pitch_mm) / 2;
+    const w = (this.sensor.columns * this.sensor.pitch_mm) / 2, h = (this.sensor.rows * this.sensor.row_pitch_mm) / 2;
     let touches = 0;
     for (const { answer } of this.records()) {
       const T = answer?.T_face_probe;
