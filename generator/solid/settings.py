@@ -69,8 +69,9 @@ class EmbossingSettings:
     # polygon.py
     clipping_turns_rad: tuple[float, ...] = (0.0, 0.3, 1.1, 2.0)
     """By which an area is turned where its triangles do not come out right."""
-    flat: float = 1e-9
-    """Triangles thinner than this share of their longest side are taken for flat."""
+    flat: float = 1e-6
+    """Triangles thinner than this share of their longest side are taken for flat: the rounding of
+    STL, 1e-6 mm at 20 mm, turns them over."""
 
     # triangulate.py
     bent_flat: float = 1e-5
