@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -19,10 +20,11 @@ def print_made(result: Encoded, *, dry_run: bool, as_json: bool) -> None:
     if as_json:
         output.write_json(_encoded_values(result, dry_run))
         return
-    for made in result.objects:
-        output.write(_object_text(made, dry_run))
-        for warning in made.warnings:
-            output.warning(f"{made.name}: {warning}")
+    for alike in _alike(result.objects, dry_run):
+        output.write(_group_text(alike, dry_run))
+        for made in alike:
+            for warning in made.warnings:
+                output.warning(f"{made.name}: {warning}")
     share = result.used_cells / max(1, result.rows * result.columns)
     array = f"array {result.rows} x {result.columns}, {share:.0%} of its cells in use"
     if dry_run:
@@ -30,14 +32,37 @@ def print_made(result: Encoded, *, dry_run: bool, as_json: bool) -> None:
         return
     if result.set_files:
         folder = result.set_files[0].parent
-        output.write(
-            f"set:\n  {folder}{os.sep}  {', '.join(file.name for file in result.set_files)}"
-        )
+        output.write(f"set:\n  {folder}{os.sep}  {_file_list(folder, result.set_files)}")
     output.write(
         f"\n{array}; registered in {without_password(result.database)} ({result.seconds:.1f} s)"
     )
     if following := next_step(result):
         output.write(following)
+
+
+def _alike(objects: Sequence[MadeObject], dry_run: bool) -> list[list[MadeObject]]:
+    """Return runs of objects of which the same is to be said but for their name: copies."""
+    runs: list[list[MadeObject]] = []
+    said = ""
+    for made in objects:
+        own = _object_text(made, dry_run).replace(made.name, "")
+        if runs and own == said:
+            runs[-1].append(made)
+        else:
+            runs.append([made])
+        said = own
+    return runs
+
+
+def _group_text(alike: Sequence[MadeObject], dry_run: bool) -> str:
+    """Return a few lines on objects of which the same is to be said."""
+    first, last = alike[0].name, alike[-1].name
+    text = _object_text(alike[0], dry_run)
+    if len(alike) == 1:
+        return text
+    return text.replace(f"{first}: ", f"{first} ... {last}: {len(alike)} alike, each ", 1).replace(
+        f"{first}{os.sep}  ", f"{first}{os.sep} ... {last}{os.sep}  "
+    )
 
 
 def _object_text(made: MadeObject, dry_run: bool) -> str:
@@ -77,7 +102,7 @@ def _object_text(made: MadeObject, dry_run: bool) -> str:
     return "\n".join(lines)
 
 
-def _file_list(folder: Path, files: tuple[Path, ...]) -> str:
+def _file_list(folder: Path, files: Sequence[Path]) -> str:
     """Return the files of a folder: by name, or how many where there are several of a kind."""
     kinds: dict[str, list[str]] = {}
     for file in files:

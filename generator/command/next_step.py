@@ -25,14 +25,18 @@ def _of_set(result: Encoded) -> str:
     steps = []
     if plain:
         first = plain[0].name if len(plain) == 1 else f"{plain[0].name} ... {plain[-1].name}"
-        steps.append(f"print {first} in {plain[0].parent} ({_twin_name(plain[0])} in PrusaSlicer)")
+        lies = "as it lies" if len(plain) == 1 else "as they lie"
+        if all(made.lying is None for made in result.objects):
+            lies += ", backs down, symbols up, no supports, 100 % scale"
+        where = f"{first} in {plain[0].parent} ({_twin_name(plain[0])} in PrusaSlicer)"
+        steps.append(f"print {where} {lies}")
     if sheet:
         steps.append(f"put the objects together by {sheet}")
     elif not steps:
         return ""
     whole = [made for made in result.objects if made.lying is not None]
     if whole:
-        steps.append(f"{', '.join(made.name for made in whole)}: supports are needed")
+        steps.append("; ".join(f"{made.name}: {made.lying}" for made in whole))
     return "next: " + ", then ".join(steps)
 
 

@@ -105,7 +105,7 @@ def test_the_last_line_says_what_to_print(made):
     line = next_step(made)
     assert "print course-plate-1.3mf" in line or "print course-plate-1.3mf ... " in line
     assert "course-build.html" in line
-    assert "Whole: supports are needed" in line
+    assert "Whole: F1 down, supports needed under F1 (" in line
     whole = next(one for one in made.objects if one.name == "Whole")
     assert whole.lying is not None
     assert re.fullmatch(

@@ -1,0 +1,41 @@
+"""What `encode-object` says of copies, and of the files of a set."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from generator.command.made_report import print_made
+from generator.pipeline import Encoded, MadeObject
+
+
+def copy(number: int, name: str = "Cube", symbols: int = 384) -> MadeObject:
+    folder = Path("out") / f"{name}-{number}"
+    files = tuple(folder / f"{name}-{number}-F{face}.step" for face in (1, 2))
+    return MadeObject(f"{name}-{number}", 6, symbols, 200, 6, files, (), False)
+
+
+def said(objects, capsys, set_files=()):
+    made = Encoded(tuple(objects), "sqlite:///lab.db", 51, 1285, 5000, 1.0, set_files=set_files)
+    print_made(made, dry_run=False, as_json=False)
+    return capsys.readouterr().out
+
+
+def test_copies_are_said_once(capsys):
+    text = said([copy(1), copy(2), copy(3), copy(1, "Roof", 322)], capsys)
+    assert "Cube-1 ... Cube-3: 3 alike, each made; 6 faces, 384 symbols, 6 parts" in text
+    assert "out/Cube-1/ ... Cube-3/  2 step (Cube-1-F1.step, ...)" in text
+    assert "Cube-2" not in text
+    assert "Roof-1: made; 6 faces, 322 symbols" in text
+
+
+def test_copies_that_differ_are_said_each(capsys):
+    text = said([copy(1), copy(2, symbols=380)], capsys)
+    assert "Cube-1: made; 6 faces, 384 symbols" in text
+    assert "Cube-2: made; 6 faces, 380 symbols" in text
+
+
+def test_plates_of_a_set_are_counted(capsys):
+    plates = tuple(Path("out") / f"Set-plate-{n}.3mf" for n in range(1, 7))
+    text = said([copy(1)], capsys, (Path("out/Set-packing.csv"), *plates))
+    assert "out/  Set-packing.csv, 6 3mf (Set-plate-1.3mf, ...)" in text
+    assert "as they lie, backs down, symbols up, no supports, 100 % scale" in text
