@@ -22,6 +22,7 @@ TOUCH_FRAME: Final = "encoded_objects_msgs/msg/TouchFrame"
 RECOGNITION: Final = "encoded_objects_msgs/msg/Recognition"
 SENSOR_FRAME: Final = "sensor"  #: frame_id: x right, y up, z away from the object
 BASE_FRAME: Final = "base"  #: frame_id of the robot's base
+METADATA: Final = "recording"  #: name of the metadata of an MCAP file
 
 _LINE = "=" * 80 + "\n"
 _HEADER = (

@@ -1,14 +1,8 @@
-"""Recordings as MCAP files of ROS 2 messages, and back, without ROS and without loss.
+"""MCAP files of ROS 2 messages -> recordings, without ROS and without loss.
 
-::
-
-    /touch/image   sensor_msgs/Image              counts as 32FC1
-    /touch/pose    geometry_msgs/PoseStamped      T_base_sensor, m, where it is known
-    /touch/frame   encoded_objects_msgs/TouchFrame  the rest, see `probe.recording.ros`
-    metadata "recording"                          what the attributes of a recording say, as JSON
-
-Of a file by somebody else `sensor_msgs/Image` messages (32FC1, 16UC1 or mono8) are enough; their
-stamps are the times, and a `PoseStamped` belongs to the image of its stamp.
+What `probe.recording.mcap_writer` wrote comes back as it was. Of a file by somebody else
+`sensor_msgs/Image` messages (32FC1, 16UC1 or mono8) are enough; their stamps are the times, and a
+`PoseStamped` belongs to the image of its stamp.
 """
 
 from __future__ import annotations
@@ -19,13 +13,12 @@ from collections.abc import Collection, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 from types import MappingProxyType
-from typing import IO, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.errors import require
-from probe.closing import Closing
 from probe.errors import FrameError, RecordingError
 from probe.frame import Frame, frame_from
 from probe.recording.layout import RecordingOrigin
@@ -33,96 +26,13 @@ from probe.recording.names import check_name, final_name, part_of, unless_it_fai
 from probe.recording.opened import explain_errors
 from probe.recording.read import Recording
 from probe.recording.record import block_of
-from probe.recording.ros import (
-    BASE_FRAME,
-    DEFINITIONS,
-    IMAGE,
-    POSE,
-    TOUCH_FRAME,
-    frame_message,
-    image_message,
-    pose_message,
-)
+from probe.recording.ros import IMAGE, METADATA, POSE, TOUCH_FRAME
 from probe.recording.write import FileWriter
 from probe.sensor import SensorType
 from probe.sensor_types import choose_sensor_type, sensor_type_text
 
-IMAGE_TOPIC: Final = "/touch/image"
-POSE_TOPIC: Final = "/touch/pose"
-FRAME_TOPIC: Final = "/touch/frame"
-METADATA: Final = "recording"
 _AT_ONCE: Final = 1024  #: frames read at a time
 _ENCODINGS: Final = {"32FC1": "f4", "16UC1": "u2", "mono16": "u2", "mono8": "u1", "8UC1": "u1"}
-
-
-class McapWriter(Closing):
-    """An MCAP file of ROS 2 messages that is being written.
-
-    Parameters
-    ----------
-    stream
-        Where it goes.
-    origin
-        Where the frames come from.
-
-    Raises
-    ------
-    MissingExtraError
-        The libraries of the extra `robot` are not installed.
-    """
-
-    def __init__(self, stream: IO[bytes], origin: RecordingOrigin) -> None:
-        require("mcap_ros2.writer", extra="robot", purpose="MCAP")
-        from mcap_ros2.writer import Writer
-
-        self._writer = Writer(stream)
-        self._schemas: dict[str, Any] = {}
-        said = {
-            "sensor": origin.sensor,
-            "calibration": origin.calibration,
-            "units": origin.units,
-            "sensor_type": origin.sensor_type,
-            "more": json.dumps({name: _plain(value) for name, value in origin.more.items()}),
-        }
-        self._writer.add_metadata(METADATA, said)
-
-    def frame(self, frame: Frame) -> None:
-        """Append a frame."""
-        self.message(IMAGE_TOPIC, IMAGE, image_message(frame), frame.t_ns, frame.seq)
-        self.message(FRAME_TOPIC, TOUCH_FRAME, frame_message(frame), frame.t_ns, frame.seq)
-        if frame.pose is not None:
-            pose = pose_message(frame.pose, frame.t_ns, BASE_FRAME)
-            self.message(POSE_TOPIC, POSE, pose, frame.t_ns, frame.seq)
-
-    def message(self, topic: str, kind: str, fields: Mapping[str, Any], t_ns: int, n: int) -> None:
-        """Append a message of one of the types of `DEFINITIONS`."""
-        if kind not in self._schemas:
-            self._schemas[kind] = self._writer.register_msgdef(kind, DEFINITIONS[kind])
-        self._writer.write_message(
-            topic, self._schemas[kind], fields, log_time=max(t_ns, 0), sequence=n & 0xFFFFFFFF
-        )
-
-    def close(self) -> None:
-        """Write what belongs at the end of the file; the stream stays open."""
-        self._writer.finish()
-
-
-def export_mcap(recording: Recording, out: Path) -> int:
-    """Write a recording as an MCAP file; returns the number of frames.
-
-    Raises
-    ------
-    RecordingError
-        The recording cannot be read, or the file not be written.
-    """
-    with (
-        explain_errors(out, "write"),
-        open(out, "wb") as stream,
-        McapWriter(stream, recording.origin) as writer,
-    ):
-        for frame in recording.frames():
-            writer.frame(frame)
-    return len(recording)
 
 
 def import_mcap(
@@ -298,10 +208,3 @@ def _pose(pose: Any) -> NDArray[np.float64]:
     T[:3, :3] = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).as_matrix()
     T[:3, 3] = 1e3 * np.array([at.x, at.y, at.z])
     return T
-
-
-def _plain(value: Any) -> Any:
-    """Return a value of an attribute as JSON holds it."""
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    return value.item() if isinstance(value, np.generic) else value
