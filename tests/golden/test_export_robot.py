@@ -14,6 +14,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from reference.kernel import inertia_of, solid_of
 from reference.sdformat import faults
 
 from generator.database.open import open_database
@@ -53,20 +54,10 @@ def part(request, tmp_path_factory):
         known = read_object(connection, "Part")
     faces = {face.name: face.T_object_face for face in known.faces if "." not in face.name}
     solids = [
-        (kernel_shape(folder / "out" / Path(entry.file).name), entry.T_object_part)
+        (solid_of(folder / "out" / Path(entry.file).name), entry.T_object_part)
         for entry in known.parts
     ]
     return SimpleNamespace(kind=request.param, folder=folder / "out", faces=faces, solids=solids)
-
-
-def kernel_shape(step: Path):
-    """Return what the CAD kernel reads."""
-    from OCP.STEPControl import STEPControl_Reader
-
-    reader = STEPControl_Reader()
-    reader.ReadFile(str(step))
-    reader.TransferRoots()
-    return reader.OneShape()
 
 
 def read_models(part):
@@ -77,28 +68,8 @@ def read_models(part):
         yield suffix, read(named, part.folder / f"Part{suffix}")
 
 
-def kernel_inertia(solids):
-    """Return volume (mm3), centre (mm) and inertia about it (mm5) in the object frame."""
-    from OCP.BRepGProp import BRepGProp
-    from OCP.GProp import GProp_GProps
-
-    volume, moment, about = 0.0, np.zeros(3), np.zeros((3, 3))
-    for shape, T in solids:
-        found = GProp_GProps()
-        BRepGProp.VolumeProperties_s(shape, found)
-        centre, matrix = found.CentreOfMass(), found.MatrixOfInertia()
-        own = np.array([[matrix.Value(i, k) for k in (1, 2, 3)] for i in (1, 2, 3)])
-        at = T[:3, :3] @ (centre.X(), centre.Y(), centre.Z()) + T[:3, 3]
-        volume += found.Mass()
-        moment += found.Mass() * at
-        about += T[:3, :3] @ own @ T[:3, :3].T
-        about += found.Mass() * (at @ at * np.eye(3) - np.outer(at, at))
-    middle = moment / volume
-    return volume, middle, about - volume * (middle @ middle * np.eye(3) - np.outer(middle, middle))
-
-
 def test_mass_centre_and_inertia_are_the_kernels(part):
-    volume, centre, inertia = kernel_inertia(part.solids)
+    volume, centre, inertia = inertia_of(part.solids)
     density = 2000.0 if part.kind == "whole" else 1240.0
     for suffix, read in read_models(part):
         assert read.mass_kg == pytest.approx(density * volume * 1e-9, rel=2e-7), suffix
