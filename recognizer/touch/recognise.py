@@ -176,7 +176,8 @@ def answer_at(
         return refusal(seq, reason, margin=margin, runner_up=runner_up)
     face = embossed.face(hypothesis.face)
     pose = face_pose(embossed, face, hypothesis, fit)
-    if inside_mm(face, float(pose[0, 3]), float(pose[1, 3])) < -settings.belief.rim_mm:
+    inside = inside_mm(face, float(pose[0, 3]), float(pose[1, 3]))
+    if inside < -settings.belief.rim_mm:
         return refusal(seq, OUTSIDE, margin=margin, runner_up=runner_up)
     covariance = face_covariance(face, fit.covariance)
     if face.printed is not None:
@@ -196,4 +197,5 @@ def answer_at(
         noise=fit.noise,
         scale=fit.scale,
         stroke_mm=embossed.style.stroke_mm + fit.wider * settings.template.wider_mm,
+        inside_mm=inside if face.round is None else None,
     )

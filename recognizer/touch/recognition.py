@@ -98,6 +98,9 @@ class Recognition:
     thesis's way is read."""
     next: NextTouch | None = None  #: where it does not answer or is unsure
     cause: Cause | None = None  #: what of the touch made it fail; None where it answers
+    inside_mm: float | None = None
+    """How far the sensor's centre lies inside the face's outline; negative outside; None where it
+    does not answer, on a round face, and where the thesis's way is read."""
 
     def __bool__(self) -> bool:
         return self.object is not None

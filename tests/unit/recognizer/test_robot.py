@@ -9,10 +9,11 @@ from scipy.spatial.transform import Rotation
 from probe.arm.carried import SensorPose
 from probe.arm.links import Arm, forward
 from probe.errors import PoseError
+from probe.sensor import SensorType
 from probe.wrist.distances import counts_of, distances_at
 from probe.wrist.geometry import Wrist, gripper_to_plate, plate_to_sensor
 from recognizer.touch.recognition import Recognition, refusal
-from recognizer.touch.robot import ObjectPose, Seating, carried_pose, fuse_poses, object_pose
+from recognizer.touch.robot import Seating, carried_pose, object_pose
 
 JOINTS = np.radians([20.0, -40.0, 70.0, -25.0, 15.0])
 PLANAR = np.array([[0.02, 0.004, 1e-4], [0.004, 0.01, -5e-5], [1e-4, -5e-5, 4e-5]])
@@ -29,9 +30,12 @@ T_OBJECT_FACE = pose_of([0.3, 1.1, -0.4], [30.0, -20.0, 10.0])
 T_FACE_PROBE = pose_of([0.0, 0.0, 0.7], [22.0, 31.0, 1.0])
 
 
-def answer(T_face_probe=T_FACE_PROBE):
+EXACT = Seating(0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def answer(T_face_probe=T_FACE_PROBE, inside_mm=20.0):
     return Recognition(0, "Cube", "F1", (3, 4), T_face_probe, T_OBJECT_FACE @ T_face_probe,
-                       PLANAR, 30.0, None, "")  # fmt: skip
+                       PLANAR, 30.0, None, "", inside_mm=inside_mm)  # fmt: skip
 
 
 def moved(T, error):
@@ -43,15 +47,30 @@ def moved(T, error):
 def test_the_object_is_found_where_it_stands():
     T_base_object = pose_of([0.1, 0.2, 1.3], [350.0, 80.0, 20.0])
     T_base_sensor = T_base_object @ T_OBJECT_FACE @ T_FACE_PROBE
-    placed = object_pose(answer(), SensorPose(T_base_sensor, np.zeros((6, 6))))
+    sensor = SensorPose(T_base_sensor, np.zeros((6, 6)))
+    placed = object_pose(answer(), sensor, EXACT)
     assert placed.T_robot_object == pytest.approx(T_base_object, abs=1e-9)
+    sunk = object_pose(answer(), sensor, Seating(pressed_mm=0.4))
+    out = (T_base_object @ T_OBJECT_FACE)[:3, 2]
+    assert sunk.T_robot_object[:3, 3] == pytest.approx(T_base_object[:3, 3] + 0.4 * out, abs=1e-9)
+
+
+def test_a_sensor_that_hangs_over_the_border_sinks_and_tips():
+    seating = Seating(0.5, 0.4, 0.3, 0.01, 0.05, half_mm=10.0)
+    assert [seating.depth_mm(at) for at in (25.0, 10.0, 5.0, 0.0, -1.0)] == pytest.approx(
+        [0.5, 0.5, 0.7, 0.9, 0.9]
+    )
+    assert [seating.spread_rad(at) for at in (10.0, 2.5, 0.0)] == pytest.approx([0.01, 0.04, 0.05])
+    assert seating.spread_rad(None) == seating.spread_rad(0.0)  # of a round face nothing is known
+    assert Seating.of(SensorType(rows=12, columns=32)).half_mm == pytest.approx(9.525)
 
 
 def test_the_covariance_is_that_of_drawn_errors():
     rng = np.random.default_rng(2)
     root = rng.normal(0, 1, (6, 6)) * np.repeat([0.2, 0.002], 3)[:, None]
     sensor = SensorPose(pose_of([0.4, -2.2, 0.6], [300.0, 50.0, 90.0]), root @ root.T)
-    seating = Seating(z_mm=0.4, tilt_rad=0.01)
+    seating = Seating(pressed_mm=0.3, z_mm=0.4, tilt_rad=0.01)
+    sunk = pose_of([0.0, 0.0, 0.0], [0.0, 0.0, -seating.pressed_mm])
     placed = object_pose(answer(), sensor, seating)
     number = 1500
     errors = rng.multivariate_normal(np.zeros(6), sensor.covariance, number)
@@ -60,10 +79,10 @@ def test_the_covariance_is_that_of_drawn_errors():
     for k in range(number):
         touch = np.zeros(6)
         touch[[0, 1, 5]] = planar[k]
-        touch[2] = rng.normal(0, seating.z_mm)
+        touch[2] = rng.normal(0, math.hypot(seating.z_mm, 0.01 * seating.half_mm / 2))
         touch[3:5] = rng.normal(0, seating.tilt_rad, 2)
         true = moved(sensor.T_base_sensor, errors[k]) @ np.linalg.inv(
-            T_OBJECT_FACE @ moved(T_FACE_PROBE, touch)
+            T_OBJECT_FACE @ moved(T_FACE_PROBE @ sunk, touch)
         )
         drawn[k, :3] = true[:3, 3] - placed.T_robot_object[:3, 3]
         turn = true[:3, :3] @ placed.T_robot_object[:3, :3].T
@@ -78,10 +97,9 @@ def test_a_joint_error_moves_the_object_as_its_covariance_says():
     errors = np.array([0.01, 0.0, 0.0, 0.0, 0.0])
     at = carried_pose(arm, wrist, JOINTS, errors, counts)
     turned = carried_pose(arm, wrist, JOINTS + errors, np.zeros(5), counts)
-    exact = Seating(0.0, 0.0)
     known = answer()
-    placed, other = object_pose(known, at, exact), object_pose(known, turned, exact)
-    alone = object_pose(known, carried_pose(arm, wrist, JOINTS, np.zeros(5), counts), exact)
+    placed, other = object_pose(known, at, EXACT), object_pose(known, turned, EXACT)
+    alone = object_pose(known, carried_pose(arm, wrist, JOINTS, np.zeros(5), counts), EXACT)
     step = other.T_robot_object[:3, 3] - placed.T_robot_object[:3, 3]
     grown = placed.covariance[:3, :3] - alone.covariance[:3, :3]
     assert np.linalg.norm(step) > 1.0
@@ -105,56 +123,3 @@ def test_what_is_not_known():
     assert object_pose(refusal(0, "ambiguous"), sensor) is None
     with pytest.raises(PoseError, match="end stops"):
         carried_pose(Arm(), Wrist(), JOINTS, np.zeros(5), [0, 0, 0, 0])
-
-
-def test_several_touches_tighten_and_hold():
-    """Errors drawn anew shrink by the root of the number; what is shared stays, and is honest."""
-    rng = np.random.default_rng(6)
-    base = pose_of([0.2, -0.1, 0.9], [320.0, 40.0, 30.0])
-    roots = [rng.normal(0, 1, (6, 6)) * np.repeat([0.2, 0.002], 3)[:, None] for _ in range(9)]
-    own = [root @ root.T for root in roots]
-    shared = np.diag([0.0, 0.0, 0.16, 1e-4, 1e-4, 0.0])
-    inside, moved_ones, number = 0, 0, 400
-    for _ in range(number):
-        common = rng.multivariate_normal(np.zeros(6), shared)
-        poses = []
-        for covariance in own:
-            off = rng.multivariate_normal(np.zeros(6), covariance) + common
-            poses.append(ObjectPose(moved(base, -off), covariance + shared, shared))
-        fused = fuse_poses(poses)
-        moved_ones += fused.moved
-        left = np.concatenate(
-            [
-                base[:3, 3] - fused.pose.T_robot_object[:3, 3],
-                Rotation.from_matrix(
-                    base[:3, :3] @ fused.pose.T_robot_object[:3, :3].T
-                ).as_rotvec(),
-            ]
-        )
-        inside += left @ np.linalg.solve(fused.pose.covariance, left) < 12.592
-    assert 0.92 < inside / number < 0.98
-    assert moved_ones <= 3
-    tight = np.linalg.inv(sum(np.linalg.inv(covariance) for covariance in own)) + shared
-    assert fused.pose.covariance == pytest.approx(tight, rel=1e-6, abs=1e-12)
-    assert fused.freedoms == 48
-
-
-def test_a_moved_object_is_noticed():
-    rng = np.random.default_rng(7)
-    base = pose_of([0.2, -0.1, 0.9], [320.0, 40.0, 30.0])
-    covariance = np.diag([0.2, 0.2, 0.4, 2e-3, 2e-3, 2e-3]) ** 2
-    for shift, noticed in ((0.0, False), (3.0, True)):
-        poses = [
-            ObjectPose(moved(base, rng.multivariate_normal(np.zeros(6), covariance)), covariance)
-            for _ in range(2)
-        ]
-        poses.append(ObjectPose(moved(base, np.array([shift, 0, 0, 0, 0, 0])), covariance))
-        assert fuse_poses(poses).moved is noticed
-
-
-def test_one_pose_fused_is_itself():
-    placed = object_pose(answer(), SensorPose(np.eye(4), 1e-4 * np.eye(6)))
-    fused = fuse_poses([placed])
-    assert fused.pose.T_robot_object == pytest.approx(placed.T_robot_object, abs=1e-12)
-    assert fused.pose.covariance == pytest.approx(placed.covariance, rel=1e-6)
-    assert (fused.freedoms, fused.moved) == (0, False)

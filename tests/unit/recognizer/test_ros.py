@@ -11,7 +11,7 @@ import pytest
 from recognizer.command.answers import Answer
 from recognizer.command.ros import object_message, recognition_message
 from recognizer.touch.recognition import AMBIGUOUS, Recognition, refusal
-from recognizer.touch.robot import ObjectPose
+from recognizer.touch.robot import ObjectPose, Seating
 
 
 def turned(angle, at):
@@ -36,15 +36,18 @@ def test_without_a_base_the_object_is_told_in_the_sensors_frame(found):
         "frame_id": "sensor",
     }
     expected = -turned(0.5, [0, 0, 0])[:3, :3].T @ [0.02, 0.03, 0]
+    expected[2] = Seating().depth_mm(found.inside_mm) / 1000
     at = message["pose"]["pose"]["position"]
     assert np.allclose([at["x"], at["y"], at["z"]], expected)
     turn = message["pose"]["pose"]["orientation"]
     assert np.allclose([turn["z"], turn["w"]], [-np.sin(0.25), np.cos(0.25)])
     spread = np.array(message["pose"]["covariance"]).reshape(6, 6)
     assert np.allclose(spread, spread.T)
-    # The turn of the probe, 3 mrad, moves the object's origin, 36 mm away, by .108 mm.
+    # The turn of the probe, 3 mrad, moves the object's origin, 36 mm away, by .108 mm; tilts move
+    # it by as much as the probe is pressed in.
+    tips = Seating().spread_rad(None) * Seating().depth_mm(None)
     assert np.sqrt(np.trace(spread[:2, :2])) == pytest.approx(
-        1e-3 * np.sqrt(0.04**2 + 0.05**2 + (0.003 * np.hypot(20, 30)) ** 2), rel=1e-6
+        1e-3 * np.sqrt(0.04**2 + 0.05**2 + (0.003 * np.hypot(20, 30)) ** 2 + 2 * tips**2), rel=1e-6
     )
 
 
