@@ -1,9 +1,10 @@
 """A world to touch in: an arm, a compliant wrist, the probe, and encoded objects on a table.
 
 MuJoCo moves the arm, presses the probe through the wrist's springs onto objects whose poses nobody
-told, and says what the tactels feel of the written meshes. The robot knows its link table, encoders
-with play and noise, and the wrist's four distances. It presses over the table until something is
-higher than that, reads, goes where `next` says, and tells object and pose in its base.
+told, and says what the tactels feel of the written meshes and how the plate comes to rest on them.
+The robot knows its link table, encoders with play and noise, and the wrist's four distances. It
+presses over the table until something is higher than that, reads, goes where `next` says, and tells
+object and pose in its base.
 
     python mujoco_bench.py --trials 1 --pictures strip.png
 
@@ -17,6 +18,7 @@ import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -32,22 +34,27 @@ from probe.arm.links import Arm
 from probe.errors import ContactError, PoseError
 from probe.scan.kinesthetic import JointErrors
 from probe.scan.places import touch_at
+from probe.simulate.scene import Scene
 from probe.simulate.world.levels import LEVELS
 from probe.simulate.world.reading import read_sensor
+from probe.simulate.world.sensor_copy import draw_copy
 from probe.wrist.distances import counts_of, distances_at
 from probe.wrist.geometry import Wrist, WristPose, gripper_to_plate, plate_to_sensor
 from probe.wrist.springs import stiffness
-from recognizer.touch.robot import ObjectPose, carried_pose, object_pose
+from recognizer.touch.robot import carried_pose, object_pose
 from recognizer.validation.written import written_surface
 
 Array = np.ndarray
 Shown = Callable[[Any, Array, Any], None] | None
-Found = tuple[Any, ObjectPose | None, int]
+Found = tuple[Any, SensorPose | None, int]
 OBJECTS = {"Cube": "{cube: 60 mm}", "Box": "{box: 70 x 55 x 45 mm}",
            "Prism": "{prism: {sides: 6, side: 36 mm, height: 50 mm}}"}  # fmt: skip
+KEY = "0123-4567-89AB-CDER"  # so that every run has the same symbols
 SECTORS = np.radians([-55.0, 0.0, 55.0])  # where on the table one of them lies
 ARM, WRIST, ERRORS = Arm(), Wrist(), JointErrors()
-FORCE_N, SPEED_MM_S, STEP_S = 60.0, 80.0, 0.001
+FORCE_N, SPEED_MM_S, STEP_S, TICK_S = 60.0, 80.0, 0.001, 0.005
+JOINTS = [f"q{i}" for i in range(1, 6)]
+LEVEL = Rotation.from_rotvec([0, 0, -WRIST.gamma_rad]).as_matrix()  # of the plate on the gripper
 SPRING_N_MM = 4 * WRIST.spring_n_mm + WRIST.axial_n_mm
 ON = "table/"  # before the names of what lies there
 HELD_OFF_MM = 0.65  # by which the symbols hold the tips' plane off the face at this force
@@ -77,6 +84,12 @@ def pose(body: Any) -> Array:
     T[:3, :3] = body.xmat.reshape(3, 3)
     T[:3, 3] = 1e3 * body.xpos
     return T
+
+
+@cache
+def surface(lab: str, name: str, face: str) -> Scene:
+    """Return a face as it was written."""
+    return written_surface(lab, name, face)
 
 
 def arm_mjcf() -> str:
@@ -122,7 +135,8 @@ def build(folder: Path) -> mujoco.MjModel:
     spec = mujoco.MjSpec.from_string(
         f'<mujoco><option timestep="{STEP_S}" integrator="implicitfast" '
         'cone="elliptic" impratio="10"/>'
-        '<visual><global offwidth="640" offheight="480"/></visual><worldbody>'
+        '<visual><global offwidth="640" offheight="480"/></visual><asset><texture type="skybox" '
+        'builtin="flat" rgb1=".93 .94 .96" width="32" height="192"/></asset><worldbody>'
         '<light pos="0.3 -0.6 1.4" dir="0 .4 -1"/><camera name="film" pos=".78 -.55 .42" '
         'xyaxes=".62 .78 0 -.3 .24 .92"/><geom type="plane" size="1 1 .1" rgba=".82 .84 .86 1"/>'
         f"{arm_mjcf()}</worldbody><actuator>{actuators}</actuator></mujoco>"
@@ -142,8 +156,9 @@ class Bench:
     def __init__(self, model: mujoco.MjModel, lab: str, rng: np.random.Generator) -> None:
         self.model, self.data, self.rng, self.lab = model, mujoco.MjData(model), rng, lab
         self.reader = Reader(open_lab(lab))
-        self.joints = [model.joint(f"q{i}").qposadr[0] for i in range(1, 6)]
+        self.joints = [model.joint(name).qposadr[0] for name in JOINTS]
         self.presses = 0
+        self.copy = draw_copy(self.reader.sensor, rng)
         hanging = WristPose(WRIST.travel_mm[1], 0.0, 0.0, np.zeros((3, 3)))
         self.T_gripper_sensor = gripper_to_plate(WRIST, hanging) @ plate_to_sensor(WRIST)
 
@@ -174,11 +189,11 @@ class Bench:
         self._stand(above)
         height = 95.0
         while self._force() < FORCE_N:
-            height -= SPEED_MM_S * STEP_S * (1.0 if self._force() < 2.0 else 0.2)
+            height -= SPEED_MM_S * TICK_S * (1.0 if self._force() < 2.0 else 0.2)
             if height < -4.0:
                 return None
             self.data.ctrl[:] = self._angles([*at_mm, height], turn_rad)
-            self._steps(STEP_S)
+            self._steps(TICK_S)
         self._steps(0.25)
         if 1e3 * self.data.site("sensor").xpos[2] < 10.0:
             return None
@@ -192,36 +207,56 @@ class Bench:
         return counts, sensor
 
     def _feel(self) -> Array:
-        """Return what the tactels feel of the written part under the sensor."""
-        T_base_sensor = pose(self.data.site("sensor"))
-        level = self.level_sensor()
-        best = None
-        for i in range(self.model.nsite):
-            site = self.data.site(i)
-            if site.name == "sensor":
-                continue
-            T = np.linalg.inv(pose(site)) @ T_base_sensor
-            name, _, face = site.name.removeprefix(ON).rpartition("-")
-            if T[2, 2] > 0.98 and abs(T[2, 3] - HELD_OFF_MM) < 3.0:
-                scene = written_surface(self.lab, name, face)
-                off = -float(scene.region.distance_mm(T[None, :2, 3])[0])
-                inside = bool(scene.region.contains(T[None, :2, 3])[0])
-                off = off if inside else -off
-                if best is None or off < best[0]:
-                    best = (off, scene, np.linalg.inv(pose(site)) @ level, T)
-        if best is None:
+        """Return what the tactels feel of the written part; let the plate rest as it is pressed."""
+        name, face = self.under()
+        if not face:
             return np.zeros((16, 16), np.uint16)
-        _, scene, T_unloaded, T = best
-        T_unloaded[:3, 3] = T[:3, 3]
-        touch = touch_at(T_unloaded, self._force(), stiffness(WRIST))
+        site, scene = self.data.site(f"{ON}{name}-{face}"), surface(self.lab, name, face)
+        T_face_base = np.linalg.inv(pose(site))
+        T = T_face_base @ self.level_sensor()
+        T[:3, 3] = (T_face_base @ pose(self.data.site("sensor")))[:3, 3]
+        touch = touch_at(T, self._force(), stiffness(WRIST))
         try:
-            counts, _ = read_sensor(
+            counts, contact = read_sensor(
                 scene.under(touch).surface, self.reader.sensor, touch, LEVELS["typical"], self.rng,
-                "mujoco",
+                "mujoco", copy=self.copy,
             )  # fmt: skip
         except ContactError:  # the plate tips over the edge
             return np.zeros((16, 16), np.uint16)
+        lean = Rotation.from_euler("ZXY", [touch.theta_rad, contact.tilt_x_rad, contact.tilt_y_rad])
+        self._rest(pose(site), lean, np.array([touch.x_mm, touch.y_mm, contact.z_mm]))
         return counts
+
+    def _rest(self, T_base_face: Array, lean: Rotation, at_mm: Array) -> None:
+        """Let the plate hang as the symbols hold it: tilts, height, and where it was felt."""
+        R_base_level = pose(self.data.body("link5"))[:3, :3] @ LEVEL
+        out = -(R_base_level.T @ T_base_face[:3, :3] @ lean.as_matrix())[:, 2]  # of the plate
+        self.data.joint("ty").qpos[0] = math.atan2(out[0], out[2])
+        self.data.joint("tx").qpos[0] = -math.asin(out[1])
+        freedoms = [self.model.joint(name).dofadr[0] for name in (*JOINTS, "z")]
+        columns = np.zeros((6, self.model.nv))
+        for _ in range(3):  # as the plate tilts the tips swing aside: the arm yields by that much
+            mujoco.mj_forward(self.model, self.data)
+            sensor = self.data.site("sensor")
+            off = T_base_face[:3, :3] @ at_mm + T_base_face[:3, 3] - pose(sensor)[:3, 3]
+            mujoco.mj_jacSite(self.model, self.data, columns[:3], columns[3:], sensor.id)
+            step = np.linalg.lstsq(columns[:, freedoms], [*(1e-3 * off), 0, 0, 0], rcond=None)[0]
+            self.data.qpos[[*self.joints, self.model.joint("z").qposadr[0]]] += step
+        mujoco.mj_forward(self.model, self.data)
+
+    def under(self) -> tuple[str, str]:
+        """Return object and face that lie under the sensor; empty where none does."""
+        T_base_sensor, best = pose(self.data.site("sensor")), (math.inf, "", "")
+        for i in range(self.model.nsite):
+            site = self.data.site(i)
+            T = np.linalg.inv(pose(site)) @ T_base_sensor
+            if site.name == "sensor" or T[2, 2] < 0.98 or abs(T[2, 3] - HELD_OFF_MM) > 3.0:
+                continue
+            name, _, face = site.name.removeprefix(ON).rpartition("-")
+            region, at = surface(self.lab, name, face).region, T[None, :2, 3]
+            off = float(region.distance_mm(at)[0]) * (-1 if region.contains(at)[0] else 1)
+            best = min(best, (off, name, face))
+        return best[1:]
 
     def level_sensor(self) -> Array:
         """Return where the sensor would be if the wrist were level."""
@@ -250,7 +285,7 @@ class Bench:
         mujoco.mj_step(self.model, self.data, max(1, round(seconds / STEP_S)))
 
     def find(self, sector: float, most: int = 4, shown: Shown = None) -> Found:
-        """Search a sector; returns (recognition, object pose, touches read) or None."""
+        """Search a sector; returns (recognition, pose of the sensor, touches read)."""
         middle = 315.0 * np.array([math.cos(sector), math.sin(sector)])
         read = 0
         for off in SEARCH_MM:
@@ -268,25 +303,33 @@ class Bench:
                 if shown:
                     shown(self, counts, found)
                 if found:
-                    return found, object_pose(found, sensor), read
-                if found.next is None or scan.touches >= most:
+                    return found, sensor, read
+                step = found.next and (found.next.dx_mm, found.next.dy_mm)
+                if not step or not any(step) or scan.touches >= most:
                     break
                 c, s = math.cos(turn), math.sin(turn)
-                step = np.array([[c, -s], [s, c]]) @ [found.next.dx_mm, found.next.dy_mm]
-                at, turn = at + step, turn + math.radians(found.next.turn_deg)
+                at = at + np.array([[c, -s], [s, c]]) @ step
+                turn += math.radians(found.next.turn_deg)
         return None, None, read
 
 
+def error_of(T: Array, truth: Array) -> Array:
+    """Return (6,) truth less answer: mm and rad, base axes."""
+    turn = Rotation.from_matrix(truth[:3, :3] @ T[:3, :3].T).as_rotvec()
+    return np.array([*(truth[:3, 3] - T[:3, 3]), *turn])
+
+
 def compare(
-    trial: int, name: str, bench: Bench, found: Any, placed: ObjectPose | None, read: int
+    trial: int, name: str, bench: Bench, found: Any, sensor: SensorPose | None, read: int
 ) -> Told:
     """Return an answer beside the simulator's truth."""
     told = Told(trial, name, found.object if found else "", read, bench.presses)
-    if not found or placed is None or found.object not in OBJECTS:
+    if not found or sensor is None or found.object not in OBJECTS:
         return told
-    truth, T = pose(bench.data.body(ON + found.object)), placed.T_robot_object
-    turn = Rotation.from_matrix(truth[:3, :3] @ T[:3, :3].T).as_rotvec()
-    off = np.array([*(truth[:3, 3] - T[:3, 3]), *turn])
+    placed = object_pose(found, sensor)
+    assert placed is not None
+    off = error_of(placed.T_robot_object, pose(bench.data.body(ON + found.object)))
+    turn = off[3:]
     told.position_mm, told.turn_deg = np.linalg.norm(off[:3]), math.degrees(np.linalg.norm(turn))
     told.chi2 = float(off @ np.linalg.solve(placed.covariance, off))
     told.off, told.covariance = off.tolist(), placed.covariance.tolist()
@@ -303,18 +346,22 @@ class Film:
         self.pictures: list[Image.Image] = []
 
     def __call__(self, bench: Bench, counts: Array, found: Any) -> None:
-        """Take a picture of a touch that is read."""
+        """Take a picture of a touch that is felt."""
+        if not counts.any():
+            return
         with mujoco.Renderer(bench.model, 360, 480) as renderer:
             options = mujoco.MjvOption()
             options.geomgroup[3] = 0  # not what is hit
             renderer.update_scene(bench.data, "film", options)
             picture = Image.fromarray(renderer.render())
-        felt = np.clip(counts / max(counts.max(), 1) * 255, 0, 255).astype(np.uint8)
+        felt = (counts / counts.max() * 255).astype(np.uint8)
         picture.paste(Image.fromarray(felt).resize((128, 128), Image.Resampling.NEAREST), (8, 8))
         said = f"{found.object}/{found.face}" if found else found.reason
         if not found and found.next is not None:
             said += f"; next: {found.next.dx_mm:.0f}, {found.next.dy_mm:.0f} mm"
-        ImageDraw.Draw(picture).text((8, 340), said, fill=(20, 30, 45), font_size=14)
+        draw = ImageDraw.Draw(picture)
+        draw.rectangle((0, 334, 480, 360), fill=(255, 255, 255))
+        draw.text((8, 337), said, fill=(20, 30, 45), font_size=17)
         self.pictures.append(picture)
 
     def save(self, path: Path, most: int = 4) -> None:
@@ -326,16 +373,21 @@ class Film:
         strip.quantize(128).save(path)
 
 
-def run(trials: int, seed: int, folder: Path, shown: Shown = None) -> list[Told]:
-    """Lay out, search and read; three objects a trial."""
+def make(folder: Path) -> tuple[mujoco.MjModel, str]:
+    """Encode the objects into a lab; return the world and the lab's URL."""
     lab = str(folder / "bench.db")
     for name, shape in OBJECTS.items():
         spec = folder / f"{name}.yaml"
-        spec.write_text(f"name: {name}\nshape: {shape}\nprofile: one-touch\n")
+        spec.write_text(f"name: {name}\nshape: {shape}\noutput: {{lab_key: {KEY}}}\n")
         encode(spec, database=lab, folder=folder / name, formats=("stl", "mjcf"))
-    model, told = build(folder), []
+    return build(folder), f"sqlite:///{lab}"
+
+
+def run(trials: int, seed: int, folder: Path, shown: Shown = None) -> list[Told]:
+    """Lay out, search and read; three objects a trial."""
+    (model, lab), told = make(folder), []
     for trial in range(trials):
-        bench = Bench(model, f"sqlite:///{lab}", np.random.default_rng([seed, trial]))
+        bench = Bench(model, lab, np.random.default_rng([seed, trial]))
         bench.lay_out()
         for sector in SECTORS:
             bench.presses = 0
