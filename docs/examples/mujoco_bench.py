@@ -375,12 +375,18 @@ class Film:
 
 def make(folder: Path) -> tuple[mujoco.MjModel, str]:
     """Encode the objects into a lab; return the world and the lab's URL."""
-    lab = str(folder / "bench.db")
     for name, shape in OBJECTS.items():
         spec = folder / f"{name}.yaml"
         spec.write_text(f"name: {name}\nshape: {shape}\noutput: {{lab_key: {KEY}}}\n")
-        encode(spec, database=lab, folder=folder / name, formats=("stl", "mjcf"))
-    return build(folder), f"sqlite:///{lab}"
+        encode(
+            spec, database=str(folder / "bench.db"), folder=folder / name, formats=("stl", "mjcf")
+        )
+    return load(folder)
+
+
+def load(folder: Path) -> tuple[mujoco.MjModel, str]:
+    """Return the world of what was encoded; and the lab's URL."""
+    return build(folder), f"sqlite:///{folder / 'bench.db'}"
 
 
 def run(trials: int, seed: int, folder: Path, shown: Shown = None) -> list[Told]:

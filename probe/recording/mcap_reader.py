@@ -55,7 +55,7 @@ def import_mcap(
         No MCAP file, no images in it, or images that are none of a touch; a name that is taken.
     """
     check_name(out, replace=replace)
-    origin, frames = read_mcap(path)
+    origin, frames, poses = read_mcap(path)
     if sensor_type and not origin.sensor_type:
         told = sensor_type_text(choose_sensor_type(sensor_type, "", None, str(path)))
         origin = dataclasses.replace(origin, sensor_type=told)
@@ -67,13 +67,15 @@ def import_mcap(
                     f"images of {some[0].counts.shape} and of {odd[0].counts.shape} readings",
                     fix="keep the images of one sensor in a file", place=str(path),
                 )  # fmt: skip
-            writer.write(block_of(some, poses=True))
+            writer.write(block_of(some, poses=poses))
     final_name(part, out, [], last=True, replace=replace)
     return Recording(out)
 
 
-def read_mcap(path: Path) -> tuple[RecordingOrigin, Iterator[Frame]]:
-    """Return where the frames of an MCAP file come from, and these, in order of their time.
+def read_mcap(path: Path) -> tuple[RecordingOrigin, Iterator[Frame], bool]:
+    """Return where the frames of an MCAP file come from, these, and whether any may have a pose.
+
+    The frames come in order of their time.
 
     Raises
     ------
@@ -109,7 +111,7 @@ def read_mcap(path: Path) -> tuple[RecordingOrigin, Iterator[Frame]]:
         said.get("sensor", ""), said.get("calibration", ""), said.get("units", "counts"),
         said.get("sensor_type", ""), MappingProxyType(dict(more)),
     )  # fmt: skip
-    return origin, _frames(path)
+    return origin, _frames(path), summary is None or POSE in kinds.values()
 
 
 def _frames(path: Path) -> Iterator[Frame]:

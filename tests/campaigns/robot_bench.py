@@ -2,11 +2,10 @@
 
     python tests/campaigns/robot_bench.py -o OUT.jsonl --trials 67 --seed 1
 
-Three objects a trial in the world of `docs/examples/mujoco_bench.py`. Each is found and touched
-again at another place of its face; in every twelfth trial at `--more` places, and then it is moved
-(1, 2, 5, 10 mm, 1, 2, 5 degrees in turn) and touched once more. A line of JSON an object; trials
-that are in OUT are not run again. Prints errors and covariances after 1, 2, 3 ... touches, and how
-often a move was noticed.
+Three objects a trial in the world of `docs/examples/mujoco_bench.py`. In every eighth trial each is
+touched `--more` times again at other places of its face, then moved (1, 2, 5, 10 mm, 1, 2, 5
+degrees in turn) and touched once more. A line of JSON an object; trials that are in OUT are not run
+again. Prints errors and covariances after 1, 2, 3 ... touches, and how often a move was noticed.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ from recognizer.touch.robot import ObjectPose, object_pose
 Array = np.ndarray
 MOVES = [("mm", 1.0), ("mm", 2.0), ("mm", 5.0), ("mm", 10.0), ("deg", 1.0), ("deg", 2.0),
          ("deg", 5.0)]  # fmt: skip
-LONG = 12  #: every so many trials have all further touches, the others one
+LONG = 8  #: every so many trials have further touches
 INSIDE_MM = 6.0  #: of the face's border are further touches
 REACH_RAD = 1.2  #: turns of further touches, both ways
 
@@ -136,7 +135,8 @@ def main() -> None:
     done = {line["trial"] for line in lines}
     folder = options.output.with_suffix("")
     folder.mkdir(parents=True, exist_ok=True)
-    model, lab = world.make(folder)
+    made_before = (folder / "bench.db").exists()
+    model, lab = world.load(folder) if made_before else world.make(folder)
     for trial in range(options.trials):
         if trial in done:
             continue
@@ -146,7 +146,7 @@ def main() -> None:
         for sector in world.SECTORS:
             long = trial % LONG == 0
             shift = MOVES[(trial // LONG * 3 + len(made)) % len(MOVES)] if long else None
-            more = options.more if long else 1
+            more = options.more if long else 0
             made.append({"trial": trial} | work_on(bench, sector, more, shift))
         with options.output.open("a") as file:
             file.write("".join(json.dumps(line) + "\n" for line in made))

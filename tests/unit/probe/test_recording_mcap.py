@@ -61,7 +61,10 @@ def assert_same(one, other):
         assert np.array_equal(value, other.origin.more[name]), name
     a, b = one.block(), other.block()
     for name, values in a.datasets().items():
-        assert np.array_equal(values, b.datasets()[name], equal_nan=name == "pose"), name
+        other = b.datasets()[name]
+        assert (values is None) == (other is None), name
+        if values is not None:
+            assert np.array_equal(values, other, equal_nan=name == "pose"), name
 
 
 def test_there_and_back_is_the_same_recording_and_the_same_file(recording, tmp_path):
@@ -71,6 +74,17 @@ def test_there_and_back_is_the_same_recording_and_the_same_file(recording, tmp_p
     export_mcap(back, tmp_path / "b.mcap")
     digests = {hashlib.sha256((tmp_path / n).read_bytes()).digest() for n in ("a.mcap", "b.mcap")}
     assert len(digests) == 1
+
+
+def test_a_recording_without_poses_has_none_afterwards(tmp_path):
+    with Recorder(tmp_path / "a.h5") as recorder:
+        for i in range(3):
+            recorder.append(frame_from(RNG.integers(0, 1024, (8, 8)), t_ns=i, seq=i))
+    recording = Recording(tmp_path / "a.h5")
+    export_mcap(recording, tmp_path / "a.mcap")
+    back = import_mcap(tmp_path / "a.mcap", tmp_path / "back.h5")
+    assert recording.block().pose is None
+    assert_same(recording, back)
 
 
 def test_mcap_ros2_support_reads_it(recording, tmp_path):
