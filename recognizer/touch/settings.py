@@ -307,10 +307,10 @@ class RoundSettings:
 class FirstLookSettings:
     """Which touches are refused before a search, or before a wide one.
 
-    Chosen on touches of `docs/validation/forty.yaml` with seed 901: of 2,161 touches of registered
-    faces none had fewer gaps than .286, of 282 of a blank plate nine in ten had fewer than .26; of
-    583 that the first try did not answer, six were answered by the wide search, all of them with
-    94 tactels pressed or more and 2 nats over symbols of no registered place.
+    Chosen with pitches of 5 mm (seed 902) and 5.5 mm (720 touches of faulty sensors): of 1,008
+    touches of registered faces none had fewer gaps than .30, of 112 of a blank plate nine in ten
+    fewer than .275; of 583 that the first try did not answer, six were answered by the wide search,
+    all of them with 94 tactels pressed or more and 2 nats over symbols of no registered place.
     """
 
     strongest: int = 12  #: tactels that say how hard is pressed
@@ -318,8 +318,8 @@ class FirstLookSettings:
     around: int = 5  #: tactels, side of a square in which strokes and gaps lie
     high: float = 0.85  #: quantile of its readings that stands for strokes
     weak: float = 0.35  #: share of that below which a tactel lies over a gap
-    gaps: float = 0.26  #: share of such tactels below which nothing is embossed
-    finest: float = 4.0  #: tactels, pitches between which gaps were measured
+    gaps: float = 0.285  #: share of such tactels below which nothing is embossed
+    finest: float = 3.1  #: tactels, pitches between which gaps were measured
     coarsest: float = 5.0
     ink: float = 0.44  #: share of a cell's tactels that its symbol presses, and some beside it
     foreign: float = -4.0  #: nats over symbols of no registered place

@@ -23,7 +23,7 @@ def reader(tmp_path_factory):
         {
             "name": "Box",
             "shape": {"box": ["70 mm", "55 mm", "45 mm"]},
-            "output": {"lab_key": 31},
+            "output": {"lab_key": "FMJ7-TFFE-Q560-Y90B"},
         },
         database=f"sqlite:///{folder}/lab.db", folder=folder, formats=("stl",),
     )  # fmt: skip
@@ -49,4 +49,4 @@ def test_errors_lie_within_the_ellipse_as_often_as_it_says(reader, engine, touch
         inside += away @ np.linalg.solve(answer.covariance, away) < chi2.ppf(0.95, 3)
     assert answered >= 0.9 * touches
     assert inside >= binom.ppf(SURE, answered, 0.90)
-    assert inside <= binom.ppf(1 - SURE, answered, 0.98)
+    assert inside <= binom.ppf(1 - SURE / 5, answered, 0.98)
