@@ -86,7 +86,7 @@ def shore_a(young_mpa: float) -> float:
     Examples
     --------
     >>> round(shore_a(1.0), 1)
-    26.6
+    26.8
     """
     a = young_mpa * 0.137505 / 0.0981
     return (254 * a - 56) / (7.62336 + 2.54 * a)
