@@ -85,7 +85,7 @@ def sliced(plate: Path) -> dict[str, object]:
     with tempfile.TemporaryDirectory() as name:
         gcode = Path(name) / "plate.gcode"
         subprocess.run(
-            ["prusa-slicer", "--export-gcode", "-o", str(gcode), str(plate)],
+            ["prusa-slicer", "--export-gcode", "--dont-arrange", "-o", str(gcode), str(plate)],
             capture_output=True, text=True, check=True, timeout=SECONDS,
         )  # fmt: skip
         text = gcode.read_text(errors="replace")
