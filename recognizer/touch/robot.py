@@ -40,7 +40,7 @@ class Seating:
     pressed_border_mm: float = 0.5  #: more with the centre on the border
     z_mm: float = 0.3  #: about that; the overlay's, and so the same at every touch
     tilt_rad: float = 0.005  #: of the sensor against the face, both ways, wholly on the face
-    tilt_border_rad: float = 0.045  #: with the centre on the border
+    tilt_border_rad: float = 0.064  #: with the centre on the border, in the direction it tips
     half_mm: float = 12.7  #: half the width of the sensor
 
     @classmethod
