@@ -1,10 +1,12 @@
-"""Reading a touch among 10 ... 100,000 registered faces: time, memory, right answers.
+"""Reading a touch among 10 ... 1,000,000 registered faces: time, memory, doubt, right answers.
 
-    python tests/bench/recognizer_scale.py [--faces 12 1000 10000 100000] [--touches 40]
+    python tests/bench/recognizer_scale.py [--faces 10 1000 100000 1000000] [--touches 40]
 
-Faces of 60 x 60 mm, 64 symbols each, fill a 4095 x 4097 array without gaps. They are put into
-the reader's memory as `open_lab` leaves them; what a database takes to give them is measured by
-`database_scale.py`. Process time, median; memory is the peak of a process of its own.
+Faces of 60 x 60 mm, 121 symbols of 5 mm each as `auto` lays them, fill the smallest of `large` and
+its next sizes that holds them, without gaps. They are put into the reader's memory as `open_lab`
+leaves them; what a database takes to give them is measured by `database_scale.py`. Touches amid
+faces, typical. Process time, median; memory is the peak of a process of its own. 1,000,000 faces
+take 8 GB.
 """
 
 from __future__ import annotations
@@ -39,19 +41,20 @@ from recognizer.touch.reader import Reader  # noqa: E402
 from recognizer.touch.recognise import recognise  # noqa: E402
 from recognizer.touch.signal import signal_of  # noqa: E402
 
-SIDE = 8  # symbols along an edge
-STYLE = SymbolStyle()
+SIDE = 11  # symbols along an edge
+STYLE = SymbolStyle(pitch_mm=5.0, stroke_mm=1.0, draft_rad=math.radians(5.0))
 ALPHABET = alphabet_named("dense-4")
 SQUARE = np.array([[0.0, 0.0], [60.0, 0.0], [60.0, 60.0], [0.0, 60.0]])
 R, C = (index.ravel() for index in np.mgrid[:SIDE, :SIDE])
-CENTRES = np.column_stack([(C + 0.5) * 7.0 + 2.0, 58.0 - (R + 0.5) * 7.0])
+CENTRES = np.column_stack([(C + 0.5) * 5.0 + 2.5, 57.5 - (R + 0.5) * 5.0])
 
 
-def array_4095():
+def array_for(faces: int):
+    """Return the smallest array in whose rows and columns the faces lie side by side."""
     known = profile("large")
-    while known.array().rows < 4095:
+    while (array := known.array()).rows // SIDE * (array.columns // SIDE) < faces:
         known = next_larger(known)
-    return known.array()
+    return array
 
 
 class Faces(dict):
@@ -72,7 +75,7 @@ class Faces(dict):
 
 
 def encoding_of(array, faces: int) -> EmbossedArray:
-    wide = math.ceil(math.sqrt(faces))
+    wide = array.columns // SIDE
     row, column = (SIDE * part for part in np.divmod(np.arange(faces), wide))
     rows, columns = (row[:, None] + R).ravel(), (column[:, None] + C).ravel()
     labels = np.concatenate(
@@ -95,7 +98,8 @@ def encoding_of(array, faces: int) -> EmbossedArray:
 
 
 def measured(faces: int, touches: int) -> str:
-    encoding = encoding_of(array_4095(), faces)
+    array = array_for(faces)
+    encoding = encoding_of(array, faces)
     reader = Reader(Lab("", (encoding,)), SensorType())
     start = time.process_time()
     encoding.windows()
@@ -104,11 +108,11 @@ def measured(faces: int, touches: int) -> str:
     relief = Relief(STYLE.height_mm, STYLE.stroke_mm, STYLE.draft_rad, STYLE.chamfer_mm)
     glyphs = tuple(glyph.strokes for glyph in ALPHABET.glyphs)
     drawn = template(emboss(glyphs, ALPHABET.reach * STYLE.pitch_mm, relief), STYLE.pitch_mm)
-    counts, ms = Counter(), []
+    counts, ms, doubts = Counter(), [], []
     for _ in range(touches):
         number = int(rng.integers(faces))
         held = encoding.known[number]
-        lattice = LatticeSurface(drawn, list_lookup(R, C, held.labels), 0.0, -2.0, -58.0)
+        lattice = LatticeSurface(drawn, list_lookup(R, C, held.labels), 0.0, -2.5, -57.5)
         x, y = rng.uniform(12, 48, 2)
         touch = Touch(x, y, rng.uniform(-math.pi, math.pi), rng.uniform(20, 120))
         image, _ = read_sensor(
@@ -117,21 +121,24 @@ def measured(faces: int, touches: int) -> str:
         start = time.process_time()
         found = recognise(reader, signal_of(image.astype(float)))
         ms.append(1e3 * (time.process_time() - start))
+        doubts += [] if found.doubt is None else [found.doubt]
         right = (found.object, found.face) == (held.object, held.face)
         counts["right" if right else "wrong" if found else "rejected"] += 1
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    doubt = np.median(doubts) if doubts else math.nan
     return (
-        f"{faces:8,d} {indexed:9.2f} {np.median(ms):9.1f} {peak:9.0f} "
+        f"{faces:9,d} {array.rows:5d}x{array.columns:<5d} {indexed:9.2f} {np.median(ms):9.1f} "
+        f"{peak:9.0f} {doubt:9.1e} "
         f"{counts['right']:7d} {counts['wrong']:6d} {counts['rejected']:6d}"
     )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--faces", type=int, nargs="+", default=[12, 1000, 10000, 100000])
+    parser.add_argument("--faces", type=int, nargs="+", default=[10, 1000, 100000, 1000000])
     parser.add_argument("--touches", type=int, default=40)
     options = parser.parse_args()
-    print("   faces   index s  ms/touch   peak MB   right  wrong reject")
+    print("    faces array         index s  ms/touch   peak MB     doubt   right  wrong reject")
     for faces in options.faces:
         with multiprocessing.get_context("spawn").Pool(1) as alone:
             print(alone.apply(measured, (faces, options.touches)), flush=True)

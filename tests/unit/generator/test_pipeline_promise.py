@@ -71,7 +71,7 @@ def test_what_would_help_does_help():
 def test_a_large_cube_promises_more_than_a_small_one_and_names_no_face():
     shares = []
     for side in (28, 60, 200):
-        faces = reports(f"name: Cube\nshape: {{cube: {side} mm}}\n", "large")
+        faces = reports(f"name: Cube\nshape: {{cube: {side} mm}}\n", "auto")
         promised = [face.promise for face in faces]
         assert len(promised) == 6
         shares.append(promised[0].at_once)
