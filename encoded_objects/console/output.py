@@ -26,14 +26,16 @@ def write_json(value: Any, *, line: bool = False) -> None:
     write(json.dumps(json_value(value), indent=None if line else 2, allow_nan=False))
 
 
-def version(name: str, *, as_json: bool) -> None:
-    """Say which version this is."""
+def version(name: str, *, as_json: bool, **parts: str) -> None:
+    """Say which version this is, and of parts which one is in use."""
     from encoded_objects import __version__
 
     if as_json:
-        write_json({"version": __version__})
+        write_json({"version": __version__, **parts})
     else:
         write(f"{name} {__version__}")
+        for part, used in parts.items():
+            write(f"{part}: {used}")
 
 
 def error(problem: EncodedObjectsError, *, as_json: bool) -> None:

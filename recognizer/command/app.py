@@ -139,8 +139,9 @@ def recognize(
     if version:
         from encoded_objects.console import output
         from recognizer.command import NAME
+        from recognizer.touch.symbols.compiled import kernels_in_use
 
-        output.version(NAME, as_json=as_json)
+        output.version(NAME, as_json=as_json, kernels=kernels_in_use())
         raise typer.Exit
     if (recording is None) == (not port):
         both = "both RECORDING and --port were given" if port else "nothing to read"

@@ -18,6 +18,7 @@ from probe.contact.engines import engine_named
 from probe.contact.press import level_for
 from probe.sensor_types.read import sensor_type_named, shipped_names
 from probe.simulate.world.levels import LEVELS
+from recognizer.touch.symbols.compiled import kernels_in_use
 from recognizer.validation.campaign import KINDS, LEVEL_SHARES, Campaign, Shares
 from recognizer.validation.draw import TouchPlan, sensor_of
 from recognizer.validation.encoded_set import members_of
@@ -36,6 +37,7 @@ def provenance(record: RunRecord, database: str) -> dict[str, Any]:
         "versions": {
             "encoded-objects": version("encoded-objects"),
             "source, sha256": record.code_digest,
+            "kernels": kernels_in_use(),
             "python": platform.python_version(),
             **{name: version(name) for name in LIBRARIES},
         },

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from recognizer.touch.symbols.compiled import compiled_kernels, evaluate_compiled
 from recognizer.touch.symbols.damped import ascend, damped_step
 from recognizer.touch.symbols.gain import Image, bounded_gain
 from recognizer.touch.symbols.noise import NormalizedImage, log_likelihoods, psi_deviation
@@ -98,6 +99,11 @@ def _evaluate_lattices(
     image: Image, template: ResponseTemplate, pose: Array, gain: Array, shown: Shown | None
 ) -> Lattices:
     """Return how well lattices explain the image, and what a small change would do."""
+    library = compiled_kernels()
+    if library is not None:
+        known, precision = prior_departure(image, pose, gain), prior_precision(image)
+        found = evaluate_compiled(library, image, template, pose, gain, known, precision, shown)
+        return Lattices(pose, gain, *found)
     at = linearize_image(image, template, pose, gain, shown)
     weighted = (at.jacobian * at.sure[..., None]).swapaxes(1, 2)
     normal = weighted @ at.jacobian + np.diag(at.precision)
