@@ -35,6 +35,8 @@ def expected_matches(
     fit: Fit,
     hypothesis: Hypothesis,
     settings: ReaderSettings,
+    *,
+    borders: bool = True,
 ) -> float:
     """Return how many registered places random symbols would match as well as a hypothesis.
 
@@ -44,6 +46,8 @@ def expected_matches(
         Of the lab. Those count that are embossed alike: the same symbols, as large.
     embossed
         The one of the hypothesis.
+    borders
+        Whether those only count whose own borders agree with the bare cells; else all.
     """
     scores = bounded_scores(fit, settings.hypotheses)
     held = labels_at(embossed, hypothesis, fit.cells)
@@ -52,7 +56,7 @@ def expected_matches(
     border = _border_of(fit, scores, held)
     largest = settings.hypotheses.large
     return chance * sum(
-        _count_places(one, border, largest)
+        _count_places(one, border, largest) if borders else len(one.keys)
         for one in arrays
         if (one.alphabet, one.style) == (embossed.alphabet, embossed.style)
     )

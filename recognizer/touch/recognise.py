@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from recognizer.touch.belief import VerifiedHypothesis, symbols_to_name
+from recognizer.touch.belief import VerifiedHypothesis
 from recognizer.touch.chance import expected_matches
 from recognizer.touch.diagnose import diagnose
 from recognizer.touch.first_look import may_tell_more, shows_strokes
@@ -42,7 +42,7 @@ from recognizer.touch.recognition import (
     RunnerUp,
     refusal,
 )
-from recognizer.touch.settings import BeliefSettings, ReaderSettings
+from recognizer.touch.settings import ReaderSettings
 from recognizer.touch.signal import Signal
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.verify import verify_hypotheses
@@ -87,7 +87,7 @@ def recognise_with_rivals(
     if answer and final and not first[0].coincides(second[0]):
         return refusal(seq, AMBIGUOUS, margin=0.0, runner_up=answer.runner_up), second
     if final and inliers < limits.many_inliers:
-        final = _refuse_few(limits, second[0].embossed, final, inliers)
+        final = _refuse_few(reader, second[0], final)
     return _refuse_by_chance(reader, second[0], final) if second else final, second
 
 
@@ -129,14 +129,15 @@ def _answer(
     return answer, support.inliers
 
 
-def _refuse_few(
-    limits: BeliefSettings, embossed: EmbossedArray, answer: Recognition, inliers: int
-) -> Recognition:
+def _refuse_few(reader: PreparedLab, best: VerifiedHypothesis, answer: Recognition) -> Recognition:
     """Return an answer that few cells speak for, if they can name a place and do so plainly."""
-    reason = ""
-    if inliers < symbols_to_name(embossed):
+    settings, reason = reader.settings, ""
+    by_symbols = expected_matches(
+        reader.lab.arrays, best.embossed, best.fit, best.hypothesis, settings, borders=False
+    )
+    if by_symbols > settings.belief.named:
         reason = TOO_FEW
-    elif answer.margin is not None and answer.margin < limits.margin_by_few:
+    elif answer.margin is not None and answer.margin < settings.belief.margin_by_few:
         reason = AMBIGUOUS
     if not reason:
         return answer

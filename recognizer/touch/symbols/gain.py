@@ -19,6 +19,7 @@ from probe.sensor import SensorType
 from recognizer.touch.sensor_state import PRIOR
 from recognizer.touch.settings import DEFAULTS, ReaderSettings
 from recognizer.touch.signal import Signal
+from recognizer.touch.symbols.loaded_area import find_loaded_area
 from recognizer.touch.symbols.noise import NormalizedImage
 from recognizer.touch.symbols.pressing import Pressing, pressing_of
 from recognizer.touch.symbols.template import PSI, psi
@@ -38,6 +39,7 @@ class Image:
     newtons: bool  #: whether the scale of the pressing is that of the forces
     plane: Array  #: (n, 3) basis of planes: 1, x and y over the half widths
     settings: ReaderSettings
+    loaded: NDArray[np.bool_]  #: (n,) where the sensor lies on something, `loaded_area`
     noise: float = 0.0  #: standard deviation of forces where nothing is felt; 0: it is not one
     aside: Array | float = 1.0  #: (n,) variance of tips' places over that of an unlearned tip
     falls: Array | None = None  #: (1 or b, n) of a round face under b planes, overlay heights
@@ -66,6 +68,7 @@ def image_of_signal(
         plane=np.column_stack([np.ones(len(points)), points / np.array(sensor.half_mm)]),
         settings=settings,
         aside=aside,
+        loaded=find_loaded_area(sensor, signal, settings.loaded).reshape(-1),
     )
 
 
@@ -85,17 +88,18 @@ def bend_image(
     return replace(
         image,
         points_mm=bend.unrolled_mm(points, symbol),
+        loaded=np.ones_like(image.loaded),  # where it falls away is told by the bend
         falls=np.multiply.outer(np.array(shares), bend.raised(symbol).falls_mm(points) / height),
     )
 
 
 def first_gain(image: Image, ink: float) -> Array | None:
-    """Return the gain (4,) of an image with symbols of mean response `ink` all over.
+    """Return the gain (4,) of an image with symbols of mean response `ink` all over what is loaded.
 
     None where nothing presses.
     """
     basis = image.plane
-    root = np.sqrt(image.trust)
+    root = np.sqrt(image.trust * image.loaded)
     plane = np.linalg.lstsq(basis * (root * ink)[:, None], image.forces * root, rcond=None)[0]
     if not (np.isfinite(plane).all() and plane[0] > 0):
         return None
@@ -165,13 +169,20 @@ def normalize_image(image: Image, gain: Array) -> NormalizedImage:
         depth = depth - image.falls
     plain = image.pressing.force(depth)
     lower = image.pressing.force(depth - image.pressing.symbol)
-    least = settings.least_gain * plain.max(axis=1, keepdims=True)
-    share = np.maximum(plain, least)
-    plateau = np.exp(gain[:, :1]) * share
+    least = settings.least_gain * plain[:, image.loaded].max(axis=1, keepdims=True)
+    # what the plane would press where nothing lies is no word about it, however deep it stands
+    scale, loaded = np.exp(gain[:, :1]), image.loaded
+    plateau = np.where(loaded, scale * np.maximum(plain, least), image.forces.max())
+    share = plateau / scale
+    usual = gain[:, 1:] @ image.plane[loaded].mean(axis=0)
     return NormalizedImage(
         psi=psi(image.forces / plateau),
-        press=np.clip(depth / (settings.full_press * gain[:, 1:2]), settings.least_press, 1.0),
-        bare=lower / share,
+        press=np.clip(
+            depth / (settings.full_press * np.maximum(usual, 1e-9))[:, None],
+            settings.least_press,
+            1.0,
+        ),
+        bare=np.where(loaded, lower / share, 0.0),
         contact=np.clip(plain / least, 0.0, 1.0),
         trust=image.trust,
         measure=-(image.trust * np.log(plateau + PSI * image.forces)).sum(axis=1),

@@ -42,7 +42,7 @@ def slope(depth):
     return 2 * (1 - depth) ** -3 + 1
 
 
-def image(forces, *, hardens=True, newtons=True, trust=None, falls=None):
+def image(forces, *, hardens=True, newtons=True, trust=None, falls=None, loaded=None):
     y, x = np.indices((SIDE, SIDE)).reshape(2, -1)
     points = np.column_stack([x - HALF, HALF - y]).astype(float)
     return Image(
@@ -57,6 +57,7 @@ def image(forces, *, hardens=True, newtons=True, trust=None, falls=None):
         plane=np.column_stack([np.ones(len(points)), points / HALF]),
         falls=falls,
         settings=ReaderSettings(),
+        loaded=np.ones(SIDE * SIDE, np.bool_) if loaded is None else loaded,
     )
 
 
@@ -145,6 +146,46 @@ def test_an_image_under_gains_tactel_by_tactel(hardens, fallen):
                 assert getattr(found, name)[b, n] == pytest.approx(value, rel=1e-6), name
         assert found.measure[b] == pytest.approx(measure)
     np.testing.assert_array_equal(found.trust, trust)
+
+
+def loaded_half():
+    """Flags of the left half of the image."""
+    return np.indices((SIDE, SIDE))[1].ravel() < SIDE / 2
+
+
+def test_what_is_not_loaded_says_nothing_of_the_plane():
+    rng = np.random.default_rng(4)
+    half = loaded_half()
+    forces = np.where(half, rng.uniform(1, 9, SIDE**2), 0.0)
+    gains = np.array([[0.4, 0.3, 0.4, 0.0], [0.4, 0.3, -0.2, 0.0]])  # deep to the right, shallow
+    found = normalize_image(image(forces, loaded=half), gains)
+    assert (found.plateau[:, ~half] == forces.max()).all()
+    assert (found.bare[:, ~half] == 0.0).all()
+    assert (found.psi[:, ~half] == 0.0).all()
+    for b, gain in enumerate(gains):
+        plain = np.array([force(u) for u in depths(gain)])
+        least = 0.12 * plain[half].max()  # however deep it stands where nothing is felt
+        assert found.plateau[b, half] == pytest.approx(
+            math.exp(0.4) * np.maximum(plain, least)[half]
+        )
+        inside = depths(gain)[half].mean()
+        assert found.press[b] == pytest.approx(np.clip(depths(gain) / (0.5 * inside), 0.2, 1.0))
+    all_over = normalize_image(image(forces), gains)
+    told = half.astype(float)
+    apart = [
+        one.measure + (told * np.log(one.plateau + 3 * forces)).sum(axis=1)
+        for one in (found, all_over)
+    ]
+    assert apart[0][0] == pytest.approx(apart[0][1])  # the same, whatever the plane says there
+    assert abs(apart[1][0] - apart[1][1]) > 1
+
+
+def test_the_first_guess_is_made_of_what_is_loaded():
+    half = loaded_half()
+    forces = np.where(half, 2.0, 0.0)
+    found = first_gain(image(forces, loaded=half), 0.5)
+    assert np.abs(found[2:]).max() < 1e-9  # as deep all over, not falling to the right
+    assert found[1] > first_gain(image(forces), 0.5)[1]
 
 
 def tilted(gain):

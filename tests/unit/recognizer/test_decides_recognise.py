@@ -80,15 +80,15 @@ def reads(small, lab, monkeypatch):
         covariance=np.diag([1.0, 2.0, 3.0]),
     )  # fmt: skip
 
-    def read(first, second=None, signal=TOUCHED, doubt=1e-5):
+    def read(first, second=None, signal=TOUCHED, doubt=1e-5, named=0.5):
         tries = []
 
-        def matches(arrays, embossed, fit, hypothesis, settings):
+        def matches(arrays, embossed, fit, hypothesis, settings, *, borders=True):
             assert (arrays, settings) == (READER.lab.arrays, READER.settings)
             judged = first if len(tries) == 1 else second
             best = judged[0]
             assert (embossed, fit, hypothesis) == (best.embossed, best.fit, best.hypothesis)
-            return doubt
+            return doubt if borders else named
 
         def found(reader, given, effort):
             assert reader is READER
@@ -198,13 +198,6 @@ def test_where_many_cells_speak_at_the_second_try_ten_nats_are_enough(reads):
     assert answer
 
 
-def test_it_is_the_lab_of_the_best_in_which_few_cells_name_a_place(reads):
-    binary = replace(reads.lab, array=SimpleNamespace(rows=11, columns=13, order=2))
-    found = [reads.one(inliers=4), reads.one("rival", -40.0, embossed=binary)]
-    assert reads.read(found, found)[0]
-    assert reads.read(found[:1], found[::-1])[0].reason == AMBIGUOUS
-
-
 def test_what_the_second_try_refuses_is_refused(reads):
     answer, judged, _ = reads.read([reads.one(inliers=10)], [reads.one("there", explained=0.1)])
     assert answer.reason == NOT_ENCODED
@@ -254,14 +247,12 @@ def test_four_cells_speak_at_least(reads, inliers, reason):
     assert answer.reason == reason
 
 
-@pytest.mark.parametrize(("inliers", "reason"), [(5, TOO_FEW), (6, "")])
-def test_so_many_cells_speak_that_they_can_name_a_place(small, reads, inliers, reason):
-    # 48 registered cells of an array of two symbols: 2^5 < 48 <= 2^6
-    binary = replace(
-        reads.lab, array=SimpleNamespace(rows=11, columns=13, order=2), known=reads.lab.known
-    )
-    found = [reads.one(inliers=inliers, embossed=binary)]
-    answer, _, _ = reads.read(found, found)
+@pytest.mark.parametrize(
+    ("named", "inliers", "reason"), [(1.0, 10, ""), (1.01, 10, TOO_FEW), (1.01, 11, "")]
+)
+def test_what_few_cells_show_names_a_place(reads, named, inliers, reason):
+    found = [reads.one(inliers=inliers)]
+    answer, _, _ = reads.read(found, found, named=named)
     assert answer.reason == reason
     assert answer.margin == math.inf
 

@@ -15,7 +15,8 @@ from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
-from recognizer.touch.belief import Support, symbols_to_name, weigh_cells
+from recognizer.touch.belief import Support, weigh_cells
+from recognizer.touch.chance import expected_matches
 from recognizer.touch.lab import open_lab
 from recognizer.touch.locate import (
     Hypothesis,
@@ -297,22 +298,22 @@ def test_a_place_that_fits_nearly_as_well_is_found_wherever_it_is(reader, other)
     assert all((p.row, p.column) != (place.row, place.column) for p in found)
 
 
-def at_the_rim(url, reader):
-    """Clean touches ever nearer to an edge and a corner: recognition and cells that speak."""
+def touches_at_the_rim(url, reader):
+    """Clean touches ever nearer to an edge and a corner: recognition and what was judged."""
     for x, y in [(6.0, 30.0), (3.0, 30.0), (0.5, 30.0), (6.0, 6.0), (3.0, 5.0), (2.0, 1.0)]:
         forces = felt(url, "Cube", "F1", Touch(x, y, 0.5, 80.0))
-        found, hypothesis = recognise_with_hypothesis(reader, signal_of(forces, newtons=True))
-        yield found, hypothesis.support().inliers
+        yield recognise_with_hypothesis(reader, signal_of(forces, newtons=True))
 
 
 def test_few_symbols_answer_only_if_they_can_name_a_place(coarse_url):
     reader = Reader(open_lab(coarse_url), SensorType())
-    encoding = reader.lab.arrays[0]
-    fewest, order = symbols_to_name(encoding), encoding.array.order
-    assert order ** (fewest - 1) < len(encoding.keys) <= order**fewest
-    limits = reader.settings.belief
-    seen = [(bool(found), cells) for found, cells in at_the_rim(coarse_url, reader)]
-    assert all(cells >= fewest for told, cells in seen if told)
+    limits, arrays = reader.settings.belief, reader.lab.arrays
+    seen = []
+    for found, best in touches_at_the_rim(coarse_url, reader):
+        cells, at = best.support().inliers, (best.embossed, best.fit, best.hypothesis)
+        seen.append((bool(found), cells))
+        if found and cells < limits.many_inliers:
+            assert expected_matches(arrays, *at, reader.settings, borders=False) <= limits.named
     assert any(told and cells < limits.many_inliers for told, cells in seen)
     assert not all(told for told, _ in seen)
 
@@ -340,19 +341,27 @@ def test_a_cell_that_says_hardly_anything_does_not_speak_for_a_place(url, reader
 
 def test_few_symbols_must_leave_other_places_far_behind(url, reader):
     strict = replace(reader, settings=replace(DEFAULTS, belief=BeliefSettings(margin_by_few=1e6)))
-    for found, cells in at_the_rim(url, strict):
-        assert not found or cells >= strict.settings.belief.many_inliers
+    for found, best in touches_at_the_rim(url, strict):
+        assert not found or best.support().inliers >= strict.settings.belief.many_inliers
         assert found or found.reason in (AMBIGUOUS, NOT_ENCODED, TOO_FEW)
 
 
-def test_what_few_symbols_say_is_refused_by_their_number_first(url, reader):
-    encoding, limits = reader.lab.arrays[0], reader.settings.belief
-    told = recognise(reader, signal_of(felt(url, "Cube", "F1", Touch(32.0, 24.0, 0.7, 80.0)),
-                                       newtons=True))  # fmt: skip
-    near, fewest = replace(told, margin=limits.margin_by_few - 0.1), symbols_to_name(encoding)
-    assert _refuse_few(limits, encoding, told, fewest) is told
-    assert _refuse_few(limits, encoding, told, fewest - 1).reason == TOO_FEW
-    assert _refuse_few(limits, encoding, near, fewest).reason == AMBIGUOUS
+def test_what_few_symbols_say_is_refused_by_what_they_name_first(url, reader):
+    signal = signal_of(felt(url, "Cube", "F1", Touch(32.0, 24.0, 0.7, 80.0)), newtons=True)
+    told, best = recognise_with_hypothesis(reader, signal)
+    limits = reader.settings.belief
+    near = replace(told, margin=limits.margin_by_few - 0.1)
+    by_symbols = expected_matches(
+        reader.lab.arrays, best.embossed, best.fit, best.hypothesis, reader.settings, borders=False
+    )
+    strict, even = (
+        replace(reader, settings=replace(DEFAULTS, belief=replace(limits, named=named)))
+        for named in (0.99 * by_symbols, by_symbols)
+    )
+    assert _refuse_few(even, best, told) is told
+    assert _refuse_few(strict, best, told).reason == TOO_FEW
+    assert _refuse_few(even, best, near).reason == AMBIGUOUS
+    assert _refuse_few(strict, best, near).reason == TOO_FEW
 
 
 def test_a_point_in_a_face(reader):

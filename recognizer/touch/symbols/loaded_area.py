@@ -1,0 +1,46 @@
+"""Which tactels lie on something: where a face ends is felt, whatever symbols it bears. Thesis 6.2.
+
+Signal -> flags of the tactels. Beyond the edge of a face, and of a face around a right angle,
+nothing is felt, however deep the plate hangs there; at a corner it tips, stands deepest at the
+corner itself, and a plane through its depths says most where least is felt. So gain planes are
+judged by what is loaded, and what is not speaks against symbols there and for nothing else.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from probe.sensor import SensorType
+from recognizer.touch.settings import DEFAULTS, LoadedAreaSettings
+from recognizer.touch.signal import Signal
+
+Flags = NDArray[np.bool_]
+
+
+def find_loaded_area(
+    sensor: SensorType, signal: Signal, settings: LoadedAreaSettings = DEFAULTS.loaded
+) -> Flags:
+    """Return (rows, columns) where a sensor lies on something, gaps between strokes closed.
+
+    All of them where nothing rises over the noise, and under a pad or a gel, which smear what
+    lies between strokes.
+    """
+    everywhere = np.ones(signal.forces.shape, np.bool_)
+    if sensor.overlay.kind != "tab":
+        return everywhere
+    forces = np.where(signal.trust > 0, signal.forces, 0.0)
+    strongest = float(np.sort(forces, axis=None)[-settings.strongest :].mean())
+    noise = min(signal.noise, settings.quiet * strongest)
+    high = _windows(forces, settings.around, 0.0).max(axis=(2, 3))
+    least = np.maximum(settings.faint * high, settings.sigmas * noise)
+    pressed = np.asarray(forces > least, np.bool_)
+    near = np.asarray(_windows(pressed, settings.around, 0.0).any(axis=(2, 3)), np.bool_)
+    closed = np.asarray(_windows(near, settings.around, 1.0).all(axis=(2, 3)))
+    return closed if closed.any() else everywhere
+
+
+def _windows(values: NDArray[np.generic], size: int, beyond: float) -> NDArray[np.generic]:
+    """Return the neighbourhoods (rows, columns, size, size) of tactels."""
+    padded = np.pad(values, size // 2, constant_values=beyond)
+    return np.lib.stride_tricks.sliding_window_view(padded, (size, size))
