@@ -27,7 +27,7 @@ from generator.database.registered import RegisteredArray
 from generator.errors import ArrayError, GeneratorError, LayoutError
 from generator.layout.placement import Layout
 from generator.pipeline.place import NO_CELLS, lay_out_object
-from generator.pipeline.plan import ObjectPlan, has_round_faces, plan_object
+from generator.pipeline.plan import ObjectPlan, plan_object
 from generator.pipeline.settings import CHOICE
 from generator.polyhedron import Polyhedron
 from generator.spec import LocatedSpec, error_at
@@ -95,9 +95,7 @@ def choose_array(
     for candidate in _candidates():
         array = lab.of_profile(candidate)
         made = array.definition(), lab.key_of(candidate)
-        tried = tuple(
-            _with_array(one, candidate.name, *made, _pitch_of_shape(one, solid)) for one in specs
-        )
+        tried = tuple(_with_array(one, candidate.name, *made) for one in specs)
         needed, blank = _count_needs(tried, solid)
         room = _room(array, connection)
         size = f"{candidate.name} {array.rows}x{array.columns}"
@@ -213,12 +211,6 @@ def _with_array(
 ) -> LocatedSpec:
     """Return a spec of `auto` on an array; at a pitch, if its own is to be chosen."""
     return with_profile(located, profile, AUTO, encoding, array_key, pitch_mm)
-
-
-def _pitch_of_shape(located: LocatedSpec, solid: Polyhedron | None) -> float | None:
-    """Return the pitch that an object's faces are read best at; None for the usual one."""
-    bent = bool(solid.surfaces) if solid else has_round_faces(located.spec)
-    return _share_mm(CHOICE.round_share, located) if bent else None
 
 
 def _share_mm(share: float, located: LocatedSpec) -> float:

@@ -147,11 +147,6 @@ def _layer_note(spec: ObjectSpec) -> tuple[str, ...]:
     return (note,)
 
 
-def has_round_faces(spec: ObjectSpec) -> bool:
-    """Whether some faces of a spec's shape are cylinders or cones."""
-    return bool(_polyhedron(spec.shape).surfaces)
-
-
 def _polyhedron(shape: ShapeSpec) -> Polyhedron:
     if shape.file is not None:
         return _model(shape.file, shape.parameters["sha256"], shape.parameters.get("scale", 1.0))

@@ -10,10 +10,6 @@ class ChoiceSettings:
     """Which array and how many processes."""
 
     larger: int = 4  #: sizes tried beyond `large`
-    round_share: float = 1.4
-    """Pitch on objects with round faces over that which the sensor proposes, 7 mm: on a cylinder of
-    60 mm 11 of 16 touches are answered, at 5 mm 9, because strokes are bent over as many tactels
-    and more of them."""
     finer_shares: tuple[float, ...] = (0.9, 0.8)
     """Pitches tried where faces stay blank, over that which the sensor proposes: 4.5 and 4 mm."""
     first: float = 0.5  #: of an array's room that its first objects may fill

@@ -24,13 +24,17 @@ def face_pose(
 ) -> Array:
     """Return T_face_probe (4, 4), mm: the sensor's tips in the plane of the symbols' tops."""
     array, pitch = embossed.array, embossed.style.pitch_mm
-    # any symbol of the face ties the two frames together; the first one does
-    row, column = int(face.rows[0]), int(face.columns[0])
-    i = _nearest_congruent(column - hypothesis.column, array.columns, fit.x_mm / pitch)
-    j = _nearest_congruent(hypothesis.row - row, array.rows, fit.y_mm / pitch)
-    away = np.array([fit.x_mm - (i + 0.5) * pitch, fit.y_mm - (j + 0.5) * pitch])
+    # the symbol nearest to the sensor's centre ties the two frames together: on a face longer than
+    # half of the array another one may be nearer the other way round
+    along = fit.x_mm / pitch - 0.5 - (face.columns - hypothesis.column)
+    up = fit.y_mm / pitch - 0.5 - (hypothesis.row - face.rows)
+    along -= np.round(along / array.columns) * array.columns
+    up -= np.round(up / array.rows) * array.rows
+    near = int(np.argmin(along**2 + up**2))
+    away = pitch * np.array([along[near], up[near]])
     c, s = math.cos(face.rotation_rad), math.sin(face.rotation_rad)
-    centre = face.centres_mm[0] + np.array([c * away[0] + s * away[1], c * away[1] - s * away[0]])
+    turned = np.array([c * away[0] + s * away[1], c * away[1] - s * away[0]])
+    centre = face.centres_mm[near] + turned
     turn = fit.theta_rad - face.rotation_rad
     pose = np.eye(4)
     pose[:2, :2] = [[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]]
@@ -83,8 +87,3 @@ def inside_mm(face: EncodedFace, x: float, y: float) -> float:
                 side = (high[0] - low[0]) * (y - low[1]) - (x - low[0]) * (high[1] - low[1])
                 crossings += side > 0
     return distance if crossings % 2 else -distance
-
-
-def _nearest_congruent(difference: int, size: int, near: float) -> int:
-    """Return the number congruent to `difference` modulo `size` that lies nearest to `near`."""
-    return difference + round((near - difference) / size) * size

@@ -128,9 +128,9 @@ def test_auto_takes_finer_symbols_on_a_printer_that_makes_them(tmp_path):
         assert bool(found.notes) == (pitch < 5)
 
 
-def test_round_objects_are_embossed_coarser(tmp_path):
+def test_round_objects_are_embossed_as_flat_ones(tmp_path):
     can = "name: A\nshape: {cylinder: {diameter: 60 mm, height: 50 mm}}\n"
-    assert choice(tmp_path, can).specs[0].spec.style.pitch_mm == 7.0
+    assert choice(tmp_path, can).specs[0].spec.style.pitch_mm == 5.0
     asked = choice(tmp_path, can + "symbols: {pitch: 6 mm}\n")
     assert asked.specs[0].spec.style.pitch_mm == 6.0
 

@@ -17,21 +17,22 @@ def touch(w, turn, rotation, first, cell, steps):
     """Return what `face_pose` takes of a sensor at w (complex, face, mm), turned by `turn`.
 
     The symbol at `first` (complex, face) is array cell `cell`, and lies `steps` = (i, j) cells
-    right of and above lattice cell (0, 0).
+    right of and above lattice cell (0, 0). Five more stand beside it: 6 of the array's 10 columns.
     """
     row, column = cell
     i, j = steps
     centre = PITCH * complex(i + 0.5, j + 0.5)  # of the first symbol, lattice
     at = centre + cmath.exp(1j * rotation) * (w - first)
+    run = [first + PITCH * k * cmath.exp(-1j * rotation) for k in range(6)]
     return (
         SimpleNamespace(
             array=SimpleNamespace(rows=ROWS, columns=COLUMNS),
             style=SimpleNamespace(pitch_mm=PITCH, height_mm=HEIGHT),
         ),
         SimpleNamespace(
-            rows=np.array([row, 77]),
-            columns=np.array([column, 88]),
-            centres_mm=np.array([[first.real, first.imag], [500.0, 600.0]]),
+            rows=np.full(len(run), row),
+            columns=(column + np.arange(len(run))) % COLUMNS,
+            centres_mm=np.array([[at.real, at.imag] for at in run]),
             rotation_rad=rotation,
         ),
         SimpleNamespace(row=(row + j) % ROWS, column=(column - i) % COLUMNS),
@@ -57,11 +58,14 @@ def test_the_pose_on_the_face_is_where_the_sensor_was_put(rotation, turn, cell, 
         np.testing.assert_allclose(pose, truth, atol=1e-9)
 
 
-def test_far_from_its_first_symbol_the_sensor_goes_the_nearer_way_round_the_array():
-    for dx, dy in ((4.4, 3.4), (-4.4, -3.4), (4.4, -3.4)):  # pitches; half of it is 5, 4
-        w = PITCH * complex(dx, dy)
-        pose = face_pose(*touch(w, 0.0, 0.0, 0j, (4, 5), (0, 0)))
-        assert pose[:2, 3] == pytest.approx([w.real, w.imag])
+@pytest.mark.parametrize("dx", [-1.4, 0.2, 3.0, 5.4, 6.9])
+@pytest.mark.parametrize("dy", [-3.4, 0.0, 3.4])
+def test_on_a_face_longer_than_half_of_the_array_the_nearest_symbol_tells_the_place(dx, dy):
+    w = PITCH * complex(dx, dy)
+    for rotation in (0.0, math.pi / 2):
+        pose = face_pose(*touch(w * cmath.exp(-1j * rotation), 0.0, rotation, 0j, (4, 5), (0, 0)))
+        at = w * cmath.exp(-1j * rotation)
+        assert pose[:2, 3] == pytest.approx([at.real, at.imag])
 
 
 def test_on_a_flat_face_the_pose_goes_through_the_face_on_a_round_one_through_its_tangent():
