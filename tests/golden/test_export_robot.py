@@ -71,11 +71,13 @@ def read_models(part):
 def test_mass_centre_and_inertia_are_the_kernels(part):
     volume, centre, inertia = inertia_of(part.solids)
     density = 2000.0 if part.kind == "whole" else 1240.0
+    facets = 2e-3 if part.kind == "round" else 0.0  #: what triangles cut off a true cylinder
     for suffix, read in read_models(part):
-        assert read.mass_kg == pytest.approx(density * volume * 1e-9, rel=2e-7), suffix
-        assert read.centre_m == pytest.approx(centre * 1e-3, abs=2e-9), suffix
+        assert read.mass_kg == pytest.approx(density * volume * 1e-9, rel=2e-7 + facets), suffix
+        assert read.centre_m == pytest.approx(centre * 1e-3, abs=2e-9 + 1e-2 * facets), suffix
         expected = density * inertia * 1e-15
-        assert np.abs(read.inertia_kg_m2 - expected).max() < 5e-7 * expected.max(), suffix
+        within = (5e-7 + facets) * expected.max()
+        assert np.abs(read.inertia_kg_m2 - expected).max() < within, suffix
 
 
 def test_frames_of_faces_are_those_of_the_database(part):

@@ -109,7 +109,7 @@ def test_mujoco_bench(tmp_path):
     assert [one["answer"] for one in told] == [one["object"] for one in told]
     assert {one["object"] for one in told} == {"Cube", "Box", "Prism"}
     assert max(one["position_mm"] for one in told) < 2.0
-    assert max(one["turn_deg"] for one in told) < 1.0
+    assert max(one["turn_deg"] for one in told) < 2.0
     assert max(one["chi2"] for one in told) < 22.5  # 1 of 1,000 lies beyond
 
 

@@ -13,6 +13,7 @@ import pytest
 from generator.command import run as encode_object
 from probe.command import run as probe_sensor
 from recognizer.command import run as recognize_object
+from recognizer.touch.robot import Seating
 
 CUBE = Path(__file__).parents[2] / "fixtures" / "cube.yaml"
 COMMAND = (sys.executable, "-c", "from recognizer.command import main; main()")
@@ -135,7 +136,11 @@ def test_images_and_answers_are_kept_as_ros_messages(asked, lab):
         message = placed.pop(answer["t_ns"])
         T = np.linalg.inv(answer["T_object_probe"])
         at = message.pose.pose.position
-        assert np.allclose([at.x, at.y, at.z], T[:3, 3] / 1000, atol=1e-12)
+        assert np.allclose([at.x, at.y], T[:2, 3] / 1000, atol=1e-12)
+        pressed_mm = 1000 * at.z - T[2, 3]  # the tips stand below the tops, deepest at a border
+        seating = Seating()
+        assert seating.pressed_mm <= pressed_mm + 1e-9
+        assert pressed_mm <= seating.pressed_mm + seating.pressed_border_mm + 1e-9
     assert not placed
     assert [topic for topic, _ in seen].count("/touch/image") == 18
 

@@ -25,6 +25,7 @@ from probe.wrist.geometry import Wrist
 from recognizer.command import run
 from recognizer.command.scanning import ScanError, pose_during, read_joints
 from recognizer.touch.contacts import TouchImage
+from recognizer.touch.robot import Seating
 
 SPEC = "name: Cube\nshape: {cube: 40 mm}\n"
 KEYS = {"seq", "object", "face", "index", "T_face_probe", "T_object_probe", "margin", "reason"}
@@ -293,7 +294,9 @@ def test_the_object_in_the_robots_base(asked, lab, images):
     assert code == 0
     assert "object in the robot's base at (" in out
     entry = json.loads(asked(path, "--json")[1])[0]
-    known = T_BASE_SENSOR @ np.linalg.inv(entry["T_object_probe"])
+    pressed = np.eye(4)
+    pressed[2, 3] = Seating().depth_mm(math.inf)  # amid the face
+    known = T_BASE_SENSOR @ pressed @ np.linalg.inv(entry["T_object_probe"])
     assert np.array(entry["T_robot_object"]) == pytest.approx(known)
     assert np.linalg.eigvalsh(entry["robot_covariance"]).min() >= 0
     wrist = Wrist()
