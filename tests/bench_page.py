@@ -19,7 +19,8 @@ FLAGS = (
     "--disable-sync",
 )  # fmt: skip
 PATIENCE_S = 60.0  #: for anything, on a busy machine
-expect.set_options(timeout=1e3 * PATIENCE_S)
+PATIENCE_MS = 1e3 * PATIENCE_S
+expect.set_options(timeout=PATIENCE_MS)
 
 
 @contextmanager
@@ -69,3 +70,20 @@ def touched(page, x=0.42, y=0.55):
     page.mouse.click(box["x"] + x * box["width"], box["y"] + y * box["height"])
     until(page, f"bench.answers > {before}")
     return page.get_by_test_id("answer").inner_text()
+
+
+def press_known_loads(page, loads_n=(80, 200, 600)):
+    """Calibrate step by step, without a load and with each; the last one is left on the sensor."""
+    page.get_by_test_id("calibrate").click()
+    page.get_by_test_id("guide-loads").fill(", ".join(map(str, loads_n)))
+    page.get_by_test_id("guide-seconds").fill("0.5")
+    page.get_by_test_id("guide-start").click()
+    steps = len(loads_n) + 1
+    for step in range(steps):
+        expect(page.get_by_test_id("guide-ask")).to_contain_text(f"{step + 1} of {steps}")
+        page.get_by_test_id("guide-load").click()
+        page.wait_for_timeout(300)  # the film creeps
+        page.get_by_test_id("guide-read").click()
+        expect(page.locator("#guide-felt li")).to_have_count(step + 1)
+    page.get_by_test_id("guide-finish").click()
+    expect(page.get_by_test_id("guide-result")).to_contain_text("tactels are sound")

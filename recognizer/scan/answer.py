@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.scan.composite import Composite
-from recognizer.scan.path import ScanPath
+from recognizer.scan.path import RegisteredPath
 from recognizer.scan.settings import ScanSettings
 from recognizer.touch.belief import null_log_likelihood, unworn_labels_at, weigh_cells
 from recognizer.touch.chance import expected_matches
@@ -64,7 +64,7 @@ class LocatedComposite:
     fit: Fit  #: of the composite, with the pose of the last touch
     score: float  #: log-likelihood of all touches, nats
     explained: float = math.nan  #: share of the last image's variance; NaN: not asked
-    path: ScanPath | None = None  #: that the touches were followed along; None: somebody knew it
+    path: RegisteredPath | None = None  #: that was followed; None: the motion was known
 
     @property
     def embossed(self) -> EmbossedArray:

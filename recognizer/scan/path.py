@@ -36,7 +36,7 @@ Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ScanPath:
+class RegisteredPath:
     """Where touches stand as their images and the database have it."""
 
     poses: Array  #: (n, 3) in array axes; of a touch that is left out, that of one beside it
@@ -51,7 +51,7 @@ def follow_path(
     steps: Sequence[PlanarBelief],
     hypotheses: HypothesisSettings,
     settings: ScanSettings,
-) -> ScanPath:
+) -> RegisteredPath:
     """Return the likeliest path; where no touch may be anywhere, one without places.
 
     Parameters
@@ -69,7 +69,7 @@ def follow_path(
     ends = [end - settings.left_out * (len(ends) - 1 - t) for t, end in enumerate(ends)]
     last = int(np.argmax(ends))
     if not math.isfinite(ends[last]):
-        return ScanPath(np.zeros((len(views), 3)), np.zeros(len(views), np.bool_), 0.0, 0.0)
+        return RegisteredPath(np.zeros((len(views), 3)), np.zeros(len(views), np.bool_), 0.0, 0.0)
     scores = trellis.scores[last]
     end = int(scores.argmax())
     elsewhere = _lie_elsewhere(encoding, places[last], end)
@@ -89,10 +89,10 @@ def follow_path(
     freedom = log_freedom(
         fits, poses, steps, encoding.style.pitch_mm, encoding.array.order, settings
     )
-    return ScanPath(poses, placed, margin, freedom)
+    return RegisteredPath(poses, placed, margin, freedom)
 
 
-def path_touch_poses(path: ScanPath, steps: Sequence[PlanarBelief]) -> TouchPoses:
+def path_touch_poses(path: RegisteredPath, steps: Sequence[PlanarBelief]) -> TouchPoses:
     """Return where the touches of a path stand, in array axes."""
     sure = np.diag(np.square(PATHS.sure))
     spread = np.where(path.placed[:, None, None], sure, steps[0].covariance)

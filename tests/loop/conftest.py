@@ -7,7 +7,7 @@ import sys
 from contextlib import contextmanager
 
 import pytest
-from bench_page import CHROMIUM, FLAGS
+from bench_page import CHROMIUM, FLAGS, opened, rest, shown
 from playwright.sync_api import sync_playwright
 
 ENDED_S = 30.0
@@ -62,3 +62,12 @@ def browser():
         chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
         yield chromium
         chromium.close()
+
+
+@pytest.fixture
+def page(browser, bench):
+    """The page of a module's `bench`, showing the cube, with nothing touched."""
+    with opened(browser, bench) as page:
+        rest(page)
+        shown(page, "Cube")
+        yield page

@@ -8,7 +8,7 @@ import httpx
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from bench_page import PATIENCE_S, opened, rest, shown, touched, until
+from bench_page import PATIENCE_MS, opened, press_known_loads, rest, shown, touched, until
 from playwright.sync_api import expect
 
 from probe.recording.read import Recording
@@ -19,14 +19,6 @@ def bench(served):
     """Address of a bench whose probe runs the firmware."""
     with served("--port", "touch:?firmware=avr&hold=1.5") as address:
         yield address
-
-
-@pytest.fixture
-def page(browser, bench):
-    with opened(browser, bench) as page:
-        rest(page)
-        shown(page, "Cube")
-        yield page
 
 
 def heat(page):
@@ -161,8 +153,8 @@ def test_filters_and_overlays(page):
 def test_unplug_and_replug_are_said_plainly(page):
     page.get_by_test_id("unplug").click()
     state = page.get_by_test_id("state")
-    expect(state).to_contain_text("probe is gone", timeout=PATIENCE_S * 1e3)
-    expect(state).to_contain_text("probe is there", timeout=PATIENCE_S * 1e3)
+    expect(state).to_contain_text("probe is gone", timeout=PATIENCE_MS)
+    expect(state).to_contain_text("probe is there", timeout=PATIENCE_MS)
     frames = page.evaluate("bench.frames")
     until(page, f"bench.frames > {frames + 10}")
     assert touched(page).startswith("Cube")
@@ -185,7 +177,7 @@ def test_record_and_replay(page, lab):
     expect(page.get_by_test_id("state")).to_contain_text("replaying")
     until(page, f"bench.answers > {answers}")
     assert page.get_by_test_id("answer").inner_text().startswith(said)
-    expect(page.get_by_test_id("play")).to_have_text("Play", timeout=PATIENCE_S * 1e3)
+    expect(page.get_by_test_id("play")).to_have_text("Play", timeout=PATIENCE_MS)
     until(page, "bench.contact === false")
     strength = httpx.get(f"{page.url}api/timeline").json()["strength"]
     held = np.flatnonzero(np.array(strength) > 0.8)
@@ -196,23 +188,11 @@ def test_record_and_replay(page, lab):
     words = "document.querySelector('[data-testid=place]').innerText.split(' ').map(parseFloat)"
     until(page, f"(w => Math.abs(w[0] - {place / 1000} * w[2]) < 0.2)({words})")
     page.get_by_test_id("leave").click()
-    expect(page.get_by_test_id("state")).to_contain_text("probe is there", timeout=PATIENCE_S * 1e3)
+    expect(page.get_by_test_id("state")).to_contain_text("probe is there", timeout=PATIENCE_MS)
 
 
 def test_calibrate_step_by_step(page, lab):
-    page.get_by_test_id("calibrate").click()
-    page.get_by_test_id("guide-loads").fill("80, 200, 600")
-    page.get_by_test_id("guide-seconds").fill("0.5")
-    page.get_by_test_id("guide-start").click()
-    for step in range(4):
-        expect(page.get_by_test_id("guide-ask")).to_contain_text(f"{step + 1} of 4")
-        page.get_by_test_id("guide-load").click()
-        page.wait_for_timeout(300)  # the film creeps
-        page.get_by_test_id("guide-read").click()
-        felt = page.locator("#guide-felt li")
-        expect(felt).to_have_count(step + 1, timeout=PATIENCE_S * 1e3)
-    page.get_by_test_id("guide-finish").click()
-    expect(page.get_by_test_id("guide-result")).to_contain_text("tactels are sound")
+    press_known_loads(page)
     page.locator("#guide-close").click()
     expect(page.get_by_test_id("calibration-age")).to_contain_text("fresh")
     rest(page)
@@ -322,7 +302,7 @@ def test_an_empty_lab_offers_an_example(served, browser, tmp_path):
         page = browser.new_page(viewport={"width": 1440, "height": 900})
         page.goto(address)
         button = page.get_by_test_id("example")
-        expect(button).to_be_visible(timeout=PATIENCE_S * 1e3)
+        expect(button).to_be_visible(timeout=PATIENCE_MS)
         button.click()
         until(page, "bench.answers > 0")
         assert page.get_by_test_id("answer").inner_text().startswith("Example F1")

@@ -7,7 +7,7 @@ import re
 
 import httpx
 import pytest
-from bench_page import PATIENCE_S, opened, rest, shown, touched, until
+from bench_page import PATIENCE_MS, opened, press_known_loads, rest, shown, touched, until
 from playwright.sync_api import expect
 
 from generator.database.as_built import read_as_built
@@ -15,8 +15,6 @@ from generator.database.entries import object_entry
 from generator.database.open import open_database
 from generator.database.transaction import read_transaction
 from probe.recording.read import Recording
-
-PATIENCE_MS = 1e3 * PATIENCE_S
 
 
 @pytest.fixture(scope="module")
@@ -133,18 +131,7 @@ def test_the_print_is_checked_and_the_sensor_learned_from_touches(page, bench, l
 
 def test_what_is_left_of_a_load_is_no_touch_and_the_scale_follows(page):
     kept = page.get_by_test_id("touch-list").locator("button").count()
-    page.get_by_test_id("calibrate").click()
-    page.get_by_test_id("guide-loads").fill("80, 200, 600")
-    page.get_by_test_id("guide-seconds").fill("0.5")
-    page.get_by_test_id("guide-start").click()
-    for step in range(4):
-        expect(page.get_by_test_id("guide-ask")).to_contain_text(f"{step + 1} of 4")
-        page.get_by_test_id("guide-load").click()
-        page.wait_for_timeout(300)  # the film creeps
-        page.get_by_test_id("guide-read").click()
-        expect(page.locator("#guide-felt li")).to_have_count(step + 1, timeout=PATIENCE_MS)
-    page.get_by_test_id("guide-finish").click()  # 600 N are still on it
-    expect(page.get_by_test_id("guide-result")).to_contain_text("tactels are sound")
+    press_known_loads(page)  # 600 N are still on it
     frames = page.evaluate("bench.frames")
     until(page, f"bench.frames > {frames + 40}")
     assert page.evaluate("bench.contact") is False

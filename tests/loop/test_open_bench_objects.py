@@ -6,10 +6,8 @@ import re
 
 import httpx
 import pytest
-from bench_page import PATIENCE_S, opened, rest, shown, touched, until
+from bench_page import PATIENCE_MS, opened, rest, shown, touched, until
 from playwright.sync_api import expect
-
-PATIENCE_MS = 1e3 * PATIENCE_S
 
 
 @pytest.fixture(scope="module")

@@ -11,24 +11,14 @@ from contextlib import closing, contextmanager
 
 import httpx
 import pytest
-from bench_page import PATIENCE_S, opened, rest, shown, touched, until
+from bench_page import PATIENCE_MS, opened, rest, shown, touched, until
 from playwright.sync_api import expect
-
-PATIENCE_MS = 1e3 * PATIENCE_S
 
 
 @pytest.fixture(scope="module")
 def bench(served):
     with served("--port", "touch:?hold=1.0") as address:
         yield address
-
-
-@pytest.fixture
-def page(browser, bench):
-    with opened(browser, bench) as page:
-        rest(page)
-        shown(page, "Cube")
-        yield page
 
 
 @contextmanager

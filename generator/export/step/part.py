@@ -11,7 +11,7 @@ from generator.export.fixed_text import decimal_numbers, decimal_width, pad, sta
 from generator.export.step.body import StepBody
 from generator.export.step.curved import round_entities, write_round_faces
 from generator.export.step.entities import PLACES, Entities, numbers_listed, step_string
-from generator.export.step.product import Product, Shared, write_product
+from generator.export.step.product import ProductReferences, Shared, write_product
 from generator.export.step.symbol import KINDS, outline_points, symbol_entities, symbol_template
 from generator.solid.emboss import turn
 from generator.solid.part import Embossing, Part
@@ -21,7 +21,7 @@ _CHUNK_BYTES = 4_000_000
 
 def write_part(
     part: Part, entities: Entities, shared: Shared, body_style: str
-) -> Generator[bytes, None, Product]:
+) -> Generator[bytes, None, ProductReferences]:
     """Write one part and the product that it is the shape of."""
     name, units, style = step_string(part.name), shared.units, shared.symbols
     body = StepBody(part, entities)

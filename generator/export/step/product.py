@@ -29,7 +29,7 @@ class Shared:
 
 
 @dataclass(frozen=True, slots=True)
-class Product:
+class ProductReferences:
     """References to a product."""
 
     definition: str
@@ -82,14 +82,16 @@ def write_style(entities: Entities, colour_rgb: RGB) -> str:
     return entities.add(f"PRESENTATION_STYLE_ASSIGNMENT(({usage}))")
 
 
-def write_product(entities: Entities, name: str, solid: str, units: str, origin: str) -> Product:
+def write_product(
+    entities: Entities, name: str, solid: str, units: str, origin: str
+) -> ProductReferences:
     """Write the product that the solid is the shape of."""
     add = entities.add
     shape = add(f"ADVANCED_BREP_SHAPE_REPRESENTATION('{name}',({origin},{solid}),{units})")
     return write_product_of(entities, name, shape)
 
 
-def write_product_of(entities: Entities, name: str, shape: str) -> Product:
+def write_product_of(entities: Entities, name: str, shape: str) -> ProductReferences:
     """Write the product that a representation is the shape of."""
     add = entities.add
     application = add("APPLICATION_CONTEXT('automotive design')")
@@ -105,11 +107,14 @@ def write_product_of(entities: Entities, name: str, shape: str) -> Product:
     definition = add(f"PRODUCT_DEFINITION('design','',{formation},{design})")
     definition_shape = add(f"PRODUCT_DEFINITION_SHAPE('','',{definition})")
     add(f"SHAPE_DEFINITION_REPRESENTATION({definition_shape},{shape})")
-    return Product(definition, shape)
+    return ProductReferences(definition, shape)
 
 
 def write_assembly(
-    entities: Entities, name: str, shared: Shared, held: Sequence[tuple[Part, Product]]
+    entities: Entities,
+    name: str,
+    shared: Shared,
+    held: Sequence[tuple[Part, ProductReferences]],
 ) -> None:
     """Write the product that holds all parts, each where it belongs (ISO 10303-44, -43)."""
     add = entities.add

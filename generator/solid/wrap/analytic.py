@@ -26,7 +26,7 @@ from generator.solid.analytic import AnalyticFace, BentSymbol, Points, Rim
 from generator.solid.emboss import turn
 from generator.solid.part import Part
 from generator.solid.settings import EMBOSS
-from generator.solid.wrap.bend import Bend, bend_lines
+from generator.solid.wrap.bend import RoundSurfaceMap, bend_lines
 
 
 def analytic_faces(
@@ -195,7 +195,7 @@ def _with_symbols(
     tiers: tuple[Tiers, ...],
 ) -> AnalyticFace:
     """Bend the symbols of a face onto it."""
-    place = Bend(face, development(polyhedron, surface))
+    place = RoundSurfaceMap(face, development(polyhedron, surface))
     R = turn(-layout.placement.rotation_rad)
     labels = layout.labels.tolist()
     starts, steps, heights, walls, first = [], [], [], [], 0

@@ -18,7 +18,7 @@ from generator.solid.analytic import AnalyticFace, Points
 from generator.solid.settings import EMBOSS
 
 
-class Bend:
+class RoundSurfaceMap:
     """From the plane of a development to the round face."""
 
     def __init__(self, face: AnalyticFace, development: Development) -> None:
@@ -62,7 +62,11 @@ class Bend:
 
 
 def bend_lines(
-    place: Bend, starts: Points, steps: Points, z_mm: Points, walls: NDArray[np.int64]
+    place: RoundSurfaceMap,
+    starts: Points,
+    steps: Points,
+    z_mm: Points,
+    walls: NDArray[np.int64],
 ) -> list[Points]:
     """Return the control points of lines on the round face, each (degree, 3) without its end.
 
@@ -89,7 +93,9 @@ def bend_lines(
     return found
 
 
-def _interpolate(place: Bend, starts: Points, steps: Points, z_mm: Points, n: int) -> Points:
+def _interpolate(
+    place: RoundSurfaceMap, starts: Points, steps: Points, z_mm: Points, n: int
+) -> Points:
     """Return the Bezier curves (k, n + 1, 3) of degree n through n + 1 points of each line."""
     t = 0.5 - 0.5 * np.cos(np.pi * np.arange(n + 1) / n)
     flat = starts[:, None, :] + t[None, :, None] * steps[:, None, :]

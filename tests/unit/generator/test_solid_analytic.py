@@ -14,7 +14,7 @@ from generator.polyhedron.winged import Face
 from generator.solid import emboss_whole, round_volume, volume
 from generator.solid.settings import EMBOSS
 from generator.solid.wrap import analytic_faces
-from generator.solid.wrap.bend import Bend, bend_lines
+from generator.solid.wrap.bend import RoundSurfaceMap, bend_lines
 from tests.unit.generator.test_solid_wrap import STYLE, TIERS, layout_on
 
 SOLIDS = {
@@ -43,7 +43,7 @@ def test_volume_of_the_body_is_that_of_the_round_solid(name):
 @pytest.mark.parametrize("name", SOLIDS)
 def test_lines_keep_their_length_and_stay_on_the_face(name):
     face, flat = plain_face(SOLIDS[name][0])
-    place = Bend(face, flat)
+    place = RoundSurfaceMap(face, flat)
     starts = np.array([[20.0, 12.0], [33.0, 16.0], [25.0, 20.0]])
     steps = np.array([[4.0, 0.0], [0.0, 3.0], [2.0, -2.5]])
     curves = bend_lines(place, starts, steps, np.zeros(3), np.arange(3))
@@ -61,7 +61,7 @@ def test_lines_keep_their_length_and_stay_on_the_face(name):
 
 def test_heights_are_distances_from_the_face():
     face, flat = plain_face(SOLIDS["cone"][0])
-    place = Bend(face, flat)
+    place = RoundSurfaceMap(face, flat)
     at = np.array([[30.0, 20.0]])
     foot, top = place(at, np.zeros(1)), place(at, np.ones(1))
     assert np.linalg.norm(top - foot) == pytest.approx(1.0)
