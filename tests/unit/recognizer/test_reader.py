@@ -176,7 +176,7 @@ def test_a_lab_says_what_it_holds(lab):
 def test_every_number_that_decides_stands_in_the_settings():
     bare = []
     for path in sorted(Path(recognizer.touch.__file__).parent.rglob("*.py")):
-        if path.name == "settings.py":
+        if "settings" in (path.stem, path.parent.name):
             continue
         for node in ast.parse(path.read_text()).body:
             targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", 0)]

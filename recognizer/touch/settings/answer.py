@@ -1,0 +1,135 @@
+"""Numbers of the answer: what is weighed against what, refused, asked for next.
+
+Units as in `recognizer.touch.settings`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class HypothesisSettings:
+    """Which registered places are looked at, and what a cell may cost one of them."""
+
+    kept: int = 8  #: verified at most, two at least
+    near: float = 14.0  #: nats below the best within which they are
+    steps: int = 4  #: of their verification
+    cap: float = 8.0  #: nats that one cell can cost at most
+    corner: float = 8.0  #: tactels on a cell below which it can cost less than that
+    worn: float = 4.0  #: nats that a symbol costs that is registered but not felt at all
+    anchors: int = 3  #: cells tried as the one surely registered, where no window is whole
+    anchors_again: int = 2  #: the same, when the best place is known
+    windows: int = 4  #: whole windows that are looked up, the surest ones
+    sure: float = 6.0  #: nats by which each of their cells shows its symbol, not any other
+    many: int = 1024  #: candidates, from which on those count that two windows agree on
+    large: int = 1 << 18  #: registered cells, from which on a whole window must be seen
+    first: int = 6  #: cells after which only ...
+    followed: int = 512  #: ... so many candidates go on (`tests/bench/recognizer_scale.py`)
+    heavy: float = 12.0  #: tactels from which a cell counts whole in the order of the cells
+
+
+@dataclass(frozen=True, slots=True)
+class BeliefSettings:
+    """When an answer is given.
+
+    With these, 100,000 touches of 40 objects, a fifth of them of surfaces of no database, gave 0
+    wrong answers, and an answer to 99.6 % of those that show enough symbols
+    (`docs/validation/README.md`).
+    """
+
+    margin: float = 10.0  #: nats over the best other place
+    margin_by_few: float = 14.0  #: the same where fewer than `many_inliers` cells speak ...
+    #: ... and registered places, whatever their borders, that random symbols match as well: with
+    #: more of them what is felt, partly seen symbols counted by what they show, names no place
+    named: float = 1.0
+    surprise: float = 3.0  #: nats over symbols of no registered place
+    sure: float = 7.0  #: nats below which a share of `well` must be explained
+    wide: float = 0.9  #: tenths of a mm by which strokes are hardly printed wider; the same holds
+    well: float = 0.8
+    explained: float = 0.72  #: share of the image's variance
+    explained_by_many: float = 0.58  #: the same where `many_inliers` agree
+    many_inliers: int = 11
+    least_inliers: int = 4  #: cells that hold a symbol, are seen, and agree
+    contradicted: int = 1  #: cells that speak `clearly` for another symbol; `plainly`: none
+    clearly: float = 8.0  #: nats
+    plainly: float = 16.0
+    whole: float = 6.0  #: tactels that look at a cell which counts as seen
+    #: tactels to a symbol below which numbers of tactels shrink with the square of the share: 8x8
+    #: at 3 mm, 7 mm symbols, 40 typical touches mid-face, 0 wrong: 38 answered, 0 without it
+    coarse: float = 8.0
+    rim_mm: float = 2.0  #: how far the sensor's centre may lie beyond the face
+    #: registered places that foreign symbols may match as well by chance: of 395 right answers
+    #: among 20,880 places of 5 mm it refuses 5, all at edges (`tests/campaigns/other_labs.py`)
+    doubt: float = 1e-4
+    grain: float = 0.25  #: nats to which scores are rounded where that is counted
+
+
+@dataclass(frozen=True, slots=True)
+class FirstLookSettings:
+    """Which touches are refused before a search, or before a wide one.
+
+    Chosen with pitches of 5 mm (seed 902) and 5.5 mm (720 touches of faulty sensors): of 1,008
+    touches of registered faces none had fewer gaps than .30, of 112 of a blank plate nine in ten
+    fewer than .275; of 583 that the first try did not answer, six were answered by the wide search,
+    all of them with 94 tactels pressed or more and 2 nats over symbols of no registered place.
+    """
+
+    strongest: int = 12  #: tactels that say how hard is pressed
+    pressed: float = 0.15  #: share of that from which a tactel is pressed
+    around: int = 5  #: tactels, side of a square in which strokes and gaps lie
+    high: float = 0.85  #: quantile of its readings that stands for strokes
+    weak: float = 0.35  #: share of that below which a tactel lies over a gap
+    gaps: float = 0.285  #: share of such tactels below which nothing is embossed
+    finest: float = 3.1  #: tactels, pitches between which gaps were measured
+    coarsest: float = 5.0
+    ink: float = 0.44  #: share of a cell's tactels that its symbol presses, and some beside it
+    foreign: float = -4.0  #: nats over symbols of no registered place
+
+
+@dataclass(frozen=True, slots=True)
+class NextSettings:
+    """Which steps are weighed, and what they are worth (`tests/campaigns/next_touch.py`)."""
+
+    lengths_mm: tuple[float, ...] = (4.0, 7.0, 10.0, 14.0)  #: of steps
+    directions: int = 16  #: of steps
+    turns_rad: tuple[float, ...] = (0.0, math.pi / 4)  #: a row of symbols fits along a diagonal
+    force_n: float = 80.0  #: at which touches are read best
+    strongest: int = 12  #: tactels that say how hard is pressed
+    faint: float = 0.08  #: share of that from which a tactel lies on something ...
+    least_counts: float = 16.0  #: ... and readings over the background: less is noise
+    least_n: float = 0.1  #: the same where readings are newtons
+    gap: int = 5  #: tactels, side of the square that closes gaps between strokes
+    clear_mm: float = 2.5  #: from where the face may end to the centre: nearer, the plate tips
+    points: int = 8  #: along each side of the sensor at which a view is asked
+    whole: float = 0.36  #: pitches within the rim at which a symbol's centre is seen whole
+    beyond_mm: float = 30.0  #: beyond the sensor's rim at which trust in a face falls to 1/e
+    novelty: float = 0.2  #: more that a symbol is worth which was not seen yet ...
+    novelty_inside: float = 0.5  #: ... where no edge is near: there another look tells as little
+    faces: int = 6  #: hypotheses that are asked, and ...
+    soft: float = 3.0  #: ... nats by which their weights fall to 1/e
+    by_face: float = 0.5  #: weight of what faces say against what the image says
+    agreed: float = 0.9  #: of the hypotheses' weight that must know a face under the centre
+    cost: float = 0.01  #: symbols that a mm of the way costs
+    turning: float = 1.5  #: symbols that a turn costs
+    whole_share: float = 0.85  #: of the sensor that lies on something; with less, an edge is near
+    soft_counts: float = 40.0  #: below which the strongest readings are weak
+    soft_n: float = 0.25  #: the same where readings are newtons
+    margin: float = 14.0  #: nats below which an answer had better be confirmed
+    doubt: float = 1e-5  #: places by chance above which it had
+
+
+@dataclass(frozen=True, slots=True)
+class PrintedSettings:
+    """How prints come out that nobody has measured, and how poses on prints are corrected.
+
+    Standard deviations: printers are off by .3 % as a rule and .6 % at worst, and backlash and
+    shifted layers move symbols by up to .03 mm (`docs/printed.md`).
+    """
+
+    scale: float = 0.004  #: of what both axes have in common
+    apart: float = 0.002  #: of the difference between the two
+    skew_rad: float = 0.001
+    aside_mm: float = 0.02  #: each way, of the place of symbols, beyond scale and skew
+    step: float = 1e-6  #: of scales and skew, of the differences that stand for derivatives
