@@ -18,12 +18,12 @@ from probe.contact.engines import engine_named
 from probe.simulate.world.levels import LEVELS
 from recognizer.touch.reader import Reader
 from recognizer.touch.settings import DEFAULTS
-from recognizer.validation.draw import TouchPlan
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.made_kinds import COPY, NEAR, SAME_PROFILE, SIDE, SMALL
 from recognizer.validation.policy import ONE
 from recognizer.validation.settings import SHARING
 from recognizer.validation.surfaces import FOREIGN
+from recognizer.validation.touch_plan import TouchPlan
 
 TOUCHES = "touches"  #: name of the series that is counted
 BLANK, STRANGE = "blank", "foreign"

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from recognizer.validation.errors import ValidationError
-from recognizer.validation.pipeline import RESULTS, TIMES_FILE
+from recognizer.validation.finish import RESULTS, TIMES_FILE
 from recognizer.validation.results import FORMAT
 
 

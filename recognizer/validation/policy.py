@@ -21,8 +21,9 @@ from probe.errors import ContactError
 from recognizer.scan.session import Scan
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import NextTouch, Recognition
-from recognizer.validation.draw import DrawnTouch, TouchPlan, draw_again, draw_tilt, draw_touch
+from recognizer.validation.draw import DrawnTouch, draw_again, draw_tilt, draw_touch
 from recognizer.validation.settings import POLICIES
+from recognizer.validation.touch_plan import TouchPlan
 
 Array = NDArray[np.float64]
 

@@ -20,10 +20,10 @@ from probe.sensor_types.read import sensor_type_named, shipped_names
 from probe.simulate.world.levels import LEVELS
 from recognizer.touch.symbols.compiled import kernels_in_use
 from recognizer.validation.campaign import KINDS, LEVEL_SHARES, Campaign, Shares
-from recognizer.validation.draw import TouchPlan, sensor_of
 from recognizer.validation.encoded_set import members_of
 from recognizer.validation.record import RunRecord
 from recognizer.validation.settings import DRAWING, JUDGING
+from recognizer.validation.touch_plan import TouchPlan, sensor_of
 
 LIBRARIES = ("numpy", "scipy", "pyarrow", "matplotlib")
 

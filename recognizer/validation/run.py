@@ -25,7 +25,6 @@ from pathlib import Path
 from probe.sensor import SensorType
 from probe.sensor_types import sensor_type_text
 from recognizer.validation.campaign import Campaign, batches_of, series_of, shards_of
-from recognizer.validation.draw import sensor_of
 from recognizer.validation.encoded_set import LAB, PARTS, make_parts, set_digest
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.files import write_text
@@ -42,6 +41,7 @@ from recognizer.validation.record import (
 )
 from recognizer.validation.rows import CpuTime, Row
 from recognizer.validation.shards import done_shards, write_shard
+from recognizer.validation.touch_plan import sensor_of
 from recognizer.validation.work import Workers, code_digest
 
 SENSOR = "sensor.yaml"

@@ -21,9 +21,10 @@ from probe.contact.engines import ENGINES, engine_named, engine_table
 from probe.contact.press import LEVELS, level_for, table
 from probe.contact.tips import Tips, tip_points
 from recognizer.touch.reader import Reader
-from recognizer.validation.draw import TouchPlan, draw_touch
+from recognizer.validation.draw import draw_touch
 from recognizer.validation.precision import Study
 from recognizer.validation.settings import STUDIES
+from recognizer.validation.touch_plan import TouchPlan
 
 
 def find_savings(reader: Reader, plan: TouchPlan, readers: Study) -> Study:

@@ -15,9 +15,10 @@ import numpy as np
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.recognition import Recognition
-from recognizer.validation.draw import DrawnTouch, TouchPlan, draw_touch
+from recognizer.validation.draw import DrawnTouch, draw_touch
 from recognizer.validation.policy import NEXT, touch_until_answered
 from recognizer.validation.settings import JUDGING, POLICIES
+from recognizer.validation.touch_plan import TouchPlan
 
 RIGHT, WRONG, REJECTED = "right", "wrong", "rejected"
 

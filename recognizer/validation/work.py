@@ -16,10 +16,10 @@ from pathlib import Path
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.validation.campaign import Batch, Campaign, plan_of, reader_with, series_of
-from recognizer.validation.draw import sensor_of
 from recognizer.validation.encoded_set import set_digest
 from recognizer.validation.errors import WorkersError
 from recognizer.validation.rows import CpuTime, Row, row_of, symbols_in_view
+from recognizer.validation.touch_plan import sensor_of
 from recognizer.validation.trial import trial
 
 PACKAGES = ("generator", "decoder", "probe", "recognizer")

@@ -27,7 +27,8 @@ from recognizer.touch.symbols.fit import fit_lattices  # noqa: E402
 from recognizer.touch.symbols.gain import first_gain, image_of_signal, normalize_image  # noqa: E402
 from recognizer.touch.symbols.search import search  # noqa: E402
 from recognizer.touch.verify import verify_hypotheses  # noqa: E402
-from recognizer.validation.draw import TouchPlan, draw_touch, sensor_of  # noqa: E402
+from recognizer.validation.draw import draw_touch  # noqa: E402
+from recognizer.validation.touch_plan import TouchPlan, sensor_of  # noqa: E402
 from recognizer.validation.trial import judge  # noqa: E402
 
 SETTINGS = {

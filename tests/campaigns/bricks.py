@@ -20,7 +20,7 @@ import numpy as np  # noqa: E402
 from encoded_objects import encode  # noqa: E402
 from recognizer.touch.lab import open_lab  # noqa: E402
 from recognizer.touch.reader import Reader  # noqa: E402
-from recognizer.validation.draw import TouchPlan  # noqa: E402
+from recognizer.validation.touch_plan import TouchPlan  # noqa: E402
 from recognizer.validation.trial import trial  # noqa: E402
 
 SIZE_MM = (45, 35, 28)

@@ -32,7 +32,8 @@ from recognizer.touch.reader import Reader  # noqa: E402
 from recognizer.touch.recognise import recognise_with_rivals  # noqa: E402
 from recognizer.touch.settings import DEFAULTS  # noqa: E402
 from recognizer.validation.campaign import LEVEL_SHARES  # noqa: E402
-from recognizer.validation.draw import TouchPlan, draw_touch  # noqa: E402
+from recognizer.validation.draw import draw_touch  # noqa: E402
+from recognizer.validation.touch_plan import TouchPlan  # noqa: E402
 from recognizer.validation.trial import judge  # noqa: E402
 
 LABS, OBJECTS, SIZES_MM = 8, 40, (35.0, 75.0)

@@ -39,8 +39,8 @@ from generator.layout.promise import AnswerTable, measured_answers  # noqa: E402
 from generator.layout.views import SensorView, views_at  # noqa: E402
 from recognizer.touch.lab import open_lab  # noqa: E402
 from recognizer.touch.reader import Reader  # noqa: E402
-from recognizer.validation.draw import TouchPlan  # noqa: E402
 from recognizer.validation.policy import NEXT, touch_until_answered  # noqa: E402
+from recognizer.validation.touch_plan import TouchPlan  # noqa: E402
 from recognizer.validation.trial import judge  # noqa: E402
 
 Points = NDArray[np.float64]

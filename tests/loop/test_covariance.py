@@ -9,7 +9,8 @@ from scipy.stats import binom, chi2
 from encoded_objects import encode
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
-from recognizer.validation.draw import TouchPlan, draw_touch
+from recognizer.validation.draw import draw_touch
+from recognizer.validation.touch_plan import TouchPlan
 
 #: Probability that a true ellipse fails: of 150 touches 129 must lie within it, which one that
 #: holds 83 % of the errors misses in 8 of 10 draws, one of 81 % in 9.

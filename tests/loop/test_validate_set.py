@@ -18,8 +18,9 @@ import pytest
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.validation.command import run
-from recognizer.validation.draw import TouchPlan, draw_touch, sensor_of
+from recognizer.validation.draw import draw_touch
 from recognizer.validation.errors import SetError
+from recognizer.validation.touch_plan import TouchPlan, sensor_of
 from recognizer.validation.written import written_surface
 
 TOUCHES, SHARD = 18, 6

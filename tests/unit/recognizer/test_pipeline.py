@@ -34,9 +34,10 @@ from recognizer.touch.signal import signal_of
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.template import psi, template_of
 from recognizer.touch.verify import verify_hypotheses
-from recognizer.validation.draw import TouchPlan, draw_touch, sensor_of
+from recognizer.validation.draw import draw_touch
 from recognizer.validation.settings import DRAWING
 from recognizer.validation.surfaces import FOREIGN
+from recognizer.validation.touch_plan import TouchPlan, sensor_of
 from recognizer.validation.trial import trial
 
 PLACES = DEFAULTS.hypotheses

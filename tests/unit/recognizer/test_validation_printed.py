@@ -33,9 +33,10 @@ from probe.simulate.printed import (
 )
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
-from recognizer.validation.draw import TouchPlan, draw_touch, level_of, sensor_of
+from recognizer.validation.draw import draw_touch
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.printing import find_parts
+from recognizer.validation.touch_plan import TouchPlan, level_of, sensor_of
 from recognizer.validation.trial import RIGHT, trial
 
 OPTIONS = PrintOptions(faults="usual", seed=5)

@@ -1,0 +1,118 @@
+"""What a campaign touches: the plan of its touches, and the faces and sensor that it names."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+from probe.sensor import SensorType
+from probe.sensor_types import choose_sensor_type
+from probe.simulate.registered import registered_object, registered_objects, registered_surface
+from probe.simulate.scene import Scene
+from probe.simulate.touch import TouchRanges
+from probe.simulate.world.levels import LEVELS, Level
+from recognizer.touch.lab import EmbossedArray
+from recognizer.validation.made_kinds import SIDE, is_extra
+from recognizer.validation.settings import DRAWING
+from recognizer.validation.written import written_surface
+
+
+@dataclass(frozen=True, slots=True)
+class TouchPlan:
+    """What is drawn.
+
+    `kind` is `face` (the sensor's centre at least `inside_mm` from the edges), `edge` (nearer
+    than that), `corner` (within `inside_mm` of a corner), `worn` (a face with a share of its
+    symbols gone), `copy`, `near` or `small` (inside faces of these members, `made_kinds`), `side`
+    (near an edge beside which another object lies), `same_profile` (a part of another lab),
+    `anywhere` (all places of a face are alike likely), or one of the surfaces of
+    `surfaces.FOREIGN`.
+    """
+
+    database: str
+    seed: int = 1
+    level: str = "typical"
+    kind: str = "face"
+    force_n: tuple[float, float] = DRAWING.force_n
+    tilt_rad: float = DRAWING.tilt_rad
+    worn: float = DRAWING.worn
+    files: bool = False  #: touch the written STL files, not what the database says of them
+    prints: str = ""  #: listing of the printed surfaces that are touched instead; empty: none
+    engine: str = "own"  #: of contact, `probe.contact.engines`
+    sensor_per: str = "touch"  #: or `run`: the errors of the sensor stay the same
+    labs: tuple[str, ...] = ()  #: databases of other labs, of `same_profile`
+    policy: str = "one"  #: or `next`: touches follow until one is answered, `policy`
+    only: str = ""  #: object/face that is touched; empty: any
+
+
+def level_of(plan: TouchPlan) -> Level:
+    """Return what is wrong with the sensor; a printed surface brings the print's faults itself."""
+    level = LEVELS[plan.level]
+    return replace(level, wider_mm=0.0, scale=0.0) if plan.prints else level
+
+
+def sensor_of(sensor_type: str, overlay: str) -> SensorType:
+    """Return the sensor type of a campaign, given as YAML, with the overlay that it names."""
+    return choose_sensor_type(None, sensor_type, None, "--sensor-type").with_overlay(overlay)
+
+
+def ranges_of(plan: TouchPlan, level: Level, sensor: SensorType) -> TouchRanges:
+    """Return forces and tilts of a plan, or those of a level that has its own.
+
+    Forces are those on `fsr-16`; another sensor is pressed as hard for its area.
+    """
+    tilt = plan.tilt_rad if level.tilt_rad is None else level.tilt_rad
+    share = math.prod(sensor.half_mm) / math.prod(SensorType().half_mm)
+    low, high = level.force_n or plan.force_n
+    return TouchRanges(force_n=(low * share, high * share), tilt_rad=tilt)
+
+
+@lru_cache(maxsize=512)
+def faces_of_kind(
+    encoding: EmbossedArray, kind: str, prints: str = "", only: str = ""
+) -> list[int]:
+    """Return the faces that a kind touches, in the order of their objects' names.
+
+    With prints, those that were printed alone; with a face named, that one.
+
+    Their numbers follow the order of registration, which a set made in parallel leaves to chance.
+    """
+    faces, names = encoding.faces.tolist(), encoding.names
+    found = sorted(range(len(faces)), key=lambda n: (names[faces[n][0]], faces[n][1]))
+    found = [n for n in found if is_extra(names[faces[n][0]], kind)]
+    if kind == SIDE:  # round faces roll away from each other
+        found = [n for n in found if encoding.face(n).round is None]
+    if only:
+        whole = {n: encoding.face(n) for n in found if only.startswith(names[faces[n][0]])}
+        found = [n for n, face in whole.items() if f"{face.object}/{face.face}" == only]
+    if not prints:
+        return found
+    from probe.simulate.printed import read_listing
+
+    printed = read_listing(prints).keys
+    shown = {n: encoding.face(n) for n in found}
+    return [n for n, face in shown.items() if (face.object, face.face) in printed]
+
+
+@lru_cache(maxsize=8)
+def faces_of_lab(database: str) -> list[tuple[str, str]]:
+    """Return the objects and faces of another lab that bear symbols, in order."""
+    return [
+        (name, face.name)
+        for name in registered_objects(database)
+        for face in registered_object(database, name).faces
+        if face.placement is not None
+    ]
+
+
+@lru_cache(maxsize=512)
+def scene_of(database: str, object_name: str, face: str, files: bool, prints: str = "") -> Scene:
+    """Return a face as it was printed, as it was written, or as the database says that it is."""
+    if prints:
+        from probe.simulate.printed import printed_scene
+
+        return printed_scene(prints, database, object_name, face)
+    if files:
+        return written_surface(database, object_name, face)
+    return registered_surface(database, object_name, face)
