@@ -5,24 +5,22 @@ from __future__ import annotations
 import datetime
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from probe.calibration import read_calibration
 from probe.circuit import Electronics
 from recognizer.bench.calibration_guide import CalibrationGuide, forces_given
+from recognizer.bench.desk import DeskSession
 from recognizer.bench.errors import BenchError, BusyError
 from recognizer.bench.feed import ProbeFeed
 from recognizer.bench.files import find_file
 from recognizer.bench.settings import SESSION
 
-if TYPE_CHECKING:
-    from recognizer.bench.session import Session
-
 
 class CalibrationDesk:
     """The calibration of the sensor that a session reads."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: DeskSession) -> None:
         self._session = session
 
     def bias(self, *, on: bool) -> None:

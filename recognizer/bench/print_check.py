@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from generator.database.as_built import AsBuilt
 from probe.frame import Frame
@@ -14,11 +14,9 @@ from recognizer.as_built.settings import ESTIMATE, settings_for_prints
 from recognizer.as_built.touches import feel_prints
 from recognizer.as_built.words import as_built_entry, as_built_sizes
 from recognizer.bench.errors import BusyError
+from recognizer.bench.session import Session
 from recognizer.touch.contacts import TouchImage
 from recognizer.touch.reader import Reader
-
-if TYPE_CHECKING:
-    from recognizer.bench.session import Session
 
 
 class PrintCheck:

@@ -8,10 +8,11 @@ but recording it. What is learned is kept in the folder, `NAME.state.json`, as `
 from __future__ import annotations
 
 import threading
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from encoded_objects.errors import EncodedObjectsError
 from probe.recording.names import next_free
+from recognizer.bench.desk import DeskSession
 from recognizer.bench.errors import BusyError
 from recognizer.bench.files import find_file, list_files
 from recognizer.bench.settings import DESK
@@ -23,16 +24,13 @@ from recognizer.sensor.wiring import Wiring, wiring_named
 from recognizer.sensor.words import state_words
 from recognizer.touch.reader import Reader
 
-if TYPE_CHECKING:
-    from recognizer.bench.session import Session
-
 STATE = ".state.json"
 
 
 class SensorDesk:
     """Mounting and state of the sensor that a session reads."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: DeskSession) -> None:
         self._session = session
         self._share: float | None = None  #: of the learning that is done; None: nothing is learned
         self._name = self._words = ""  #: of the state that is read by
