@@ -6,12 +6,10 @@ import { element, say } from "./dom";
 import { mosaicOf } from "./live";
 import { mosaicPicture } from "./mosaic";
 import type { Part } from "./part";
-import type { FaceShape, MosaicImage, ObjectShape, Promised, Sensor, TouchRecord } from "./types";
+import type { FacePicture, FaceShape, MosaicImage, ObjectShape, Promised, Sensor, TouchRecord } from "./types";
 
 const PIXELS = 256; // along the longer side of a face
 type Kind = "plain" | "coverage" | "promise" | "mosaic";
-/** A picture on a face: its box in the face's frame or unrolled plane, mm. */
-export interface FacePicture { canvas: HTMLCanvasElement; x0: number; y0: number; x1: number; y1: number }
 
 export class Tint {
   private readonly list = element("face-list");

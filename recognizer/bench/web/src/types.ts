@@ -92,6 +92,9 @@ export interface FaceShape {
   labels: number[]; centres: [number, number][]; stands: number[][];
 }
 
+/** A picture on a face: its box in the face's frame or unrolled plane, mm. */
+export interface FacePicture { canvas: HTMLCanvasElement; x0: number; y0: number; x1: number; y1: number }
+
 export interface ObjectShape {
   name: string; type: string; profile: string; registered: string; pitch_mm: number; height_mm: number;
   faces: FaceShape[]; glyphs: number[][];
