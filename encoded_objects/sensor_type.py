@@ -31,6 +31,11 @@ class SensorSize:
         """Side of the square of the same area."""
         return 2 * math.sqrt(self.half_mm[0] * self.half_mm[1])
 
+    @property
+    def coarseness(self) -> float:
+        """How many times larger its symbols are than those of `fsr-16`."""
+        return self.pitch_mm / USUAL_SENSOR.pitch_mm
+
 
 USUAL_SENSOR = SensorSize()
 

@@ -16,6 +16,7 @@ from generator.database.read import surfaces_of
 from generator.database.url import without_password
 
 if TYPE_CHECKING:
+    from encoded_objects.sensor_type import SensorSize
     from generator.database.carry import CopyReport
     from generator.database.fullness import Fullness
     from generator.database.part_state import PartState
@@ -50,11 +51,17 @@ def print_list(
 
 
 def print_object(
-    held: RegisteredObject, files: Sequence[PartState], url: str, *, as_json: bool
+    held: RegisteredObject,
+    files: Sequence[PartState],
+    url: str,
+    sensor: SensorSize,
+    *,
+    as_json: bool,
 ) -> None:
-    """Say all about one object."""
+    """Say all about one object, and what its faces promise to a sensor."""
+    faces = _faces(held, sensor)
     if as_json:
-        output.write_json(_object_values(held, files) | {"database": without_password(url)})
+        output.write_json(_object_values(held, faces, files) | {"database": without_password(url)})
         return
     e, style, alphabet = held.entry, held.style, held.alphabet.get("name", "")
     lengths = f"height {style.height_mm:g}, stroke {style.stroke_mm:g}"
@@ -72,7 +79,7 @@ def print_object(
     output.write("\n".join(lines))
     titles = ("face", "kind", "area", "symbols", "places", "at once", "first cell")
     table = output.table(*titles, broken=())
-    for face in _faces(held):
+    for face in faces:
         on = face.layout
         first = f"({on.rows[0]}, {on.columns[0]})" if len(on.rows) else "blank"
         share = "" if face.promise is None else f"{100 * face.promise.at_once:.0f} %"
@@ -168,7 +175,7 @@ class _Face:
     promise: FacePromise | None = None  #: None: nothing was measured
 
 
-def _faces(held: RegisteredObject) -> list[_Face]:
+def _faces(held: RegisteredObject, sensor: SensorSize) -> list[_Face]:
     """Return the faces of an object with their symbols; layouts may be in another order."""
     from generator.pipeline.registered_promise import registered_promises
 
@@ -176,7 +183,7 @@ def _faces(held: RegisteredObject) -> list[_Face]:
     area = {face.face_id: face.area_mm2 for face in held.faces}
     surfaces = {surface.carrier: surface for surface in surfaces_of(held.spec)}
     facets = {facet for surface in surfaces.values() for facet in surface.facets[1:]}
-    promises = registered_promises(held)
+    promises = registered_promises(held, sensor)
     found = []
     for face in held.faces:
         if face.face_id not in layouts or face.face_id in facets:
@@ -212,11 +219,13 @@ def _entry_values(entry: ObjectEntry) -> dict[str, Any]:
     }
 
 
-def _object_values(held: RegisteredObject, files: Sequence[PartState]) -> dict[str, Any]:
+def _object_values(
+    held: RegisteredObject, faces: Sequence[_Face], files: Sequence[PartState]
+) -> dict[str, Any]:
     """Return all about an object as plain values; `faces` are the faces, not their number."""
     entry = held.entry
     return _entry_values(entry) | {
-        "faces": [_face_values(face) for face in _faces(held)],
+        "faces": [_face_values(face) for face in faces],
         "layout": held.layout.kind,
         "warnings": list(held.layout.warnings),
         "files": [

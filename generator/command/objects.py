@@ -24,6 +24,10 @@ Only = Annotated[
     typer.Option("--object", metavar="NAME", show_default=False,
                  help="Only this one; may be given several times."),
 ]  # fmt: skip
+SensorTypeName = Annotated[
+    str, typer.Option("--sensor-type", metavar="NAME|FILE", show_default=False,
+                      help="What touches it, for what faces promise; fsr-16."),
+]  # fmt: skip
 LAB = "sqlite:///lab.db"
 
 
@@ -76,11 +80,13 @@ def lab(database: Database = LAB, as_json: Json = False) -> Action:
 def show(
     name: Annotated[str, typer.Argument(metavar="OBJECT", help="As `list` names it.")],
     database: Database = LAB,
+    sensor_type: SensorTypeName = "",
     as_json: Json = False,
 ) -> Action:
     """Print all about one object: faces, cells, origin, files and whether they are unchanged."""
 
     def action() -> int:
+        from encoded_objects.sensor_type import USUAL_SENSOR, sensor_size
         from generator.command import object_report
         from generator.database.open import open_database
         from generator.database.part_state import part_state
@@ -89,11 +95,12 @@ def show(
         from generator.spec.option import database_option
 
         url = database_option(database)
+        sensor = sensor_size(sensor_type) if sensor_type else USUAL_SENSOR
         engine = open_database(url, writable=False)
         with read_transaction(engine) as connection:
             held = read_object(connection, name)
         files = [part_state(engine.url, part) for part in held.parts]
-        object_report.print_object(held, files, url, as_json=as_json)
+        object_report.print_object(held, files, url, sensor, as_json=as_json)
         return 0
 
     return action

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from encoded_objects.sensor_type import USUAL_SENSOR, SensorSize
 from generator.alphabet.outline import SymbolStyle, footprint_half_mm
 from generator.alphabet.printable import check_printable
 from generator.array.touches import touches_needed
@@ -92,14 +91,9 @@ def _promise(
     view = SensorView(plan.spec.sensor.half_mm, reach)
     views = face_views(loops, face, style.pitch_mm, view, settings)
     one_row = bool((views.lines <= 1).mean() >= PROMISE.one_line)
-    pitch = style.pitch_mm / _fineness(plan.spec.sensor)
+    pitch = style.pitch_mm / plan.spec.sensor.coarseness
     once, within = promised_shares(views, measured_answers(), pitch)
     return FacePromise(round(once, 3), round(within, 3), one_row)
-
-
-def _fineness(sensor: SensorSize) -> float:
-    """Return how many times coarser a sensor is than that of the measured table."""
-    return sensor.pitch_mm / USUAL_SENSOR.pitch_mm
 
 
 def _remedy(plan: ObjectPlan, loops: Loops, face: int) -> str:
@@ -113,7 +107,7 @@ def _remedy(plan: ObjectPlan, loops: Loops, face: int) -> str:
     elif more := _thicker(plan, loops, plan.clearances_mm[face]):
         found.append(f"{more:g} mm wider all along")
     for usual in PROMISE.pitches_mm:
-        pitch = round(usual * _fineness(plan.spec.sensor), 1)
+        pitch = round(usual * plan.spec.sensor.coarseness, 1)
         if pitch >= style.pitch_mm:
             continue
         finer = dataclasses.replace(

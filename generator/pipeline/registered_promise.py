@@ -1,26 +1,38 @@
 """What the faces of a registered object promise, from the database alone.
 
-Registered object -> by its face's number the shares of touches that are answered at once and
-within three, as `promise` tells them where the object is made. Nothing is said of round faces and
-of arrays that are read by a scan. The sensor is the usual one.
+Registered object + sensor -> by its face's number the shares of touches that are answered at once
+and within three, as `promise` tells them where the object is made. Nothing is said of round faces
+and of arrays that are read by a scan.
 """
 
 from __future__ import annotations
 
-from generator.array.touches import SENSOR_MM, touches_needed
+from encoded_objects.sensor_type import USUAL_SENSOR, SensorSize
+from generator.array.touches import touches_needed
 from generator.database.registered import RegisteredObject
 from generator.layout.promise import measured_answers, promised_shares
 from generator.layout.views import SensorView, face_views
 from generator.pipeline.promise import FacePromise, face_key
 
 
-def registered_promises(held: RegisteredObject) -> dict[int, FacePromise]:
-    """Return the promise of each flat face with symbols; equal faces share the work."""
+def registered_promises(
+    held: RegisteredObject, sensor: SensorSize = USUAL_SENSOR
+) -> dict[int, FacePromise]:
+    """Return the promise of each flat face with symbols; equal faces share the work.
+
+    Parameters
+    ----------
+    held
+        The object.
+    sensor
+        What touches it.
+    """
     array, style = held.array, held.style
-    if touches_needed(array.order, array.rows * array.columns, style.pitch_mm) > 1:
+    cells = array.rows * array.columns
+    if touches_needed(array.order, cells, style.pitch_mm, sensor_mm=sensor.across_mm) > 1:
         return {}
     reach = held.alphabet["reach"] * style.pitch_mm + style.stroke_mm / 2
-    view = SensorView((SENSOR_MM / 2, SENSOR_MM / 2), reach)
+    view = SensorView(sensor.half_mm, reach)
     facets = {n for face in held.faces if face.round for n in face.round.surface.facets}
     layouts = {layout.face: layout for layout in held.layout.faces}
     known: dict[bytes, FacePromise] = {}
@@ -32,7 +44,8 @@ def registered_promises(held: RegisteredObject) -> dict[int, FacePromise]:
         key = face_key(face.polygon_mm, layout)
         if key not in known:
             views = face_views(face.polygon_mm, layout, style.pitch_mm, view)
-            once, within = promised_shares(views, measured_answers(), style.pitch_mm)
+            pitch = style.pitch_mm / sensor.coarseness
+            once, within = promised_shares(views, measured_answers(), pitch)
             known[key] = FacePromise(round(once, 3), round(within, 3))
         found[face.face_id] = known[key]
     return found

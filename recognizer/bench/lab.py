@@ -69,7 +69,7 @@ def lab_routes(session: Session, parts: Path | None) -> APIRouter:
     def promise(name: str) -> dict[str, Any]:
         with read_transaction(engine()) as connection:
             registered = object_entry(connection, name).utc
-        return {"faces": face_promises(session.database, name, registered)}
+        return {"faces": face_promises(session.database, name, registered, session.sensor)}
 
     @routes.get("/objects/{name}/parts/{number}")
     def part(name: str, number: int) -> FileResponse:

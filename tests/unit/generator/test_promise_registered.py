@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from encoded_objects.sensor_type import sensor_size
 from generator.database.open import open_database
 from generator.database.read import read_object
 from generator.database.transaction import read_transaction
@@ -46,3 +47,19 @@ def test_the_database_tells_the_promise_that_was_made(made, name):
     made = {face: (one.at_once, one.within_three) for face, one in told.items() if one}
     assert found == {face: both for face, both in made.items() if both[0]}
     assert bool(found) == (name != "Old")
+
+
+def test_another_sensor_is_promised_what_it_would_have_been_promised_when_made(made, tmp_path):
+    _, held = made["Bar"]
+    spec = tmp_path / "bar.yaml"
+    spec.write_text(f"{{name: Bar, shape: {SPECS['Bar']}}}")
+    report = encode(
+        read_specs([spec], sensor_type="mat-32x32"), folder=tmp_path, formats=(),
+        database=f"{tmp_path}/lab.db",
+    )  # fmt: skip
+    told = [face.promise.at_once for face in report.objects[0].face_reports if face.symbols]
+    found = [one.at_once for one in registered_promises(held, sensor_size("mat-32x32")).values()]
+    assert sorted(found) == sorted(told)
+    usual = {one.at_once for one in registered_promises(held).values()}
+    assert usual.isdisjoint(found)
+    assert registered_promises(held, sensor_size("gel-24x32")) == {}  # sees too few at once
