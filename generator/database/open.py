@@ -9,6 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from sqlalchemy import URL, Connection, Engine, insert, inspect, select, text
+from sqlalchemy.schema import CreateIndex, CreateTable
 
 from generator.array.lab_key import draw_lab_key
 from generator.database.engine import check_place, database_engine
@@ -164,6 +165,10 @@ def _columns_of_meta(connection: Connection) -> set[str]:
 
 
 def _create_schema(connection: Connection, lab_key: str) -> None:
-    metadata.create_all(connection, checkfirst=False)
+    for table in metadata.sorted_tables:
+        connection.execute(CreateTable(table))
+        # `create_all` takes the indexes of a table as they lie in memory: other bytes every time
+        for index in sorted(table.indexes, key=lambda one: str(one.name)):
+            connection.execute(CreateIndex(index))
     rows = {"format": FORMAT, "schema_version": str(SCHEMA_VERSION), "lab_key": lab_key}
     connection.execute(insert(meta), [{"key": key, "value": rows[key]} for key in rows])

@@ -1,11 +1,14 @@
 """A small encoded plate for the first touch: one panel of a flat box, with a database of its own.
 
 Its lab has a key of its own, the same for everybody: every coupon of a type is alike, and is found
-in `coupon.db` alone. A lab's own parts are made in the lab's own database.
+in `coupon.db` alone. A lab's own parts are made in the lab's own database. The same type gives the
+same bytes of both, so a coupon does not tell when it was made.
 """
 
 from __future__ import annotations
 
+import sqlite3
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +18,7 @@ from probe.kit.sizes import KitSizes
 
 KEY = "V2DC-7EWP-B45S-77XC"  #: of the lab of all coupons
 NAME, DATABASE = "Coupon", "coupon.db"
+UNDATED = "1980-01-01T00:00:00+00:00"  #: when every coupon says it was made, as in its 3MF
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,5 +60,14 @@ def make_coupon(k: KitSizes, pitch_mm: float, printer: str, database: Path) -> C
         print={"printer": printer},
         output={"lab_key": KEY},
     )
+    _undate(database)
     best = max(made.parts, key=lambda part: (part.symbols, -part.T_object_part[2, 2]))
     return Coupon(best, best.name, side, best.symbols, pitch_mm, printer)
+
+
+def _undate(database: Path) -> None:
+    """Put the same time into every coupon's database, and nothing of what stood there before."""
+    with closing(sqlite3.connect(database)) as connection:
+        with connection:
+            connection.execute("UPDATE provenance SET utc = ?", (UNDATED,))
+        connection.execute("VACUUM")

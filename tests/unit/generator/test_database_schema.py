@@ -1,8 +1,10 @@
 """The schema itself: the thesis's tables, and what the database refuses without our help."""
 
 import math
+import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 
 import pytest
 from sqlalchemy import insert, inspect, select, text
@@ -136,3 +138,15 @@ def test_reading_imports_nothing_heavy():
     )
     out = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == "[]"
+
+
+def test_the_same_schema_has_the_same_order_on_every_run(tmp_path):
+    open_database(str(tmp_path / "lab.db"))
+    with closing(sqlite3.connect(tmp_path / "lab.db")) as connection:
+        made = connection.execute(
+            "SELECT tbl_name, name FROM sqlite_master WHERE type = 'index' AND sql IS NOT NULL"
+        ).fetchall()
+    of_edges = [name for table, name in made if table == "edges"]
+    assert len(of_edges) == 4
+    assert of_edges == sorted(of_edges)
+    assert len(made) == sum(len(table.indexes) for table in tables.metadata.tables.values())

@@ -6,6 +6,8 @@ import csv
 import json
 import math
 import re
+import sqlite3
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +20,7 @@ from probe.contact.press import press
 from probe.kit import model
 from probe.kit.board import connections, has_board, shore_a, wiring_svg
 from probe.kit.command import run
+from probe.kit.coupon import UNDATED, make_coupon
 from probe.kit.mesh import mesh_of, step_text
 from probe.kit.settings import KIT
 from probe.kit.sizes import frustum_mm3, kit_sizes
@@ -150,6 +153,19 @@ def test_a_kit_is_made_verified_and_its_coupon_read(tmp_path, capsys):
     answer = Reader(open_lab(database), sensor).read(1000 * forces)
     assert (answer.object, answer.face) == ("Coupon", face)
     assert math.hypot(answer.x_mm - x, answer.y_mm - y) < 0.2
+
+
+def test_a_coupon_is_the_same_on_every_run(tmp_path):
+    sizes, told = kit_sizes(SMALL, 7.0), []
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        database = tmp_path / name / "coupon.db"
+        make_coupon(sizes, 7.0, "fdm-0.4", database)
+        told.append(database.read_bytes())
+    assert told[0] == told[1]
+    with closing(sqlite3.connect(tmp_path / "one" / "coupon.db")) as connection:
+        ((utc,),) = connection.execute("SELECT utc FROM provenance").fetchall()
+    assert utc == UNDATED
 
 
 def test_an_unknown_type_is_refused(tmp_path, capsys):
