@@ -2,12 +2,16 @@
 
     python tests/campaigns/promised.py -o out/promised --save    # touches, table, check: an hour
     python tests/campaigns/promised.py -o out/promised --rounds 0  # of the touches that are there
+    python tests/campaigns/promised.py -o out/gel --sensor-type gel-24x32 --rounds 9
 
 Two sets of solids by default: a table that is made from the first is checked on 60 faces of all
 sizes of the second. With `--save` a table of both is kept (`generator/layout/answers.json`). In
 each round every face is touched once, anywhere, and in every third round again where the answer's
 `next` says, up to three times; so any number of rounds is a fair sample. A touch is looked at as
 `generator.layout.views` sees it. What is there is kept, and an interrupted run goes on.
+
+Of another sensor type than `fsr-16` the second set alone is touched, at the pitch that the type
+proposes, and held against the table that ships, as `encode-object --sensor-type` does.
 
 A step over a re-entrant edge may end on another face, which is told and counted as not answered.
 """
@@ -19,7 +23,7 @@ import itertools
 import json
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,13 +34,14 @@ import numpy as np  # noqa: E402
 from numpy.typing import ArrayLike, NDArray  # noqa: E402
 
 from encoded_objects import encode  # noqa: E402
-from generator.array.touches import SENSOR_MM  # noqa: E402
+from encoded_objects.sensor_type import USUAL_SENSOR, SensorSize, sensor_size  # noqa: E402
 from generator.database.open import open_if_there  # noqa: E402
 from generator.database.read import read_object  # noqa: E402
 from generator.database.transaction import read_transaction  # noqa: E402
 from generator.layout.placement import FaceLayout  # noqa: E402
 from generator.layout.promise import AnswerTable, measured_answers  # noqa: E402
 from generator.layout.views import SensorView, views_at  # noqa: E402
+from probe.sensor_types.read import sensor_type_named  # noqa: E402
 from recognizer.touch.lab import open_lab  # noqa: E402
 from recognizer.touch.reader import Reader  # noqa: E402
 from recognizer.validation.policy import NEXT, touch_until_answered  # noqa: E402
@@ -52,6 +57,7 @@ LOADED = (0.25, 0.4, 0.5, 0.6, 0.7, 0.85, 1.0)  #: and columns
 WEIGHT = 8.0  #: touches that the smooth law counts for at every entry
 CLASSES_MM = (0.0, 16.0, 22.0, 30.0, 45.0, 1e3)  #: narrower side of a face
 LAB_KEY = "0123-4567-89AB-CDER"
+RESIN_MM = 4.0  #: pitch below which strokes are too fine for a filament printer
 EVERY = 3  #: rounds, of which one goes on until a touch is answered
 
 Solid = dict[str, Any]
@@ -143,11 +149,17 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--rounds", type=int, default=100, help="touches of each face")
     parser.add_argument("--seed", type=int, default=25)
+    parser.add_argument("--sensor-type", default=USUAL_SENSOR.name, metavar="T")
     parser.add_argument("--save", action="store_true", help="the table, as the one that ships")
     asked = parser.parse_args()
     kept = asked.output / "touches.jsonl"
-    touch_faces(asked.output, kept, asked.rounds, asked.seed)
+    sensor = sensor_size(asked.sensor_type)
+    touch_faces(asked.output, kept, asked.rounds, asked.seed, sensor)
     touches = [_touched(json.loads(line)) for line in kept.read_text().splitlines()]
+    if sensor.name != USUAL_SENSOR.name:
+        print(f"{sensor.name}, {sensor.pitch_mm:g} mm, against the table of {USUAL_SENSOR.name}")
+        compare(touches, measured_answers(), sensor.pitch_mm / USUAL_SENSOR.pitch_mm)
+        return
     table = measured_table([one for one in touches if one.group == "learn"])
     for label, one in (("that ships", measured_answers()), ("of the first set", table)):
         print(f"\nthe second set against the table {label}")
@@ -162,7 +174,7 @@ def _touched(values: dict[str, Any]) -> Touched:
     return Touched(**(values | lists))
 
 
-def touch_faces(folder: Path, kept: Path, rounds: int, seed: int) -> None:
+def touch_faces(folder: Path, kept: Path, rounds: int, seed: int, sensor: SensorSize) -> None:
     """Touch every face once a round, the rounds that are not there yet."""
     folder.mkdir(parents=True, exist_ok=True)
     kept.touch()
@@ -170,17 +182,21 @@ def touch_faces(folder: Path, kept: Path, rounds: int, seed: int) -> None:
     if not rounds:
         return
     readers, faces = {}, []
-    for group, solids in SETS.items():
+    usual = sensor.name == USUAL_SENSOR.name
+    reading = sensor_type_named(sensor.name)
+    for group, solids in SETS.items() if usual else [("check", SETS["check"])]:
         lab = folder / f"{group}.db"
         if not lab.exists():
             unfinished = lab.with_suffix(".part")
             unfinished.unlink(missing_ok=True)
             for k, solid in enumerate(solids):  # one by one: each has the pitch that suits it
                 spec = {"name": f"{group} {k + 1}", "output": {"lab_key": LAB_KEY}} | solid
+                spec |= {} if usual else {"sensor_type": sensor.name}
+                spec |= {"print": {"printer": "resin"}} if sensor.pitch_mm < RESIN_MM else {}
                 encode(spec, database=str(unfinished), formats=())
             unfinished.rename(lab)
-        readers[group] = Reader(open_lab(lab))
-        faces += list(faces_of(lab, group))
+        readers[group] = Reader(open_lab(lab), reading)
+        faces += list(faces_of(lab, group, sensor))
     with kept.open("a", encoding="utf-8") as file:
         for number in range(done, rounds * len(faces)):
             face, most = faces[number % len(faces)], 3 if number // len(faces) % EVERY == 0 else 1
@@ -190,7 +206,7 @@ def touch_faces(folder: Path, kept: Path, rounds: int, seed: int) -> None:
             file.flush()
 
 
-def faces_of(lab: Path, group: str) -> Iterator[Face]:
+def faces_of(lab: Path, group: str, sensor: SensorSize) -> Iterator[Face]:
     """Yield the faces of a set that bear symbols, one of those that are equal."""
     engine = open_if_there(f"sqlite:///{lab}", writable=False)
     assert engine is not None
@@ -200,7 +216,7 @@ def faces_of(lab: Path, group: str) -> Iterator[Face]:
             held = read_object(connection, f"{group} {k + 1}")
             pitch = held.style.pitch_mm
             reach = held.alphabet["reach"] * pitch + held.style.stroke_mm / 2
-            view = SensorView((SENSOR_MM / 2, SENSOR_MM / 2), reach)
+            view = SensorView(sensor.half_mm, reach)
             layouts = {one.face: one for one in held.layout.faces}
             for face in held.faces:
                 layout = layouts[face.face_id]
@@ -230,8 +246,12 @@ def touch_face(face: Face, lab: str, number: int, most: int, reader: Reader, see
     )  # fmt: skip
 
 
-def compare(touches: list[Touched], table: AnswerTable) -> None:
-    """Print promise and reading by size and face, and how far they lie apart."""
+def compare(touches: list[Touched], table: AnswerTable, coarser: float = 1.0) -> None:
+    """Print promise and reading by size and face, and how far they lie apart.
+
+    The sensor is so many times coarser than that of the table.
+    """
+    touches = [replace(one, pitch_mm=one.pitch_mm / coarser) for one in touches]
     for title, within in (("at once", False), ("within three", True)):
         some = [one for one in touches if one.most > 1] if within else touches
         names = sorted({one.face for one in some})
