@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,9 @@ class CompiledKernels(BuildHookInterface):  # type: ignore[misc, type-arg]
         made = source.with_suffix(".so")
         draft = made.with_suffix(".so.draft")
         compiler = [sys.executable, "-m", "ziglang", "cc"]
-        subprocess.run([*compiler, *OPTIONS, str(source), "-lm", "-o", str(draft)], check=True)  # noqa: S603
+        made_of = f"-DSOURCE_SUM={zlib.crc32(source.read_bytes())}u"
+        arguments = [*OPTIONS, made_of, str(source), "-lm", "-o", str(draft)]
+        subprocess.run([*compiler, *arguments], check=True)  # noqa: S603
         draft.replace(made)
         build_data["artifacts"].append(str(Path(SOURCE).with_suffix(".so")))
         build_data["pure_python"] = False

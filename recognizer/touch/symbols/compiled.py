@@ -1,15 +1,16 @@
 """The inner loop of the refinement, compiled: `evaluate.c`, built when the project is installed.
 
 The numpy form in `refine` is the reference: the same values to 1e-6 of them, the same answers. It
-is also what reads where the compiled form is missing (a checkout that nobody installed) or
-unwanted (`ENCODED_OBJECTS_KERNELS=numpy`); `recognize-object --version` and a run's provenance
-say which of the two it was.
+is also what reads where the compiled form is missing (a checkout that nobody installed), older
+than its source (install again) or unwanted (`ENCODED_OBJECTS_KERNELS=numpy`); `recognize-object
+--version` and a run's provenance say which of the two it was.
 """
 
 from __future__ import annotations
 
 import ctypes
 import os
+import zlib
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
@@ -25,6 +26,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 FILE = Path(__file__).with_name("evaluate.so")
+SOURCE = FILE.with_suffix(".c")  #: the file is of no use that was made of another text
 CHOICE = "ENCODED_OBJECTS_KERNELS"  #: variable; "numpy" leaves the compiled form out
 
 _WHOLE = ("b", "n", "q", "size", "hardens", "falls")
@@ -55,14 +57,19 @@ def compiled_kernels() -> ctypes.CDLL | None:
 
 @lru_cache(maxsize=2)
 def load_kernels(file: Path) -> ctypes.CDLL | None:
-    """Return a library of evaluate.c; None where there is no such file."""
+    """Return a library of evaluate.c; None where there is none, or one of another text."""
     if not file.is_file():
         return None
     library = ctypes.CDLL(str(file))
+    if not hasattr(library, "source_sum"):
+        return None
+    library.source_sum.restype = ctypes.c_uint32
+    if library.source_sum() != zlib.crc32(SOURCE.read_bytes()):
+        return None
     library.work_size.restype = ctypes.c_int64
     for function, arguments in ((library.work_size, 1), (library.cells_under, 5)):
         function.argtypes = [ctypes.c_void_p] * arguments
-    library.evaluate.argtypes = [ctypes.c_void_p] * 16
+    library.evaluate.argtypes = [ctypes.c_void_p] * 17
     library.cells_under.restype = library.evaluate.restype = None
     return library
 
@@ -111,8 +118,9 @@ def evaluate_compiled(
     normal = np.empty((count, len(precision), len(precision)))
     library.evaluate(
         at, points, address(image.forces), address(image.trust), address(image.plane),
-        address(image.falls), address(template.rimmed, np.float32), poses, address(gain), labels,
-        address(known), address(precision), work.ctypes.data, value.ctypes.data,
+        address(image.loaded, np.uint8), address(image.falls),
+        address(template.rimmed, np.float32), poses, address(gain), labels, address(known),
+        address(precision), work.ctypes.data, value.ctypes.data,
         normal.ctypes.data, right.ctypes.data,
     )  # fmt: skip
     return value, normal, right

@@ -9,6 +9,9 @@
 #include <stdint.h>
 #include <string.h>
 
+/* Which text this was made of; `compiled.load_kernels` leaves out what is older. */
+uint32_t source_sum(void) { return SOURCE_SUM; }
+
 enum { UNKNOWNS = 11, FIELDS = 6 };
 
 typedef struct {
@@ -46,29 +49,38 @@ static double psi(double y) { return y > 0.0 ? log1p(3.0 * y) / LOG4 : 0.0; }
 #define FELT(k) (felt + ((k) * s->b + i) * s->n)
 
 static void normalize(const Scene *s, const double *forces, const double *trust,
-                      const double *plane, const double *falls, const double *gain, double *felt,
-                      double *measure, int *any_bare, int *is_loud) {
+                      const double *plane, const uint8_t *loaded, const double *falls,
+                      const double *gain, double *felt, double *measure, int *any_bare,
+                      int *is_loud) {
+    double strongest = -INFINITY, mean[3] = {0}, count = 0.0;
+    for (int64_t t = 0; t < s->n; t++) {
+        strongest = larger(strongest, forces[t]);
+        if (!loaded[t]) continue;
+        count += 1.0;
+        for (int k = 0; k < 3; k++) mean[k] += plane[3 * t + k];
+    }
     *any_bare = *is_loud = 0;
     for (int64_t i = 0; i < s->b; i++) {
         const double *g = gain + 4 * i;
         double *p = FELT(0), *press = FELT(1), *bare = FELT(2), *contact = FELT(3);
         double *depth = FELT(4), *plain = FELT(5), *lower = FELT(6), *plateau = FELT(7);
         double most = 0.0, sum = 0.0, scale = exp(g[0]);
+        double usual = (g[1] * mean[0] + g[2] * mean[1] + g[3] * mean[2]) / count;
+        double full = s->full_press * larger(usual, 1e-9);
         for (int64_t t = 0; t < s->n; t++) {
             double d = g[1] * plane[3 * t] + g[2] * plane[3 * t + 1] + g[3] * plane[3 * t + 2];
             if (s->falls) d -= falls[(s->falls > 1 ? i : 0) * s->n + t];
             depth[t] = d;
             plain[t] = force_of(s, d);
             lower[t] = force_of(s, d - s->symbol);
-            most = larger(most, plain[t]);
+            if (loaded[t]) most = larger(most, plain[t]);
         }
         double least = s->least_gain * most;
         for (int64_t t = 0; t < s->n; t++) {
-            double share = larger(plain[t], least);
-            plateau[t] = scale * share;
+            plateau[t] = loaded[t] ? scale * larger(plain[t], least) : strongest;
             p[t] = psi(forces[t] / plateau[t]);
-            press[t] = smaller(larger(depth[t] / (s->full_press * g[1]), s->least_press), 1.0);
-            bare[t] = lower[t] / share;
+            press[t] = smaller(larger(depth[t] / full, s->least_press), 1.0);
+            bare[t] = loaded[t] ? lower[t] / (plateau[t] / scale) : 0.0;
             contact[t] = smaller(larger(plain[t] / least, 0.0), 1.0);
             sum += trust[t] * log(plateau[t] + 3.0 * forces[t]);
             if (bare[t] != 0.0) *any_bare = 1;
@@ -198,17 +210,17 @@ int64_t work_size(const Scene *s) {
 /* given: (b, n) labels that cells show, or NULL; known (b, 11), precision (11,) of unknowns.
    Out: value (b,), normal (b, 11, 11), right (b, 11). */
 void evaluate(const Scene *s, const double *points, const double *forces, const double *trust,
-              const double *plane, const double *falls, const float *rimmed, const double *pose,
-              const double *gain, const int64_t *given, const double *known,
-              const double *precision, double *work, double *value, double *normal,
-              double *right) {
+              const double *plane, const uint8_t *loaded, const double *falls,
+              const float *rimmed, const double *pose, const double *gain, const int64_t *given,
+              const double *known, const double *precision, double *work, double *value,
+              double *normal, double *right) {
     double *felt = work, *measure = felt + 8 * s->b * s->n, *offsets = measure + s->b;
     int64_t *cells = (int64_t *)(offsets + 2 * s->b * s->n);
     double *scores = (double *)(cells + 2 * s->b * s->n), *sums = scores + s->n * (s->q + 1);
     int64_t *first = (int64_t *)(sums + s->n * (s->q + 1)), *labels = first + s->n;
     float *tables = (float *)(labels + s->n);
     int any_bare, is_loud;
-    normalize(s, forces, trust, plane, falls, gain, felt, measure, &any_bare, &is_loud);
+    normalize(s, forces, trust, plane, loaded, falls, gain, felt, measure, &any_bare, &is_loud);
     cells_under(s, points, pose, cells, offsets);
     for (int64_t i = 0; i < s->b; i++) {
         const double *p = FELT(0), *press = FELT(1), *bare = FELT(2), *contact = FELT(3);
