@@ -1,4 +1,4 @@
-"""Build hook: `evaluate.c` -> `evaluate.so`, by the C compiler that the package `ziglang` brings.
+"""Build hook: `evaluate.c` and `places.c` -> `kernels.so`, by the compiler that `ziglang` brings.
 
 No compiler is needed on the machine. The code is for any processor of its kind, so that a wheel
 may be kept and moved; products and sums are not contracted, so that it rounds as numpy does.
@@ -14,7 +14,8 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-SOURCE = "recognizer/touch/symbols/evaluate.c"
+FOLDER = "recognizer/touch"
+SOURCES = ("symbols/evaluate.c", "places.c")  # as `recognizer.touch.symbols.compiled` has them
 OPTIONS = ["-O3", "-ffp-contract=off", "-fno-math-errno", "-shared", "-fPIC", "-mcpu=baseline"]
 
 
@@ -23,14 +24,15 @@ class CompiledKernels(BuildHookInterface):  # type: ignore[misc, type-arg]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002
         """Build the library and name it as a part of the wheel."""
-        source = Path(self.root) / SOURCE
-        made = source.with_suffix(".so")
-        draft = made.with_suffix(".so.draft")
+        folder = Path(self.root) / FOLDER
+        sources = [folder / name for name in SOURCES]
+        made, draft = folder / "kernels.so", folder / "kernels.so.draft"
         compiler = [sys.executable, "-m", "ziglang", "cc"]
-        made_of = f"-DSOURCE_SUM={zlib.crc32(source.read_bytes())}u"
-        arguments = [*OPTIONS, made_of, str(source), "-lm", "-o", str(draft)]
+        text = b"".join(source.read_bytes() for source in sources)
+        made_of = f"-DSOURCE_SUM={zlib.crc32(text)}u"
+        arguments = [*OPTIONS, made_of, *map(str, sources), "-lm", "-o", str(draft)]
         subprocess.run([*compiler, *arguments], check=True)  # noqa: S603
         draft.replace(made)
-        build_data["artifacts"].append(str(Path(SOURCE).with_suffix(".so")))
+        build_data["artifacts"].append(f"{FOLDER}/kernels.so")
         build_data["pure_python"] = False
         build_data["infer_tag"] = True

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.locate import Hypothesis, bounded_scores, labels_at
+from recognizer.touch.place_scores import count_places
 from recognizer.touch.settings import ReaderSettings
 from recognizer.touch.symbols.fit import Fit
 
@@ -110,14 +111,6 @@ def _border_of(fit: Fit, scores: Array, held: Ints) -> _Border:
 
 def _count_places(embossed: EmbossedArray, border: _Border, largest: int) -> int:
     """Return how many registered cells can be the held one; all, in a lab larger than `largest`."""
-    array, keys, owners = embossed.array, embossed.keys, embossed.owners[:-1]
-    if len(keys) > largest:
-        return len(keys)
-    row, column = (part.astype(np.int64) for part in np.divmod(keys, np.uint64(array.columns)))
-    left = np.full(len(keys), border.slack)
-    for (i, j), price in zip(border.cells.tolist(), border.price.tolist(), strict=True):
-        held_by, _ = embossed.at((row - j) % array.rows, (column + i) % array.columns)
-        left = left - price * (held_by == owners)
-        kept = left >= 0
-        row, column, owners, left = row[kept], column[kept], owners[kept], left[kept]
-    return len(row)
+    if len(embossed.keys) > largest:
+        return len(embossed.keys)
+    return count_places(embossed, border.cells, border.price, border.slack)

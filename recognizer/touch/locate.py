@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.touch.lab import EmbossedArray, cell_keys
+from recognizer.touch.place_scores import Places, add_scores
 from recognizer.touch.settings import HypothesisSettings
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.projection import Shown
@@ -108,11 +109,16 @@ def labels_at(embossed: EmbossedArray, hypothesis: Hypothesis, cells: Ints) -> I
 
 def shown_at(embossed: EmbossedArray, hypotheses: Sequence[Hypothesis]) -> Shown:
     """Return what the cells of lattices show if each lies at its place."""
+    array = embossed.array
+    rows, columns, faces = (
+        np.array([[getattr(one, name)] for one in hypotheses]) for name in ("row", "column", "face")
+    )
 
     def shown(cells: Ints) -> Ints:
-        each = zip(hypotheses, cells, strict=True)
-        labels = np.stack([labels_at(embossed, place, seen) for place, seen in each])
-        return np.where(labels == embossed.array.order, -1, labels)
+        held_by, label = embossed.at(
+            (rows - cells[..., 1]) % array.rows, (columns + cells[..., 0]) % array.columns
+        )
+        return np.where(held_by == faces, label, -1).astype(np.int64)
 
     return shown
 
@@ -166,7 +172,7 @@ def _rank_candidates(
     fit: Fit,
     number: int,
     scores: Array,
-    found: _Candidates,
+    found: Places,
     settings: HypothesisSettings,
 ) -> list[Hypothesis]:
     """Return the likeliest candidates, best first."""
@@ -185,7 +191,7 @@ def _rank_candidates(
 
 def _window_candidates(
     embossed: EmbossedArray, fit: Fit, settings: HypothesisSettings
-) -> _Candidates | None:
+) -> Places | None:
     """Return where (0, 0) can lie, from the surest whole windows; None if there is none."""
     order = embossed.array.order
     symbols = np.sort(fit.scores[:, :order], axis=1)
@@ -226,7 +232,7 @@ def _anchor_candidates(
     symbol: Array,
     anchors: int,
     settings: HypothesisSettings,
-) -> _Candidates:
+) -> Places:
     """Return where (0, 0) can lie if one of a few cells is a registered one.
 
     None in a lab that is too large for that.
@@ -251,49 +257,46 @@ def _anchor_candidates(
 
 def _origins(
     embossed: EmbossedArray, at: Ints, cells: Ints, settings: HypothesisSettings
-) -> _Candidates:
+) -> Places:
     """Return where (0, 0) lies, each place once, if cells (n, 2) are the registered ones `at`."""
     array = embossed.array
     rows, columns = np.divmod(embossed.keys[at], np.uint64(array.columns))
+    known = None
     row = (rows.astype(np.int64) + cells[:, 1]) % array.rows
     column = (columns.astype(np.int64) - cells[:, 0]) % array.columns
     owners = embossed.owners[at]
-    _, place = np.unique(cell_keys(array.columns, row, column), return_inverse=True)
-    both = place.reshape(-1).astype(np.int64) * (len(embossed.faces) + 1) + owners
-    _, once, votes = np.unique(both, return_index=True, return_counts=True)
-    if len(once) > settings.many and (votes > 1).any():
-        once = once[votes > 1]  # several windows say the same
-    return row[once], column[once], owners[once]
+    keys, faces = cell_keys(array.columns, row, column), len(embossed.faces) + 1
+    names = keys.astype(np.int64)
+    if array.rows * array.columns >= 2**63 // faces:  # one number cannot name place and face
+        known, names = np.unique(keys, return_inverse=True)
+    both, votes = np.unique(names * faces + owners, return_counts=True)
+    if len(both) > settings.many and (votes > 1).any():
+        both = both[votes > 1]  # several windows say the same
+    place, once = np.divmod(both, faces)
+    key = place.astype(np.uint64) if known is None else known[place]
+    row, column = np.divmod(key, np.uint64(array.columns))
+    return row.astype(np.int64), column.astype(np.int64), once.astype(np.int32)
 
 
 def _log_likelihoods(
     embossed: EmbossedArray,
     fit: Fit,
     scores: Array,
-    found: _Candidates,
+    found: Places,
     settings: HypothesisSettings,
 ) -> Array:
     """Return the log-likelihood of each candidate, 0 if every cell is at its best.
 
     The surest cells come first; of many candidates only the best are followed to the end.
     """
-    array, (rows, columns, owners) = embossed.array, found
     spread = scores.max(axis=1) - scores.min(axis=1)
     order = np.argsort(-spread * np.minimum(fit.seen, settings.heavy), kind="stable")
-    total = np.zeros(len(rows))
-    kept = np.arange(len(rows))
-    for done, n in enumerate(order.tolist()):
-        if done == settings.first and len(kept) > settings.followed:
-            kept = np.argpartition(-total, settings.followed)[: settings.followed]
-            low = np.full(len(rows), -np.inf)
-            low[kept] = total[kept]
-            total = low
-        i, j = fit.cells[n].tolist()
-        held_by, label = embossed.at(
-            (rows[kept] - j) % array.rows, (columns[kept] + i) % array.columns
-        )
-        total[kept] += scores[n][np.where(held_by == owners[kept], label, array.order)]
-    return total
-
-
-_Candidates = tuple[Ints, Ints, NDArray[np.int32]]
+    first, rest = order[: settings.first], order[settings.first :]
+    total = add_scores(embossed, found, fit.cells[first], scores[first], np.zeros(len(found[0])))
+    if len(rest) == 0 or len(total) <= settings.followed:
+        return add_scores(embossed, found, fit.cells[rest], scores[rest], total)
+    kept = np.argpartition(-total, settings.followed)[: settings.followed]
+    followed = found[0][kept], found[1][kept], found[2][kept]
+    low = np.full(len(total), -np.inf)
+    low[kept] = add_scores(embossed, followed, fit.cells[rest], scores[rest], total[kept])
+    return low

@@ -1,17 +1,19 @@
-"""The inner loop of the refinement, compiled: `evaluate.c`, built when the project is installed.
+"""The inner loops of reading, compiled: `evaluate.c`, `places.c`, built with the project.
 
-The numpy form in `refine` is the reference: the same values to 1e-6 of them, the same answers. It
-is also what reads where the compiled form is missing (a checkout that nobody installed), older
-than its source (install again) or unwanted (`ENCODED_OBJECTS_KERNELS=numpy`); `recognize-object
---version` and a run's provenance say which of the two it was.
+The numpy forms in `refine`, `fit` and `place_scores` are the reference: values to 1e-6 of them, the
+same answers. They are also what reads where the compiled form is missing (a checkout that nobody
+installed), older than its source (install again) or unwanted (`ENCODED_OBJECTS_KERNELS=numpy`);
+`recognize-object --version` and a run's provenance say which of the two it was.
 """
 
 from __future__ import annotations
 
 import ctypes
+import math
 import os
 import zlib
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -19,21 +21,33 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from recognizer.touch.settings import DEFAULTS
 from recognizer.touch.symbols.gain import Image
 from recognizer.touch.symbols.template import ResponseTemplate
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-FILE = Path(__file__).with_name("evaluate.so")
-SOURCE = FILE.with_suffix(".c")  #: the file is of no use that was made of another text
+FOLDER = Path(__file__).parent.parent
+FILE = FOLDER / "kernels.so"
+SOURCES = (FOLDER / "symbols" / "evaluate.c", FOLDER / "places.c")  #: as in hatch_build.py
 CHOICE = "ENCODED_OBJECTS_KERNELS"  #: variable; "numpy" leaves the compiled form out
+UNKNOWNS = len(DEFAULTS.refine.least)  #: pose (7,) and gain (4,)
 
-_WHOLE = ("b", "n", "q", "size", "hardens", "falls")
+_WHOLE = ("b", "n", "q", "size", "hardens", "falls", "high", "wide")
 _REAL = (
     "symbol", "deepest", "pitch", "half", "step", "noise", "least_gain", "full_press",
-    "least_press", "quiet", "displaced", "loud", "most", "first", "far",
+    "least_press", "steepest", "quiet", "displaced", "loud", "most", "first", "far", "damping",
+    "easier", "harder", "settled", "shallower", "deepest_gain",
 )  # fmt: skip
+_ROWS = {
+    "least": UNKNOWNS, "largest": UNKNOWNS, "limits": len(DEFAULTS.refine.limits),
+    "precision": UNKNOWNS,
+}  # fmt: skip
+_ARRAYS = {
+    "points": np.float64, "forces": np.float64, "trust": np.float64, "plane": np.float64,
+    "loaded": np.bool_, "drop": np.float64, "rimmed": np.float32,
+}  # fmt: skip
 
 
 class _Scene(ctypes.Structure):
@@ -42,6 +56,9 @@ class _Scene(ctypes.Structure):
     _fields_ = [
         *((name, ctypes.c_int64) for name in _WHOLE),
         *((name, ctypes.c_double) for name in _REAL),
+        *((name, ctypes.c_double * size) for name, size in _ROWS.items()),
+        ("usual_scale", ctypes.c_double),
+        *((name, ctypes.c_void_p) for name in _ARRAYS),
     ]
 
 
@@ -57,83 +74,166 @@ def compiled_kernels() -> ctypes.CDLL | None:
 
 @lru_cache(maxsize=2)
 def load_kernels(file: Path) -> ctypes.CDLL | None:
-    """Return a library of evaluate.c; None where there is none, or one of another text."""
+    """Return the library of the kernels; None where there is none, or one of another text."""
     if not file.is_file():
         return None
     library = ctypes.CDLL(str(file))
     if not hasattr(library, "source_sum"):
         return None
     library.source_sum.restype = ctypes.c_uint32
-    if library.source_sum() != zlib.crc32(SOURCE.read_bytes()):
+    if library.source_sum() != zlib.crc32(b"".join(one.read_bytes() for one in SOURCES)):
         return None
-    library.work_size.restype = ctypes.c_int64
-    for function, arguments in ((library.work_size, 1), (library.cells_under, 5)):
-        function.argtypes = [ctypes.c_void_p] * arguments
-    library.evaluate.argtypes = [ctypes.c_void_p] * 17
-    library.cells_under.restype = library.evaluate.restype = None
+    pointer, whole = ctypes.c_void_p, ctypes.c_int64
+    library.refine.argtypes = [pointer, whole, *[pointer] * 7]
+    library.refine.restype = None
+    library.score_cells.argtypes = [pointer, whole, ctypes.c_double, *[pointer] * 8]
+    library.score_cells.restype = ctypes.c_double
+    library.add_scores.argtypes = [
+        pointer, whole, pointer, pointer, pointer, whole, pointer, pointer, pointer
+    ]  # fmt: skip
+    library.add_scores.restype = None
+    library.count_places.argtypes = [pointer, whole, pointer, pointer, ctypes.c_double]
+    library.count_places.restype = whole
     return library
 
 
-def evaluate_compiled(
+def refine_compiled(
     library: ctypes.CDLL,
     image: Image,
     template: ResponseTemplate,
     pose: Array,
     gain: Array,
-    known: Array,
     precision: Array,
+    steps: int,
     shown: Callable[[Ints], Ints] | None,
-) -> tuple[Array, Array, Array]:
-    """Return value (b,), normal (b, 11, 11) and right (b, 11) of `refine.Lattices`.
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Return pose, gain, value, normal and right of `refine.Lattices` after damped steps.
 
     Parameters
     ----------
     pose, gain
-        (b, 7) and (b, 4) of b candidates.
-    known, precision
-        (b, 11) how far each unknown lies from what is known of it beforehand, and (11,) how well.
+        (b, 7) and (b, 4) of b candidates, to begin with.
+    precision
+        (11,) how well each unknown is known beforehand.
+    steps
+        How many, at most.
     shown
         (b, n, 2) cells -> (b, n) labels; None: each cell shows what fits best.
     """
-    count, tactels = len(pose), len(image.forces)
-    held: list[NDArray[Any]] = []
-
-    def address(values: NDArray[Any] | None, kind: Any = np.float64) -> int | None:
-        if values is None:
-            return None
-        held.append(np.ascontiguousarray(values, kind))  # until the call is over
-        return held[-1].ctypes.data
-
-    scene = _scene(image, template, count)
-    at = ctypes.addressof(scene)
-    points, poses = address(image.points_mm), address(pose)
-    labels = None
+    count = len(pose)
+    pose, gain = np.array(pose, np.float64, order="C"), np.array(gain, np.float64, order="C")
+    labels = corner = None
+    high = wide = 0
     if shown is not None:
-        cells = np.empty((count, tactels, 2), np.int64)
-        offsets = np.empty((count, tactels, 2))
-        library.cells_under(at, points, poses, cells.ctypes.data, offsets.ctypes.data)
-        labels = address(shown(cells), np.int64)
-    work = np.empty(library.work_size(at))
-    value, right = np.empty(count), np.empty((count, len(precision)))
-    normal = np.empty((count, len(precision), len(precision)))
-    library.evaluate(
-        at, points, address(image.forces), address(image.trust), address(image.plane),
-        address(image.loaded, np.uint8), address(image.falls),
-        address(template.rimmed, np.float32), poses, address(gain), labels, address(known),
-        address(precision), work.ctypes.data, value.ctypes.data,
-        normal.ctypes.data, right.ctypes.data,
+        labels, corner = _label_tables(image, template, pose, steps, shown)
+        high, wide = labels.shape[1:]
+    scene = _scene_of(image, template, count, precision, high, wide)
+    value, right = np.empty(count), np.empty((count, UNKNOWNS))
+    normal = np.empty((count, UNKNOWNS, UNKNOWNS))
+    library.refine(
+        ctypes.addressof(scene.value), steps, _address(labels), _address(corner),
+        *(one.ctypes.data for one in (pose, gain, value, normal, right)),
     )  # fmt: skip
-    return value, normal, right
+    return pose, gain, value, normal, right
 
 
-def _scene(image: Image, template: ResponseTemplate, count: int) -> _Scene:
+@dataclass(frozen=True, slots=True, eq=False)
+class CellSums:
+    """What `fit.score_cells` makes fits of."""
+
+    noise: float
+    count: Ints  #: (b,) of cells in view
+    cells: Ints  #: (b, n, 2) their names, in the first `count` rows; rising
+    scores: Array  #: (b, n, q + 1) log-likelihoods
+    seen: Array  #: (b, n) tactels that look at them, by how hard they press
+    level: Array  #: (b,) log-likelihood that no label changes
+    left: Array  #: (b, n) residuals of the likeliest labels, on a covered tactel's scale
+
+
+def sum_cells_compiled(
+    library: ctypes.CDLL,
+    image: Image,
+    template: ResponseTemplate,
+    pose: Array,
+    gain: Array,
+    best: int,
+) -> CellSums:
+    """Return the scores of all cells in view of lattices (b, 7) and (b, 4).
+
+    Parameters
+    ----------
+    best
+        The likeliest lattice: what it leaves of the image is the noise.
+    """
+    count, tactels, order = len(pose), len(image.forces), template.order
+    scene = _scene_of(image, template, count, np.zeros(UNKNOWNS), 0, 0)
+    pose, gain = np.ascontiguousarray(pose), np.ascontiguousarray(gain)
+    numbers, names = np.empty(count, np.int64), np.empty((count, tactels, 2), np.int64)
+    scores, seen = np.empty((count, tactels, order + 1)), np.empty((count, tactels))
+    level, left = np.empty(count), np.empty((count, tactels))
+    noise = library.score_cells(
+        ctypes.addressof(scene.value), best, image.settings.noise.least,
+        *(one.ctypes.data for one in (pose, gain, numbers, names, scores, seen, level, left)),
+    )  # fmt: skip
+    return CellSums(noise, numbers, names, scores, seen, level, left)
+
+
+def _label_tables(
+    image: Image,
+    template: ResponseTemplate,
+    pose: Array,
+    steps: int,
+    shown: Callable[[Ints], Ints],
+) -> tuple[NDArray[np.int8], Ints]:
+    """Return labels (b, high, wide) of all cells that steps can reach, and the first (b, 2)."""
+    refine, pitch = image.settings.refine, template.pitch_mm
+    scale = 1 + max(refine.limits[3], float(np.abs(pose[:, 6]).max()))
+    reach = scale * float(np.sqrt((image.points_mm**2).sum(axis=1).max()))
+    reach += steps * max(refine.step[:2])
+    corner = np.floor((pose[:, :2] - reach) / pitch).astype(np.int64)
+    side = np.arange(math.ceil(2 * reach / pitch) + 2)
+    box = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
+    labels = shown(corner[:, None] + box)
+    return labels.astype(np.int8).reshape(len(pose), len(side), len(side)), corner
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _HeldScene:
+    value: _Scene
+    held: tuple[NDArray[Any], ...]  # what it points to
+
+
+def _scene_of(
+    image: Image, template: ResponseTemplate, count: int, precision: Array, high: int, wide: int
+) -> _HeldScene:
     gain, noise, pressing = image.settings.gain, image.settings.noise, image.pressing
-    return _Scene(
-        b=count, n=len(image.forces), q=template.order, size=template.size,
+    refine = image.settings.refine
+    given: dict[str, NDArray[Any] | None] = {
+        "points": image.points_mm, "forces": image.forces, "trust": image.trust,
+        "plane": image.plane, "loaded": image.loaded, "drop": image.falls,
+        "rimmed": template.rimmed,
+    }  # fmt: skip
+    held: dict[str, NDArray[Any]] = {
+        name: np.ascontiguousarray(given[name], kind)
+        for name, kind in _ARRAYS.items()
+        if given[name] is not None
+    }
+    scene = _Scene(
+        b=count, n=len(image.forces), q=template.order, size=template.size, high=high, wide=wide,
         hardens=int(pressing.hardens), falls=0 if image.falls is None else len(image.falls),
         symbol=pressing.symbol, deepest=pressing.deepest, pitch=template.pitch_mm,
         half=template.half_mm, step=template.step_mm, noise=image.noise,
         least_gain=gain.least_gain, full_press=gain.full_press, least_press=gain.least_press,
-        quiet=noise.quiet, displaced=noise.displaced_mm, loud=noise.loud, most=noise.most,
-        first=noise.first, far=noise.far,
+        steepest=gain.steepest, quiet=noise.quiet, displaced=noise.displaced_mm, loud=noise.loud,
+        most=noise.most, first=noise.first, far=noise.far, damping=refine.damping,
+        easier=refine.easier, harder=refine.harder, settled=refine.settled,
+        shallower=refine.shallower, deepest_gain=refine.deepest, least=refine.least,
+        largest=refine.step, limits=refine.limits, precision=tuple(precision.tolist()),
+        usual_scale=math.log(pressing.scale) if image.newtons else 0.0,
+        **{name: one.ctypes.data for name, one in held.items()},
     )  # fmt: skip
+    return _HeldScene(scene, tuple(held.values()))
+
+
+def _address(values: NDArray[Any] | None) -> int | None:
+    return None if values is None else values.ctypes.data

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.touch.settings import FitSettings
+from recognizer.touch.symbols.compiled import CellSums, compiled_kernels, sum_cells_compiled
 from recognizer.touch.symbols.covariance import covariances
 from recognizer.touch.symbols.gain import Image, first_gain, normalize_image, tilted_gain
 from recognizer.touch.symbols.noise import log_likelihoods, psi_deviation
@@ -163,21 +164,12 @@ def score_cells(
 
     Scores are made with the noise that the likeliest lattice leaves.
     """
-    settings = image.settings.noise
-    under = project_template(image, template, lattices.pose, lattices.gain)
-    felt, cells = under.felt, under.cells
-    away = _residuals(under)
-    best = np.minimum(np.abs(away[int(np.argmax(lattices.value))]), settings.far * settings.first)
-    left = math.sqrt(float((felt.trust * best**2).sum() / felt.trust.sum()))
-    noise = max(settings.least, left)
-    each = log_likelihoods(felt, under.tables, np.full(len(cells), noise))
-    level = felt.measure + (felt.trust * np.log(felt.press)).sum(axis=1)
-    covariance = covariances(image, lattices, away * felt.trust, noise)
+    sums = _sum_cells(image, template, lattices)
+    covariance = covariances(image, lattices, sums.left * image.trust, sums.noise)
+    unit = float(image.trust.sum()) * math.log(sums.noise)
     found = []
-    for b in range(len(cells)):
-        names, dense = np.unique(cells[b], axis=0, return_inverse=True)
-        dense = dense.reshape(-1)
-        scores = np.stack([np.bincount(dense, column, len(names)) for column in each[b].T], axis=1)
+    for b, count in enumerate(sums.count.tolist()):
+        scores = sums.scores[b, :count]
         most = scores.max(axis=1)
         found.append(
             Fit(
@@ -186,15 +178,41 @@ def score_cells(
                 theta_rad=math.remainder(float(lattices.pose[b, 2]), 2 * math.pi),
                 nuisance=lattices.pose[b, 3:],
                 gain=lattices.gain[b],
-                cells=names,
+                cells=sums.cells[b, :count],
                 scores=scores - most[:, None],
-                seen=np.bincount(dense, felt.press[b] * felt.trust, len(names)).astype(np.float64),
-                noise=noise,
-                value=float(most.sum() + level[b] - felt.trust.sum() * math.log(noise)),
+                seen=sums.seen[b, :count],
+                noise=sums.noise,
+                value=float(most.sum() + sums.level[b] - unit),
                 covariance=covariance[b],
             )
         )
     return tuple(found)
+
+
+def _sum_cells(image: Image, template: ResponseTemplate, lattices: Lattices) -> CellSums:
+    """Return what the cells in view of lattices score, and what that is judged by."""
+    settings, best = image.settings.noise, int(np.argmax(lattices.value))
+    library = compiled_kernels()
+    if library is not None:
+        return sum_cells_compiled(library, image, template, lattices.pose, lattices.gain, best)
+    under = project_template(image, template, lattices.pose, lattices.gain)
+    felt, cells = under.felt, under.cells
+    away = _residuals(under)
+    bounded = np.minimum(np.abs(away[best]), settings.far * settings.first)
+    left = math.sqrt(float((felt.trust * bounded**2).sum() / felt.trust.sum()))
+    noise = max(settings.least, left)
+    each = log_likelihoods(felt, under.tables, np.full(len(cells), noise))
+    level = felt.measure + (felt.trust * np.log(felt.press)).sum(axis=1)
+    count = np.zeros(len(cells), np.int64)
+    names, scores, seen = np.zeros_like(cells), np.zeros_like(each), np.zeros_like(away)
+    for b in range(len(cells)):
+        known, dense = np.unique(cells[b], axis=0, return_inverse=True)
+        dense, count[b] = dense.reshape(-1), len(known)
+        names[b, : count[b]] = known
+        for k, column in enumerate(each[b].T):
+            scores[b, : count[b], k] = np.bincount(dense, column, len(known))
+        seen[b, : count[b]] = np.bincount(dense, felt.press[b] * felt.trust, len(known))
+    return CellSums(noise, count, names, scores, seen, level, away)
 
 
 def _residuals(under: Projection) -> Array:

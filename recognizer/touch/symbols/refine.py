@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.touch.symbols.compiled import compiled_kernels, evaluate_compiled
+from recognizer.touch.symbols.compiled import compiled_kernels, refine_compiled
 from recognizer.touch.symbols.damped import ascend, damped_step
 from recognizer.touch.symbols.gain import Image, bounded_gain
 from recognizer.touch.symbols.noise import NormalizedImage, log_likelihoods, psi_deviation
@@ -66,6 +66,13 @@ def refine_lattices(
     shown
         What the cells show, where that is known; otherwise each cell shows what fits best.
     """
+    whole = np.pad(pose, ((0, 0), (0, POSE - pose.shape[1])))
+    library = compiled_kernels()
+    if library is not None:
+        precision = prior_precision(image)
+        return Lattices(
+            *refine_compiled(library, image, template, whole, gain, precision, steps, shown)
+        )
     settings = image.settings.refine
     least, most = np.array(settings.least), np.array(settings.step)
     limits = np.array(settings.limits)
@@ -78,7 +85,6 @@ def refine_lattices(
         gain = bounded_gain(gain, image.settings.gain.steepest)
         return _evaluate_lattices(image, template, pose, gain, shown)
 
-    whole = np.pad(pose, ((0, 0), (0, POSE - pose.shape[1])))
     start = _evaluate_lattices(image, template, whole, gain, shown)
     return ascend(start, moved, steps, settings, settings.settled)
 
@@ -99,11 +105,6 @@ def _evaluate_lattices(
     image: Image, template: ResponseTemplate, pose: Array, gain: Array, shown: Shown | None
 ) -> Lattices:
     """Return how well lattices explain the image, and what a small change would do."""
-    library = compiled_kernels()
-    if library is not None:
-        known, precision = prior_departure(image, pose, gain), prior_precision(image)
-        found = evaluate_compiled(library, image, template, pose, gain, known, precision, shown)
-        return Lattices(pose, gain, *found)
     at = linearize_image(image, template, pose, gain, shown)
     weighted = (at.jacobian * at.sure[..., None]).swapaxes(1, 2)
     normal = weighted @ at.jacobian + np.diag(at.precision)

@@ -1,19 +1,27 @@
-"""The compiled inner loop of the refinement gives what its numpy form gives."""
+"""The compiled inner loops of reading give what their numpy forms give."""
 
+import re
 import shutil
 import subprocess
 import zlib
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hypothesis import given as drawn
+from hypothesis import strategies as st
 
 from generator.alphabet import SymbolStyle, alphabet_named
 from probe.sensor import SensorType
+from recognizer.touch.lab import EmbossedArray, cell_keys
+from recognizer.touch.locate import find_hypotheses
+from recognizer.touch.place_scores import add_scores, count_places
 from recognizer.touch.settings import DEFAULTS
 from recognizer.touch.signal import Signal
 from recognizer.touch.symbols import compiled
+from recognizer.touch.symbols.fit import score_cells
 from recognizer.touch.symbols.gain import image_of_signal, normalize_image
 from recognizer.touch.symbols.projection import project_template
 from recognizer.touch.symbols.refine import refine_lattices
@@ -25,17 +33,17 @@ TRUE = np.array([[1.3, -0.7, 0.4, 0.1, 0.05, -0.02, 0.003]])
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory):
-    """Return evaluate.c as this machine's compiler makes it: also of a tree not installed."""
-    made = tmp_path_factory.mktemp("kernels") / "evaluate.so"
-    source = Path(compiled.__file__).with_name("evaluate.c")
-    compile_kernels(source, made)
+    """Return the kernels as this machine's compiler makes them: also of a tree not installed."""
+    made = tmp_path_factory.mktemp("kernels") / "kernels.so"
+    compile_kernels(compiled.SOURCES, made)
     return made
 
 
-def compile_kernels(source, made):
+def compile_kernels(sources, made):
     options = ["-O2", "-ffp-contract=off", "-shared", "-fPIC", "-Wall", "-Werror"]
-    made_of = f"-DSOURCE_SUM={zlib.crc32(source.read_bytes())}u"
-    subprocess.run([shutil.which("cc"), *options, made_of, source, "-o", made, "-lm"], check=True)
+    made_of = f"-DSOURCE_SUM={zlib.crc32(b''.join(one.read_bytes() for one in sources))}u"
+    command = [shutil.which("cc"), *options, made_of, *sources, "-o", made, "-lm"]
+    subprocess.run(command, check=True)
 
 
 @pytest.fixture
@@ -135,20 +143,103 @@ def test_the_same_pose_is_reached(name, use):
 
 def test_what_is_missing_is_said(tmp_path, monkeypatch):
     monkeypatch.delenv(compiled.CHOICE, raising=False)
-    monkeypatch.setattr(compiled, "FILE", tmp_path / "evaluate.so")
+    monkeypatch.setattr(compiled, "FILE", tmp_path / "kernels.so")
     assert compiled.compiled_kernels() is None
     assert compiled.kernels_in_use() == "numpy"
 
 
 def test_what_was_made_of_another_text_is_left_out(tmp_path):
-    source = tmp_path / "evaluate.c"
-    source.write_text(compiled.SOURCE.read_text() + "\n")
-    compile_kernels(source, tmp_path / "evaluate.so")
-    assert compiled.load_kernels(tmp_path / "evaluate.so") is None
+    changed = tmp_path / "places.c"
+    changed.write_text(compiled.SOURCES[-1].read_text() + "\n")
+    compile_kernels((*compiled.SOURCES[:-1], changed), tmp_path / "kernels.so")
+    assert compiled.load_kernels(tmp_path / "kernels.so") is None
 
 
-def test_scene_is_as_long_as_in_c(library):
-    loaded = compiled.load_kernels(library)
-    scene_of = compiled._Scene(b=2, n=5, q=3)
-    assert loaded.work_size(compiled.ctypes.addressof(scene_of)) == 2 * 5 * 12 + 2 + 5 * 17 + 10
-    assert compiled.ctypes.sizeof(scene_of) == 8 * (len(compiled._WHOLE) + len(compiled._REAL))
+def test_the_build_compiles_the_sources_that_are_looked_at():
+    hook = Path(__file__).parents[3] / "hatch_build.py"
+    names = re.findall(r'"([\w/]+\.c)"', hook.read_text())
+    assert tuple(compiled.FOLDER / name for name in names) == compiled.SOURCES
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_cells_score_alike(name, use):
+    image, template, gain = SCENES[name]()
+    pose, gains = starts(gain)
+    if name.endswith("each gain"):
+        image = replace(image, falls=np.repeat(image.falls, len(pose), axis=0) * gains[:, 1:2])
+    use("numpy")
+    lattices = refine_lattices(image, template, pose, gains, steps=0)
+    expected = score_cells(image, template, lattices)
+    use("compiled")
+    for one, other in zip(score_cells(image, template, lattices), expected, strict=True):
+        assert one.cells.tolist() == other.cells.tolist()
+        assert one.scores == pytest.approx(other.scores, abs=1e-4)
+        assert one.seen == pytest.approx(other.seen, rel=1e-9)
+        assert (one.noise, one.value) == pytest.approx((other.noise, other.value), rel=1e-6)
+        assert one.covariance == pytest.approx(other.covariance, rel=1e-4)
+
+
+HELD = st.lists(
+    st.tuples(st.integers(0, 6), st.integers(0, 8), st.integers(0, 2), st.integers(0, 3)),
+    min_size=1, max_size=40, unique_by=lambda cell: cell[:2],
+)  # fmt: skip
+
+
+@drawn(held=HELD, dense=st.booleans(), seed=st.integers(0, 999))
+def test_places_score_alike(held, dense, seed, library):
+    embossed, draw = embossed_of(held, dense=dense), np.random.default_rng(seed)
+    count = draw.integers(1, 9)
+    places = (
+        draw.integers(0, 7, count), draw.integers(0, 9, count), draw.integers(0, 3, count, np.int32)
+    )  # fmt: skip
+    cells, scores = draw.integers(-20, 20, (6, 2)), draw.normal(size=(6, 5))
+    before = draw.normal(size=count)
+    borders, prices = draw.integers(-4, 4, (5, 2)), draw.random(5)
+    found = []
+    for kind in ("numpy", "compiled"):
+        with pytest.MonkeyPatch.context() as patched:
+            patched.setattr(compiled, "FILE", library)
+            patched.setenv(compiled.CHOICE, kind)
+            sums = add_scores(embossed, places, cells, scores, before)
+            found.append((sums.tolist(), count_places(embossed, borders, prices, 1.2)))
+    assert found[0] == found[1]
+
+
+def test_places_of_an_array_of_2_to_the_64_cells_are_named_alike(use):
+    held = [(row, column, row % 3, 0) for row in range(7) for column in range(9)]
+    scores = np.full((2, 5), -9.0)
+    scores[:, 0] = 0.0
+    fit = SimpleNamespace(
+        cells=np.array([[0, 0], [1, 0]]), scores=scores, seen=np.full(2, 20.0), value=0.0
+    )
+    use("compiled")
+    found = []
+    for rows, columns in ((7, 9), (2**32 - 1, 2**32 + 1)):
+        embossed = embossed_of(held, dense=False, columns=columns)
+        array = SimpleNamespace(rows=rows, columns=columns, order=4)
+        all_ = replace(DEFAULTS.hypotheses, kept=200)
+        places = find_hypotheses(replace(embossed, array=array), (fit,), all_)
+        found.append({(one.row, one.column, one.face, one.score) for one in places})
+    inside = {one for one in found[1] if one[1] < 8}
+    assert inside == {one for one in found[0] if one[1] < 8}
+    assert {one[0] for one in inside} == set(range(7))
+
+
+def embossed_of(held, *, dense, columns=9):
+    """Return cells (row, column, face, label) of a torus of 7 x 9 cells as a lab has them."""
+    rows, across, faces, labels = np.array(sorted(held)).T
+    keys = cell_keys(columns, rows, across)
+    table = np.full(63, len(keys), np.int32)
+    table[keys[keys < 63]] = np.flatnonzero(keys < 63)
+    return EmbossedArray(
+        array=SimpleNamespace(rows=7, columns=9, order=4), alphabet=None, style=STYLE, keys=keys,
+        owners=np.append(faces, -1).astype(np.int32), labels=np.append(labels, -1).astype(np.int8),
+        dense=table if dense else None, faces=np.zeros((3, 2), np.int64), names={}, engine=None,
+    )  # fmt: skip
+
+
+def test_scene_is_as_long_as_in_c():
+    text = compiled.SOURCES[0].read_text()
+    fields = text[text.index("typedef struct {") : text.index("} Scene;")]
+    names = re.findall(r"\*?(\w+)(?:\[\w+\])?[,;]", re.sub(r"/\*.*?\*/", "", fields, flags=re.S))
+    assert names == [name for name, _ in compiled._Scene._fields_]

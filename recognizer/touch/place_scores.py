@@ -1,0 +1,98 @@
+"""What the cells of a lattice say of many registered places at once.
+
+Each function has a numpy form, the reference, and a compiled one (`places.c`): the same sums in the
+same order. Cells (m, 2) are column and upward row of a lattice; a place is the array cell on which
+its cell (0, 0) lies, and the face that holds the symbols. Thesis 6.3.
+"""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recognizer.touch.lab import EmbossedArray
+from recognizer.touch.symbols.compiled import compiled_kernels
+
+Ints = NDArray[np.int64]
+Array = NDArray[np.float64]
+
+Places = tuple[Ints, Ints, NDArray[np.int32]]  #: rows and columns (n,) of (0, 0), and faces
+
+
+class _Held(ctypes.Structure):
+    """`Held` of places.c."""
+
+    _fields_ = [
+        *((name, ctypes.c_int64) for name in ("registered", "rows", "columns", "order")),
+        *((name, ctypes.c_void_p) for name in ("keys", "owners", "labels", "dense")),
+    ]
+
+
+def add_scores(
+    embossed: EmbossedArray, places: Places, cells: Ints, scores: Array, before: Array
+) -> Array:
+    """Return sums (n,) that are continued by the scores of what cells show at each place.
+
+    Parameters
+    ----------
+    cells, scores
+        (m, 2) and (m, order + 1), the last one where the face of the place holds no symbol.
+    before
+        (n,) to which they are added, one after the other.
+    """
+    library, total = compiled_kernels(), before.copy()
+    rows, columns, owners = (np.ascontiguousarray(one) for one in places)
+    cells, scores = np.ascontiguousarray(cells), np.ascontiguousarray(scores)
+    if library is not None:
+        held = _held_by(embossed)
+        library.add_scores(
+            ctypes.addressof(held), len(total), rows.ctypes.data, columns.ctypes.data,
+            owners.ctypes.data, len(cells), cells.ctypes.data, scores.ctypes.data,
+            total.ctypes.data,
+        )  # fmt: skip
+        return total
+    array = embossed.array
+    for (i, j), each in zip(cells.tolist(), scores, strict=True):
+        held_by, label = embossed.at((rows - j) % array.rows, (columns + i) % array.columns)
+        total += each[np.where(held_by == owners, label, array.order)]
+    return total
+
+
+def count_places(embossed: EmbossedArray, cells: Ints, prices: Array, slack: float) -> int:
+    """Return how many registered cells can be the one that cells are counted from.
+
+    Parameters
+    ----------
+    cells, prices
+        (m, 2) that show no symbol, and (m,) nats that each costs where the place holds one.
+    slack
+        Nats that these may come to.
+    """
+    library = compiled_kernels()
+    cells, prices = np.ascontiguousarray(cells), np.ascontiguousarray(prices)
+    if library is not None:
+        held = _held_by(embossed)
+        at = ctypes.addressof(held)
+        return int(
+            library.count_places(at, len(cells), cells.ctypes.data, prices.ctypes.data, slack)
+        )
+    array, keys, owners = embossed.array, embossed.keys, embossed.owners[:-1]
+    row, column = (part.astype(np.int64) for part in np.divmod(keys, np.uint64(array.columns)))
+    left = np.full(len(keys), slack)
+    for (i, j), price in zip(cells.tolist(), prices.tolist(), strict=True):
+        held_by, _ = embossed.at((row - j) % array.rows, (column + i) % array.columns)
+        left = left - price * (held_by == owners)
+        kept = left >= 0
+        row, column, owners, left = row[kept], column[kept], owners[kept], left[kept]
+    return len(row)
+
+
+def _held_by(embossed: EmbossedArray) -> _Held:
+    array, dense = embossed.array, embossed.dense
+    return _Held(
+        registered=len(embossed.keys), rows=array.rows, columns=array.columns, order=array.order,
+        keys=embossed.keys.ctypes.data, owners=embossed.owners.ctypes.data,
+        labels=embossed.labels.ctypes.data, dense=None if dense is None else dense.ctypes.data,
+    )  # fmt: skip
