@@ -36,9 +36,11 @@ def answer_json(recognition: Recognition, lab: Lab, sensor: SensorType) -> dict[
     answer["margin"] = None if margin is None or math.isinf(margin) else round(margin, 2)
     answer["alone"] = margin is not None and math.isinf(margin)
     cause = recognition.cause
-    answer["advice"] = (
-        ADVICE.get(recognition.reason, "") if cause is None else f"{cause}; {recognition.way_out}"
-    )
+    short, colon, rest = ("" if cause is None else str(cause)).partition(": ")
+    answer["because"] = short if colon else recognition.reason
+    answer["advice"] = ADVICE.get(recognition.reason, "")
+    if cause is not None:
+        answer["advice"] = f"{rest or short}; {recognition.way_out}"
     answer["noise"] = None if recognition.noise is None else round(recognition.noise, 3)
     pose = recognition.T_face_probe
     found = _face(lab, recognition)

@@ -125,7 +125,7 @@ class DatabaseSettings:
 class PageSettings:
     """What pages may ask of the live line, and how much they get."""
 
-    pages: int = 64  #: open at once
+    pages: int = 80  #: open at once; 64 that never read leave room for those that do
     connections: int = 900  #: open at once, below the files that a process may have open
     silent_s: float = 5.0  #: that a connection may take for its first request
     message: int = 1024  #: bytes of a message from a page

@@ -27,9 +27,9 @@ import httpx
 from playwright.sync_api import sync_playwright
 from websockets.asyncio.client import connect
 
-FLAGS = ("--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-quic",
-         "--no-first-run", "--disable-background-networking", "--disable-component-update",
-         "--disable-sync")  # fmt: skip
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from bench_page import CHROMIUM, FLAGS, until
+
 STATIC = Path(__file__).parents[2] / "recognizer" / "bench" / "static"
 
 
@@ -60,12 +60,6 @@ def memory_mb(pid):
     """Return the memory that a process holds."""
     status = Path(f"/proc/{pid}/status").read_text()
     return int(status.split("VmRSS:")[1].split()[0]) / 1024
-
-
-def until(page, wanted):
-    """Wait until an expression holds in the page."""
-    while not page.evaluate(wanted):
-        time.sleep(0.02)
 
 
 def at_rates(browser, database, rates, seconds):
@@ -207,14 +201,13 @@ def main():
     asked.add_argument("--rates", type=float, nargs="*", default=[50, 100, 200])
     asked.add_argument("--touches", type=int, default=20)
     asked.add_argument("--pages", type=int, nargs="*", default=[0, 1, 20])
-    asked.add_argument("--deaf", type=int, default=63, help="pages that never read")
-    asked.add_argument("--browser", default="/usr/bin/chromium")
+    asked.add_argument("--deaf", type=int, default=64, help="pages that never read")
     asked.add_argument("--soak", type=float, default=0.0, metavar="SECONDS")
     given = asked.parse_args()
     size = sum(file.stat().st_size for file in STATIC.iterdir())
     print(f"the page: {size / 1000:.0f} kB")
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=given.browser, args=list(FLAGS))
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
         at_rates(browser, given.database, given.rates, given.seconds)
         if given.touches:
             touches(browser, given.database, given.touches)

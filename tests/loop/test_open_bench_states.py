@@ -14,6 +14,10 @@ import pytest
 from bench_page import PATIENCE_MS, opened, rest, shown, touched, until
 from playwright.sync_api import expect
 
+GROWTH = """() => new Promise((done) => { const heights = []; const look = () => {
+    heights.push(document.getElementById('part').getBoundingClientRect().height);
+    if (heights.length < 20) requestAnimationFrame(look); else done(heights); }; look(); })"""
+
 
 @pytest.fixture(scope="module")
 def bench(served):
@@ -168,6 +172,15 @@ def test_4k_uses_the_screen_and_text_grows(browser, bench):
             .reduce((sum, box) => sum + box.width * Math.min(box.height, 2160), 0)"""
         )
         assert used > 0.8 * 3840 * 2160
+        heights = page.evaluate(GROWTH)
+        assert max(heights) == min(heights)  # a canvas whose pixels size its panel grows for ever
+        page.set_viewport_size({"width": 1440, "height": 900})
+        part = page.get_by_test_id("part")
+        before = part.bounding_box()
+        page.set_viewport_size({"width": 3840, "height": 2160})
+        page.set_viewport_size({"width": 1440, "height": 900})
+        assert part.bounding_box() == before
+        page.set_viewport_size({"width": 3840, "height": 2160})
         rest(page)
         assert touched(page, 0.5, 0.5)
 

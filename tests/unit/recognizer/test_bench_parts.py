@@ -21,6 +21,7 @@ from probe.frame import frame_from
 from probe.recording.read import Recording
 from probe.recording.record import Recorder
 from probe.sensor import SensorType
+from recognizer.bench.answers import answer_json
 from recognizer.bench.broker import Broker, Subscriber
 from recognizer.bench.calibration_guide import CalibrationGuide, forces_given
 from recognizer.bench.errors import BenchError, BusyError, UnknownError
@@ -40,6 +41,9 @@ from recognizer.bench.simulated import parse_simulation
 from recognizer.bench.touch_log import TouchLog
 from recognizer.bench.uploads import Uploads, folder_bytes
 from recognizer.scan.mosaic.image import GlobalImage
+from recognizer.touch.cause import EDGE, NO_LOAD, Cause
+from recognizer.touch.lab import Lab
+from recognizer.touch.recognition import refusal
 
 
 def recorded(path, counts, step_ns=10_000_000):
@@ -49,6 +53,22 @@ def recorded(path, counts, step_ns=10_000_000):
             image[4:9, 4:9] += value
             recorder.append(frame_from(image, t_ns=i * step_ns, seq=i))
     return path
+
+
+# -- answers
+
+
+@pytest.mark.parametrize(
+    ("cause", "because", "advice"),
+    [(Cause(EDGE, {"loaded": 0.5, "symbols": 4.0}), "at an edge",
+      "50 % of the sensor is loaded, 4 symbols are read; move towards the loaded part"),
+     (Cause(NO_LOAD, {}), "no contact", "no contact; press the probe onto the object"),
+     (None, "ambiguous", "two places look alike here; touch a little beside it")],
+)  # fmt: skip
+def test_a_refusal_is_told_by_its_cause(cause, because, advice):
+    reason = "no contact" if cause is not None and cause.code == NO_LOAD else "ambiguous"
+    told = answer_json(replace(refusal(0, reason), cause=cause), Lab("", ()), SensorType())
+    assert (told["because"], told["advice"]) == (because, advice)
 
 
 # -- files

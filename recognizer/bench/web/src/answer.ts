@@ -39,7 +39,7 @@ export class AnswerPanel {
         ? `read in ${answer.read_ms.toFixed(0)} ms` : `read in ${answer.read_ms.toFixed(0)} ms, ${clicked_ms.toFixed(0)} ms after the click`;
     } else {
       name.classList.add("reason");
-      name.textContent = `Not recognised: ${answer.reason}`;
+      name.textContent = `Not recognised: ${answer.because}`;
       more.className = "";
       more.textContent = answer.advice;
     }
@@ -62,9 +62,9 @@ export class AnswerPanel {
     const share = answer.alone ? 1 : Math.max(0, Math.min(1, answer.margin! / (FULL * this.threshold)));
     const fill = element("margin-fill");
     fill.style.width = `${100 * share}%`;
-    fill.style.background = answer.alone || answer.margin! >= this.threshold ? "var(--good)" : "var(--bad)";
+    fill.style.background = answer.object ? "var(--good)" : "var(--bad)";
     const next = answer.runner_up
-      ? `next: ${answer.runner_up.object} ${answer.runner_up.face}, row ${answer.runner_up.index[0]}, column ${answer.runner_up.index[1]}`
+      ? `runner-up: ${answer.runner_up.object} ${answer.runner_up.face}, row ${answer.runner_up.index[0]}, column ${answer.runner_up.index[1]}`
       : "no other place comes into question";
     const size = answer.alone ? "" : `margin ${answer.margin!.toFixed(1)} nats, ${this.threshold} are needed; `;
     say(element("margin-text"), size + next);

@@ -11,6 +11,13 @@ export function say(target: HTMLElement, text: string): void {
   if (target.textContent !== text) target.textContent = text;
 }
 
+/** Let a button or link be used, or not: what cannot work is off. */
+export function able(id: string, can: boolean): void {
+  const target = element(id);
+  if (target instanceof HTMLButtonElement) target.disabled = !can;
+  else target.inert = !can;
+}
+
 /** Fill a list of choices, keeping the choice; nothing is touched while it is the same. */
 export function choices(list: HTMLSelectElement, options: [string, string][], chosen?: string): void {
   const key = JSON.stringify(options);

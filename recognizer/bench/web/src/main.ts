@@ -4,7 +4,7 @@ import { get, post } from "./api";
 import { AnswerPanel } from "./answer";
 import { type Bench, MountingCheck, PrintCheck } from "./checks";
 import { setClock, since as sinceServer } from "./clock";
-import { choices, element, isDark, say } from "./dom";
+import { able, choices, element, isDark, say } from "./dom";
 import { figures, keep } from "./figures";
 import { GuideDialog } from "./guide";
 import { Heat } from "./heat";
@@ -72,7 +72,7 @@ async function begin(): Promise<void> {
     if (!newest) return;
     heat.paint(newest);
     surface.paint(newest, heat.top);
-    figures.paints++;
+    if (!figures.paints++) for (const id of ["save-picture", "save-frame"]) able(id, true);
     keep(figures.latency_ms, sinceServer(newest.received_ms));
     if (performance.now() - painted > 1000) {
       painted = performance.now();

@@ -1,7 +1,7 @@
 /** The mosaic of a face as it grows, the face's outline and the sensor where it stands. */
 
 import { TABLE } from "./colours";
-import { element, fitted, say, themed } from "./dom";
+import { able, element, fitted, say, themed } from "./dom";
 import type { Answer, MosaicImage, MosaicOf, ObjectShape, Sensor } from "./types";
 
 export class MosaicPanel {
@@ -21,6 +21,7 @@ export class MosaicPanel {
 
   told(of: MosaicOf): void {
     this.of = of;
+    able("mosaic-clear", of.touches > 0);
     const touches = `${of.touches} ${of.touches === 1 ? "touch" : "touches"}`;
     say(element("mosaic-text"), of.object ? `${of.object} ${of.face}, ${touches}` : "no touch yet");
   }

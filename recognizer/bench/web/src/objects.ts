@@ -1,7 +1,7 @@
 /** What the database holds: its objects, their files, its arrays; an example where it holds none. */
 
 import { get, post } from "./api";
-import { choices, element, say } from "./dom";
+import { able, choices, element, say } from "./dom";
 import { figures } from "./figures";
 import { Gallery } from "./gallery";
 import type { Heat } from "./heat";
@@ -29,6 +29,7 @@ export class Objects {
   async reader(state: ReaderState): Promise<void> {
     const texts = { preparing: "reading the database…", ready: "", off: `${state.cause ?? ""}: ${state.fix ?? ""}` };
     say(element("reader"), texts[state.state]);
+    able("scan", state.state === "ready");
     if (state.state === "off") await this.held();
     if (state.state !== "ready") return;
     const { encodings } = await get<{ encodings: Encoding[] }>("lab");
@@ -68,6 +69,7 @@ export class Objects {
   private async held(): Promise<ObjectEntry[]> {
     const { objects } = await get<{ objects: ObjectEntry[] }>("objects");
     element("empty").hidden = objects.length > 0;
+    able("gallery-open", objects.length > 0);
     return objects;
   }
 
@@ -87,6 +89,7 @@ export class Objects {
   }
 
   private async array(number: number): Promise<void> {
+    for (const id of ["map-all", "map-window"]) able(id, true);
     this.map.show(await get<ArrayMap>(`map/${number}`), number);
   }
 }

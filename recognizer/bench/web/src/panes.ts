@@ -3,7 +3,7 @@
 import { element } from "./dom";
 
 const STEP = 0.05, LEAST = 0.35, MOST = 3;
-const USUAL = [1.15, 1, 0.72];
+const USUAL = [1.25, 1, 0.72];
 
 export class Panes {
   private readonly main = document.querySelector("main")!;

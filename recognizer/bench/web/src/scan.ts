@@ -20,7 +20,7 @@ export class ScanPanel {
     const slipped = told.changes ? `; given up ${told.changes} times, as touches contradicted it` : "";
     say(element("scan-text"), !told.steps.length ? "Touch the same object again and again; each touch should overlap the one before by a third."
       : answer?.object ? `${count} together: ${answer.object} ${answer.face}${answer.place ? `, x ${answer.place.x_mm.toFixed(2)}, y ${answer.place.y_mm.toFixed(2)} mm ±${answer.place.sigma_mm.toFixed(3)}` : ""}${slipped}`
-        : `${count} together: not recognised yet (${answer?.reason ?? "…"})${slipped}`);
+        : `${count} together: not recognised yet (${answer?.because ?? "…"})${slipped}`);
     element("scan-steps").replaceChildren(...told.steps.map((step) => {
       const item = document.createElement("li"), label = document.createElement("span"), track = document.createElement("span");
       const best = step.likeliest[0];

@@ -6,12 +6,14 @@ import {
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { isDark } from "./dom";
 
+const FIELD = Math.tan(Math.PI * 16 / 180); // half of the lower side of what is seen, at a distance of 1
+const NARROW = 1.25; // width over height, under which the width is kept instead of the height
 const STEP = Math.PI / 24;
 const GLIDE_MS = 350;
 
 export class Stage {
   readonly scene = new Scene();
-  readonly camera = new PerspectiveCamera(32, 1, 0.5, 5000);
+  readonly camera = new PerspectiveCamera(32, 0, 0.5, 5000);
   private readonly renderer: WebGLRenderer;
   private readonly controls: OrbitControls;
   private waiting = false;
@@ -82,6 +84,7 @@ export class Stage {
       this.renderer.setSize(w, h, false);
       if (this.camera.aspect !== aspect) {
         this.camera.aspect = aspect;
+        this.camera.fov = (360 / Math.PI) * Math.atan(FIELD * Math.max(1, NARROW / aspect));
         this.camera.updateProjectionMatrix();
       }
       this.renderer.render(this.scene, this.camera);

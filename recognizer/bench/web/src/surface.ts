@@ -14,6 +14,7 @@ export class Surface {
   private readonly places: Float32Array;
   private readonly colours: Float32Array;
   private readonly shape = new BufferGeometry();
+  private readonly mesh: Mesh;
   private drawn = 0;
 
   constructor(private readonly sensor: Sensor) {
@@ -33,9 +34,9 @@ export class Surface {
     this.shape.setAttribute("position", new BufferAttribute(this.places, 3));
     this.shape.setAttribute("color", new BufferAttribute(this.colours, 3));
     const material = new MeshLambertMaterial({ vertexColors: true, side: DoubleSide });
-    const mesh = new Mesh(this.shape, material);
-    mesh.frustumCulled = false;
-    this.stage.scene.add(mesh);
+    this.mesh = new Mesh(this.shape, material);
+    this.mesh.frustumCulled = this.mesh.visible = false; // nothing was felt yet
+    this.stage.scene.add(this.mesh);
     this.stage.look(new Vector3(0, 0, HEIGHT_MM / 4), 14, new Vector3(-0.45, -1, 0.75));
   }
 
@@ -45,6 +46,7 @@ export class Surface {
     const now = performance.now();
     if (now - this.drawn < APART_MS) return;
     this.drawn = now;
+    this.mesh.visible = true;
     const { rows, columns } = this.sensor;
     for (let i = 0; i < rows * columns; i++) {
       const share = Math.min(1, Math.max(0, frame.values[i]! / top));

@@ -2,7 +2,7 @@
 
 import { get, post, remove } from "./api";
 import { when } from "./answer";
-import { element, say } from "./dom";
+import { able, element, say } from "./dom";
 import type { TouchRecord } from "./types";
 
 export class Touches {
@@ -71,7 +71,7 @@ export class Touches {
     }
     button.dataset["state"] = record.state;
     const { answer } = record;
-    const what = record.state === "answered" ? `${answer!.object} ${answer!.face}` : record.state === "refused" ? answer!.reason : "…";
+    const what = record.state === "answered" ? `${answer!.object} ${answer!.face}` : record.state === "refused" ? answer!.because : "…";
     say(button, `${record.number}  ${record.name || what}`);
     button.title = `${when(record)}  ${what}`;
   }
@@ -95,6 +95,7 @@ export class Touches {
     }
     const record = this.chosen === null ? null : this.records.get(this.chosen) ?? null;
     for (const id of ["touch-live", "touch-delete"]) element<HTMLButtonElement>(id).disabled = record === null;
+    for (const id of ["touch-csv", "touch-h5"]) able(id, this.records.size > 0);
     const name = element<HTMLInputElement>("touch-name");
     name.disabled = record === null;
     if (document.activeElement !== name) name.value = record?.name ?? "";

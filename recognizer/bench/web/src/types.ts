@@ -43,7 +43,7 @@ export interface Answer {
   T_face_probe: Matrix | null; T_object_probe: Matrix | null;
   margin: number | null; alone: boolean; noise: number | null;
   runner_up: { object: string; face: string; index: [number, number] } | null;
-  reason: string; advice: string;
+  reason: string; because: string; advice: string;
   place: { x_mm: number; y_mm: number; theta_deg: number; sigma_mm: number; sigma_deg: number } | null;
   symbols: [number, number, number, number, number][];
   turn?: number;
