@@ -59,14 +59,14 @@ def recorded(path, counts, step_ns=10_000_000):
 
 
 @pytest.mark.parametrize(
-    ("cause", "because", "advice"),
-    [(Cause(EDGE, {"loaded": 0.5, "symbols": 4.0}), "at an edge",
+    ("reason", "cause", "because", "advice"),
+    [("not an encoded surface", Cause(EDGE, {"loaded": 0.5, "symbols": 4.0}), "at an edge",
       "50 % of the sensor is loaded, 4 symbols are read; move towards the loaded part"),
-     (Cause(NO_LOAD, {}), "no contact", "no contact; press the probe onto the object"),
-     (None, "ambiguous", "two places look alike here; touch a little beside it")],
+     ("no contact", Cause(NO_LOAD, {}), "no contact",
+      "no contact; press the probe onto the object"),
+     ("ambiguous", None, "ambiguous", "two places look alike here; touch a little beside it")],
 )  # fmt: skip
-def test_a_refusal_is_told_by_its_cause(cause, because, advice):
-    reason = "no contact" if cause is not None and cause.code == NO_LOAD else "ambiguous"
+def test_a_refusal_is_told_by_its_cause(reason, cause, because, advice):
     told = answer_json(replace(refusal(0, reason), cause=cause), Lab("", ()), SensorType())
     assert (told["because"], told["advice"]) == (because, advice)
 
