@@ -63,10 +63,10 @@ def info(
     def action() -> int:
         from encoded_objects.console import output
         from probe.command import described
-        from probe.port.url import is_url
+        from probe.port.url import means_port
 
         values: dict[str, Any]
-        if is_url(what) or what.startswith("/dev/"):
+        if means_port(what):
             values, lines = described.describe_probe(what, sensor, seconds, sensor_type)
         elif what.endswith(".json"):
             values, lines = described.describe_calibration(what)

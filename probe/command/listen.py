@@ -10,7 +10,7 @@ from encoded_objects.console.output import message
 from probe.client.stream import Stream, name_of
 from probe.errors import PortError
 from probe.port.typed import typed_port
-from probe.port.url import is_url
+from probe.port.url import means_port
 from probe.recording.layout import FrameBlock
 from probe.recording.read import Recording
 from probe.sensor import SensorType
@@ -31,7 +31,7 @@ def frames_of(
     SensorTypeError
         No such type, or one of another shape.
     """
-    if not is_url(source):
+    if not means_port(source):
         recording = Recording(source)
         return recording.block().counts, recording.origin.sensor, recording.sensor_type(sensor_type)
 

@@ -89,6 +89,11 @@ def is_url(text: str) -> bool:
     return bool(colon) and (scheme in SCHEMES or scheme in _other_schemes())
 
 
+def means_port(text: str) -> bool:
+    """Tell whether a text is meant for a port, also one that cannot be opened; not a file."""
+    return is_url(text) or text.startswith("/dev/") or "://" in text
+
+
 def _opener(address: Address) -> Callable[[Address], Port]:
     if address.scheme in SCHEMES:
         module, _, name = SCHEMES[address.scheme][0].partition(":")

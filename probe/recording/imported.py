@@ -124,12 +124,21 @@ def _choose_array(
     here = ", ".join(f"{found.name} {found.shape}" for found in (images or arrays)) or "nothing"
     if not images:
         cause = f"no array of images (N, {kind.rows}, {kind.columns}) in it, but {here}"
-        fix = "give the --sensor-type whose images they are, or reshape it first"
+        fix = f"give the --sensor-type {_types_of(arrays)}, or reshape it first"
     elif name is None:
         cause, fix = f"several arrays of images in it: {here}", "say which by --dataset NAME"
     else:
         cause, fix = f"no array of images '{name}' in it, but {here}", "take one of these"
     raise RecordingError(cause, fix=fix, place=str(path))
+
+
+def _types_of(arrays: list[FileArray]) -> str:
+    """Return the shipped types of which one of the arrays holds images, in words."""
+    from probe.sensor_types.read import sensor_type_named, shipped_names
+
+    shapes = {name: sensor_type_named(name).shape for name in shipped_names()}
+    alike = [n for n, shape in shapes.items() if any(one.frames(shape) for one in arrays)]
+    return " or ".join(alike) or "whose images they are"
 
 
 def _images(found: FileArray, image: tuple[int, int]) -> Iterator[tuple[int, NDArray[Any]]]:

@@ -231,6 +231,14 @@ def test_info_of_a_probe_a_recording_and_a_calibration(asked, bench):
     assert asked("info", bench / "bench.json")[1].count("\n") > 8
 
 
+@pytest.mark.parametrize("command", [("info",), ("calibrate", "bias")])
+def test_a_scheme_that_nobody_opens_is_no_missing_file(asked, command):
+    code, _, err = asked(*command, "udp://0.0.0.0:5005")
+    assert code == 3
+    assert "must begin with serial:, flexitac:, sim: or file:" in err
+    assert "recording" not in err.replace("file:recording.h5", "")
+
+
 def test_record_ends_by_frames_and_by_seconds(asked, tmp_path):
     out = tmp_path / "a.h5"
     code, text, err = asked("record", "sim:?rate=500", "-o", out, "--frames", "40", "--json")

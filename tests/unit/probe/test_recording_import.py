@@ -134,6 +134,9 @@ def test_values_that_are_no_numbers_are_refused(tmp_path):
 def test_what_holds_no_images_is_refused(tmp_path):
     np.save(tmp_path / "a.npy", np.zeros((70, 32, 32)))
     refused(tmp_path / "a.npy", r"no array of images \(N, 16, 16\) in it, but a \(70, 32, 32\)")
+    refused(tmp_path / "a.npy", "give the --sensor-type mat-32x32, or reshape it")
+    np.save(tmp_path / "f.npy", np.zeros((70, 5, 7)))
+    refused(tmp_path / "f.npy", "give the --sensor-type whose images they are, or")
     np.save(tmp_path / "b.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
     refused(tmp_path / "b.npy", "it holds objects")
     np.save(tmp_path / "c.npy", COUNTS + 1j)
