@@ -3,12 +3,14 @@
 Views of a face + a table of measured answers -> the share of touches that are answered at once,
 and within three, each where the answer before says. `answers.json` is that table, measured
 (docs/folds.md): flat faces, a sensor of 25.4 mm whose centre lies on the face and whose plate
-rests there, 20 to 120 N, symbols of 4.5 to 7 mm.
+rests there, 20 to 120 N, symbols of 4.5 to 7 mm. Of that, other sensor types answer a share that
+was measured too (`answers_of_types.json`, `tests/campaigns/promised_types.py`).
 """
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -16,8 +18,9 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from encoded_objects.sensor_type import USUAL_SENSOR, SensorSize
 from generator.layout.footprint import Points
 from generator.layout.views import FaceViews
 
@@ -70,11 +73,30 @@ class AnswerTable:
         pose = np.arange(len(seen))
         return np.asarray(rows[below, pose] * (1 - share) + rows[above, pose] * share)
 
-    def later(self, seen: NDArray[np.int64], around: NDArray[np.int64]) -> Points:
+    def later(self, seen: ArrayLike, around: ArrayLike) -> Points:
         """Return the probability that a touch is answered by the third, if not at once, (P,)."""
+        seen, around = np.asarray(seen, float), np.asarray(around, float)
         constant, by_around, by_seen = self.again
         logit = constant + by_around * np.log1p(around) + by_seen * np.log1p(seen)
         return np.asarray(np.where(around > 0, 1 / (1 + np.exp(-logit)), 0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class AnsweredShare:
+    """How much a sensor type answers of what the usual one would of the same symbols, measured.
+
+    Logistic in the loaded share: larger sensors hang over borders, and membranes of gels bridge
+    them.
+    """
+
+    across_mm: float  #: of the type, as `SensorSize.across_mm`
+    pitch_mm: float  #: of the symbols that it was measured on
+    constant: float
+    by_loaded: float
+
+    def at(self, loaded: Points) -> Points:
+        """Return the share at each pose, (P,)."""
+        return np.asarray(1 / (1 + np.exp(-(self.constant + self.by_loaded * loaded))))
 
 
 def _between(value: Any, steps: Sequence[float]) -> tuple[Any, Any, Any]:
@@ -84,7 +106,9 @@ def _between(value: Any, steps: Sequence[float]) -> tuple[Any, Any, Any]:
     return low, np.minimum(low + 1, len(steps) - 1), place - low
 
 
-def promised_shares(views: FaceViews, table: AnswerTable, pitch_mm: float) -> tuple[float, float]:
+def promised_shares(
+    views: FaceViews, table: AnswerTable, pitch_mm: float, sensor: SensorSize = USUAL_SENSOR
+) -> tuple[float, float]:
     """Return the shares of touches of a face that will be answered at once, and within three.
 
     Parameters
@@ -95,10 +119,74 @@ def promised_shares(views: FaceViews, table: AnswerTable, pitch_mm: float) -> tu
         Measured.
     pitch_mm
         Of its symbols.
+    sensor
+        That touches it.
     """
-    once = table.at(pitch_mm, views.seen, views.loaded)
-    within = once + (1 - once) * table.later(views.seen, views.around)
+    once = answered_at_once(table, pitch_mm, views.seen, views.loaded, sensor)
+    within = once + (1 - once) * answered_later(table, views.seen, views.around, sensor)
     return float(once.mean()), float(within.mean())
+
+
+def answered_share(sensor: SensorSize) -> AnsweredShare | None:
+    """Return what a sensor type answers of what the usual one would; None of the usual one.
+
+    Of a type that was not measured it is that of the one most like it in size and pitch.
+    """
+    known = measured_types()
+    if sensor.name == USUAL_SENSOR.name or sensor.name in known:
+        return known.get(sensor.name)
+    nearest = min(known.values(), key=lambda one: _unlike(one, sensor))
+    return nearest if _unlike(nearest, sensor) < _unlike(USUAL_SENSOR, sensor) else None
+
+
+def _unlike(one: AnsweredShare | SensorSize, sensor: SensorSize) -> float:
+    size, pitch = one.across_mm / sensor.across_mm, one.pitch_mm / sensor.pitch_mm
+    return math.hypot(math.log(size), math.log(pitch))
+
+
+def answered_at_once(
+    table: AnswerTable,
+    pitch_mm: float,
+    seen: NDArray[np.int64],
+    loaded: Points,
+    sensor: SensorSize = USUAL_SENSOR,
+) -> Points:
+    """Return the probability that a sensor's touch is answered at once at each pose, (P,).
+
+    Parameters
+    ----------
+    table
+        Measured with the usual sensor.
+    pitch_mm
+        Of the symbols.
+    seen, loaded
+        (P,) symbols seen whole, and the loaded share.
+    sensor
+        That touches; the table is looked up for the pitch that it meets as the usual one that.
+    """
+    usual, share = table.at(pitch_mm / sensor.coarseness, seen, loaded), answered_share(sensor)
+    return usual if share is None else usual * share.at(loaded)
+
+
+def answered_later(
+    table: AnswerTable, seen: ArrayLike, around: ArrayLike, sensor: SensorSize = USUAL_SENSOR
+) -> Points:
+    """Return the probability that a touch is answered by the third, if not at once, (P,).
+
+    The law was measured with the usual sensor: symbols are counted as many as on its area.
+    """
+    more = (sensor.across_mm / USUAL_SENSOR.across_mm / sensor.coarseness) ** 2
+    return table.later(np.asarray(seen) / more, np.asarray(around) / more)
+
+
+@lru_cache(maxsize=1)
+def measured_types() -> dict[str, AnsweredShare]:
+    """Return the shares of the sensor types that were measured, by name."""
+    text = (resources.files("generator.layout") / "answers_of_types.json").read_text("utf-8")
+    return {
+        name: AnsweredShare(one["across_mm"], one["pitch_mm"], *one["logit"])
+        for name, one in json.loads(text).items()
+    }
 
 
 @lru_cache(maxsize=1)

@@ -20,12 +20,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.sensor_type import USUAL_SENSOR, SensorSize
 from generator.layout.footprint import Points
 from generator.layout.placement import FaceLayout
 from generator.plane.polygon import points_inside, signed_area
 
 _STRIPS = 64  # poses looked at together
 _STEPS = 1.2207440846057596 ** -np.arange(1.0, 4.0)  # of x, y and turn: 1.22^4 = 1.22 + 1
+
+
+AROUND_MM = 20.0  #: of the usual sensor: half its width and a step
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,8 +39,6 @@ class ViewSettings:
     poses: int = 1000
     """On each face: shares within .008 of those of 40,000 on faces of 28 to 60 mm (pitch 7 and
     4.5 mm); 6 to 10 ms a face."""
-    around_mm: float = 20.0
-    """From the sensor's centre to what another touch beside may show: half its width and a step."""
 
 
 VIEWS = ViewSettings()
@@ -48,6 +50,13 @@ class SensorView:
 
     half_mm: tuple[float, float]  #: half width and half height of the sensor's rectangle
     symbol_half_mm: float  #: from a symbol's centre to the end of its strokes
+    around_mm: float = AROUND_MM  #: from its centre to what another touch beside may show
+
+
+def sensor_view(sensor: SensorSize, symbol_half_mm: float) -> SensorView:
+    """Return what a sensor type can see; a larger one steps farther, too."""
+    around = AROUND_MM * sensor.across_mm / USUAL_SENSOR.across_mm
+    return SensorView(sensor.half_mm, symbol_half_mm, around)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +68,7 @@ class FaceViews:
     seen: NDArray[np.int64]  #: (P,) symbols seen whole
     lines: NDArray[np.int64]  #: (P,) rows or columns in which these stand, the fewer of both
     loaded: Points  #: (P,) share of the sensor's rectangle that lies on the face
-    around: NDArray[np.int64]  #: (P,) symbols that stand within `ViewSettings.around_mm`
+    around: NDArray[np.int64]  #: (P,) symbols that stand within `SensorView.around_mm`
 
 
 def face_views(
@@ -83,7 +92,7 @@ def face_views(
         How many poses.
     """
     centre, turn = _poses_on(loops, settings.poses)
-    return views_at(loops, face, pitch_mm, view, centre, turn, settings)
+    return views_at(loops, face, pitch_mm, view, centre, turn)
 
 
 def views_at(
@@ -93,13 +102,12 @@ def views_at(
     view: SensorView,
     centre_mm: Points,
     turn_rad: Points,
-    settings: ViewSettings = VIEWS,
 ) -> FaceViews:
     """Return what a sensor meets at given poses of one face.
 
     Parameters
     ----------
-    loops, face, pitch_mm, view, settings
+    loops, face, pitch_mm, view
         As for `face_views`.
     centre_mm, turn_rad
         (P, 2) and (P,) of the sensor, face frame.
@@ -112,7 +120,7 @@ def views_at(
     loaded = area / (4 * view.half_mm[0] * view.half_mm[1])
     whole = _seen_whole(face, pitch_mm, view, centre_mm, turn_rad)
     rows, columns = whole.any(axis=2).sum(axis=1), whole.any(axis=1).sum(axis=1)
-    lines, around = np.minimum(rows, columns), _around(face, centre_mm, settings.around_mm)
+    lines, around = np.minimum(rows, columns), _around(face, centre_mm, view.around_mm)
     return FaceViews(centre_mm, turn_rad, whole.sum(axis=(1, 2)), lines, loaded, around)
 
 

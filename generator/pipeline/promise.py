@@ -23,7 +23,7 @@ from generator.layout.footprint import Points, Region, region_of
 from generator.layout.layout import lay_out_face
 from generator.layout.placement import FaceLayout, Layout
 from generator.layout.promise import PROMISE, measured_answers, promised_shares
-from generator.layout.views import VIEWS, SensorView, ViewSettings, face_views
+from generator.layout.views import VIEWS, ViewSettings, face_views, sensor_view
 from generator.pipeline.plan import ObjectPlan
 from generator.plane.polygon import is_convex
 from generator.polyhedron import face_polygon
@@ -88,11 +88,10 @@ def _promise(
     if not len(face.labels):
         return FacePromise(0.0, 0.0)
     reach = plan.alphabet.reach * style.pitch_mm + style.stroke_mm / 2
-    view = SensorView(plan.spec.sensor.half_mm, reach)
+    view = sensor_view(plan.spec.sensor, reach)
     views = face_views(loops, face, style.pitch_mm, view, settings)
     one_row = bool((views.lines <= 1).mean() >= PROMISE.one_line)
-    pitch = style.pitch_mm / plan.spec.sensor.coarseness
-    once, within = promised_shares(views, measured_answers(), pitch)
+    once, within = promised_shares(views, measured_answers(), style.pitch_mm, plan.spec.sensor)
     return FacePromise(round(once, 3), round(within, 3), one_row)
 
 

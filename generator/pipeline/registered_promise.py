@@ -11,7 +11,7 @@ from encoded_objects.sensor_type import USUAL_SENSOR, SensorSize
 from generator.array.touches import touches_needed
 from generator.database.registered import RegisteredObject
 from generator.layout.promise import measured_answers, promised_shares
-from generator.layout.views import SensorView, face_views
+from generator.layout.views import face_views, sensor_view
 from generator.pipeline.promise import FacePromise, face_key
 
 
@@ -32,7 +32,7 @@ def registered_promises(
     if touches_needed(array.order, cells, style.pitch_mm, sensor_mm=sensor.across_mm) > 1:
         return {}
     reach = held.alphabet["reach"] * style.pitch_mm + style.stroke_mm / 2
-    view = SensorView(sensor.half_mm, reach)
+    view = sensor_view(sensor, reach)
     facets = {n for face in held.faces if face.round for n in face.round.surface.facets}
     layouts = {layout.face: layout for layout in held.layout.faces}
     known: dict[bytes, FacePromise] = {}
@@ -44,8 +44,8 @@ def registered_promises(
         key = face_key(face.polygon_mm, layout)
         if key not in known:
             views = face_views(face.polygon_mm, layout, style.pitch_mm, view)
-            pitch = style.pitch_mm / sensor.coarseness
-            once, within = promised_shares(views, measured_answers(), pitch)
+            pitch, table = style.pitch_mm, measured_answers()
+            once, within = promised_shares(views, table, pitch, sensor)
             known[key] = FacePromise(round(once, 3), round(within, 3))
         found[face.face_id] = known[key]
     return found

@@ -10,8 +10,9 @@ each round every face is touched once, anywhere, and in every third round again 
 `next` says, up to three times; so any number of rounds is a fair sample. A touch is looked at as
 `generator.layout.views` sees it. What is there is kept, and an interrupted run goes on.
 
-Of another sensor type than `fsr-16` the second set alone is touched, at the pitch that the type
-proposes, and held against the table that ships, as `encode-object --sensor-type` does.
+Of another sensor type than `fsr-16` every third solid of the second set is touched, at the pitch
+that the type proposes, and held against what `encode-object --sensor-type` promises; that was set
+by other touches (`promised_types.py`).
 
 A step over a re-entrant edge may end on another face, which is told and counted as not answered.
 """
@@ -23,7 +24,7 @@ import itertools
 import json
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -35,12 +36,18 @@ from numpy.typing import ArrayLike, NDArray  # noqa: E402
 
 from encoded_objects import encode  # noqa: E402
 from encoded_objects.sensor_type import USUAL_SENSOR, SensorSize, sensor_size  # noqa: E402
+from generator.database.entries import object_names  # noqa: E402
 from generator.database.open import open_if_there  # noqa: E402
 from generator.database.read import read_object  # noqa: E402
 from generator.database.transaction import read_transaction  # noqa: E402
 from generator.layout.placement import FaceLayout  # noqa: E402
-from generator.layout.promise import AnswerTable, measured_answers  # noqa: E402
-from generator.layout.views import SensorView, views_at  # noqa: E402
+from generator.layout.promise import (  # noqa: E402
+    AnswerTable,
+    answered_at_once,
+    answered_later,
+    measured_answers,
+)
+from generator.layout.views import SensorView, sensor_view, views_at  # noqa: E402
 from probe.sensor_types.read import sensor_type_named  # noqa: E402
 from recognizer.touch.lab import open_lab  # noqa: E402
 from recognizer.touch.reader import Reader  # noqa: E402
@@ -131,7 +138,7 @@ class Touched:
     seen: int
     lines: int
     loaded: float
-    around: int  #: symbols that stand about the centre, `views.ViewSettings.around_mm`
+    around: int  #: symbols that stand about the centre, `views.SensorView.around_mm`
     most: int  #: touches that were allowed
     touches: int  #: that were made
     first: str  #: what the first said: right, wrong, rejected
@@ -157,8 +164,8 @@ def main() -> None:
     touch_faces(asked.output, kept, asked.rounds, asked.seed, sensor)
     touches = [_touched(json.loads(line)) for line in kept.read_text().splitlines()]
     if sensor.name != USUAL_SENSOR.name:
-        print(f"{sensor.name}, {sensor.pitch_mm:g} mm, against the table of {USUAL_SENSOR.name}")
-        compare(touches, measured_answers(), sensor.pitch_mm / USUAL_SENSOR.pitch_mm)
+        print(f"{sensor.name}, {sensor.pitch_mm:g} mm")
+        compare(touches, measured_answers(), sensor)
         return
     table = measured_table([one for one in touches if one.group == "learn"])
     for label, one in (("that ships", measured_answers()), ("of the first set", table)):
@@ -184,7 +191,7 @@ def touch_faces(folder: Path, kept: Path, rounds: int, seed: int, sensor: Sensor
     readers, faces = {}, []
     usual = sensor.name == USUAL_SENSOR.name
     reading = sensor_type_named(sensor.name)
-    for group, solids in SETS.items() if usual else [("check", SETS["check"])]:
+    for group, solids in SETS.items() if usual else [("check", SETS["check"][::3])]:
         lab = folder / f"{group}.db"
         if not lab.exists():
             unfinished = lab.with_suffix(".part")
@@ -212,11 +219,11 @@ def faces_of(lab: Path, group: str, sensor: SensorSize) -> Iterator[Face]:
     assert engine is not None
     known = set()
     with read_transaction(engine) as connection:
-        for k in range(len(SETS[group])):
-            held = read_object(connection, f"{group} {k + 1}")
+        for k, name in enumerate(object_names(connection)):
+            held = read_object(connection, name)
             pitch = held.style.pitch_mm
             reach = held.alphabet["reach"] * pitch + held.style.stroke_mm / 2
-            view = SensorView(sensor.half_mm, reach)
+            view = sensor_view(sensor, reach)
             layouts = {one.face: one for one in held.layout.faces}
             for face in held.faces:
                 layout = layouts[face.face_id]
@@ -246,12 +253,8 @@ def touch_face(face: Face, lab: str, number: int, most: int, reader: Reader, see
     )  # fmt: skip
 
 
-def compare(touches: list[Touched], table: AnswerTable, coarser: float = 1.0) -> None:
-    """Print promise and reading by size and face, and how far they lie apart.
-
-    The sensor is so many times coarser than that of the table.
-    """
-    touches = [replace(one, pitch_mm=one.pitch_mm / coarser) for one in touches]
+def compare(touches: list[Touched], table: AnswerTable, sensor: SensorSize = USUAL_SENSOR) -> None:
+    """Print promise and reading by size and face, and how far they lie apart."""
     for title, within in (("at once", False), ("within three", True)):
         some = [one for one in touches if one.most > 1] if within else touches
         names = sorted({one.face for one in some})
@@ -259,11 +262,13 @@ def compare(touches: list[Touched], table: AnswerTable, coarser: float = 1.0) ->
         for low, high in itertools.pairwise(CLASSES_MM):
             sized = [one for one in some if low <= min(one.size_mm) < high]
             if sized:
-                p, right, error = _shares(sized, table, within)
+                p, right, error = _shares(sized, table, within, sensor)
                 faces = len({one.face for one in sized})
                 print(f"  {low:g}-{high:g} mm, {faces:2d} faces, {len(sized):5d}  {p:.3f}"
                       f"  {right:.3f}  +- {error:.3f}  apart {p - right:+.3f}")  # fmt: skip
-        each = [_shares([t for t in some if t.face == name], table, within) for name in names]
+        each = [
+            _shares([t for t in some if t.face == name], table, within, sensor) for name in names
+        ]
         apart = np.array([p - right for p, right, _ in each])
         chance = np.array([error for *_, error in each])
         near, by_chance = np.abs(apart) <= 0.05, np.abs(apart) <= 0.05 + 2 * chance
@@ -273,15 +278,17 @@ def compare(touches: list[Touched], table: AnswerTable, coarser: float = 1.0) ->
 
 
 def _shares(
-    touches: Sequence[Touched], table: AnswerTable, within: bool
+    touches: Sequence[Touched], table: AnswerTable, within: bool, sensor: SensorSize
 ) -> tuple[float, float, float]:
     """Return what is promised and answered, and the standard error of the second."""
-    p = np.array(
-        [float(table.at(t.pitch_mm, np.array([t.seen]), np.array([t.loaded]))[0]) for t in touches]
-    )
+    p = np.array([
+        answered_at_once(table, t.pitch_mm, np.array([t.seen]), np.array([t.loaded]), sensor)[0]
+        for t in touches
+    ])  # fmt: skip
     right = [t.right for t in touches]
     if within:
-        later = table.later(*(np.array([(t.seen, t.around) for t in touches]).T))
+        seen, around = np.array([(t.seen, t.around) for t in touches]).T
+        later = answered_later(table, seen, around, sensor)
         p, right = p + (1 - p) * later, [t.last == "right" for t in touches]
     error = float(np.sqrt((p * (1 - p)).sum())) / len(touches)
     return float(p.mean()), float(np.mean(right)), error

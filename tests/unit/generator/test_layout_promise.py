@@ -1,14 +1,26 @@
 """What a face promises, against geometry done one pose and one edge at a time."""
 
+import math
+
 import numpy as np
 import pytest
 
+from encoded_objects.sensor_type import SensorSize, sensor_size
 from generator.array import profile
 from generator.layout.layout import lay_out
 from generator.layout.placement import FaceLayout, Placement
-from generator.layout.promise import AnswerTable, measured_answers, promised_shares
-from generator.layout.views import SensorView, ViewSettings, face_views
+from generator.layout.promise import (
+    AnswerTable,
+    answered_at_once,
+    answered_later,
+    answered_share,
+    measured_answers,
+    measured_types,
+    promised_shares,
+)
+from generator.layout.views import SensorView, ViewSettings, face_views, sensor_view
 from generator.polyhedron import face_polygon, shapes
+from probe.sensor_types.read import shipped_names
 
 NONE = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
 VIEW = SensorView((12.7, 9.0), 2.52)
@@ -147,3 +159,40 @@ def test_the_table_that_ships_was_measured():
     for pitch in (4.5, 5.5, 7.0):
         middle = table.at(pitch, np.full(5, 9), np.linspace(0.3, 1.0, 5))
         assert (np.diff(middle) > -0.05).all()
+
+
+def test_other_sensors_answer_a_share_of_what_the_usual_one_does():
+    table, seen, loaded = measured_answers(), np.full(3, 40), np.array([0.4, 0.7, 1.0])
+    usual = answered_at_once(table, 5.0, seen, loaded)
+    assert usual == pytest.approx(table.at(5.0, seen, loaded))
+    for name in shipped_names():
+        sensor = sensor_size(name)
+        here = answered_at_once(table, sensor.pitch_mm, seen, loaded, sensor)
+        if name == "fsr-16":
+            assert answered_share(sensor) is None
+            assert here == pytest.approx(usual)
+        else:
+            share = measured_types()[name]
+            logit = share.constant + share.by_loaded * 0.7
+            assert here[1] == pytest.approx(usual[1] / (1 + math.exp(-logit)))
+            assert (here < usual).all()
+            assert (np.diff(here) >= 0).all()
+
+
+def test_a_larger_sensor_steps_farther_and_counts_symbols_by_its_area():
+    mat, table = sensor_size("mat-32x32"), measured_answers()
+    assert sensor_view(mat, 2.0).around_mm == pytest.approx(20 * 64 / 25.4)
+    assert sensor_view(SensorSize(), 2.0) == SensorView((12.7, 12.7), 2.0)
+    more = (64 / 25.4) ** 2 / 1.2**2
+    here = answered_later(table, np.array([60]), np.array([90]), mat)
+    assert here == pytest.approx(table.later([60 / more], [90 / more]))
+    assert here == pytest.approx(answered_later(table, [60 / more], [90 / more]))
+
+
+def test_a_type_of_your_own_is_taken_for_the_one_most_like_it():
+    mine = SensorSize("mine", (31.0, 33.0), 6.0)  # 62 x 66 mm: the mat is 64 x 64
+    assert answered_share(mine) is measured_types()["mat-32x32"]
+    fine = SensorSize("fine", (8.0, 8.0), 3.0)
+    assert answered_share(fine) is measured_types()["gel-24x32"]
+    same = SensorSize("same", (12.7, 12.7), 5.0)
+    assert answered_share(same) is None
