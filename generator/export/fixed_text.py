@@ -142,6 +142,69 @@ def decimal_numbers(values: NDArray[np.float64], width: int, places: int) -> Byt
     return out
 
 
+def number_lines(
+    words: tuple[str, ...], rows: NDArray[np.float64] | NDArray[np.int64], places: int
+) -> bytes:
+    """Return one line for each row of numbers, without needless zeros.
+
+    Parameters
+    ----------
+    words
+        (k + 1) ASCII texts before, between and behind the numbers of a row.
+    rows
+        (n, k); some thousand at once stay in the cache.
+    places
+        Decimals to round to; 0 for integers.
+    """
+    scaled = np.rint(rows.T * 10.0**places).astype(np.int64) if places else rows.T
+    sizes = np.abs(scaled)
+    largest = int(sizes.max(initial=0))
+    if largest < 1 << 32:  # divided twice as fast
+        sizes = sizes.astype(np.uint32)
+    whole = max(len(str(largest)) - places, 1)
+    field = 1 + whole + (1 + places if places else 0)
+    block = np.empty((sum(map(len, words)) + field * len(scaled), len(rows)), np.uint8)
+    at = 0
+    for word, numbers, size in zip(words[:-1], scaled, sizes, strict=True):
+        _put_word(block, at, word)
+        at += len(word)
+        _put_digits(block[at + 1 : at + field], size, places)
+        block[at] = _MINUS * (numbers < 0)
+        at += field
+    _put_word(block, at, words[-1])
+    return np.ascontiguousarray(block.T).tobytes().translate(None, b"\0")
+
+
+def _put_word(block: Bytes, at: int, word: str) -> None:
+    block[at : at + len(word)] = np.frombuffer(word.encode("ascii"), np.uint8)[:, None]
+
+
+def _put_digits(field: Bytes, rest: NDArray[np.unsignedinteger | np.int64], places: int) -> None:
+    """Write numbers of 10^-places into the rows of a field; needless zeros as bytes of zero."""
+    last = len(field) - 1
+    if places:
+        needless = np.ones(len(rest), np.bool_)
+        for row in range(last, last - places, -1):
+            rest, digit = _last_digit(rest)
+            needless &= digit == _ZERO
+            field[row] = digit * ~needless
+        last -= places + 1
+        field[last + 1] = _POINT * ~needless
+    rest, field[last] = _last_digit(rest)  # always written
+    for row in range(last - 1, -1, -1):
+        needed = rest > 0
+        rest, digit = _last_digit(rest)
+        field[row] = digit * needed
+
+
+def _last_digit(
+    values: NDArray[np.unsignedinteger | np.int64],
+) -> tuple[NDArray[np.unsignedinteger | np.int64], Bytes]:
+    """Return a tenth of the values, rounded down, and the text of their last digits."""
+    quotient = values // 10
+    return quotient, (values - 10 * quotient + _ZERO).astype(np.uint8)
+
+
 def pad(names: list[str]) -> Bytes:
     """Return ASCII texts as rows of equal width, spaces behind, shape (m, width)."""
     width = max(map(len, names), default=0)
