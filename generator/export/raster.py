@@ -51,6 +51,14 @@ class DepthBuffer:
         chosen: Index = values[keys & ((1 << _NUMBER_BITS) - 1) & -(keys >= 0).astype(np.int64)]
         return np.where(keys >= 0, chosen, -1)
 
+    def triangles_seen(self, count: int) -> Index:
+        """Return the triangles seen anywhere, of `count`, in rising order."""
+        seen = np.zeros(count, np.bool_)
+        for row in range(0, len(self.keys), RASTER.rows):
+            keys = self.keys[row : row + RASTER.rows]
+            seen[keys[keys >= 0] & ((1 << _NUMBER_BITS) - 1)] = True
+        return np.flatnonzero(seen)
+
     def depths(self, rows: Index, columns: Index) -> Floats:
         """Return the depths at some pixels, one step under the lowest where nothing is seen."""
         steps = (self.keys[rows, columns] >> _NUMBER_BITS).astype(np.float64)
@@ -63,7 +71,7 @@ def rasterise(points: Floats, triangles: Index, screen: Index) -> DepthBuffer:
     Parameters
     ----------
     points
-        (N, 3) x, y (pixels) and depth (any unit).
+        (3, N) x, y (pixels) and depth (any unit).
     triangles
         (T, 3) points, counter-clockwise as seen; others turn their back and are left out.
     screen
@@ -72,15 +80,14 @@ def rasterise(points: Floats, triangles: Index, screen: Index) -> DepthBuffer:
     height, width = screen.shape
     buffer = screen.reshape(-1)
     buffer[:] = -1
-    columns = points.T.copy()
-    low = float(columns[2].min(initial=0.0))
-    step = max(float(columns[2].max(initial=0.0)) - low, 1e-300) / _DEPTH_STEPS
+    low = float(points[2].min(initial=0.0))
+    step = max(float(points[2].max(initial=0.0)) - low, 1e-300) / _DEPTH_STEPS
     for start in range(0, len(triangles), RASTER.triangles):
         _draw(
             buffer,
             height,
             width,
-            columns,
+            points,
             triangles[start : start + RASTER.triangles],
             start,
             low,
@@ -93,19 +100,19 @@ def _draw(
     buffer: Index,
     height: int,
     width: int,
-    columns: Floats,
+    points: Floats,
     triangles: Index,
     first: int,
     low: float,
     step: float,
 ) -> None:
     """Raise `buffer` where a block of triangles, numbered from `first`, is nearest."""
-    x, y = columns[0][triangles.T], columns[1][triangles.T]
+    x, y = points[0][triangles.T], points[1][triangles.T]
     # With y downwards a triangle that faces the eye has a negative area.
     area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])
     facing = np.flatnonzero(area < 0.0)
     x, y, area = x[:, facing], y[:, facing], area[facing]
-    z = (columns[2][triangles.T[:, facing]] - low) / step
+    z = (points[2][triangles.T[:, facing]] - low) / step
     slope_x = ((z[1] - z[0]) * (y[2] - y[0]) - (z[2] - z[0]) * (y[1] - y[0])) / area
     slope_y = ((z[2] - z[0]) * (x[1] - x[0]) - (z[1] - z[0]) * (x[2] - x[0])) / area
     # A sliver seen edge-on has no slope worth the name: keep it within the range of depths.

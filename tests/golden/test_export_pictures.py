@@ -92,7 +92,7 @@ def test_the_nearest_triangle_wins() -> None:
     )
     order = np.array([[0, 2, 1], [1, 2, 3], [4, 6, 5], [4, 5, 6]])
     screen = np.empty((20, 20), np.int64)
-    seen = rasterise(points, order, screen)
+    seen = rasterise(points.T.copy(), order, screen)
     picture = np.zeros((20, 20), np.uint32)
     seen.paint(picture, np.array([1, 2, 3, 4], np.uint32))
     assert picture[0, 0] == 1
@@ -100,6 +100,7 @@ def test_the_nearest_triangle_wins() -> None:
     assert picture[5, 5] == 1  # there the third triangle lies behind
     assert picture[9, 9] == 3
     assert set(np.unique(picture).tolist()) == {1, 2, 3}  # the fourth turns its back
+    assert seen.triangles_seen(5).tolist() == [0, 1, 2]
     assert seen.depths(np.array([9]), np.array([9]))[0] == pytest.approx(-1 + 4 * 9 / 10, abs=1e-6)
 
 
