@@ -197,7 +197,7 @@ def encode(
         plan = plan_object(choice.specs[0], polyhedron)
         return [dataclasses.replace(plan, notes=(*plan.notes, *choice.notes))]
 
-    engine, (plan,) = plan_in_lab(
+    engine, (plan,), rehearsal = plan_in_lab(
         [located], url, plan_solid, lab_key="", make=True, replace_changed=replace, solid=polyhedron
     )
     assert engine is not None  # it was made
@@ -207,6 +207,7 @@ def encode(
         plan.spec.formats if formats is None else tuple(formats),
         verify,
         replace,
+        rehearsal=rehearsal,
     )
     product = make_under_lock(engine, order)
     layout = product.placed.layout

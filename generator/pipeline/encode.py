@@ -27,11 +27,10 @@ from generator.pipeline.faces import face_reports
 from generator.pipeline.files import parts_of
 from generator.pipeline.lab import lab_of
 from generator.pipeline.made import Encoded, MadeObject, describe_object
-from generator.pipeline.make import Order, make_under_lock
+from generator.pipeline.make import Order, Rehearsal, make_under_lock
 from generator.pipeline.place import occupancy_of, occupancy_with, place_object
 from generator.pipeline.plan import ObjectPlan, plan_object
 from generator.pipeline.progress import Progress, no_progress, part_of_progress
-from generator.pipeline.sets import make_set, set_folder
 from generator.polyhedron import Polyhedron
 from generator.spec import LocatedSpec
 
@@ -100,7 +99,7 @@ def encode(
             plans.append(dataclasses.replace(plan, notes=(*plan.notes, *notes)))
         return plans
 
-    engine, plans = plan_in_lab(
+    engine, plans, rehearsal = plan_in_lab(
         specs, url, plan_all, lab_key=lab_key, make=not dry_run, replace_changed=replace
     )
     rest = part_of_progress(progress, 0.1, 1.0)
@@ -112,13 +111,15 @@ def encode(
         orders = [
             Order(
                 plan, _folder(plan, folder, len(plans)), _formats(plan, formats), verify, replace,
-                slice_plates and len(plans) == 1,
+                slice_plates and len(plans) == 1, rehearsal,
             )
             for plan in plans
         ]  # fmt: skip
         if len(orders) == 1:
             made = [make_under_lock(engine, orders[0], rest).made]
         else:
+            from generator.pipeline.sets import make_set, set_folder  # loads what sets alone need
+
             made, files = make_set(
                 engine, url, orders, set_folder(orders, folder), jobs, rest,
                 slice_plates=slice_plates,
@@ -139,8 +140,8 @@ def plan_in_lab(
     make: bool,
     replace_changed: bool,
     solid: Polyhedron | None = None,
-) -> tuple[Engine | None, list[ObjectPlan]]:
-    """Return a lab's database, and the plans of objects on its array.
+) -> tuple[Engine | None, list[ObjectPlan], Rehearsal | None]:
+    """Return a lab's database, the plans of objects on its array, and how one was rehearsed.
 
     Parameters
     ----------
@@ -161,32 +162,34 @@ def plan_in_lab(
             choice = choose_array(specs, lab, connection, solid, replace_changed=replace_changed)
         plans = plan_all(choice)
         if engine is not None or not make:
-            return engine, plans
-        _try_all(plans)
+            return engine, plans, None
+        rehearsal = _rehearse_first(plans)
         engine = open_database(url, lab_key=lab.key)
         with read_transaction(engine) as connection:
             if stored_lab_key(connection) == lab.key:
-                return engine, plans
+                return engine, plans, rehearsal
 
 
-def _try_all(plans: Sequence[ObjectPlan]) -> None:
+def _rehearse_first(plans: Sequence[ObjectPlan]) -> Rehearsal | None:
     """Lay out and build one of each kind, so that what is refused leaves no empty database.
 
-    Where they fill more than half of the array, places are found for all.
+    Where they fill more than half of the array, places are found for all. What was built of a
+    single object is returned.
     """
     kinds: dict[str, int] = {}
     needed = 0
     for plan in plans:
         kind = json.dumps(plan.meaning, sort_keys=True, default=str)
         if kind not in kinds:
-            layout = place_object(None, plan, replace=False).layout
-            parts_of(plan, layout)
-            kinds[kind] = sum(len(face.labels) for face in layout.faces)
+            place = place_object(None, plan, replace=False)
+            rehearsal = Rehearsal(place, parts_of(plan, place.layout))
+            kinds[kind] = sum(len(face.labels) for face in place.layout.faces)
         needed += kinds[kind]
     if 2 * needed > plans[0].array.rows * plans[0].array.columns:
         taken = occupancy_of(None, plans[0])
         for plan in plans:
             taken = occupancy_with(taken, place_object(None, plan, False, taken).layout)
+    return rehearsal if len(plans) == 1 else None
 
 
 def _rehearse(

@@ -20,8 +20,7 @@ from generator.export.atomic import StagedFile, Staging
 from generator.export.fit_check import FitReport, PanelFile, verify_fit
 from generator.export.glb import glb_bytes
 from generator.export.preview import preview_png
-from generator.export.robot.files import ROBOT_FORMATS, robot_files
-from generator.export.robot.model import robot_model
+from generator.export.robot import ROBOT_FORMATS
 from generator.export.slicer_settings import SlicerSettings, slicer_settings
 from generator.export.step import assembly_chunks, gzip_chunks, step_chunks
 from generator.export.stl import stl_chunks
@@ -45,6 +44,8 @@ from generator.solid import (
     volume,
 )
 
+BuiltParts = tuple[tuple[Part, ...], tuple[str, ...]]  #: of `parts_of`: the parts, what they lack
+
 
 @dataclass(frozen=True, slots=True)
 class StagedObject:
@@ -60,6 +61,7 @@ class StagedObject:
 def stage(
     plan: ObjectPlan,
     layout: Layout,
+    built: BuiltParts,
     formats: Sequence[str],
     staging: Staging,
     *,
@@ -67,12 +69,14 @@ def stage(
     slice_plates: bool = False,
     progress: Progress,
 ) -> StagedObject:
-    """Build the parts of an object and write all its files into the staging folder.
+    """Write all files of an object into the staging folder.
 
     Parameters
     ----------
     plan, layout
         The object and its symbols.
+    built
+        From `parts_of`.
     formats
         Of step, stl, 3mf, glb, stpz, mjcf, urdf, sdf, usd; the pictures are always made.
     verify
@@ -88,8 +92,7 @@ def stage(
         A file cannot be written.
     """
     spec = plan.spec
-    progress("building the parts", 0.0)
-    parts, warnings = parts_of(plan, layout)
+    parts, warnings = built
     for part in parts:
         prove_closed(part)
     meshes = [triangles(part) for part in parts]
@@ -187,6 +190,9 @@ def _stage_robot(
     verify: bool,
 ) -> tuple[str, ...]:
     """Write what robots and simulators load; return what it lacks."""
+    from generator.export.robot.files import robot_files  # few want them
+    from generator.export.robot.model import robot_model
+
     spec = plan.spec
     with errors_at(plan.located, "robot.collision, robot"):
         model = robot_model(
@@ -201,7 +207,7 @@ def _stage_robot(
     return model.warnings
 
 
-def parts_of(plan: ObjectPlan, layout: Layout) -> tuple[tuple[Part, ...], tuple[str, ...]]:
+def parts_of(plan: ObjectPlan, layout: Layout) -> BuiltParts:
     """Return the parts of an object, panels or the whole body, and what they lack."""
     spec = plan.spec
     if spec.parts == "whole":

@@ -20,11 +20,19 @@ from generator.database.register import ObjectRecord, register
 from generator.database.transaction import LostRaceError, write_transaction
 from generator.database.url import part_file
 from generator.export.atomic import Staging
-from generator.pipeline.files import StagedObject, stage
+from generator.pipeline.files import BuiltParts, StagedObject, parts_of, stage
 from generator.pipeline.made import MadeObject, describe_object
-from generator.pipeline.place import ObjectPlacement, place_object
+from generator.pipeline.place import ObjectPlacement, occupancy_of, place_object
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress, no_progress, part_of_progress
+
+
+@dataclass(frozen=True, slots=True)
+class Rehearsal:
+    """An object built before there was a database: alone on its array."""
+
+    place: ObjectPlacement
+    built: BuiltParts
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +45,7 @@ class Order:
     verify: bool = False
     replace: bool = False
     slice_plates: bool = False
+    rehearsal: Rehearsal | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +62,7 @@ def make_under_lock(engine: Engine, order: Order, progress: Progress = no_progre
     with Staging(order.folder) as staging:
         with write_transaction(engine) as connection:
             progress(f"placing {name}", 0.0)
-            place = place_object(connection, order.plan, order.replace)
+            place = _place(connection, order)
             files = _stage(order, place, staging, part_of_progress(progress, 0.1, 0.9))
             progress(f"registering {name}", 0.9)
             _register(connection, order, place, files)
@@ -77,11 +86,27 @@ def make_at(
         return make_under_lock(engine, order, progress)
 
 
+def _place(connection: Connection, order: Order) -> ObjectPlacement:
+    """Find the object's place: that of the rehearsal where the array is as empty as it was then."""
+    plan, rehearsal = order.plan, order.rehearsal
+    if rehearsal is not None:
+        known = find_object(connection, plan.spec.name)
+        if known is None and not occupancy_of(connection, plan).used:
+            return rehearsal.place
+    return place_object(connection, plan, order.replace)
+
+
 def _stage(
     order: Order, place: ObjectPlacement, staging: Staging, progress: Progress
 ) -> StagedObject:
+    progress("building the parts", 0.0)
+    rehearsal = order.rehearsal
+    if rehearsal is not None and place is rehearsal.place:
+        built = rehearsal.built
+    else:
+        built = parts_of(order.plan, place.layout)
     return stage(
-        order.plan, place.layout, order.formats, staging, verify=order.verify,
+        order.plan, place.layout, built, order.formats, staging, verify=order.verify,
         slice_plates=order.slice_plates, progress=progress,
     )  # fmt: skip
 

@@ -22,7 +22,7 @@ from generator.database.read import read_layout, read_parts
 from generator.database.register import require_in_use
 from generator.database.transaction import read_transaction
 from generator.export.overview import can_draw
-from generator.export.robot.files import ROBOT_FORMATS
+from generator.export.robot import ROBOT_FORMATS
 from generator.pipeline.made import MadeObject, describe_object
 from generator.pipeline.make import Order, Product, make_at
 from generator.pipeline.parallel import Engines, Task, Workers

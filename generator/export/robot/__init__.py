@@ -9,3 +9,5 @@
 Metres, kilograms, radians. The origin is that of the object frame, so that the frame of a
 face is its `T_object_face`.
 """
+
+ROBOT_FORMATS = ("mjcf", "urdf", "sdf", "usd")

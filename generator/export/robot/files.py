@@ -16,7 +16,6 @@ WITH_MESHES: dict[str, tuple[str, Callable[[RobotModel], bytes]]] = {
     "sdf": (".sdf", sdf_bytes),
 }
 _BLOCK = 65_536  #: lines written at once
-ROBOT_FORMATS = (*WITH_MESHES, "usd")
 
 
 def robot_files(

@@ -21,7 +21,8 @@ from generator.errors import DatabaseError
 from generator.layout import occupancy
 from generator.layout.occupancy import tiles_of
 from generator.pipeline import encode
-from generator.pipeline.make import Order, make_at, make_under_lock
+from generator.pipeline.files import parts_of
+from generator.pipeline.make import Order, Rehearsal, make_at, make_under_lock
 from generator.pipeline.parallel import Task, Workers
 from generator.pipeline.place import place_object
 from generator.pipeline.plan import plan_object
@@ -198,6 +199,32 @@ def test_who_loses_his_cells_to_another_writer_places_anew(tmp_path):
         for name in "AB":
             for face in read_layout(connection, name).faces:
                 cells += zip(face.rows.tolist(), face.columns.tolist(), strict=True)
+    assert len(set(cells)) == len(cells) == first.made.symbols + second.made.symbols
+
+
+def test_a_rehearsal_counts_while_the_array_is_empty(tmp_path):
+    located = specs(tmp_path)
+    engine = open_database(f"sqlite:///{tmp_path / 'lab.db'}")
+    orders = []
+    for one in located[:2]:
+        plan = plan_object(one)
+        place = place_object(None, plan, replace=False)
+        rehearsal = Rehearsal(place, parts_of(plan, place.layout))
+        orders.append(Order(plan, tmp_path / one.spec.name, (), rehearsal=rehearsal))
+    first, second = (make_under_lock(engine, order) for order in orders)
+    again = make_under_lock(engine, orders[0])
+    assert first.placed is orders[0].rehearsal.place
+    assert second.placed is not orders[1].rehearsal.place  # the first one's cells were free then
+    assert again.placed is not orders[0].rehearsal.place  # registered: its own cells
+    assert again.placed.reused
+    with read_transaction(engine) as connection:
+        held = [read_layout(connection, name).faces for name in "AB"]
+    cells = [
+        cell
+        for faces in held
+        for face in faces
+        for cell in zip(face.rows.tolist(), face.columns.tolist(), strict=True)
+    ]
     assert len(set(cells)) == len(cells) == first.made.symbols + second.made.symbols
 
 
