@@ -23,7 +23,8 @@ Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, a
 def init(
     shape: Annotated[
         str, typer.Argument(help="cube, box, triangular_prism, tetrahedron, octahedron, "
-                                 "dodecahedron, prism, pyramid, polyhedron or file."),
+                                 "dodecahedron, prism, pyramid, cylinder, cone, "
+                                 "polyhedron or file."),
     ] = "cube",
     file: Annotated[
         Path | None,

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from generator.command import run
+from generator.spec.shape import KINDS
 
 FIXTURES = Path(__file__).parents[3] / "fixtures"
 HEAVY = ("numpy", "sqlalchemy", "yaml", "manifold3d", "PIL", "scipy", "shapely", "trimesh", "OCP",
@@ -288,3 +289,8 @@ def test_output_into_a_closed_pipe_is_no_traceback():
     process.stderr.close()
     assert process.wait(timeout=30) == 1
     assert messages == b""
+
+
+def test_init_names_every_shape():
+    said = command("init", "--help").stdout
+    assert [kind for kind in KINDS if kind not in said] == []
