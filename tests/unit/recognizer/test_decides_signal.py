@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from probe.sensor import SensorType
 from recognizer.touch.settings import SignalSettings
-from recognizer.touch.signal import noise_of, signal_of
+from recognizer.touch.signal import noise_of, signal_limits, signal_of
 
 
 def rows_of(*sums, turned=False):
@@ -203,3 +204,38 @@ def test_the_background_is_what_most_free_tactels_read():
     assert at == pytest.approx(np.full(at.size, 8.0), abs=1.2)
     assert (found.forces[free] == 0).mean() == pytest.approx(0.5, abs=0.15)
     assert signal_of(np.full((16, 16), 7.0)).forces.max() == 0.0
+
+
+@pytest.mark.parametrize(("sigmas", "contact"), [(6.9, False), (7.1, True)])
+def test_a_contact_rises_by_seven_deviations_of_readings_on_a_scale(sigmas, contact):
+    image = 0.01 * np.random.default_rng(9).normal(0.0, 1.0, (16, 16))
+    level, noise = float(np.quantile(image, 0.05)), noise_of(image.ravel())
+    image.ravel()[:6] = level + sigmas * noise
+    assert noise_of(image.ravel()) == pytest.approx(noise, rel=0.01)
+    assert signal_of(image).contact is contact
+
+
+def test_a_contact_rises_by_six_deviations_of_a_noisy_type():
+    assert signal_limits(SensorType(noise=4.0)).contact_counts == pytest.approx(24.0)
+    assert signal_limits(SensorType(noise=1.0)).contact_counts == pytest.approx(8.0)
+
+
+def rising(strong):
+    """A hundred readings: a third rise evenly, a third lie close together, ten are strong."""
+    sums = [np.arange(30.0), 50.0 + np.arange(60.0) / 100, np.full(10, strong)]
+    return np.concatenate(sums).reshape(10, 10)
+
+
+def test_the_background_is_no_higher_over_the_lowest_than_a_fifth_of_the_tactels_nearly_is():
+    image = rising(500.0)
+    lowest, fifth = np.quantile(image, [0.05, 0.2])
+    level = lowest + 1.4 * (fifth - lowest)  # the densest, 50, are higher
+    assert signal_of(image).forces[9] == pytest.approx(np.full(10, 500.0 - level))
+
+
+@pytest.mark.parametrize(("over", "even"), [(1.55, True), (1.65, False)])
+def test_where_few_tactels_stand_out_all_of_them_are_pressed(over, even):
+    lowest, middle = np.quantile(rising(500.0), [0.05, 0.5])
+    strong = middle + over * (middle - lowest)
+    found = signal_of(rising(strong)).forces[9, 9]
+    assert bool(found == pytest.approx(strong - lowest)) is even
