@@ -1,7 +1,7 @@
 """A solid of build123d, cadquery or trimesh -> polyhedron. mm.
 
 The first two go through the kernel that holds them; of a mesh, coplanar triangles that hang
-together become one face, as in an STL file.
+together become one face and curved regions stay blank, as in an STL file.
 """
 
 from __future__ import annotations
@@ -13,10 +13,9 @@ import numpy as np
 from generator.errors import ShapeError
 from generator.polyhedron import Polyhedron
 from generator.polyhedron.read.kernel import describe_shape
-from generator.polyhedron.read.merge import merge_triangles
+from generator.polyhedron.read.mesh import solid_of_soup
 from generator.polyhedron.read.soup import soup_of_triangles
 from generator.polyhedron.read.step import polyhedron_of
-from generator.polyhedron.winged import polyhedron
 
 PLACE = "the solid"
 
@@ -37,9 +36,7 @@ def polyhedron_from(solid: Any) -> Polyhedron:
     """
     triangles = getattr(solid, "triangles", None)  # of trimesh.Trimesh, (n, 3, 3)
     if isinstance(triangles, np.ndarray):
-        return polyhedron(
-            "solid", *merge_triangles(soup_of_triangles(np.array(triangles, float), PLACE))
-        )
+        return solid_of_soup(soup_of_triangles(np.array(triangles, float), PLACE), "solid")
     return polyhedron_of(describe_shape(_kernel_shape(solid)), PLACE, "solid")
 
 

@@ -53,6 +53,7 @@ def crossing_problems(surface: Surface) -> list[FaceProblem]:
         own[[v for loop in loops for v in loop]] = True
         origin = vertices[loops[0][0]]
         x, y, z = face_axes(vertices, loops)
+        problems += _chord_problems(surface, name, loops, edges[own[edges].all(axis=1)])
         height = (vertices - origin) @ z
         height[own] = 0.0
         if height.max() <= tolerance and not (np.abs(height[~own]) <= tolerance).any():
@@ -75,6 +76,27 @@ def crossing_problems(surface: Surface) -> list[FaceProblem]:
             cause = f"the edge between vertices {v} and {w} runs through it at {_point(point[k])}"
             problems.append(FaceProblem(name, cause, "a solid must not cut through itself"))
     return problems
+
+
+def _chord_problems(
+    surface: Surface, name: str, loops: Loops, joined: NDArray[np.intp]
+) -> list[FaceProblem]:
+    """Find edges of other faces between two vertices of this one that lie on it."""
+    own = {(min(edge), max(edge)) for edge in directed_edges(loops)}
+    chords = [(int(v), int(w)) for v, w in joined if (v, w) not in own]
+    if not chords:
+        return []
+    origin = surface.vertices[loops[0][0]]
+    axes = np.stack(face_axes(surface.vertices, loops)[:2], axis=1)
+    polygon = [(surface.vertices[list(loop)] - origin) @ axes for loop in loops]
+    middle = surface.vertices[np.array(chords)].mean(axis=1)
+    inside = side_of_polygon(polygon, (middle - origin) @ axes) > 0
+    fix = "move it away, or join the faces there"
+    return [
+        FaceProblem(name, f"the edge between vertices {v} and {w} of other faces lies on it", fix)
+        for (v, w), hit in zip(chords, inside, strict=True)
+        if hit
+    ]
 
 
 def _duplicate_vertices(surface: Surface, tolerance: float) -> list[FaceProblem]:

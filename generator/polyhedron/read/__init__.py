@@ -12,9 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from generator.errors import ShapeError
-from generator.polyhedron.read.merge import merge_triangles
+from generator.polyhedron.read.mesh import solid_of_soup
 from generator.polyhedron.read.obj import read_obj
-from generator.polyhedron.read.regions import mesh_polyhedron
 from generator.polyhedron.read.settings import MODEL
 from generator.polyhedron.read.soup import Soup
 from generator.polyhedron.read.step import read_step
@@ -64,8 +63,7 @@ def read_shape(path: str | Path, scale: float = 1.0) -> Polyhedron:
         if suffix not in MESHES:
             solid = read_step(content, place, scale)
         else:
-            vertices, faces = merge_triangles(MESHES[suffix](content, place))
-            solid = mesh_polyhedron(scale * vertices, faces)
+            solid = solid_of_soup(MESHES[suffix](content, place), "file", scale)
         _check_size(solid)
         return solid
     except ShapeError as error:

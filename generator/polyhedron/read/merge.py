@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from generator.errors import ShapeError
 from generator.plane.polygon import area_vector
+from generator.polyhedron.read.bodies import check_one_body
 from generator.polyhedron.read.settings import MODEL
 from generator.polyhedron.read.soup import Soup, cluster_labels
 from generator.polyhedron.read.tee import split_at_tees
@@ -30,11 +31,14 @@ def merge_triangles(soup: Soup) -> tuple[Floats, Faces]:
     Raises
     ------
     ShapeError
-        An open, branching or inconsistently oriented mesh (with the first place), or a
-        surface of more than `MODEL.most_facets` planar faces, or a face that is not planar.
+        An open, branching or inconsistently oriented mesh (with the first place), one of
+        several bodies, a flat one, a surface of more than `MODEL.most_facets` planar faces, or
+        a face that is not planar.
     """
+    _check_flat(soup)
     soup = split_at_tees(soup)
     twin = _twins(soup)
+    check_one_body(soup, twin)
     group = _coplanar_groups(soup, twin)
     boundary = group[soup.face] != group[soup.face[twin]]
     loops = _boundary_loops(soup, twin, boundary)
@@ -55,6 +59,18 @@ def merge_triangles(soup: Soup) -> tuple[Floats, Faces]:
         tuple(tuple(int(renumber[v]) for v in loop) for loop in _outer_first(soup.points, faces[g]))
         for g in sorted(faces)
     ]
+
+
+def _check_flat(soup: Soup) -> None:
+    points = soup.points[soup.origin]
+    points = points - points.mean(axis=0)
+    _, axes = np.linalg.eigh(points.T @ points)  # the first one with the least spread
+    thickness = float(np.ptp(points @ axes[:, 0]))
+    if thickness <= 2.0 * _distance(soup):
+        raise ShapeError(
+            "it is flat: all its points lie in one plane",
+            fix="give it a thickness in the program that made it, and export it again",
+        )
 
 
 def _twins(soup: Soup) -> Integers:
@@ -117,12 +133,13 @@ def _coplanar_groups(soup: Soup, twin: Integers) -> Integers:
     )
     flat = (off <= tolerance) & (turn <= allowed) & ~sliver[large] & ~sliver[small]
     group = cluster_labels(np.arange(count), large[flat], small[flat])
-    group = _with_slivers(group, sliver, large, small, off, turn, tolerance)
+    plane = (normal, corner)
+    group = _with_slivers(soup, group, sliver, large, small, off, turn, plane)
     bent = _bends(soup, group, vector, corner) > 2.0 * tolerance
     if bent[group].any():  # of a curved surface: each of its polygons is a face
         flat &= ~bent[group[large]]
         group = cluster_labels(np.arange(count), large[flat], small[flat])
-        group = _with_slivers(group, sliver, large, small, off, turn, tolerance)
+        group = _with_slivers(soup, group, sliver, large, small, off, turn, plane)
     _check_groups(soup, group, vector, corner)
     return group
 
@@ -149,17 +166,25 @@ def _farthest_off_plane(
 
 
 def _with_slivers(
+    soup: Soup,
     group: Integers,
     sliver: NDArray[np.bool_],
     large: Integers,
     small: Integers,
     off: Floats,
     turn: Floats,
-    tolerance: float,
+    plane: tuple[Floats, Integers],
 ) -> Integers:
-    """Join each sliver to the one neighbour that it fits best, its normal being noise."""
+    """Join each sliver to the one neighbour that it fits best, its normal being noise.
+
+    Through another sliver it joins the face that this one lies in, if it lies in that plane too:
+    slivers of an upright wall meet those of a top.
+    """
     group = group.copy()
+    normal, corner = plane
+    tolerance = _distance(soup)
     waiting = {int(f) for f in np.flatnonzero(sliver)}
+    host = np.arange(len(group))  # the polygon, no sliver, in whose plane a polygon lies
     pairs = np.flatnonzero((sliver[large] | sliver[small]) & (off <= tolerance))
     pairs = pairs[np.argsort(turn[pairs], kind="stable")]
     while waiting:
@@ -169,7 +194,12 @@ def _with_slivers(
             if (f in waiting) == (g in waiting):
                 continue
             thin, other = (f, g) if f in waiting else (g, f)
-            group[thin] = group[other]
+            if sliver[other]:
+                own = soup.points[soup.origin[soup.face == thin]]
+                height = (own - soup.points[corner[host[other]]]) @ normal[host[other]]
+                if np.abs(height).max() > tolerance:
+                    continue
+            group[thin], host[thin] = group[other], host[other]
             waiting.discard(thin)
         if len(waiting) == before:
             break

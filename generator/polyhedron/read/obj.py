@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import codecs
+
 import numpy as np
 
 from generator.errors import ShapeError
@@ -25,7 +27,7 @@ def read_obj(content: bytes, place: str) -> Soup:
     """Return the polygons of an OBJ file; `place` names it in messages."""
     points: list[tuple[float, ...]] = []
     faces: list[tuple[tuple[int, ...]]] = []
-    text = content.decode("utf-8", "replace").replace("\\\r\n", " \n").replace("\\\n", " ")
+    text = _text(content, place).replace("\\\r\n", " \n").replace("\\\n", " ")
     for line, row in enumerate(text.splitlines(), start=1):
         word, *rest = row.split("#", 1)[0].split() or [""]
         where = f"{place}:{line}"
@@ -44,17 +46,35 @@ def read_obj(content: bytes, place: str) -> Soup:
     return soup_of_loops(np.array(points, dtype=np.float64).reshape(-1, 3), faces, place)
 
 
+def _text(content: bytes, place: str) -> str:
+    """Return the text of a file in UTF-8, or in UTF-16 that begins with its byte order mark."""
+    if content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+        return content.decode("utf-16", "replace")
+    if (zero := content.find(b"\0")) >= 0:
+        cause = f"it is no plain text: byte {zero} is zero"
+        raise ShapeError(cause, fix="save it as text (UTF-8), or export it again", place=place)
+    return content.decode("utf-8-sig", "replace")
+
+
 def _point(words: list[str], place: str) -> tuple[float, ...]:
     try:
         x, y, z = (float(word) for word in words[:3])  # a weight or colours may follow
     except ValueError:
         shown = " ".join(words)[:60]
-        raise ShapeError(
-            f"'v {shown}' is not a point: it has three numbers", fix=_AGAIN, place=place
-        ) from None
+        wrong = [word for word in words[:3] if not _is_number(word)]
+        why = f"'{wrong[0][:20]}' is no number" if wrong else "it has three numbers"
+        raise ShapeError(f"'v {shown}' is not a point: {why}", fix=_AGAIN, place=place) from None
     if not np.isfinite((x, y, z)).all():
         raise ShapeError("a coordinate is not a number", fix=_AGAIN, place=place)
     return x, y, z
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
 def _loop(words: list[str], count: int, place: str) -> tuple[int, ...]:

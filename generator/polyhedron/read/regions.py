@@ -24,7 +24,7 @@ Loops = tuple[tuple[int, ...], ...]
 LISTED = 6  # regions that a note names with their places
 
 
-def mesh_polyhedron(vertices: Floats, faces: list[Loops]) -> Polyhedron:
+def mesh_polyhedron(kind: str, vertices: Floats, faces: list[Loops]) -> Polyhedron:
     """Return the solid of a mesh; of more than `MODEL.most_faces`, curved regions stay blank.
 
     Planar faces are called F1, F2, ... in the order of the file, then each curved region is one
@@ -36,7 +36,7 @@ def mesh_polyhedron(vertices: Floats, faces: list[Loops]) -> Polyhedron:
         As `polyhedron` does.
     """
     if len(faces) <= MODEL.most_faces:
-        return polyhedron("file", vertices, faces)
+        return polyhedron(kind, vertices, faces)
     regions = curved_regions(vertices, faces)
     curved = {face for region in regions for face in region}
     names = {}
@@ -45,7 +45,7 @@ def mesh_polyhedron(vertices: Floats, faces: list[Loops]) -> Polyhedron:
     first = len(names) + 1
     for number, region in enumerate(regions, first):
         names |= {f: f"F{number}.{k}" if k > 1 else f"F{number}" for k, f in enumerate(region, 1)}
-    solid = polyhedron("file", vertices, [Face(names[k], loops) for k, loops in enumerate(faces)])
+    solid = polyhedron(kind, vertices, [Face(names[k], loops) for k, loops in enumerate(faces)])
     blank = tuple(sorted(curved))
     notes = (*solid.notes, *_notes(vertices, faces, regions, first))
     return replace(solid, blank=blank, notes=notes)

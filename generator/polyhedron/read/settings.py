@@ -31,6 +31,8 @@ class ModelSettings:
     # soup.py
     weld: float = 1e-6
     """Points nearer than this share of the size are one point."""
+    coarse_weld: float = 1e-5
+    """As `weld`, tried where this makes no solid: notches as wide as a rounding of the program."""
     digits: float = 1e-6
     """Share of a coordinate that is noise: seven digits, in float32 as in ASCII STL (%e)."""
     largest_coordinate_mm: float = 1e6

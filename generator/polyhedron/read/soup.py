@@ -44,12 +44,22 @@ def soup_of_triangles(corners: NDArray[np.float64], place: str) -> Soup:
     return _soup(corners.reshape(-1, 3), starts, np.full(count, 3), np.arange(count), place)
 
 
+def welded_coarsely(soup: Soup) -> Soup:
+    """Return the soup with points joined that lie nearer than `MODEL.coarse_weld` says."""
+    after = np.append(soup.following[:-1] != np.arange(1, len(soup.following)), True)
+    last = np.flatnonzero(after)  # half-edges of a loop stand one behind another
+    lengths = np.diff(last, prepend=-1)
+    owner = soup.face[last]
+    return _soup(soup.points, soup.origin, lengths, owner, "", MODEL.coarse_weld)
+
+
 def _soup(
     points: NDArray[np.float64],
     starts: NDArray[np.intp],
     lengths: NDArray[np.intp],
     owner: NDArray[np.intp],
     place: str,
+    share: float = MODEL.weld,
 ) -> Soup:
     if len(starts) == 0:
         raise ShapeError("the file holds no faces", fix="export the solid as a mesh", place=place)
@@ -62,7 +72,7 @@ def _soup(
             place=place,
         )
     size = float(np.linalg.norm(np.ptp(used, axis=0)))
-    noise = MODEL.weld * size + MODEL.digits * reach
+    noise = share * size + MODEL.digits * reach
     welded, number = weld(points, noise)
     origin = number[starts]
     loop = np.repeat(np.arange(len(lengths)), lengths)

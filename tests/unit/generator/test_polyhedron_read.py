@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from generator.errors import ShapeError
-from generator.polyhedron import SHAPES, dihedral, face_area, polyhedron, surface_area, volume
+from generator.polyhedron import SHAPES, dihedral, face_area, surface_area, volume
 from generator.polyhedron.read import merge, read_shape
 from generator.polyhedron.read.settings import MODEL
 
@@ -163,15 +163,73 @@ def test_other_broken_meshes_are_told_apart(tmp_path):
     assert "3 edges have more than two faces" in doubled.cause
     turned = refused(written(tmp_path, "t.stl", binary_stl([triangles[0][::-1], *triangles[1:]])))
     assert "disagree about outside" in turned.cause
-    far = [np.array(t) + 200 for t in triangles]
-    assert (
-        "2 separate shells"
-        in refused(written(tmp_path, "2.stl", binary_stl(triangles + far))).cause
-    )
     flat = [(p, q, r) for p, q, r in triangles[:2]] + [(r, q, p) for p, q, r in triangles[:2]]
-    assert refused(written(tmp_path, "f.stl", binary_stl(flat))).fix
+    assert "it is flat" in refused(written(tmp_path, "f.stl", binary_stl(flat))).cause
     dot = [np.zeros((3, 3))] * 4
     assert "smaller than a rounding" in refused(written(tmp_path, "0.stl", binary_stl(dot))).cause
+
+
+def test_bodies_are_counted_and_described(tmp_path):
+    cube = np.array(triangles_of(SHAPES["cube"](side=60)))
+    middle = cube.mean(axis=(0, 1))
+    small = middle + 200 + (cube - middle) / 3
+    void = (middle + (cube - middle) / 2)[:, ::-1]
+    many = np.concatenate([small, cube, void])
+    error = refused(written(tmp_path, "3.stl", binary_stl(many)))
+    x, y, z = middle
+    assert error.cause == (
+        f"3 separate bodies: 60 x 60 x 60 mm about ({x:g}, {y:g}, {z:g}), a void of 30 x 30 x 30 "
+        f"mm about ({x:g}, {y:g}, {z:g}), 20 x 20 x 20 mm about ({x + 200:g}, {y + 200:g}, "
+        f"{z + 200:g}); one solid has one"
+    )
+    assert "boolean union" in error.fix
+    six = np.concatenate([cube + 100 * k for k in range(6)])
+    assert ", 2 smaller; one" in refused(written(tmp_path, "6.stl", binary_stl(six))).cause
+
+
+def prism(ring, height, caps):
+    """Return the triangles of a prism over a ring (x, y), its caps as triangles of the ring."""
+    found = []
+    for (a, b), (c, d) in zip(ring, ring[1:] + ring[:1], strict=True):
+        found += [
+            ((a, b, 0), (c, d, 0), (c, d, height)),
+            ((a, b, 0), (c, d, height), (a, b, height)),
+        ]
+    for cap in caps:
+        found += [[(*ring[k], height) for k in cap], [(*ring[k], 0) for k in reversed(cap)]]
+    return found
+
+
+def test_a_notch_of_a_rounding_is_welded_and_it_is_said(tmp_path):
+    """The mouth of a notch 1.2 um wide is closed, so that its outline touches itself."""
+    ring = [(0, 0), (100, 0), (100, 20), (50, 20), (50.0006, 19.9992), (49.9994, 19.9992),
+            (50, 20), (0, 20)]  # fmt: skip
+    faces = [f"f {' '.join(str(k + 1) for k in reversed(range(8)))}", "f 9 10 11 12 13 14 15 16"]
+    faces += [f"f {k + 1} {(k + 1) % 8 + 1} {(k + 1) % 8 + 9} {k + 9}" for k in range(8)]
+    points = [f"v {x} {y} {z}" for z in (0, 30) for x, y in ring]
+    solid = read_shape(written(tmp_path, "notch.obj", "\n".join(points + faces)))
+    assert len(solid.faces) == 6
+    assert volume(solid) == pytest.approx(100 * 20 * 30, rel=1e-6)
+    assert solid.notes == ("points nearer than 0.0023 mm were joined",)
+
+
+def test_slivers_of_a_wall_do_not_join_the_top(tmp_path):
+    """Between two walls that meet the top stands one 1.5 um wide, and a sliver of the top."""
+    ring = [(0, 0), (100, 0), (100, 60), (60, 60.0015), (60, 60), (0, 60)]
+    found = prism(ring, 40, [(0, k, k + 1) for k in range(1, 5)])
+    solid = read_shape(written(tmp_path, "w.stl", binary_stl(found)))
+    assert volume(solid) == pytest.approx(100 * 60 * 40, rel=1e-4)
+
+
+def test_obj_in_utf_16_is_read_and_other_bytes_are_named(tmp_path):
+    for encoding in ("utf-16", "utf-8-sig"):
+        solid = read_shape(written(tmp_path, "t.obj", TETRAHEDRON.encode(encoding)))
+        assert volume(solid) == pytest.approx(60**3 / 6)
+    error = refused(written(tmp_path, "t.obj", TETRAHEDRON.encode("utf-16-le")))
+    assert (error.cause, error.fix[:15]) == (
+        "it is no plain text: byte 1 is zero",
+        "save it as text",
+    )
 
 
 def sphere(rows, columns, radius=30.0):
@@ -314,7 +372,8 @@ def test_step_that_crashes_the_kernel_is_refused(tmp_path):
         ("a.obj", TETRAHEDRON + "f 1 0 2\n", "a.obj:9", "there is no vertex 0"),
         ("a.obj", TETRAHEDRON + "f 1 2\n", "a.obj:9", "a face of 2 vertices"),
         ("a.obj", TETRAHEDRON + "f a b c\n", "a.obj:9", "does not name vertices"),
-        ("a.obj", TETRAHEDRON + "v 1 2\n", "a.obj:9", "not a point"),
+        ("a.obj", TETRAHEDRON + "v 1 2\n", "a.obj:9", "not a point: it has three numbers"),
+        ("a.obj", TETRAHEDRON + "v 1 2 3.1+e2\n", "a.obj:9", "'3.1+e2' is no number"),
         ("a.obj", TETRAHEDRON + "surf 1 2\n", "a.obj:9", "free-form"),
         ("a.obj", TETRAHEDRON + "?\n", "a.obj:9", "no word of OBJ"),
         ("a.obj", "v 0 0 0\n", "a.obj", "no faces"),
@@ -345,13 +404,17 @@ def test_missing_and_large_files(tmp_path, monkeypatch):
 
 
 def test_faces_of_a_file_are_named_with_the_file(tmp_path):
-    # Two cubes that share one corner: closed, but no solid.
-    cube = triangles_of(polyhedron("cube", *_cube()))
-    error = refused(written(tmp_path, "c.stl", binary_stl(cube + [np.array(t) + 60 for t in cube])))
+    # A notch whose tip cuts through the back of the bar.
+    ring = [(0, 0), (60, 0), (60, 60), (30, -5), (0, 60)]
+    found = prism(ring, 40, [(0, 1, 3), (1, 2, 3), (0, 3, 4)])
+    error = refused(written(tmp_path, "c.stl", binary_stl(found)))
     assert error.place == str(tmp_path / "c.stl")
-    assert "touches itself at vertex" in error.cause
+    assert "face F1: the edge between vertices 4 and 6 runs through it" in error.cause
 
 
-def _cube():
-    solid = SHAPES["cube"](side=60)
-    return solid.vertices, solid.faces
+def test_a_solid_that_touches_its_own_face_along_a_line_is_refused(tmp_path):
+    ring = [(0, 0), (60, 0), (60, 60), (30, 0), (0, 60)]
+    found = prism(ring, 40, [(0, 1, 3), (1, 2, 3), (0, 3, 4)])
+    error = refused(written(tmp_path, "c.stl", binary_stl(found)))
+    assert error.place.endswith("face F1")
+    assert "edge between vertices 6 and 7 of other faces lies on it" in error.cause
