@@ -12,8 +12,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from generator.database.registered import RegisteredPart
 from generator.export.array_svg import FaceOnArray, array_svg
 from generator.export.atomic import StagedFile, Staging
@@ -32,6 +30,7 @@ from generator.pipeline.faces import FaceReport, face_reports
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress
 from generator.pipeline.sheet import SheetPlate, build_sheet
+from generator.pipeline.size import outer_size_mm
 from generator.polyhedron import face_polygon
 from generator.solid import (
     Mesh,
@@ -158,7 +157,7 @@ def stage(
         progress("writing for robots", 0.82)
         warnings += _stage_robot(plan, parts, meshes, formats, staging, verify=verify)
     progress("drawing", 0.85)
-    size = np.ptp(plan.polyhedron.vertices, axis=0).tolist()
+    size = outer_size_mm(plan.polyhedron, parts).tolist()
     faces = face_reports(plan, layout)
     shares = {
         face.name: (face.promise.at_once, face.promise.within_three)

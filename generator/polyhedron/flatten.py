@@ -17,6 +17,9 @@ from generator.plane.polygon import area_vector, plane_axes
 from generator.polyhedron.settings import SOLID
 
 Points = NDArray[np.float64]
+Entries = list[tuple[NDArray[np.intp], Points]]  # columns and values, one for each row
+
+_DAMPING = 1e-13  # of the mean diagonal: dependent equations stay solvable
 
 
 def flatten_faces(
@@ -34,7 +37,10 @@ def flatten_faces(
     face_of, vertex_of = _incidences(faces)
     moved = vertices
     best = np.abs(_residual(vertices, faces, face_of, vertex_of)[0]).max()
-    if best <= SOLID.planar_exactly * size or len(face_of) > SOLID.most_equations:
+    large = len(face_of) > SOLID.dense_equations
+    if best <= (SOLID.planar_enough if large else SOLID.planar_exactly) * size:
+        return vertices.copy(), 0.0
+    if len(face_of) > SOLID.most_equations:
         return vertices.copy(), 0.0
     for _ in range(SOLID.flatten_steps):
         trial = _step(moved, faces, face_of, vertex_of, size)
@@ -86,15 +92,39 @@ def _step(
     height, axes, centres = _residual(vertices, faces, face_of, vertex_of)
     count = len(vertices)
     row = np.arange(len(face_of))
-    jacobian = np.zeros((len(row), 3 * count + 3 * len(faces)))
     offset = vertices[vertex_of] - centres[face_of]
-    for k in range(3):
-        jacobian[row, 3 * vertex_of + k] = axes[face_of, 2, k]
+    entries = [(3 * vertex_of + k, axes[face_of, 2, k]) for k in range(3)]
     for k in range(2):
         tilt = np.einsum("ij,ij->i", offset, axes[face_of, k])
-        jacobian[row, 3 * (count + face_of) + k] = tilt / size
-    jacobian[row, 3 * (count + face_of) + 2] = -1.0
+        entries.append((3 * (count + face_of) + k, tilt / size))
+    entries.append((3 * (count + face_of) + 2, np.full(len(row), -1.0)))
+    solve = _least if len(row) <= SOLID.dense_equations else _least_sparse
+    change = solve(entries, (len(row), 3 * count + 3 * len(faces)), height)
+    return vertices - change[: 3 * count].reshape(-1, 3)
+
+
+def _least(entries: Entries, shape: tuple[int, int], height: Points) -> Points:
+    """Return the smallest change (n,) that changes the heights by `height`."""
+    row = np.arange(shape[0])
+    jacobian = np.zeros(shape)
+    for column, value in entries:
+        jacobian[row, column] = value
     normal = jacobian @ jacobian.T
-    normal[row, row] += 1e-13 * np.trace(normal) / len(row)  # dependent equations stay solvable
-    change = -jacobian.T @ np.linalg.solve(normal, height)
-    return vertices + change[: 3 * count].reshape(-1, 3)
+    normal[row, row] += _DAMPING * np.trace(normal) / len(row)
+    change: Points = jacobian.T @ np.linalg.solve(normal, height)
+    return change
+
+
+def _least_sparse(entries: Entries, shape: tuple[int, int], height: Points) -> Points:
+    """As `_least`, of many equations, each of which has six unknowns."""
+    from scipy import sparse
+    from scipy.sparse.linalg import splu
+
+    row = np.tile(np.arange(shape[0]), len(entries))
+    column = np.concatenate([column for column, _ in entries])
+    value = np.concatenate([value for _, value in entries])
+    jacobian = sparse.csr_matrix((value, (row, column)), shape=shape)
+    normal = jacobian @ jacobian.T
+    damping = _DAMPING * normal.trace() / shape[0] * sparse.identity(shape[0])
+    change: Points = jacobian.T @ splu((normal + damping).tocsc()).solve(height)
+    return change

@@ -35,7 +35,11 @@ class PolyhedronSettings:
     # flatten.py
     planar_exactly: float = 2e-15
     """Vertices this near to their planes, as a share of the size, stay as they are."""
-    most_equations: int = 3000
+    dense_equations: int = 3000
+    """Of flattening; more are solved as a sparse system."""
+    planar_enough: float = 1e-10
+    """As `planar_exactly`, where there are more equations: a tenth of what parts allow."""
+    most_equations: int = 30000
     """Of flattening; beyond this the coordinates are left as given: bounds the time."""
     flatten_steps: int = 6
     """Steps of flattening at most."""

@@ -26,8 +26,9 @@ from generator.solid.analytic import AnalyticFace, BentSymbol
 
 Points = NDArray[np.float64]
 
-_STRAIGHT_MM = 1e-8  #: control points this near to a line are one
-_PLANAR_MM = 1e-8
+_STRAIGHT_MM = 1e-7  #: control points this near to a line are one
+_PLANAR_MM = 2e-7  #: sides this near to a plane are planes: roundings of four corners
+_PLACES = 7  #: decimals of a symbol's coordinates in mm: the kernel's own precision
 
 
 def write_round_faces(
@@ -120,7 +121,7 @@ class _RoundSymbol:
         self.add = on.file.add
         T = on.face.T_part_axis
         self.places = [
-            [[np.round(edge @ T[:3, :3].T + T[:3, 3], PLACES) for edge in ring] for ring in tier]
+            [[np.round(edge @ T[:3, :3].T + T[:3, 3], _PLACES) for edge in ring] for ring in tier]
             for tier in symbol.rings
         ]
         self.points = [
@@ -236,7 +237,7 @@ class _RoundSymbol:
         return self.add(f"ORIENTED_EDGE('',*,*,{edge},.{'T' if forward else 'F'}.)")
 
     def point(self, place: Points) -> str:
-        return self.add(f"CARTESIAN_POINT('',{triple(place, PLACES)})")
+        return self.add(f"CARTESIAN_POINT('',{triple(place, _PLACES)})")
 
     def colour(self, face: int) -> None:
         """Give a face the symbols' colour."""

@@ -115,9 +115,11 @@ def _wrapped_colour(
 
 
 def entities_at_most(part: Part) -> int:
-    """Return a bound on the entities of a part."""
-    corners = sum(len(loop) for facet in part.facets for loop in facet.loops)
-    count = 1000 + 20 * corners + 2 * len(part.vertices) + 11 * len(part.facets)
+    """Return a bound on the entities of a part: those of facets that are written as planes."""
+    curved = {facet for face in part.analytic for facet in face.facets}
+    planar = [facet for k, facet in enumerate(part.facets) if k not in curved]
+    corners = sum(len(loop) for facet in planar for loop in facet.loops)
+    count = 1000 + 20 * corners + 11 * len(planar)
     count += sum(map(round_entities, part.analytic))
     for embossing in part.embossings:
         numbers = np.bincount(embossing.labels, minlength=len(embossing.tiers)).tolist()
