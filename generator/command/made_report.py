@@ -13,6 +13,7 @@ from generator.command.next_step import next_step
 from generator.command.promise_report import face_values, promise_lines
 from generator.database.url import without_password
 from generator.pipeline import Encoded, MadeObject
+from generator.pipeline.faces import FaceReport
 
 
 def print_made(result: Encoded, *, dry_run: bool, as_json: bool) -> None:
@@ -78,19 +79,7 @@ def _object_text(made: MadeObject, dry_run: bool) -> str:
     lines = [f"{made.name}: {verb}; {counts}, {_count(made.parts, 'part')}"]
     if made.touches > 1:
         lines.append(f"  read by a scan: about {made.touches} touches (recognize-object --scan)")
-    for face in made.face_reports:
-        if face.smallest_mm is not None:
-            size, least = (
-                " x ".join(f"{v:.3g}" for v in each) for each in (face.size_mm, face.smallest_mm)
-            )
-            answered = ""
-            if face.promise is not None:
-                once, within = face.promise.at_once, face.promise.within_three
-                answered = f"{once:.0%} answered at once, {within:.0%} within three, "
-            lines.append(
-                f"  {face.name:6} {size} mm, {_count(face.symbols, 'symbol')}, "
-                f"{answered}it could be as small as {least} mm"
-            )
+    lines += _face_lines(made.face_reports)
     lines += promise_lines(made.face_reports)
     if made.fit is not None:
         lines.append(
@@ -100,6 +89,34 @@ def _object_text(made: MadeObject, dry_run: bool) -> str:
     for folder in dict.fromkeys(file.parent for file in made.files):
         lines.append(f"  {folder}{os.sep}  {_file_list(folder, made.files)}")
     return "\n".join(lines)
+
+
+def _face_lines(reports: Sequence[FaceReport]) -> list[str]:
+    """Return a line on each face, or one on all of which the same is to be said."""
+    named: dict[str, list[str]] = {}
+    for face in reports:
+        if face.smallest_mm is None:
+            continue
+        size, least = (
+            " x ".join(f"{v:.3g}" for v in each) for each in (face.size_mm, face.smallest_mm)
+        )
+        answered = ""
+        if face.promise is not None:
+            once, within = face.promise.at_once, face.promise.within_three
+            answered = f"{once:.0%} answered at once, {within:.0%} within three, "
+        text = (
+            f"{size} mm, {_count(face.symbols, 'symbol')}, "
+            f"{answered}it could be as small as {least} mm"
+        )
+        named.setdefault(text, []).append(face.name)
+    titles = [f"{_enumeration(names)}:" for names in named.values()]
+    width = max(map(len, titles), default=0)
+    return [f"  {title:{width}} {text}" for title, text in zip(titles, named, strict=True)]
+
+
+def _enumeration(names: Sequence[str]) -> str:
+    """Return names with commas, of many the first and the number of the others."""
+    return ", ".join(names) if len(names) <= 6 else f"{names[0]} and {len(names) - 1} like it"
 
 
 def _file_list(folder: Path, files: Sequence[Path]) -> str:

@@ -9,9 +9,7 @@ are there, they stay.
 from __future__ import annotations
 
 import dataclasses
-import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,51 +17,18 @@ from generator.export.atomic import Staging
 from generator.export.bed import Plate, arrange_plates
 from generator.export.overview import can_draw, overview_pdf
 from generator.export.packing import PackedPart, packing_csv
-from generator.export.sheet.drawing import draw_boxes
-from generator.export.sheet.page import sheet_html
-from generator.export.sheet.values import BuildSheet
 from generator.export.slicer_settings import SlicerSettings
 from generator.export.threemf import PrintFile, print_file
-from generator.layout.object_code import object_code
 from generator.layout.placement import Layout
 from generator.pipeline.files import parts_of, settings_of
 from generator.pipeline.parallel import Task, Workers
 from generator.pipeline.plan import ObjectPlan
 from generator.pipeline.progress import Progress, part_of_progress
-from generator.printers import Printer
-from generator.solid import Part, box
+from generator.pipeline.set_sheet import SetObject, SetPart, SetPlate, set_sheet
+from generator.solid import Part, box, volume
 
 if TYPE_CHECKING:
     from generator.printed.sliced_plate import PlateCost
-
-
-@dataclass(frozen=True, slots=True)
-class SetObject:
-    """One object of a set, as it was made."""
-
-    plan: ObjectPlan
-    layout: Layout
-    formats: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class _Measured:
-    """One part and the room it takes."""
-
-    number: int  #: of the object
-    name: str
-    size_mm: tuple[float, float, float]
-    symbols: int
-
-
-@dataclass(frozen=True, slots=True)
-class _SetPlate:
-    """One plate, and the parts that its places count."""
-
-    printer: Printer
-    settings: SlicerSettings | None
-    plate: Plate
-    parts: tuple[_Measured, ...]
 
 
 def write_set(
@@ -88,7 +53,7 @@ def write_set(
         A file cannot be written.
     """
     name = _name(objects)
-    measured: list[_Measured] = []
+    measured: list[SetPart] = []
     for number, one in enumerate(objects):
         progress(f"measuring {one.plan.spec.name}", 0.3 * number / len(objects))
         measured += _measure(number, one.plan, one.layout)
@@ -126,7 +91,7 @@ def write_set(
                     from generator.printed.sliced_plate import slice_plate
 
                     costs[number - 1] = slice_plate(twin.staged)
-        page = _set_sheet(name, objects, sheets, folder, plates, costs)
+        page = set_sheet(name, objects, sheets, folder, plates, costs)
         staging.write(f"{name}-build.html", page.encode())
         if overview:
             progress("drawing the overview", 0.9)
@@ -137,77 +102,25 @@ def write_set(
     return tuple(folder / each for each in names)
 
 
-def _set_sheet(
-    name: str,
-    objects: Sequence[SetObject],
-    sheets: Sequence[Path],
-    folder: Path,
-    plates: Sequence[_SetPlate],
-    costs: Sequence[PlateCost | None],
-) -> str:
-    """Return the build sheet of a set: its plates, and the objects with their codes."""
-    drawings, lying = [], [list[str]() for _ in objects]
-    for number, (plate, cost) in enumerate(zip(plates, costs, strict=True), 1):
-        held = sorted({plate.parts[place.part].number for place in plate.plate.places})
-        for one in held:
-            lying[one].append(str(number))
-        what = f"{plate.printer.name}, {plate.printer.layer_mm:g} mm layers: " + ", ".join(
-            objects[one].plan.spec.name for one in held
-        )
-        drawings.append(
-            (
-                f"{name}-plate-{number}.3mf",
-                what + (f"; {cost}" if cost else ""),
-                draw_boxes(
-                    [(p.name, p.size_mm[:2]) for p in plate.parts],
-                    plate.plate,
-                    plate.printer.bed_mm,
-                ),
-            )
-        )
-    listed = tuple(
-        (
-            one.plan.spec.name,
-            object_code(one.layout, one.plan.array.rows, one.plan.array.columns),
-            ", ".join(on),
-            Path(os.path.relpath(sheet, folder)).as_posix(),
-        )
-        for one, sheet, on in zip(objects, sheets, lying, strict=True)
-    )
-    parts = sum(len(plate.plate.places) for plate in plates)
-    facts = [("objects", str(len(objects))), ("parts", str(parts)), ("plates", str(len(plates)))]
-    if plates and all(cost is not None for cost in costs):
-        minutes = sum(cost.minutes for cost in costs if cost)
-        grams = sum(cost.filament_g for cost in costs if cost)
-        facts.append(("printing", f"{minutes // 60} h {minutes % 60} min, {grams:.0f} g"))
-    note = (
-        "Every back names its object, or bears the object's short code: sort the parts by object "
-        "before anything is glued."
-    )
-    return sheet_html(
-        BuildSheet(name, tuple(facts), tuple(drawings), notes=(note,), objects=listed)
-    )
-
-
 def _name(objects: Sequence[SetObject]) -> str:
     """Return what the files of the set are called: as the spec file that it comes from."""
     names = {one.plan.located.origin for one in objects}
     return names.pop() if len(names) == 1 and all(names) else "set"
 
 
-def _measure(number: int, plan: ObjectPlan, layout: Layout) -> list[_Measured]:
+def _measure(number: int, plan: ObjectPlan, layout: Layout) -> list[SetPart]:
     """Return the parts of one object with their sizes."""
     found = []
     for part in parts_of(plan, layout)[0]:
         low, high = box(part)
         x, y, z = (high - low).tolist()
-        found.append(_Measured(number, part.name, (x, y, z), part.symbols))
+        found.append(SetPart(number, part.name, (x, y, z), part.symbols, volume(part)))
     return found
 
 
-def _plates(objects: Sequence[SetObject], parts: Sequence[_Measured]) -> list[_SetPlate]:
+def _plates(objects: Sequence[SetObject], parts: Sequence[SetPart]) -> list[SetPlate]:
     """Arrange all parts: what one printer prints with the same settings lies together."""
-    plates: list[_SetPlate] = []
+    plates: list[SetPlate] = []
     kinds = dict.fromkeys((one.plan.printer, settings_of(one.plan)) for one in objects)
     for printer, settings in kinds:
         own = tuple(
@@ -219,11 +132,11 @@ def _plates(objects: Sequence[SetObject], parts: Sequence[_Measured]) -> list[_S
         sizes = [part.size_mm[:2] for part in own]
         groups = [part.number for part in own]
         for plate in arrange_plates(sizes, printer.bed_mm, groups=groups):
-            plates.append(_SetPlate(printer, settings, plate, own))
+            plates.append(SetPlate(printer, settings, plate, own))
     return plates
 
 
-def _packing_rows(objects: Sequence[SetObject], plate: _SetPlate, number: int) -> list[PackedPart]:
+def _packing_rows(objects: Sequence[SetObject], plate: SetPlate, number: int) -> list[PackedPart]:
     rows = []
     for place in plate.plate.places:
         part = plate.parts[place.part]
@@ -244,7 +157,7 @@ def _packing_rows(objects: Sequence[SetObject], plate: _SetPlate, number: int) -
 
 
 def _plate_task(
-    objects: Sequence[SetObject], title: str, plate: _SetPlate
+    objects: Sequence[SetObject], title: str, plate: SetPlate
 ) -> tuple[str, list[tuple[ObjectPlan, Layout, list[str]]], Plate, SlicerSettings | None]:
     """Return what `_plate_files` needs: the objects on a plate, and the plate of them alone."""
     places = plate.plate.places

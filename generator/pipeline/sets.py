@@ -27,8 +27,9 @@ from generator.pipeline.made import MadeObject, describe_object
 from generator.pipeline.make import Order, Product, make_at
 from generator.pipeline.parallel import Engines, Task, Workers
 from generator.pipeline.place import ObjectPlacement, occupancy_of, occupancy_with, place_object
-from generator.pipeline.plates import SetObject, write_set
+from generator.pipeline.plates import write_set
 from generator.pipeline.progress import Progress, part_of_progress
+from generator.pipeline.set_sheet import SetObject
 
 
 def make_set(

@@ -23,6 +23,7 @@ from generator.pipeline.plan import ObjectPlan
 from generator.polyhedron import face_polygon
 from generator.polyhedron.assembly import AssemblyStep, assembly_order, telling_faces
 from generator.polyhedron.frame import face_frame
+from generator.printers import Printer
 from generator.solid import Part, box, volume
 
 if TYPE_CHECKING:
@@ -68,6 +69,26 @@ def build_sheet(
     return sheet_html(sheet)
 
 
+def layers_text(printer: Printer) -> str:
+    """Return how thick a printer's layers are."""
+    return f"{printer.layer_mm:g} mm, the first {printer.first_layer_mm:g} mm"
+
+
+def lies_text(plan: ObjectPlan, layout: Layout) -> str:
+    """Return how the parts of an object lie on the bed, and what supports they need."""
+    if plan.spec.parts == "panels":
+        return "every panel on its back, symbols up; no supports"
+    return str(overhang_of(plan, layout))
+
+
+def material_text(volume_mm3: float, *, resin: bool) -> str:
+    """Return how much material parts of this volume take."""
+    cm3 = volume_mm3 / 1000
+    if resin:
+        return f"resin, {cm3:.0f} ml in all"
+    return f"PLA, {cm3:.0f} cm3 in all; {cm3 * PLA_G_CM3:.0f} g if solid"
+
+
 def _facts(
     plan: ObjectPlan,
     layout: Layout,
@@ -76,26 +97,17 @@ def _facts(
     plates: Sequence[SheetPlate],
 ) -> Rows:
     spec, printer = plan.spec, plan.printer
-    solid_cm3 = sum(volume(part) for part in parts) / 1000
-    layers = f"{printer.layer_mm:g} mm, the first {printer.first_layer_mm:g} mm"
-    lies = "every panel on its back, symbols up; no supports"
-    if not is_panel(parts[0]):
-        lies = str(overhang_of(plan, layout))
     rows = [
         ("short code", code),
         ("printer", f"{printer.name}: {printer.description}"),
-        ("layers", layers),
-        ("lies", lies),
+        ("layers", layers_text(printer)),
+        ("lies", lies_text(plan, layout)),
         ("scale", "100 %"),
     ]
     if spec.colours > 1 and is_panel(parts[0]):
         rows.append(("colours", f"2: change the filament at {spec.wall_mm:g} mm"))
-    if printer.nozzle_mm:
-        rows.append(
-            ("material", f"PLA, {solid_cm3:.0f} cm3 in all; {solid_cm3 * PLA_G_CM3:.0f} g if solid")
-        )
-    else:
-        rows.append(("material", f"resin, {solid_cm3:.0f} ml in all"))
+    solid_mm3 = sum(volume(part) for part in parts)
+    rows.append(("material", material_text(solid_mm3, resin=not printer.nozzle_mm)))
     costs = [plate.cost for plate in plates if plate.cost is not None]
     if len(costs) == len(plates):
         minutes = sum(cost.minutes for cost in costs)

@@ -13,6 +13,7 @@ padding:0 16px}h1{font-size:26px;margin:0 0 8px}h2{font-size:19px;margin:28px 0 
 table{border-collapse:collapse}td,th{text-align:left;padding:3px 14px 3px 0;vertical-align:top;
 border-bottom:1px solid #E2E8F0}.cards{display:flex;flex-wrap:wrap;gap:18px}
 figure{margin:0;padding:10px;border:1px solid #CBD5E1;border-radius:6px;break-inside:avoid}
+.plates figure{width:calc(50% - 34px)}.plates svg{width:100%;height:auto}
 figcaption{max-width:640px}.cards figcaption{max-width:300px}.small{color:#475569;font-size:13px}
 b.mark{font-family:monospace;background:#E0E7FF;padding:0 4px}
 @media print{body{margin:0}}
@@ -35,10 +36,12 @@ def sheet_html(sheet: BuildSheet) -> str:
         )
         body.append(f"<h2>Objects and their codes</h2><table>{head}{rows}</table>")
     if sheet.files:
-        body.append("<h2>Print</h2>")
+        several = "cards plates" if len(sheet.files) > 1 else "cards"
+        body.append(f'<h2>Print</h2><div class="{several}">')
         for file, what, drawing in sheet.files:
             body.append(f"<figure>{drawing}<figcaption><b>{escape(file)}</b><br>{escape(what)}"
                         "</figcaption></figure>")  # fmt: skip
+        body.append("</div>")
     if sheet.cards:
         body.append(
             "<h2>Parts</h2><p>Left: from the front, edges with their numbers. Right: the back, as "

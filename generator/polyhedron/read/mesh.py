@@ -11,7 +11,7 @@ from dataclasses import replace
 from generator.errors import ShapeError
 from generator.polyhedron.read.merge import merge_triangles
 from generator.polyhedron.read.regions import mesh_polyhedron
-from generator.polyhedron.read.soup import Soup, welded_coarsely
+from generator.polyhedron.read.soup import Soup, weld_coarsely
 from generator.polyhedron.winged import Polyhedron
 
 
@@ -35,7 +35,7 @@ def solid_of_soup(soup: Soup, kind: str, scale: float = 1.0) -> Polyhedron:
     try:
         return _solid(soup, kind, scale)
     except ShapeError as error:
-        coarse = welded_coarsely(soup)
+        coarse = weld_coarsely(soup)
         if len(coarse.points) == len(soup.points):
             raise
         try:

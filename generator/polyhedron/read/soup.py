@@ -44,7 +44,7 @@ def soup_of_triangles(corners: NDArray[np.float64], place: str) -> Soup:
     return _soup(corners.reshape(-1, 3), starts, np.full(count, 3), np.arange(count), place)
 
 
-def welded_coarsely(soup: Soup) -> Soup:
+def weld_coarsely(soup: Soup) -> Soup:
     """Return the soup with points joined that lie nearer than `MODEL.coarse_weld` says."""
     after = np.append(soup.following[:-1] != np.arange(1, len(soup.following)), True)
     last = np.flatnonzero(after)  # half-edges of a loop stand one behind another

@@ -99,6 +99,14 @@ def test_the_sheet_of_a_set_names_codes_plates_and_sheets(made):
     assert len({row[1] for row in rows}) == 3
     folder = next(f for f in made.set_files if f.name == "course-build.html").parent
     assert all((folder / row[3]).is_file() for row in rows)
+    facts = dict(re.findall(r"<tr><th>(\w+)</th><td>(.*?)</td></tr>", page))
+    assert facts["layers"] == "0.2 mm, the first 0.2 mm"
+    lies = re.findall(r"<th>lies</th><td>(.*?)</td>", page)
+    assert lies[0] == "Block-1, Block-2: every panel on its back, symbols up; no supports"
+    assert lies[1].startswith("Whole: F1 down, supports needed under F1")
+    cm3 = [int(re.search(r"PLA, (\d+) cm3", page_of(made, name))[1])
+           for name in ("Block-1", "Block-2", "Whole")]  # fmt: skip
+    assert abs(int(re.match(r"PLA, (\d+) cm3 in all", facts["material"])[1]) - sum(cm3)) <= 2
 
 
 def test_the_last_line_says_what_to_print(made):

@@ -6,6 +6,8 @@ from pathlib import Path
 
 from generator.command.made_report import print_made
 from generator.pipeline import Encoded, MadeObject
+from generator.pipeline.faces import FaceReport
+from generator.pipeline.promise import FacePromise
 
 
 def copy(number: int, name: str = "Cube", symbols: int = 384) -> MadeObject:
@@ -39,3 +41,20 @@ def test_plates_of_a_set_are_counted(capsys):
     text = said([copy(1)], capsys, (Path("out/Set-packing.csv"), *plates))
     assert "out/  Set-packing.csv, 6 3mf (Set-plate-1.3mf, ...)" in text
     assert "as they lie, backs down, symbols up, no supports, 100 % scale" in text
+
+
+def test_faces_of_which_the_same_is_to_be_said_share_a_line(capsys):
+    def face(number, width):
+        size, promise = (width, 50.0), FacePromise(0.7, 0.99)
+        return FaceReport(
+            f"F{number}", "", "plane", size, width * 50.0, 63, 40, promise, (16.0, 20.0)
+        )
+
+    faces = tuple(face(k, 40.0 if k in (1, 4) else 60.0) for k in range(1, 13))
+    made = MadeObject("Block", 12, 700, 200, 12, (), (), False, face_reports=faces)
+    text = said([made], capsys)
+    assert (
+        "  F1, F4:           40 x 50 mm, 63 symbols, 70% answered at once, 99% within three, "
+        "it could be as small as 16 x 20 mm" in text
+    )
+    assert "  F2 and 9 like it: 60 x 50 mm" in text
