@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.touch.lab import EmbossedArray, cell_keys
-from recognizer.touch.place_scores import Places, add_scores
+from recognizer.touch.lab import EmbossedArray
+from recognizer.touch.place_scores import Places, add_scores, name_places, place_keys
 from recognizer.touch.settings import HypothesisSettings
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.projection import Shown
@@ -82,9 +82,23 @@ def log_likelihood(
     embossed: EmbossedArray, fit: Fit, hypothesis: Hypothesis, settings: HypothesisSettings
 ) -> float:
     """Return the log-likelihood of the image if the fit lies at this place, nats."""
-    labels = labels_at(embossed, hypothesis, fit.cells)
-    scores = bounded_scores(fit, settings)[np.arange(len(labels)), labels]
-    return float(scores.sum()) + fit.value
+    return float(log_likelihoods_at(embossed, fit, [hypothesis], settings)[0])
+
+
+def log_likelihoods_at(
+    embossed: EmbossedArray,
+    fit: Fit,
+    hypotheses: Sequence[Hypothesis],
+    settings: HypothesisSettings,
+) -> Array:
+    """Return the log-likelihoods (n,) of the image if the fit lies at each of n places, nats."""
+    places = (
+        np.array([one.row for one in hypotheses], np.int64),
+        np.array([one.column for one in hypotheses], np.int64),
+        np.array([one.face for one in hypotheses], np.int32),
+    )
+    scores, none = bounded_scores(fit, settings), np.zeros(len(hypotheses))
+    return add_scores(embossed, places, fit.cells, scores, none) + fit.value
 
 
 def bounded_scores(fit: Fit, settings: HypothesisSettings) -> Array:
@@ -259,17 +273,13 @@ def _origins(
     embossed: EmbossedArray, at: Ints, cells: Ints, settings: HypothesisSettings
 ) -> Places:
     """Return where (0, 0) lies, each place once, if cells (n, 2) are the registered ones `at`."""
-    array = embossed.array
-    rows, columns = np.divmod(embossed.keys[at], np.uint64(array.columns))
-    known = None
-    row = (rows.astype(np.int64) + cells[:, 1]) % array.rows
-    column = (columns.astype(np.int64) - cells[:, 0]) % array.columns
-    owners = embossed.owners[at]
-    keys, faces = cell_keys(array.columns, row, column), len(embossed.faces) + 1
-    names = keys.astype(np.int64)
-    if array.rows * array.columns >= 2**63 // faces:  # one number cannot name place and face
-        known, names = np.unique(keys, return_inverse=True)
-    both, votes = np.unique(names * faces + owners, return_counts=True)
+    array, faces = embossed.array, len(embossed.faces) + 1
+    if array.rows * array.columns < 2**63 // faces:
+        known, names = None, name_places(embossed, at, cells)
+    else:
+        known, place = np.unique(place_keys(embossed, at, cells), return_inverse=True)
+        names = place * faces + embossed.owners[at]
+    both, votes = np.unique(names, return_counts=True)
     if len(both) > settings.many and (votes > 1).any():
         both = both[votes > 1]  # several windows say the same
     place, once = np.divmod(both, faces)

@@ -12,7 +12,7 @@ import ctypes
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.touch.lab import EmbossedArray
+from recognizer.touch.lab import EmbossedArray, cell_keys
 from recognizer.touch.symbols.compiled import compiled_kernels
 
 Ints = NDArray[np.int64]
@@ -58,6 +58,33 @@ def add_scores(
         held_by, label = embossed.at((rows - j) % array.rows, (columns + i) % array.columns)
         total += each[np.where(held_by == owners, label, array.order)]
     return total
+
+
+def name_places(embossed: EmbossedArray, at: Ints, cells: Ints) -> Ints:
+    """Return key of the place times (faces + 1), and its face, as one number (n,) for each.
+
+    Cell (0, 0) lies at that place if cells (n, 2) are the registered ones `at` (n,). Of arrays
+    so large that one number cannot name both `place_keys` tells the places.
+    """
+    library, faces = compiled_kernels(), len(embossed.faces) + 1
+    if library is None:
+        return place_keys(embossed, at, cells).astype(np.int64) * faces + embossed.owners[at]
+    held, names = _held_by(embossed), np.empty(len(at), np.int64)
+    at, cells = np.ascontiguousarray(at), np.ascontiguousarray(cells)
+    library.name_places(
+        ctypes.addressof(held), len(at), at.ctypes.data, cells.ctypes.data, faces,
+        names.ctypes.data,
+    )  # fmt: skip
+    return names
+
+
+def place_keys(embossed: EmbossedArray, at: Ints, cells: Ints) -> NDArray[np.uint64]:
+    """Return where cell (0, 0) lies (n,), `cell_keys`, if cells (n, 2) are the registered `at`."""
+    array = embossed.array
+    rows, columns = np.divmod(embossed.keys[at], np.uint64(array.columns))
+    row = (rows.astype(np.int64) + cells[:, 1]) % array.rows
+    column = (columns.astype(np.int64) - cells[:, 0]) % array.columns
+    return cell_keys(array.columns, row, column)
 
 
 def count_places(embossed: EmbossedArray, cells: Ints, prices: Array, slack: float) -> int:

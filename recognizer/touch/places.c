@@ -63,3 +63,18 @@ int64_t count_places(const Held *h, int64_t m, const int64_t *cells, const doubl
     }
     return count;
 }
+
+/* One number (n,) for the place of cell (0, 0) and the face that holds it, if cells (n, 2) are the
+   registered ones `at` (n,): key of the place times `faces`, and the face. */
+void name_places(const Held *h, int64_t n, const int64_t *at, const int64_t *cells, int64_t faces,
+                 int64_t *names) {
+    for (int64_t k = 0; k < n; k++) {
+        uint64_t key = h->keys[at[k]], row = key / (uint64_t)h->columns;
+        int64_t down = (int64_t)row + cells[2 * k + 1];
+        int64_t along = (int64_t)(key - row * (uint64_t)h->columns) - cells[2 * k];
+        if (down < 0 || down >= h->rows) down = (down % h->rows + h->rows) % h->rows;
+        if (along < 0 || along >= h->columns)
+            along = (along % h->columns + h->columns) % h->columns;
+        names[k] = (down * h->columns + along) * faces + h->owners[at[k]];
+    }
+}

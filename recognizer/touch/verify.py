@@ -16,7 +16,7 @@ from recognizer.touch.locate import (
     Hypothesis,
     find_hypotheses,
     find_rivals,
-    log_likelihood,
+    log_likelihoods_at,
     shown_at,
 )
 from recognizer.touch.prepare import PreparedLab
@@ -96,13 +96,12 @@ def _fit_hypotheses(
     )
     again = score_cells(image, template, lattices)
     verified = []
-    for place in candidates:
-        # a place is as likely as under the best of the fits that began where its own did: what
-        # one of them missed of gain and sharpness is no word against the symbols
-        fair = [again[b] for b, other in enumerate(candidates) if other.fit == place.fit]
-        scores = [log_likelihood(embossed, fit, place, settings) for fit in fair]
-        best = int(np.argmax(scores))
-        verified.append(
-            VerifiedHypothesis(image, template, embossed, place, fair[best], scores[best])
-        )
+    # a place is as likely as under the best of the fits that began where its own did: what one of
+    # them missed of gain and sharpness is no word against the symbols
+    own = np.array([place.fit for place in candidates])
+    scores = np.array([log_likelihoods_at(embossed, fit, candidates, settings) for fit in again])
+    scores[own[:, None] != own] = -np.inf
+    for n, (place, best) in enumerate(zip(candidates, scores.argmax(axis=0), strict=True)):
+        score = float(scores[best, n])
+        verified.append(VerifiedHypothesis(image, template, embossed, place, again[best], score))
     return sorted(verified, key=lambda one: -one.score)

@@ -1,4 +1,4 @@
-"""The inner loops of reading, compiled: `evaluate.c`, `places.c`, built with the project.
+"""The inner loops of reading, compiled: built with the project from C.
 
 The numpy forms in `refine`, `fit` and `place_scores` are the reference: values to 1e-6 of them, the
 same answers. They are also what reads where the compiled form is missing (a checkout that nobody
@@ -30,7 +30,8 @@ Ints = NDArray[np.int64]
 
 FOLDER = Path(__file__).parent.parent
 FILE = FOLDER / "kernels.so"
-SOURCES = (FOLDER / "symbols" / "evaluate.c", FOLDER / "places.c")  #: as in hatch_build.py
+#: As in hatch_build.py.
+SOURCES = tuple(FOLDER / name for name in ("symbols/evaluate.c", "symbols/coarse.c", "places.c"))
 CHOICE = "ENCODED_OBJECTS_KERNELS"  #: variable; "numpy" leaves the compiled form out
 UNKNOWNS = len(DEFAULTS.refine.least)  #: pose (7,) and gain (4,)
 
@@ -92,6 +93,10 @@ def load_kernels(file: Path) -> ctypes.CDLL | None:
         pointer, whole, pointer, pointer, pointer, whole, pointer, pointer, pointer
     ]  # fmt: skip
     library.add_scores.restype = None
+    library.sum_lattices.argtypes = [*[whole] * 7, *[pointer] * 3]
+    library.sum_lattices.restype = None
+    library.name_places.argtypes = [pointer, whole, pointer, pointer, whole, pointer]
+    library.name_places.restype = None
     library.count_places.argtypes = [pointer, whole, pointer, pointer, ctypes.c_double]
     library.count_places.restype = whole
     return library

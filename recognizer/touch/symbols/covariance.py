@@ -35,17 +35,21 @@ def covariances(image: Image, lattices: Lattices, away: Array, noise: float) -> 
         size = settings.tab + settings.strange * strange**2
     else:
         size = settings.pad * _neighbours_alike(away, image.shape, image.settings.noise.far * first)
-    shapes = np.array(
-        [invert_normal(normal, settings.unseen)[:3, :3] for normal in lattices.normal]
-    )
+    shapes = invert_normal(lattices.normal, settings.unseen)[:, :3, :3]
     return np.asarray((noise / first) ** 2 * size[:, None, None] * shapes)
 
 
 def invert_normal(normal: Array, unseen: float) -> Array:
-    """Return the inverse of a normal matrix; wide, not narrow, in what the image does not show."""
-    unit = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-12))
-    sizes, axes = np.linalg.eigh(normal * np.outer(unit, unit))
-    return np.asarray((axes / np.maximum(sizes, unseen)) @ axes.T * np.outer(unit, unit))
+    """Return the inverses of normal matrices (..., k, k).
+
+    Wide, not narrow, in what the image does not show.
+    """
+    diagonal = np.diagonal(normal, axis1=-2, axis2=-1)
+    unit = 1.0 / np.sqrt(np.maximum(diagonal, 1e-12))
+    units = unit[..., :, None] * unit[..., None, :]
+    sizes, axes = np.linalg.eigh(normal * units)
+    shown = axes / np.maximum(sizes, unseen)[..., None, :]
+    return np.asarray(shown @ axes.swapaxes(-2, -1) * units)
 
 
 def _neighbours_alike(away: Array, shape: tuple[int, int], most: float) -> Array:

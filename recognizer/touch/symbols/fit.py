@@ -123,7 +123,7 @@ def _cross_gains(image: Image, template: ResponseTemplate, found: Lattices, gain
         pose = pose.copy()
         pose[:, 0], pose[:, 1] = -pose[:, 1], pose[:, 0].copy()
         pose[:, 2] += math.pi / 2
-    poses = np.concatenate([*tried, found.pose])
+    poses = np.concatenate([*tried, found.pose[np.sort(best[2 * gains :])]])
     each = [
         refine_lattices(image, template, poses, np.tile(gain, (len(poses), 1)), steps=1)
         for gain in found.gain[best[:gains]]

@@ -9,6 +9,7 @@ Sensor frame, mm; psi values as in `template`.
 
 from __future__ import annotations
 
+import ctypes
 import math
 from dataclasses import dataclass
 
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from probe.sensor import SensorType
 from recognizer.touch.settings import DEFAULTS, SearchSettings
+from recognizer.touch.symbols.compiled import compiled_kernels
 from recognizer.touch.symbols.template import Floats, ResponseTemplate
 
 
@@ -130,7 +132,11 @@ def lattice_scores(bank: Bank, values: Floats, weights: Floats, order: int) -> F
     height, width = patches.shape[1:3]
     flat = patches.transpose(1, 2, 0, 3, 4).reshape(height * width, -1)
     turns = len(bank.rotations_rad)
-    best = (flat @ bank.kernels).reshape(height, width, order, turns, -1).max(axis=2)
+    products = flat @ bank.kernels
+    library = compiled_kernels()
+    if library is not None:
+        return _sum_lattices(library, bank, products, (height, width, order))
+    best = products.reshape(height, width, order, turns, -1).max(axis=2)
     np.maximum(best, 0, out=best)
     phases = round(math.sqrt(best.shape[-1]))
     grid = best.reshape(height, width, turns, phases, phases).transpose(2, 0, 3, 1, 4)
@@ -138,6 +144,23 @@ def lattice_scores(bank: Bank, values: Floats, weights: Floats, order: int) -> F
     places[:, :-1] = grid.reshape(turns, -1)
     base = (np.arange(turns) * places.shape[1])[:, None, None]
     return np.asarray(np.take(places.ravel(), bank.lookups + base).sum(axis=2))
+
+
+def _sum_lattices(
+    library: ctypes.CDLL, bank: Bank, products: Floats, sides: tuple[int, int, int]
+) -> Floats:
+    """Return the scores of lattices from those of symbols at places, compiled."""
+    turns, lattices, cells = bank.lookups.shape
+    height, width, order = sides
+    phases = math.isqrt(products.shape[1] // (order * turns))
+    lookups = np.ascontiguousarray(bank.lookups, np.int32)
+    products = np.ascontiguousarray(products, np.float32)
+    scores = np.empty((turns, lattices), np.float32)
+    library.sum_lattices(
+        height, width, order, turns, phases, lattices, cells,
+        products.ctypes.data, lookups.ctypes.data, scores.ctypes.data,
+    )  # fmt: skip
+    return scores
 
 
 def _peaks(bank: Bank, scores: Floats, keep: int) -> NDArray[np.float64]:

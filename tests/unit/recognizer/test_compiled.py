@@ -17,7 +17,7 @@ from generator.alphabet import SymbolStyle, alphabet_named
 from probe.sensor import SensorType
 from recognizer.touch.lab import EmbossedArray, cell_keys
 from recognizer.touch.locate import find_hypotheses
-from recognizer.touch.place_scores import add_scores, count_places
+from recognizer.touch.place_scores import add_scores, count_places, name_places
 from recognizer.touch.settings import DEFAULTS
 from recognizer.touch.signal import Signal
 from recognizer.touch.symbols import compiled
@@ -25,6 +25,7 @@ from recognizer.touch.symbols.fit import score_cells
 from recognizer.touch.symbols.gain import image_of_signal, normalize_image
 from recognizer.touch.symbols.projection import project_template
 from recognizer.touch.symbols.refine import refine_lattices
+from recognizer.touch.symbols.search import bank_of, lattice_scores
 from recognizer.touch.symbols.template import template_of
 
 STYLE = SymbolStyle(pitch_mm=5.0)
@@ -179,6 +180,23 @@ def test_cells_score_alike(name, use):
         assert one.covariance == pytest.approx(other.covariance, rel=1e-4)
 
 
+@pytest.mark.parametrize("cells", [5, 36, 300])
+def test_lattices_of_the_coarse_search_are_summed_alike_to_the_bit(cells, use):
+    sensor, draw = SensorType(), np.random.default_rng(cells)
+    template = template_of(alphabet_named("dense-4"), STYLE, sensor, DEFAULTS.template)
+    few = replace(DEFAULTS.search, rotations=3, shifts=4)
+    bank = bank_of(template, sensor, few)
+    none = int(bank.lookups.max())
+    bank = replace(bank, lookups=draw.integers(0, none + 1, (3, 16, cells)).astype(np.int32))
+    values, weights = draw.random((2, 16, 16)).astype(np.float32)
+    found = []
+    for kind in ("numpy", "compiled"):
+        use(kind)
+        found.append(lattice_scores(bank, values, weights, template.order))
+    assert found[0].shape == (3, 16)
+    assert found[0].tobytes() == found[1].tobytes()
+
+
 HELD = st.lists(
     st.tuples(st.integers(0, 6), st.integers(0, 8), st.integers(0, 2), st.integers(0, 3)),
     min_size=1, max_size=40, unique_by=lambda cell: cell[:2],
@@ -195,13 +213,16 @@ def test_places_score_alike(held, dense, seed, library):
     cells, scores = draw.integers(-20, 20, (6, 2)), draw.normal(size=(6, 5))
     before = draw.normal(size=count)
     borders, prices = draw.integers(-4, 4, (5, 2)), draw.random(5)
+    which = draw.integers(0, len(held), 12)
     found = []
     for kind in ("numpy", "compiled"):
         with pytest.MonkeyPatch.context() as patched:
             patched.setattr(compiled, "FILE", library)
             patched.setenv(compiled.CHOICE, kind)
             sums = add_scores(embossed, places, cells, scores, before)
-            found.append((sums.tolist(), count_places(embossed, borders, prices, 1.2)))
+            names = name_places(embossed, which, cells[which % 6])
+            count_ = count_places(embossed, borders, prices, 1.2)
+            found.append((sums.tolist(), count_, names.tolist()))
     assert found[0] == found[1]
 
 
