@@ -1,4 +1,4 @@
-"""Build hook: three C files -> `kernels.so`, by the compiler that `ziglang` brings.
+"""Build hook: four C files -> `kernels.so`, by the compiler that `ziglang` brings.
 
 No compiler is needed on the machine. The code is for any processor of its kind, so that a wheel
 may be kept and moved; products and sums are not contracted, so that it rounds as numpy does.
@@ -15,11 +15,7 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 FOLDER = "recognizer/touch"
-SOURCES = (
-    "symbols/evaluate.c",
-    "symbols/coarse.c",
-    "places.c",
-)  # as `recognizer.touch.symbols.compiled` has them
+SOURCES = ("symbols/evaluate.c", "symbols/coarse.c", "symbols/scatter.c", "places.c")
 OPTIONS = ["-O3", "-ffp-contract=off", "-fno-math-errno", "-shared", "-fPIC", "-mcpu=baseline"]
 
 

@@ -31,7 +31,10 @@ Ints = NDArray[np.int64]
 FOLDER = Path(__file__).parent.parent
 FILE = FOLDER / "kernels.so"
 #: As in hatch_build.py.
-SOURCES = tuple(FOLDER / name for name in ("symbols/evaluate.c", "symbols/coarse.c", "places.c"))
+SOURCES = tuple(
+    FOLDER / name
+    for name in ("symbols/evaluate.c", "symbols/coarse.c", "symbols/scatter.c", "places.c")
+)
 CHOICE = "ENCODED_OBJECTS_KERNELS"  #: variable; "numpy" leaves the compiled form out
 UNKNOWNS = len(DEFAULTS.refine.least)  #: pose (7,) and gain (4,)
 
@@ -95,6 +98,9 @@ def load_kernels(file: Path) -> ctypes.CDLL | None:
     library.add_scores.restype = None
     library.sum_lattices.argtypes = [*[whole] * 7, *[pointer] * 3]
     library.sum_lattices.restype = None
+    real = ctypes.c_double
+    library.fit_spread.argtypes = [*[whole] * 3, *[real] * 3, *[pointer] * 7]
+    library.fit_spread.restype = ctypes.c_int
     library.name_places.argtypes = [pointer, whole, pointer, pointer, whole, pointer]
     library.name_places.restype = None
     library.count_places.argtypes = [pointer, whole, pointer, pointer, ctypes.c_double]

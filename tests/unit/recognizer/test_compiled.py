@@ -26,6 +26,7 @@ from recognizer.touch.symbols.gain import image_of_signal, normalize_image
 from recognizer.touch.symbols.projection import project_template
 from recognizer.touch.symbols.refine import refine_lattices
 from recognizer.touch.symbols.search import bank_of, lattice_scores
+from recognizer.touch.symbols.spread import fit_spread, usual_spread
 from recognizer.touch.symbols.template import template_of
 
 STYLE = SymbolStyle(pitch_mm=5.0)
@@ -195,6 +196,22 @@ def test_lattices_of_the_coarse_search_are_summed_alike_to_the_bit(cells, use):
         found.append(lattice_scores(bank, values, weights, template.order))
     assert found[0].shape == (3, 16)
     assert found[0].tobytes() == found[1].tobytes()
+
+
+@pytest.mark.parametrize("shown", [1.0, 1e-3, 0.0])  # at last: an unknown of which nothing is seen
+def test_scatter_is_fitted_alike(shown, use):
+    draw = np.random.default_rng(2)
+    left, parts = draw.normal(0, 0.1, 256), draw.random((2, 256)) + 0.1
+    jacobian = draw.normal(0, 1.0, (256, 14)) * np.array([1.0] * 13 + [shown])
+    known, trust = np.diag([0.0] * 10 + [2.0] * 3 + [0.0]), (draw.random(256) > 0.1).astype(float)
+    found = []
+    for kind in ("numpy", "compiled"):
+        use(kind)
+        spread = usual_spread(DEFAULTS.spread)
+        spread = fit_spread(spread, left, parts, jacobian, known, trust, DEFAULTS.spread)
+        found.append((spread.felt, spread.aside_mm))
+    assert found[0] == pytest.approx(found[1], rel=1e-12)
+    assert found[0] != pytest.approx((DEFAULTS.spread.felt, DEFAULTS.spread.aside_mm), rel=0.1)
 
 
 HELD = st.lists(

@@ -28,7 +28,7 @@ class Stages:
         self.on_round = []
         for name in (
             "image_of_signal", "fit_lattices", "find_hypotheses", "find_rivals",
-            "refine_lattices", "score_cells", "log_likelihood", "verify_on_round_faces",
+            "refine_lattices", "score_cells", "log_likelihoods_at", "verify_on_round_faces",
         ):  # fmt: skip
             monkeypatch.setattr(recognizer.touch.verify, name, getattr(self, "_" + name))
 
@@ -66,9 +66,9 @@ class Stages:
     def _score_cells(self, image, template, count):
         return tuple(replace(self.fits[0], noise=float(n)) for n in range(count))
 
-    def _log_likelihood(self, embossed, fit, place, settings):
+    def _log_likelihoods_at(self, embossed, fit, places, settings):
         assert settings is self.image.settings.hypotheses
-        return self.better.get((place.row, int(fit.noise)), place.score - 100.0)
+        return [self.better.get((one.row, int(fit.noise)), one.score - 100.0) for one in places]
 
     def _verify_on_round_faces(self, image, sensor, embossed, template, bank, effort):
         assert (sensor, template, bank, effort) == ("sensor", "template", "bank", "effort")
