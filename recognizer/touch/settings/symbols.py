@@ -45,6 +45,10 @@ class GainSettings:
     high: float = 0.06  #: and share of the highest of all
     top: float = 0.8  #: share of the highest around it from which a tactel is on a plateau
     few: int = 10  #: tactels of both kinds, at least
+    whole: float = 0.95  #: share of the sensor that lies on something, from which no edge is near
+    deep: float = 0.65  #: heights that strong readings are deep near an edge, as `usual` amid faces
+    strong_percent: float = 90.0  #: percentile of the highest readings that counts as strong
+    bare: float = 0.05  #: share of the highest that the lowest reach where the bare face is pressed
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from recognizer.touch.settings import FitSettings
 from recognizer.touch.symbols.compiled import CellSums, compiled_kernels, sum_cells_compiled
 from recognizer.touch.symbols.covariance import covariances
+from recognizer.touch.symbols.deep_press import deep_gain
 from recognizer.touch.symbols.gain import Image, first_gain, normalize_image, tilted_gain
 from recognizer.touch.symbols.noise import log_likelihoods, psi_deviation
 from recognizer.touch.symbols.projection import (
@@ -79,7 +80,8 @@ def fit_lattices(
     Gains to begin with, (4,) each, are guessed from the image if they are not given.
     """
     if gains is None:
-        guessed = (first_gain(image, template.ink), tilted_gain(image))
+        deep = deep_gain(image)
+        guessed = (first_gain(image, template.ink), tilted_gain(image) if deep is None else deep)
         gains = [gain for gain in guessed if gain is not None]
     starts = [_search_under(image, template, bank, gain, settings.candidates) for gain in gains]
     if sum(len(start) for start in starts) == 0:
