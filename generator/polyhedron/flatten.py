@@ -44,14 +44,15 @@ def flatten_faces(
         return vertices.copy(), 0.0
     for _ in range(SOLID.flatten_steps):
         trial = _step(moved, faces, face_of, vertex_of, size)
-        worst = np.abs(_residual(trial, faces, face_of, vertex_of)[0]).max()
+        with np.errstate(invalid="ignore"):  # a face that shrank to a point has no plane
+            worst = np.abs(_residual(trial, faces, face_of, vertex_of)[0]).max()
         if not worst < 0.5 * best:
             break
         moved, best = trial, worst
         if best <= SOLID.planar_exactly * size:
             break
     distance = float(np.linalg.norm(moved - vertices, axis=1).max())
-    if distance > 1e-3 * size:
+    if distance > 1e-3 * size or (large and best > SOLID.planar_enough * size):
         return vertices.copy(), 0.0
     return moved.copy(), distance
 

@@ -53,7 +53,8 @@ def prove_closed(part: Part) -> None:
         normal /= np.linalg.norm(normal)
         points = np.concatenate(corners) - corners[0][0]
         if np.abs(points @ normal).max() > EMBOSS.planarity * size:
-            raise SolidError("a facet is not planar", fix="check the shape", place=place)
+            fix = "export the model as STEP, or its curved regions as triangles with more digits"
+            raise SolidError("a facet is not planar", fix=fix, place=place)
         for embossing in on.get(facet, []):
             flat = in_frame(embossing.T_part_facet, np.concatenate(corners))[:, 2]
             upright = float(embossing.T_part_facet[:3, 2] @ normal)
