@@ -1,12 +1,11 @@
 """How many registered places a foreign surface would match as well by chance.
 
-Fit + hypothesis + what is registered -> doubt, the E-value of sequence databases: the expected
-number of registered places that reach at least the score of the hypothesis, where symbols are drawn
-at random (each alike likely, one independent of the other). A cell that shows its symbol clearly
+Fit + hypothesis + what is registered -> doubt, the E-value of sequence databases: number of places
+times the probability that symbols drawn at random (each alike likely, one independent of the
+other) reach at least the score that the hypothesis reached. A cell that shows its symbol clearly
 contributes 1 / q; a soft one, the share of symbols that score as well, together with what the
-others leave; one that the place leaves bare, nothing but what it is behind. A place whose border is
-another one than the image shows falls behind for that alone: at the edge of a face mostly edges are
-counted that run alike, in its corner corners.
+others leave; a bare one, 1. Of bare cells only the places are counted whose own border agrees with
+them: a place that holds symbols where the face is bare falls behind farther than the hypothesis.
 
 The probability is summed over all symbols of all cells at once, on a grid of nats, every score
 rounded up: it is never too small but for what the fit of pose and gain to the symbols that are
@@ -16,18 +15,19 @@ registered there adds to them. Thesis 6.3.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.locate import Hypothesis, bounded_scores, labels_at
+from recognizer.touch.place_scores import count_places
 from recognizer.touch.settings import ReaderSettings
 from recognizer.touch.symbols.fit import Fit
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 
 def expected_matches(
@@ -48,28 +48,18 @@ def expected_matches(
     embossed
         The one of the hypothesis.
     borders
-        Whether places fall behind where their own borders are others, which is gone into where the
-        doubt would decide anything without, in a lab that is small enough. Else all count alike.
+        Whether those only count whose own borders agree with the bare cells; else all.
     """
     scores = bounded_scores(fit, settings.hypotheses)
     held = labels_at(embossed, hypothesis, fit.cells)
     shown = held < embossed.array.order
-    alike = [
-        one for one in arrays if (one.alphabet, one.style) == (embossed.alphabet, embossed.style)
-    ]
-    belief, places = settings.belief, [len(one.keys) for one in alike]
-    most = sum(places) * chance_of_match(scores[shown, :-1], held[shown], belief.grain)
-    if not borders or most <= min(belief.doubt, settings.next.doubt):
-        return most
-    own = scores[np.arange(len(held)), held]
-    behind = np.floor((own[:, None] - scores) / belief.grain).astype(np.int64)
-    anchor = int(np.argmax(np.where(shown, fit.seen, -1.0)))
-    cells = fit.cells - fit.cells[anchor]
-    few = settings.hypotheses.large
-    share = most / max(sum(places), 1)
-    return sum(
-        _expect_matches(one, cells, behind) if len(one.keys) <= few else share * len(one.keys)
-        for one in alike
+    chance = chance_of_match(scores[shown, :-1], held[shown], settings.belief.grain)
+    border = _border_of(fit, scores, held)
+    largest = settings.hypotheses.large
+    return chance * sum(
+        _count_places(one, border, largest) if borders else len(one.keys)
+        for one in arrays
+        if (one.alphabet, one.style) == (embossed.alphabet, embossed.style)
     )
 
 
@@ -85,62 +75,42 @@ def chance_of_match(scores: Array, held: Ints, grain: float) -> float:
     grain
         Nats to which scores are rounded, towards a larger probability.
     """
+    if len(held) == 0:
+        return 1.0
+    order = scores.shape[1]
     behind = np.floor((scores[np.arange(len(held)), held][:, None] - scores) / grain)
-    return _share_within(behind.astype(np.int64), 0)
-
-
-def _share_within(behind: Ints, most: int) -> float:
-    """Return how likely random symbols of cells (m, q) fall behind by no more than `most`."""
-    if len(behind) == 0:
-        return float(most >= 0)
+    behind = behind.astype(np.int64)
     ahead = behind.min(axis=1)
-    slack = int(most - ahead.sum())  # by which all but the likeliest may fall behind
-    if slack < 0:
-        return 0.0
+    slack = int(-ahead.sum())  # by which the held symbols fall behind the likeliest ones
     reached = np.zeros(slack + 1)
     reached[0] = 1.0
     for cell in np.minimum(behind - ahead[:, None], slack + 1):
-        each = np.bincount(cell, minlength=slack + 2)[: slack + 1] / behind.shape[1]
+        each = np.bincount(cell, minlength=slack + 2)[: slack + 1] / order
         reached = np.convolve(reached, each)[: slack + 1]
     return float(reached.sum())
 
 
-def _expect_matches(embossed: EmbossedArray, cells: Ints, behind: Ints) -> float:
-    """Return how many places random symbols match, borders and all.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Border:
+    """What the bare cells of a hypothesis ask of a place."""
 
-    Parameters
-    ----------
-    cells
-        (m, 2) column and upward row, from a cell that the place holds.
-    behind
-        (m, q + 1) by how much each symbol, and none, falls behind the hypothesis there.
-    """
-    symbol, none = behind[:, :-1], behind[:, -1]
-    least = symbol.min(axis=1)
-    tell = np.flatnonzero((symbol != none[:, None]).any(axis=1))
-    tell = tell[np.argsort(-np.abs(none - least)[tell], kind="stable")]
-    # by how much all cells to come make up for the others at most
-    rest = np.append(np.cumsum(np.minimum(least, none)[tell][::-1])[::-1], 0)
-    rest = rest + none.sum() - none[tell].sum()
-    array, owners = embossed.array, embossed.owners[:-1]
-    row, column = (
-        part.astype(np.int64) for part in np.divmod(embossed.keys, np.uint64(array.columns))
-    )
-    total, held = np.zeros(len(row), np.int64), np.zeros((0, len(row)), np.bool_)
-    for done, n in enumerate(tell.tolist(), 1):
-        i, j = cells[n].tolist()
-        holder, _ = embossed.at((row - j) % array.rows, (column + i) % array.columns)
-        here = holder == owners
-        total = total + np.where(here, least[n], none[n])
-        held = np.concatenate([held, here[None]])
-        kept = total + rest[done] <= 0
-        row, column, owners = row[kept], column[kept], owners[kept]
-        total, held = total[kept], held[:, kept]
-    outlines, count = np.unique(held, axis=1, return_counts=True)
-    return float(
-        sum(
-            number
-            * _share_within(symbol[tell[outline]], int(none[tell[outline]].sum()) - int(none.sum()))
-            for outline, number in zip(outlines.T, count.tolist(), strict=True)
-        )
-    )
+    cells: Ints  #: (n, 2) column and upward row, from a cell that the place holds
+    price: Array  #: (n,) nats by which a symbol there falls behind, falling
+    slack: float  #: nats by which the hypothesis itself falls behind
+
+
+def _border_of(fit: Fit, scores: Array, held: Ints) -> _Border:
+    order = scores.shape[1] - 1
+    price = np.where(held == order, scores[:, -1] - scores[:, :-1].max(axis=1), 0.0)
+    dear = np.argsort(-price, kind="stable")[: int((price > 0).sum())]
+    anchor = int(np.argmax(np.where(held < order, fit.seen, -1.0)))
+    own = scores[np.arange(len(held)), held]
+    slack = float((scores.max(axis=1) - own).sum())
+    return _Border(fit.cells[dear] - fit.cells[anchor], price[dear], slack)
+
+
+def _count_places(embossed: EmbossedArray, border: _Border, largest: int) -> int:
+    """Return how many registered cells can be the held one; all, in a lab larger than `largest`."""
+    if len(embossed.keys) > largest:
+        return len(embossed.keys)
+    return count_places(embossed, border.cells, border.price, border.slack)
