@@ -90,6 +90,8 @@ def load_kernels(file: Path) -> ctypes.CDLL | None:
     pointer, whole = ctypes.c_void_p, ctypes.c_int64
     library.refine.argtypes = [pointer, whole, *[pointer] * 7]
     library.refine.restype = None
+    library.linearize.argtypes = [pointer] * 9
+    library.linearize.restype = None
     library.score_cells.argtypes = [pointer, whole, ctypes.c_double, *[pointer] * 8]
     library.score_cells.restype = ctypes.c_double
     library.add_scores.argtypes = [
@@ -146,6 +148,34 @@ def refine_compiled(
         *(one.ctypes.data for one in (pose, gain, value, normal, right)),
     )  # fmt: skip
     return pose, gain, value, normal, right
+
+
+def linearize_compiled(
+    library: ctypes.CDLL,
+    image: Image,
+    template: ResponseTemplate,
+    pose: Array,
+    gain: Array,
+    shown: Callable[[Ints], Ints],
+) -> tuple[Array, Array, Array, Array]:
+    """Return an image about the lattice (7,) under the gain (4,), whose symbols are known.
+
+    psi and slopes (n, 6) of what is shown, forces (n,), derivatives (n, 11) by pose and gain, and
+    (n,) by how much forces change with psi, over `NormalizedImage.press`.
+    """
+    tactels = len(image.forces)
+    pose, gain = np.ascontiguousarray(pose), np.ascontiguousarray(gain)
+    labels, corner = _label_tables(image, template, pose[None], 0, shown)
+    scene = _scene_of(image, template, 1, np.zeros(UNKNOWNS), *labels.shape[1:])
+    found = (
+        np.empty((tactels, template.rimmed.shape[-1])), np.empty(tactels),
+        np.empty((tactels, UNKNOWNS)), np.empty(tactels),
+    )  # fmt: skip
+    library.linearize(
+        ctypes.addressof(scene.value),
+        *(one.ctypes.data for one in (labels, corner, pose, gain, *found)),
+    )
+    return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)

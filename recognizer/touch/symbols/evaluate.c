@@ -264,6 +264,41 @@ static double deviation(const Scene *s, const double v[FIELDS], double faint, do
     return (double)(float)sqrt(square);
 }
 
+/* A tactel under a gain, as `normalize` has it. */
+typedef struct { double bare, depth, plain, lower, plateau; } Felt;
+
+/* The force at a tactel that shows v, and what changes with pose and gain; c, n: cosine and sine of
+   the pose, scale: of the force, by: out, of psi there. */
+static inline double force_at(const Scene *s, int64_t t, const double v[FIELDS], Felt f, double c,
+                              double n, double scale, double *by_psi, double J[UNKNOWNS]) {
+    double total = expm1(v[0] * (double)(float)LOG4) / 3.0;
+    double by = (1 + 3.0 * total) * LOG4 / 3.0 * f.plateau;
+    double symbol = smaller(larger((total - f.bare) / larger(1 - f.bare, 1e-3), 0.0), 1.5);
+    double rest = total > 0 ? 1 - symbol : 0.0;
+    double force = scale * (symbol * f.plain + rest * f.lower);
+    double slope = scale * (symbol * slope_of(s, f.depth) + rest * slope_of(s, f.depth - s->symbol));
+    double x = s->points[2 * t], y = s->points[2 * t + 1];
+    double across = c * x - n * y, up = n * x + c * y;
+    const double *plane = s->plane + 3 * t;
+    const double by_each[UNKNOWNS] = {
+        v[1] * by, v[2] * by, (v[2] * across - v[1] * up) * by, v[3] * by, v[4] * by, v[5] * by,
+        (v[1] * across + v[2] * up) * by, force, slope * plane[0], slope * plane[1],
+        slope * plane[2]};
+    memcpy(J, by_each, sizeof by_each);
+    *by_psi = by;
+    return force;
+}
+
+/* Labels (n,) of what cells show, -1 beyond the table. */
+static void read_labels(const Scene *s, const int8_t *given, const int64_t *corner,
+                        const int64_t *cells, int64_t *labels) {
+    for (int64_t t = 0; t < s->n; t++) {
+        int64_t x = cells[2 * t] - corner[0], y = cells[2 * t + 1] - corner[1];
+        int inside = x >= 0 && x < s->wide && y >= 0 && y < s->high;
+        labels[t] = inside ? given[y * s->wide + x] : -1;
+    }
+}
+
 /* Candidates somewhere: pose (b, 7), gain (b, 4), value (b,), normal (b, 11, 11), right (b, 11). */
 typedef struct { double *pose, *gain, *value, *normal, *right; } Lattices;
 
@@ -279,14 +314,8 @@ static void evaluate(const Scene *s, const int8_t *given, const int64_t *corner,
         const double *pose = at.pose + 7 * i, *gain = at.gain + 4 * i;
         const int64_t *under = w->cells + 2 * i * s->n;
         const float *tables = w->tables;
-        int64_t *shown = given ? w->labels : NULL;
-        if (given) {
-            for (int64_t t = 0; t < s->n; t++) {
-                int64_t x = under[2 * t] - corner[2 * i], y = under[2 * t + 1] - corner[2 * i + 1];
-                int inside = x >= 0 && x < s->wide && y >= 0 && y < s->high;
-                shown[t] = inside ? given[(i * s->high + y) * s->wide + x] : -1;
-            }
-        }
+        const int64_t *shown = given ? w->labels : NULL;
+        if (given) read_labels(s, given + i * s->high * s->wide, corner + 2 * i, under, w->labels);
         look_up(s, w->offsets + 2 * i * s->n, pose, bare, contact, w->any_bare, shown, w->tables);
         score(s, s->first, p, press, bare, plateau, tables, w->is_loud, shown, w->scores);
         if (!given) choose(s, under, w->scores, w->sums, w->first, w->labels);
@@ -300,23 +329,12 @@ static void evaluate(const Scene *s, const int8_t *given, const int64_t *corner,
             if (press[t] != 1.0) level += s->trust[t] * log(press[t]);
             double v[FIELDS], unit = s->first / press[t];
             value_of(s, tables, t, label, p[t], bare[t], v);
-            double total = expm1(v[0] * (double)(float)LOG4) / 3.0;
-            double by = (1 + 3.0 * total) * LOG4 / 3.0 * plateau[t];
+            Felt f = {bare[t], depth[t], plain[t], lower[t], plateau[t]};
+            double J[UNKNOWNS], by, force = force_at(s, t, v, f, c, n, scale, &by, J);
             double wide = unit * deviation(s, v, s->noise / plateau[t], unit, w->is_loud) * by;
-            double symbol = (total - bare[t]) / larger(1 - bare[t], 1e-3);
-            symbol = smaller(larger(symbol, 0.0), 1.5);
-            double rest = total > 0 ? 1 - symbol : 0.0;
-            double force = scale * (symbol * plain[t] + rest * lower[t]);
             double left = s->forces[t] - force;
             if (!(fabs(left / wide) < s->far) || s->trust[t] == 0.0) continue;
-            double slope = scale * (symbol * slope_of(s, depth[t]) +
-                                    rest * slope_of(s, depth[t] - s->symbol));
-            double x = s->points[2 * t], y = s->points[2 * t + 1];
-            double across = c * x - n * y, up = n * x + c * y, sure = s->trust[t] / (wide * wide);
-            double J[UNKNOWNS] = {
-                v[1] * by, v[2] * by, (v[2] * across - v[1] * up) * by, v[3] * by, v[4] * by,
-                v[5] * by, (v[1] * across + v[2] * up) * by, force, slope * s->plane[3 * t],
-                slope * s->plane[3 * t + 1], slope * s->plane[3 * t + 2]};
+            double sure = s->trust[t] / (wide * wide);
             for (int k = 0; k < UNKNOWNS; k++) {
                 double weighed = J[k] * sure;
                 r[k] += weighed * left;
@@ -334,6 +352,29 @@ static void evaluate(const Scene *s, const int8_t *given, const int64_t *corner,
         memcpy(at.normal + i * UNKNOWNS * UNKNOWNS, N, sizeof N);
         memcpy(at.right + i * UNKNOWNS, r, sizeof r);
     }
+}
+
+/* The image about one lattice whose cells show what is given: psi and slopes (n, 6), forces (n,),
+   their derivatives (n, 11), and (n,) by how much forces change with psi, where all press fully. */
+void linearize(const Scene *s, const int8_t *given, const int64_t *corner, const double *pose,
+               const double *gain, double *values, double *forces, double *jacobian,
+               double *unit) {
+    Work w = new_work(s);
+    double *felt = w.felt;
+    const int64_t i = 0;
+    normalize(s, gain, w.felt, w.measure, &w.any_bare, &w.is_loud);
+    cells_under(s, pose, w.cells, w.offsets);
+    read_labels(s, given, corner, w.cells, w.labels);
+    look_up(s, w.offsets, pose, FELT(2), FELT(3), w.any_bare, w.labels, w.tables);
+    double c = cos(pose[2]), n = sin(pose[2]), scale = exp(gain[0]), by;
+    for (int64_t t = 0; t < s->n; t++) {
+        Felt f = {FELT(2)[t], FELT(4)[t], FELT(5)[t], FELT(6)[t], FELT(7)[t]};
+        value_of(s, w.tables, t, w.labels[t], FELT(0)[t], f.bare, values + FIELDS * t);
+        forces[t] = force_at(s, t, values + FIELDS * t, f, c, n, scale, &by,
+                             jacobian + UNKNOWNS * t);
+        unit[t] = by / FELT(1)[t];
+    }
+    free_work(&w);
 }
 
 /* Solve A x = b by elimination with row pivots; both are overwritten. */

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from recognizer.touch.settings import PosteriorSettings
 from recognizer.touch.symbols.blur import second_differences
+from recognizer.touch.symbols.compiled import compiled_kernels, linearize_compiled
 from recognizer.touch.symbols.covariance import invert_normal
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.gain import Image, bounded_gain
@@ -123,17 +124,13 @@ def fit_posterior(
 def _linearize(
     image: Image, template: ResponseTemplate, pose: Array, gain: Array, more: Array, shown: Shown
 ) -> _Linearized:
-    under = project_template(image, template, pose[None], gain[None])
-    felt, noise = under.felt, image.settings.noise
-    values = values_of(under, shown(under.cells))
-    slopes, forces = force_jacobian(image, pose[None], gain[None], values, felt)
-    jacobian, force, value = slopes[0], forces[0], values[0]
+    noise = image.settings.noise
+    value, force, jacobian, unit = _linearize_lattice(image, template, pose, gain, shown)
     across = second_differences(np.column_stack([force, jacobian]), image.shape)
     blurred = [one[:, 0] for one in across]
     jacobian = jacobian + sum(
         share * one[:, 1:] for share, one in zip(more[1:], across, strict=True)
     )
-    unit = response_by_psi(response_of(value[:, 0])) * felt.plateau[0] / felt.press[0]
     parts = unit**2 * np.stack(
         [noise.quiet**2 + value[:, 0] ** 2, image.aside * (value[:, 1] ** 2 + value[:, 2] ** 2)]
     )
@@ -142,6 +139,21 @@ def _linearize(
     departure = np.concatenate([prior_departure(image, pose[None], gain[None])[0], more])
     jacobian = np.column_stack([jacobian, columns])
     return _Linearized(pose, gain, more, left, parts, jacobian, departure)
+
+
+def _linearize_lattice(
+    image: Image, template: ResponseTemplate, pose: Array, gain: Array, shown: Shown
+) -> tuple[Array, Array, Array, Array]:
+    """Return what `compiled.linearize_compiled` does."""
+    library = compiled_kernels()
+    if library is not None:
+        return linearize_compiled(library, image, template, pose, gain, shown)
+    under = project_template(image, template, pose[None], gain[None])
+    values = values_of(under, shown(under.cells))
+    jacobian, force = force_jacobian(image, pose[None], gain[None], values, under.felt)
+    plateau, press = under.felt.plateau[0], under.felt.press[0]
+    unit = response_by_psi(response_of(values[0, :, 0])) * plateau / press
+    return values[0], force[0], jacobian[0], unit
 
 
 def _move(

@@ -23,6 +23,7 @@ from recognizer.touch.signal import Signal
 from recognizer.touch.symbols import compiled
 from recognizer.touch.symbols.fit import score_cells
 from recognizer.touch.symbols.gain import image_of_signal, normalize_image
+from recognizer.touch.symbols.posterior import fit_posterior
 from recognizer.touch.symbols.projection import project_template
 from recognizer.touch.symbols.refine import refine_lattices
 from recognizer.touch.symbols.search import bank_of, lattice_scores
@@ -196,6 +197,19 @@ def test_lattices_of_the_coarse_search_are_summed_alike_to_the_bit(cells, use):
         found.append(lattice_scores(bank, values, weights, template.order))
     assert found[0].shape == (3, 16)
     assert found[0].tobytes() == found[1].tobytes()
+
+
+@pytest.mark.parametrize("name", [name for name in SCENES if not name.endswith("each gain")])
+def test_the_last_fit_is_the_same(name, use):
+    image, template, gain = SCENES[name]()
+    found = []
+    for kind in ("numpy", "compiled"):
+        use(kind)
+        found.append(fit_posterior(image, template, TRUE[0], gain[0], given))
+    one, other = found
+    assert np.abs(one.pose[:3] - other.pose[:3]).max() < 1e-6
+    assert one.gain == pytest.approx(other.gain, abs=1e-6)
+    assert one.covariance == pytest.approx(other.covariance, rel=1e-5, abs=1e-9)
 
 
 @pytest.mark.parametrize("shown", [1.0, 1e-3, 0.0])  # at last: an unknown of which nothing is seen
