@@ -4,11 +4,15 @@ import { get } from "./api";
 import { element, say } from "./dom";
 import type { ObjectEntry } from "./types";
 
+const LEAST = 3; // letters of a word that is looked for beside the name: "2" means a name, not 124 symbols
+
+interface Item { name: string; words: string[]; item: HTMLLIElement; button: HTMLButtonElement }
+
 export class Gallery {
   private readonly dialog = element<HTMLDialogElement>("gallery");
   private readonly search = element<HTMLInputElement>("gallery-search");
   private readonly list = element("gallery-list");
-  private items: { words: string; item: HTMLLIElement; button: HTMLButtonElement }[] = [];
+  private items: Item[] = [];
 
   constructor(private readonly chosen: (object: string) => void, private readonly shown: () => string) {
     element("gallery-open").addEventListener("click", () => void this.open().catch(() => undefined));
@@ -27,7 +31,7 @@ export class Gallery {
     this.list.querySelector('[aria-current="true"]')?.scrollIntoView({ block: "nearest" });
   }
 
-  private itemOf(one: ObjectEntry): { words: string; item: HTMLLIElement; button: HTMLButtonElement } {
+  private itemOf(one: ObjectEntry): Item {
     const item = document.createElement("li"), button = document.createElement("button");
     const picture = document.createElement("img"), name = document.createElement("strong"), more = document.createElement("span");
     picture.loading = "lazy";
@@ -44,15 +48,16 @@ export class Gallery {
       this.chosen(one.name);
     });
     item.append(button);
-    return { words: `${one.name} ${more.textContent} ${one.profile} ${one.registered}`.toLowerCase(), item, button };
+    const words = `${more.textContent} ${one.profile} ${one.registered}`.toLowerCase().split(/[\s,_]+/);
+    return { name: one.name.toLowerCase(), words, item, button };
   }
 
   /** Show the objects of which all words are true. */
   private filter(): void {
     const wanted = this.search.value.toLowerCase().split(/\s+/).filter(Boolean);
     let found = 0;
-    for (const { words, item } of this.items) {
-      item.hidden = !wanted.every((word) => words.includes(word));
+    for (const { name, words, item } of this.items) {
+      item.hidden = !wanted.every((word) => name.includes(word) || (word.length >= LEAST && words.some((one) => one.startsWith(word))));
       found += item.hidden ? 0 : 1;
     }
     say(element("gallery-count"), `${found} of ${this.items.length} objects`);
