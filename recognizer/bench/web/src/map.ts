@@ -45,15 +45,11 @@ export class MapPanel {
 
   private all(): void {
     if (!this.map) return;
-    let [r0, r1, c0, c1] = [Infinity, -Infinity, Infinity, -Infinity];
-    for (const face of this.map.faces) {
-      for (const r of face.rows) { r0 = Math.min(r0, r); r1 = Math.max(r1, r + 1); }
-      for (const c of face.columns) { c0 = Math.min(c0, c); c1 = Math.max(c1, c + 1); }
-    }
-    if (r0 > r1) [r0, r1, c0, c1] = [0, this.map.rows, 0, this.map.columns];
+    const [r, high] = arc(this.map.faces.flatMap((face) => face.rows), this.map.rows);
+    const [c, wide] = arc(this.map.faces.flatMap((face) => face.columns), this.map.columns);
     const { clientWidth: w, clientHeight: h } = this.canvas;
-    const cells = 1.06 * Math.max(c1 - c0, ((r1 - r0) * w) / Math.max(h, 1));
-    this.view = { row: (r0 + r1) / 2, column: (c0 + c1) / 2, cells };
+    const cells = 1.06 * Math.max(wide, (high * w) / Math.max(h, 1));
+    this.view = { row: r + high / 2, column: c + wide / 2, cells };
     this.draw();
   }
 
@@ -84,7 +80,8 @@ export class MapPanel {
       const lit = this.answer?.object === face.object && this.answer.face === face.face;
       const colour = hue(this.objects.indexOf(face.object));
       for (let i = 0; i < face.rows.length; i++) {
-        const left = x(face.columns[i]!), above = y(face.rows[i]!);
+        const [down, across] = this.around(face.rows[i]!, face.columns[i]!);
+        const left = x(face.columns[i]! + across), above = y(face.rows[i]! + down);
         if (left < -unit || above < -unit || left > width || above > height) continue;
         const shade = (dark ? 34 : 78) + (dark ? 7 : -6) * (face.labels[i]! % 4);
         ink.fillStyle = lit ? `hsl(34 95% ${dark ? 48 : 62}%)` : `hsl(${colour} 38% ${shade}%)`;
@@ -94,14 +91,24 @@ export class MapPanel {
     this.window(unit, x, y);
   }
 
+  /** By how much a cell is shown beside its place: the array is a torus, and what is seen of it may lie across its border. */
+  private around(row: number, column: number): [number, number] {
+    const { rows, columns } = this.map!, { width, height } = this.canvas, across = this.view.cells, down = (across * height) / width;
+    return [
+      down < rows ? rows * Math.round((this.view.row - row) / rows) : 0,
+      across < columns ? columns * Math.round((this.view.column - column) / columns) : 0,
+    ];
+  }
+
   /** The sensor's outline on the torus: where it crosses the border it is drawn on both sides. */
   private window(unit: number, x: (c: number) => number, y: (r: number) => number): void {
     const corners = this.answer?.window?.encoding === this.number ? this.answer.window.corners : null;
     if (!corners || !this.map) return;
-    const { ink, map } = this, all = corners;
+    const { ink, map } = this, [row, column] = this.around(...corners[0]!);
+    const all = corners.map(([r, c]): [number, number] => [r + row, c + column]);
     for (const down of [-map.rows, 0, map.rows]) for (const across of [-map.columns, 0, map.columns]) {
-      const inside = all.some(([r, c]) => r + down > 0 && r + down < map.rows && c + across > 0 && c + across < map.columns);
-      if (!inside) continue;
+      const seen = all.some(([r, c]) => this.seen(r + down, c + across));
+      if (!seen) continue;
       ink.beginPath();
       all.forEach(([r, c], i) => ink[i ? "lineTo" : "moveTo"](x(c + across), y(r + down)));
       ink.closePath();
@@ -109,6 +116,13 @@ export class MapPanel {
       ink.strokeStyle = themed("--accent");
       ink.stroke();
     }
+  }
+
+  /** Whether a place is on the canvas, and on the array where all of that is. */
+  private seen(row: number, column: number): boolean {
+    const { rows, columns } = this.map!, { width, height } = this.canvas, across = this.view.cells, down = (across * height) / width;
+    return (down < rows ? Math.abs(row - this.view.row) < down : row > 0 && row < rows)
+      && (across < columns ? Math.abs(column - this.view.column) < across : column > 0 && column < columns);
   }
 
   private scale(): { unit: number; x: (c: number) => number; y: (r: number) => number } {
@@ -122,9 +136,10 @@ export class MapPanel {
 
   private cellAt(event: MouseEvent): [number, number] {
     const box = this.canvas.getBoundingClientRect(), unit = box.width / this.view.cells;
+    const at = (cell: number, size: number): number => ((Math.floor(cell) % size) + size) % size;
     return [
-      Math.floor(this.view.row + (event.clientY - box.top - box.height / 2) / unit),
-      Math.floor(this.view.column + (event.clientX - box.left - box.width / 2) / unit),
+      at(this.view.row + (event.clientY - box.top - box.height / 2) / unit, this.map?.rows ?? 1),
+      at(this.view.column + (event.clientX - box.left - box.width / 2) / unit, this.map?.columns ?? 1),
     ];
   }
 
@@ -177,4 +192,15 @@ export class MapPanel {
       this.draw();
     });
   }
+}
+
+/** The shortest stretch of a ring of cells that holds these: where it begins, and how long it is. */
+function arc(cells: number[], size: number): [number, number] {
+  const held = [...new Set(cells)].sort((a, b) => a - b);
+  let from = 0, gap = 0;
+  held.forEach((cell, i) => {
+    const next = held[i + 1] ?? held[0]! + size;
+    if (next - cell > gap) [from, gap] = [next % size, next - cell];
+  });
+  return gap > size / 4 ? [from, size - gap + 1] : [0, size];
 }
