@@ -53,6 +53,10 @@ def _percent(share: float) -> str:
     return f"{100 * max(share, 0.0):.0f} %"
 
 
+def _symbols_read(count: float) -> str:
+    return "1 symbol is read" if round(count) == 1 else f"{count:.0f} symbols are read"
+
+
 def _soft(n: Numbers) -> str:
     reach = f"{n['plateau']:.2g} N" if n["newtons"] else f"{n['plateau']:.0f} counts"
     return (
@@ -63,7 +67,7 @@ def _soft(n: Numbers) -> str:
 def _edge(n: Numbers) -> str:
     return (
         f"at an edge: {_percent(n['loaded'])} of the sensor is loaded, "
-        f"{n['symbols']:.0f} symbols are read"
+        f"{_symbols_read(n['symbols'])}"
     )
 
 
@@ -80,7 +84,7 @@ def _dead(n: Numbers) -> str:
 
 def _not_registered(n: Numbers) -> str:
     return (
-        f"{n['symbols_anywhere']:.0f} symbols are read and explain "
+        f"{_symbols_read(n['symbols_anywhere'])} and explain "
         f"{_percent(n['explained_anywhere'])} of the image, but stand so nowhere in this database"
     )
 

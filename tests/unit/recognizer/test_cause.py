@@ -152,6 +152,8 @@ def test_a_cause_is_said_beside_the_reason_it_led_to():
         "not recognised: at an edge: 50 % of the sensor is loaded, 3 symbols are read; "
         "move towards the loaded part"
     )
+    one = Cause(cause.EDGE, {"loaded": 0.2, "symbols": 1.0})
+    assert str(one) == "at an edge: 20 % of the sensor is loaded, 1 symbol is read"
     both = str(replace(refusal(1, AMBIGUOUS), cause=edge))
     assert both.startswith("not recognised: ambiguous: at an edge: 50 %")
     assert both.endswith("touch again a few mm beside")
