@@ -103,7 +103,8 @@ def _face_lines(reports: Sequence[FaceReport]) -> list[str]:
         answered = ""
         if face.promise is not None:
             once, within = face.promise.at_once, face.promise.within_three
-            answered = f"{once:.0%} answered at once, {within:.0%} within three, "
+            later = "" if within is None else f"{within:.0%} within three, "
+            answered = f"{once:.0%} answered at once, {later}"
         text = (
             f"{size} mm, {_count(face.symbols, 'symbol')}, "
             f"{answered}it could be as small as {least} mm"

@@ -20,10 +20,10 @@ def promise_lines(faces: Sequence[FaceReport]) -> list[str]:
         return []
     area = sum(face.area_mm2 for face, _ in promised)
     share = sum(face.area_mm2 * promise.at_once for face, promise in promised) / area
-    within = sum(face.area_mm2 * promise.within_three for face, promise in promised) / area
-    lines = [
-        f"  {_percent(share)} of touches are answered at once, {_percent(within)} within three"
-    ]
+    later = [face.area_mm2 * promise.within_three for face, promise in promised
+             if promise.within_three is not None]  # fmt: skip
+    within = f", {_percent(sum(later) / area)} within three" if later else ""
+    lines = [f"  {_percent(share)} of touches are answered at once{within}"]
     alike: dict[tuple[str, ...], list[FaceReport]] = {}
     for face, promise in sorted(promised, key=lambda one: one[1].at_once):
         if promise.at_once < PROMISE.low:
@@ -49,7 +49,8 @@ def _low_text(why: str, remedy: str, faces: Sequence[FaceReport]) -> str:
     promises = [face.promise for face in faces if face.promise is not None]
     shares = [promise.at_once for promise in promises]
     share = f"{_range(shares)} of touches are answered at once"
-    share += f", {_range([promise.within_three for promise in promises])} within three"
+    later = [one.within_three for one in promises if one.within_three is not None]
+    share += f", {_range(later)} within three" if later else ""
     others = f" (and {', '.join(f.name for f in faces[1:])}, as narrow)" if faces[1:] else ""
     said = why if not max(shares) else f"{why}; {share}" if why else share
     help_ = f"; would help: {remedy}" if remedy else ""

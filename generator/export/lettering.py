@@ -91,13 +91,13 @@ def write_lettering(
     draw.text(((left + right) / 2, y - 8), f"{length:g} mm", GREY, small, anchor="mb")
 
 
-def write_legend(image: Image.Image, font: Font) -> None:
-    """Say at the top what the colours of faces mean."""
+def write_legend(image: Image.Image, font: Font, *, within_three: bool) -> None:
+    """Say at the top what the colours of faces mean, and the second number of a label."""
     draw = ImageDraw.Draw(image)
     left, y, step = image.size[0] // 2, 58, LEGEND[0] // LEGEND[1]
     draw.text((left - 8, y + 8), "touches answered at once: 0 %", GREY, font, anchor="rm")
     for k in range(LEGEND[1]):
         x = left + k * step
         draw.rectangle((x, y, x + step - 1, y + 15), answered_rgb(k / (LEGEND[1] - 1)))
-    over = "100 %  (at once / within three)"
+    over = "100 %  (at once / within three)" if within_three else "100 %"
     draw.text((left + LEGEND[1] * step + 8, y + 8), over, GREY, font, anchor="lm")

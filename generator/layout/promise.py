@@ -108,8 +108,10 @@ def _between(value: Any, steps: Sequence[float]) -> tuple[Any, Any, Any]:
 
 def promised_shares(
     views: FaceViews, table: AnswerTable, pitch_mm: float, sensor: SensorSize = USUAL_SENSOR
-) -> tuple[float, float]:
+) -> tuple[float, float | None]:
     """Return the shares of touches of a face that will be answered at once, and within three.
+
+    The second is known of the usual sensor alone: None of others.
 
     Parameters
     ----------
@@ -123,7 +125,9 @@ def promised_shares(
         That touches it.
     """
     once = answered_at_once(table, pitch_mm, views.seen, views.loaded, sensor)
-    within = once + (1 - once) * answered_later(table, views.seen, views.around, sensor)
+    if sensor.name != USUAL_SENSOR.name:
+        return float(once.mean()), None
+    within = once + (1 - once) * table.later(views.seen, views.around)
     return float(once.mean()), float(within.mean())
 
 
@@ -166,17 +170,6 @@ def answered_at_once(
     """
     usual, share = table.at(pitch_mm / sensor.coarseness, seen, loaded), answered_share(sensor)
     return usual if share is None else usual * share.at(loaded)
-
-
-def answered_later(
-    table: AnswerTable, seen: ArrayLike, around: ArrayLike, sensor: SensorSize = USUAL_SENSOR
-) -> Points:
-    """Return the probability that a touch is answered by the third, if not at once, (P,).
-
-    The law was measured with the usual sensor: symbols are counted as many as on its area.
-    """
-    more = (sensor.across_mm / USUAL_SENSOR.across_mm / sensor.coarseness) ** 2
-    return table.later(np.asarray(seen) / more, np.asarray(around) / more)
 
 
 @lru_cache(maxsize=1)

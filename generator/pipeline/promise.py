@@ -37,7 +37,8 @@ class FacePromise:
     """Of one flat face."""
 
     at_once: float  #: share of touches, the sensor's centre on the face, that are answered
-    within_three: float  #: the same of up to three, each where the answer before says
+    #: the same of up to three, each where the answer before says; None: no such measurement
+    within_three: float | None
     one_row: bool = False  #: touches show one row of symbols
     remedy: str = ""  #: what would make it answer most touches, where it does not
 
@@ -92,7 +93,7 @@ def _promise(
     views = face_views(loops, face, style.pitch_mm, view, settings)
     one_row = bool((views.lines <= 1).mean() >= PROMISE.one_line)
     once, within = promised_shares(views, measured_answers(), style.pitch_mm, plan.spec.sensor)
-    return FacePromise(round(once, 3), round(within, 3), one_row)
+    return FacePromise(round(once, 3), None if within is None else round(within, 3), one_row)
 
 
 def _remedy(plan: ObjectPlan, loops: Loops, face: int) -> str:

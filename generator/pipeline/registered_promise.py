@@ -46,6 +46,7 @@ def registered_promises(
             views = face_views(face.polygon_mm, layout, style.pitch_mm, view)
             pitch, table = style.pitch_mm, measured_answers()
             once, within = promised_shares(views, table, pitch, sensor)
-            known[key] = FacePromise(round(once, 3), round(within, 3))
+            rounded = None if within is None else round(within, 3)
+            known[key] = FacePromise(round(once, 3), rounded)
         found[face.face_id] = known[key]
     return found

@@ -44,7 +44,6 @@ from generator.layout.placement import FaceLayout  # noqa: E402
 from generator.layout.promise import (  # noqa: E402
     AnswerTable,
     answered_at_once,
-    answered_later,
     measured_answers,
 )
 from generator.layout.views import SensorView, sensor_view, views_at  # noqa: E402
@@ -288,7 +287,7 @@ def _shares(
     right = [t.right for t in touches]
     if within:
         seen, around = np.array([(t.seen, t.around) for t in touches]).T
-        later = answered_later(table, seen, around, sensor)
+        later = table.later(seen, around)
         p, right = p + (1 - p) * later, [t.last == "right" for t in touches]
     error = float(np.sqrt((p * (1 - p)).sum())) / len(touches)
     return float(p.mean()), float(np.mean(right)), error

@@ -80,7 +80,8 @@ def preview_png(
     image = image.reduce(samples).convert("RGB")
     write_lettering(image, _subtitle(size_mm, parts), name, labels, scale, fonts, apart=apart)
     if answered:
-        write_legend(image, fonts[2])
+        later = any(within is not None for _, within in answered.values())
+        write_legend(image, fonts[2], within_three=later)
     return _png(np.asarray(image))
 
 

@@ -22,7 +22,7 @@ from generator.export.settings import PREVIEW
 
 Colours = NDArray[np.uint32]  # 0xXXBBGGRR
 
-Shares = tuple[float, float]  #: of touches answered at once, and within three
+Shares = tuple[float, float | None]  #: of touches answered at once, and within three, if known
 
 NOTHING_KNOWN: Mapping[str, Shares] = MappingProxyType({})
 
@@ -121,7 +121,8 @@ def pack_colours(rgb: Points) -> Colours:
 
 def _percents(shares: Shares) -> str:
     """Return what a label says of a face: at once / within three, per cent."""
-    return f" {100 * shares[0]:.0f}/{100 * shares[1]:.0f}%"
+    once, within = shares
+    return f" {100 * once:.0f}" + ("%" if within is None else f"/{100 * within:.0f}%")
 
 
 def _shade(view: View, seen: NDArray[np.int64], answered: Mapping[str, Shares]) -> Colours:

@@ -12,7 +12,6 @@ from generator.layout.placement import FaceLayout, Placement
 from generator.layout.promise import (
     AnswerTable,
     answered_at_once,
-    answered_later,
     answered_share,
     measured_answers,
     measured_types,
@@ -179,14 +178,15 @@ def test_other_sensors_answer_a_share_of_what_the_usual_one_does():
             assert (np.diff(here) >= 0).all()
 
 
-def test_a_larger_sensor_steps_farther_and_counts_symbols_by_its_area():
-    mat, table = sensor_size("mat-32x32"), measured_answers()
+def test_a_larger_sensor_steps_farther_and_within_three_is_said_of_the_usual_one_alone():
+    mat = sensor_size("mat-32x32")
     assert sensor_view(mat, 2.0).around_mm == pytest.approx(20 * 64 / 25.4)
     assert sensor_view(SensorSize(), 2.0) == SensorView((12.7, 12.7), 2.0)
-    more = (64 / 25.4) ** 2 / 1.2**2
-    here = answered_later(table, np.array([60]), np.array([90]), mat)
-    assert here == pytest.approx(table.later([60 / more], [90 / more]))
-    assert here == pytest.approx(answered_later(table, [60 / more], [90 / more]))
+    views = face_views((SQUARE,), lattice(SQUARE), 7.0, VIEW)
+    once, within = promised_shares(views, measured_answers(), 6.0, mat)
+    assert 0 < once < 1
+    assert within is None
+    assert promised_shares(views, measured_answers(), 6.0)[1] is not None
 
 
 def test_a_type_of_your_own_is_taken_for_the_one_most_like_it():
