@@ -233,11 +233,12 @@ def peers(symbols: int, limit_s: float) -> dict[str, Figure]:
     """Return what embossing a cube costs every way that stays below the limit, imports left out."""
     found = {}
     for way in WAYS:
-        product_s = product()
-        if way != DRAFTED and (made := run(way, symbols, limit_s)):
-            name = f"{'this project' if way == OURS else way}"
+        if way == DRAFTED:
+            continue
+        product_s, name = product(), "this project" if way == OURS else way
+        if made := run(way, symbols, limit_s):
             found[name] = Figure.of(made.cpu_s, product_s, made.peak_mb)
-        print(f"{way:52} {found.get(name) if way != DRAFTED else ''}", flush=True)
+        print(f"{way:52} {found.get(name, 'left out: over the limit')}", flush=True)
     return found
 
 
