@@ -58,7 +58,8 @@ def test_a_driven_row_never_gives_more_current_than_its_tactels_into_a_short(g, 
 @given(matrices())
 def test_floating_rows_give_back_what_they_were_made_from(g):
     found = solve_floating(effective_resistances(g))
-    np.testing.assert_allclose(found.conductance_s, g, rtol=1e-7)
+    rounding = 1e-11 * g.max()  # of what flows beside a tactel through all others
+    np.testing.assert_allclose(found.conductance_s, g, rtol=1e-7, atol=rounding)
 
 
 @settings(deadline=None, max_examples=40)
