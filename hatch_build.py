@@ -15,7 +15,6 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 FOLDER = "recognizer/touch"
-SOURCES = ("symbols/evaluate.c", "symbols/coarse.c", "symbols/scatter.c", "places.c")
 OPTIONS = ["-O3", "-ffp-contract=off", "-fno-math-errno", "-shared", "-fPIC", "-mcpu=baseline"]
 
 
@@ -25,7 +24,7 @@ class CompiledKernels(BuildHookInterface):  # type: ignore[misc, type-arg]
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002
         """Build the library and name it as a part of the wheel."""
         folder = Path(self.root) / FOLDER
-        sources = [folder / name for name in SOURCES]
+        sources = sorted(folder.rglob("*.c"))
         made, draft = folder / "kernels.so", folder / "kernels.so.draft"
         compiler = [sys.executable, "-m", "ziglang", "cc"]
         text = b"".join(source.read_bytes() for source in sources)

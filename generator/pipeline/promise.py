@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from encoded_objects.sensor_type import SensorSize
 from generator.alphabet.outline import SymbolStyle, footprint_half_mm
 from generator.alphabet.printable import check_printable
 from generator.array.touches import touches_needed
@@ -23,7 +24,7 @@ from generator.layout.footprint import Points, Region, region_of
 from generator.layout.layout import lay_out_face
 from generator.layout.placement import FaceLayout, Layout
 from generator.layout.promise import PROMISE, measured_answers, promised_shares
-from generator.layout.views import VIEWS, ViewSettings, face_views, sensor_view
+from generator.layout.views import VIEWS, FaceViews, ViewSettings, face_views, sensor_view
 from generator.pipeline.plan import ObjectPlan
 from generator.plane.polygon import is_convex
 from generator.polyhedron import face_polygon
@@ -92,8 +93,24 @@ def _promise(
     view = sensor_view(plan.spec.sensor, reach)
     views = face_views(loops, face, style.pitch_mm, view, settings)
     one_row = bool((views.lines <= 1).mean() >= PROMISE.one_line)
-    once, within = promised_shares(views, measured_answers(), style.pitch_mm, plan.spec.sensor)
-    return FacePromise(round(once, 3), None if within is None else round(within, 3), one_row)
+    promise = promise_of(views, style.pitch_mm, plan.spec.sensor)
+    return dataclasses.replace(promise, one_row=one_row)
+
+
+def promise_of(views: FaceViews, pitch_mm: float, sensor: SensorSize) -> FacePromise:
+    """Return the shares that a face promises to a sensor, to three places.
+
+    Parameters
+    ----------
+    views
+        Of the face.
+    pitch_mm
+        Of its symbols.
+    sensor
+        That touches it.
+    """
+    once, within = promised_shares(views, measured_answers(), pitch_mm, sensor)
+    return FacePromise(round(once, 3), None if within is None else round(within, 3))
 
 
 def _remedy(plan: ObjectPlan, loops: Loops, face: int) -> str:

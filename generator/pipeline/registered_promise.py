@@ -10,9 +10,8 @@ from __future__ import annotations
 from encoded_objects.sensor_type import USUAL_SENSOR, SensorSize
 from generator.array.touches import touches_needed
 from generator.database.registered import RegisteredObject
-from generator.layout.promise import measured_answers, promised_shares
 from generator.layout.views import face_views, sensor_view
-from generator.pipeline.promise import FacePromise, face_key
+from generator.pipeline.promise import FacePromise, face_key, promise_of
 
 
 def registered_promises(
@@ -44,9 +43,6 @@ def registered_promises(
         key = face_key(face.polygon_mm, layout)
         if key not in known:
             views = face_views(face.polygon_mm, layout, style.pitch_mm, view)
-            pitch, table = style.pitch_mm, measured_answers()
-            once, within = promised_shares(views, table, pitch, sensor)
-            rounded = None if within is None else round(within, 3)
-            known[key] = FacePromise(round(once, 3), rounded)
+            known[key] = promise_of(views, style.pitch_mm, sensor)
         found[face.face_id] = known[key]
     return found

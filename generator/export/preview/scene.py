@@ -25,7 +25,7 @@ Points = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class PreviewScene:
     """All parts in the object frame."""
 
     vertices: Points  #: (3, N) mm
@@ -38,7 +38,7 @@ class Scene:
     normals: Points  #: (F, 3)
 
 
-def both_scenes(parts: Sequence[Part], meshes: Sequence[Mesh]) -> tuple[Scene, Scene]:
+def both_scenes(parts: Sequence[Part], meshes: Sequence[Mesh]) -> tuple[PreviewScene, PreviewScene]:
     """Return the object as it is put together, and with its panels moved apart."""
     turned = [part.T_object_part[:3, :3] @ mesh.vertices.T
               for part, mesh in zip(parts, meshes, strict=True)]  # fmt: skip
@@ -49,7 +49,7 @@ def both_scenes(parts: Sequence[Part], meshes: Sequence[Mesh]) -> tuple[Scene, S
 
 def _scene(
     parts: Sequence[Part], meshes: Sequence[Mesh], turned: Sequence[Points], apart: float
-) -> Scene:
+) -> PreviewScene:
     """Gather all parts in the object frame; panels move out by a share of the size.
 
     Closed panels hide their backs, so these are left out unless the panels move apart.
@@ -90,7 +90,7 @@ def _scene(
         names += [name for name, _ in faces]
         centres += [centre + shift for centre, _ in shapes]
         normals += [normal for _, normal in shapes]
-    return Scene(
+    return PreviewScene(
         np.concatenate(vertices, axis=1),
         np.concatenate(triangles),
         np.concatenate(symbols),

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from generator.export.colours import BODY_RGB, SYMBOL_RGB, answered_rgb
 from generator.export.labels import LabelRequest, label_places
 from generator.export.lettering import Font, Label, transliterate
-from generator.export.preview.scene import Points, Scene
+from generator.export.preview.scene import Points, PreviewScene
 from generator.export.raster import DepthBuffer, rasterise
 from generator.export.settings import PREVIEW
 
@@ -34,14 +34,14 @@ _EYES = tuple(np.array([x, -1.0, z]) for z in (0.62, 0.45, 0.8) for x in (0.62, 
 class View:
     """A scene as a camera sees it."""
 
-    scene: Scene
+    scene: PreviewScene
     axes: Points  #: (3, 3) rows right, up and eye, object frame
     flat: Points  #: (3, N) mm, vertices along these axes
     low: Points  #: (3,) mm, least of them
     high: Points  #: (3,) mm, greatest
 
 
-def view_of(scene: Scene, eye: Points) -> View:
+def view_of(scene: PreviewScene, eye: Points) -> View:
     """Return what a camera sees that looks against `eye`, (3,)."""
     towards: Points = eye / np.linalg.norm(eye)
     right: Points = np.cross([0.0, 0.0, 1.0], towards)

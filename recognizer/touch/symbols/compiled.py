@@ -30,11 +30,7 @@ Ints = NDArray[np.int64]
 
 FOLDER = Path(__file__).parent.parent
 FILE = FOLDER / "kernels.so"
-#: As in hatch_build.py.
-SOURCES = tuple(
-    FOLDER / name
-    for name in ("symbols/evaluate.c", "symbols/coarse.c", "symbols/scatter.c", "places.c")
-)
+SOURCES = tuple(sorted(FOLDER.rglob("*.c")))
 CHOICE = "ENCODED_OBJECTS_KERNELS"  #: variable; "numpy" leaves the compiled form out
 UNKNOWNS = len(DEFAULTS.refine.least)  #: pose (7,) and gain (4,)
 
