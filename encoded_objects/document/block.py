@@ -12,7 +12,7 @@ from encoded_objects.document.quantity import refuse
 class Block(BaseModel):
     """A block of settings."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
     @model_validator(mode="before")
     @classmethod

@@ -5,14 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 from pydantic import TypeAdapter
-from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import core_schema
 
+from encoded_objects.document.json_schema import DescribedSchema
 from generator.spec.settings import ObjectSettings, SetSettings
 from generator.spec.shape import Shape
 
 
-class _SpecSchema(GenerateJsonSchema):
+class _SpecSchema(DescribedSchema):
     """Says what a person may write: a setting is there with a value, or it is left out."""
 
     def nullable_schema(self, schema: core_schema.NullableSchema) -> JsonSchemaValue:

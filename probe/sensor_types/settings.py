@@ -195,8 +195,10 @@ class SensorTypeSettings(Block):
 
 def sensor_type_schema() -> dict[str, Any]:
     """Return the JSON schema (draft 2020-12) of a file of a sensor type."""
+    from encoded_objects.document.json_schema import DescribedSchema
+
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "sensor type",
-        **SensorTypeSettings.model_json_schema(),
+        **SensorTypeSettings.model_json_schema(schema_generator=DescribedSchema),
     }
