@@ -36,321 +36,475 @@ static inline double smaller(double a, double b) { return a < b ? a : b; }
 
 static const double LOG4 = 1.3862943611198906; /* log(1 + 3) */
 
-static double stiffness(double u) { double w = 1.0 - u; return 2.0 / (w * w * w) + 1.0; }
-
-static double force_of(const Scene *s, double depth) {
-    if (!s->hardens) return 3.0 * larger(depth, 0.0);
-    double u = smaller(larger(depth, 0.0), s->deepest), w = 1.0 - u;
-    double beyond = larger(depth - s->deepest, 0.0) * stiffness(s->deepest);
-    return 1.0 / (w * w) - w + beyond;
+/* 2^x of |x| < 100 and log x of x > 0 to 1e-7, in steps that compilers do side by side:
+   S. L. Moshier, Methods and Programs for Mathematical Functions (Ellis Horwood, 1989). */
+static inline float power_of_two(float x) {
+    const float shift = 12582912.0f; /* adding it rounds to whole numbers */
+    float whole = (x + shift) - shift, f = x - whole, y = 1.535336188319500e-4f;
+    y = y * f + 1.339887440266574e-3f;
+    y = y * f + 9.618437357674640e-3f;
+    y = y * f + 5.550332471162809e-2f;
+    y = y * f + 2.402264791363012e-1f;
+    y = y * f + 6.931472028550421e-1f;
+    y = y * f + 1.0f;
+    union { int32_t bits; float value; } scale = {.bits = ((int32_t)whole + 127) << 23};
+    return y * scale.value;
 }
 
-static double slope_of(const Scene *s, double depth) {
-    if (!(depth > 0)) return 0.0;
-    return s->hardens ? stiffness(smaller(depth, s->deepest)) : 3.0;
+static inline float logarithm(float x) {
+    union { float value; int32_t bits; } at = {.value = x};
+    int32_t exponent = (at.bits - 0x3f3504f3) >> 23; /* the rest lies about 1 */
+    at.bits -= exponent << 23;
+    float f = at.value - 1.0f, z = f * f, e = (float)exponent, y = 7.0376836292e-2f;
+    y = y * f - 1.1514610310e-1f;
+    y = y * f + 1.1676998740e-1f;
+    y = y * f - 1.2420140846e-1f;
+    y = y * f + 1.4249322787e-1f;
+    y = y * f - 1.6668057665e-1f;
+    y = y * f + 2.0000714765e-1f;
+    y = y * f - 2.4999993993e-1f;
+    y = y * f + 3.3333331174e-1f;
+    y = y * f * z - 2.12194440e-4f * e - 0.5f * z;
+    return f + y + 0.693359375f * e;
 }
 
-static double psi(double y) { return y > 0.0 ? log1p(3.0 * y) / LOG4 : 0.0; }
+static inline double stiffness(double u) { double w = 1.0 - u; return 2.0 / (w * w * w) + 1.0; }
 
-/* felt: (8, b, n) psi, press, bare, contact, depth, plain, lower, plateau */
-#define FELT(k) (felt + ((k) * s->b + i) * s->n)
-
-static void normalize(const Scene *s, const double *gain, double *felt, double *measure,
-                      int *any_bare, int *is_loud) {
-    const double *forces = s->forces, *plane = s->plane;
-    const uint8_t *loaded = s->loaded;
-    double strongest = -INFINITY, mean[3] = {0}, count = 0.0;
-    for (int64_t t = 0; t < s->n; t++) {
-        strongest = larger(strongest, forces[t]);
-        if (!loaded[t]) continue;
-        count += 1.0;
-        for (int k = 0; k < 3; k++) mean[k] += plane[3 * t + k];
-    }
-    *any_bare = *is_loud = 0;
-    for (int64_t i = 0; i < s->b; i++) {
-        const double *g = gain + 4 * i;
-        double *p = FELT(0), *press = FELT(1), *bare = FELT(2), *contact = FELT(3);
-        double *depth = FELT(4), *plain = FELT(5), *lower = FELT(6), *plateau = FELT(7);
-        double most = 0.0, sum = 0.0, scale = exp(g[0]);
-        double usual = (g[1] * mean[0] + g[2] * mean[1] + g[3] * mean[2]) / count;
-        double full = s->full_press * larger(usual, 1e-9);
-        for (int64_t t = 0; t < s->n; t++) {
-            double d = g[1] * plane[3 * t] + g[2] * plane[3 * t + 1] + g[3] * plane[3 * t + 2];
-            if (s->falls) d -= s->drop[(s->falls > 1 ? i : 0) * s->n + t];
-            depth[t] = d;
-            plain[t] = force_of(s, d);
-            lower[t] = force_of(s, d - s->symbol);
-            if (loaded[t]) most = larger(most, plain[t]);
-        }
-        double least = s->least_gain * most;
-        for (int64_t t = 0; t < s->n; t++) {
-            plateau[t] = loaded[t] ? scale * larger(plain[t], least) : strongest;
-            p[t] = psi(forces[t] / plateau[t]);
-            press[t] = smaller(larger(depth[t] / full, s->least_press), 1.0);
-            bare[t] = loaded[t] ? lower[t] / (plateau[t] / scale) : 0.0;
-            contact[t] = smaller(larger(plain[t] / least, 0.0), 1.0);
-            sum += s->trust[t] * log(plateau[t] + 3.0 * forces[t]);
-            if (bare[t] != 0.0) *any_bare = 1;
-            if (s->noise / plateau[t] >= s->loud) *is_loud = 1;
-        }
-        measure[i] = -sum;
-    }
+static inline double force_of(int64_t hardens, double deepest, double beyond, double depth) {
+    if (!hardens) return 3.0 * larger(depth, 0.0);
+    double u = smaller(larger(depth, 0.0), deepest), w = 1.0 - u;
+    return 1.0 / (w * w) - w + larger(depth - deepest, 0.0) * beyond;
 }
 
-/* Column and upward row of the cell under each tactel (b, n, 2); offsets from its centre, mm. */
-static void cells_under(const Scene *s, const double *pose, int64_t *cells, double *offsets) {
-    for (int64_t i = 0; i < s->b; i++) {
-        const double *at = pose + 7 * i;
-        double c = cos(at[2]) * (1 + at[6]), n = sin(at[2]) * (1 + at[6]);
-        for (int64_t t = 0; t < s->n; t++) {
-            double x = s->points[2 * t], y = s->points[2 * t + 1];
-            double u[2] = {at[0] + c * x - n * y, at[1] + n * x + c * y};
-            for (int k = 0; k < 2; k++) {
-                double cell = floor(u[k] / s->pitch);
-                cells[2 * (i * s->n + t) + k] = (int64_t)cell;
-                offsets[2 * (i * s->n + t) + k] = u[k] - (cell + 0.5) * s->pitch;
-            }
-        }
-    }
+static inline double slope_of(const Scene *s, double depth) {
+    double slope = s->hardens ? stiffness(smaller(depth, s->deepest)) : 3.0;
+    return depth > 0 ? slope : 0.0;
 }
 
-/* What the noise of readings adds to the square of a spread; value in the precision given. */
-static double readings(double by_response, double faint, double unit) {
-    double share = by_response * faint / unit;
-    return share * share;
-}
+static inline double psi(double y) { return y > 0.0 ? log(1.0 + 3.0 * y) / LOG4 : 0.0; }
 
-static int64_t grid(const Scene *s, double offset) {
-    double at = rint((offset + s->half) / s->step);
-    return (int64_t)smaller(larger(at, -1.0), (double)s->size) + 1;
-}
-
-/* tables (n, q, 6) of one candidate, for what is fitted of form and gain; shown: the label of each
-   tactel, where nothing else is asked for, or NULL */
-static void look_up(const Scene *s, const double *offsets, const double *pose, const double *bare,
-                    const double *contact, int any_bare, const int64_t *shown, float *tables) {
-    const float form[3] = {(float)pose[3], (float)pose[4], (float)pose[5]};
-    const float log4 = (float)LOG4;
-    for (int64_t t = 0; t < s->n; t++) {
-        int64_t place = grid(s, offsets[2 * t + 1]) * (s->size + 2) + grid(s, offsets[2 * t]);
-        const float *from = s->rimmed + place * s->q * FIELDS;
-        float *to = tables + t * s->q * FIELDS, hold = (float)contact[t], face = (float)bare[t];
-        for (int64_t k = 0; k < s->q; k++, from += FIELDS, to += FIELDS) {
-            if (shown && shown[t] != k) continue;
-            memcpy(to, from, FIELDS * sizeof(float));
-            for (int f = 0; f < 3; f++) to[0] += to[3 + f] * form[f];
-            if (hold < 1.0f)
-                for (int f = 0; f < FIELDS; f++) to[f] *= hold;
-            if (any_bare && face == 0.0f) {
-                to[0] = to[0] > 0.0f ? to[0] : 0.0f;
-            } else if (any_bare) {
-                float response = expm1f(to[0] * log4) / 3.0f;
-                float total = response + (1.0f - response) * face;
-                float by = (1.0f - face) * (1.0f + 3.0f * response) / (1.0f + 3.0f * total);
-                for (int f = 1; f < FIELDS; f++) to[f] *= by;
-                to[0] = log1pf(3.0f * (total > 0.0f ? total : 0.0f)) / log4;
-            }
-        }
-    }
-}
-
-/* scores (n, q + 1) of one candidate: each symbol at each tactel, and none; or what is shown alone.
-   noise: deviation of psi on a covered tactel */
-static void score(const Scene *s, double noise, const double *p, const double *press,
-                  const double *bare, const double *plateau, const float *tables, int is_loud,
-                  const int64_t *shown, double *scores) {
-    const double *trust = s->trust;
-    const float quiet = (float)(s->quiet * s->quiet), aside = (float)(s->displaced * s->displaced);
-    for (int64_t t = 0; t < s->n; t++) {
-        double unit = noise / larger(press[t], 1e-3), faint = s->noise / plateau[t];
-        double *to = scores + t * (s->q + 1);
-        for (int64_t k = 0; k < s->q; k++) {
-            if (shown && shown[t] != k) continue;
-            const float *at = tables + (t * s->q + k) * FIELDS;
-            float square = quiet + at[0] * at[0] + aside * (at[1] * at[1] + at[2] * at[2]), wide;
-            if (is_loud) {
-                float by = (float)(3.0 / LOG4) * expf((float)-LOG4 * at[0]);
-                wide = (float)sqrt(square + readings(by, faint, unit));
-            } else {
-                wide = sqrtf(square);
-            }
-            double away = (p[t] - at[0]) / (unit * wide);
-            to[k] = trust[t] * (-smaller(0.5 * away * away, s->most) - logf(wide));
-        }
-        if (shown && shown[t] >= 0) continue;
-        double floor_ = psi(bare[t]), best = -INFINITY;
-        for (int k = 0; k < (floor_ > 0.0 ? 2 : 1); k++) { /* beyond the edge of the face, or not */
-            double value = k ? floor_ : 0.0, square = s->quiet * s->quiet + value * value;
-            if (is_loud) square += readings(3.0 / LOG4 * exp(-LOG4 * value), faint, unit);
-            double wide = sqrt(square), away = (p[t] - value) / (unit * wide);
-            best = larger(best, trust[t] * (-smaller(0.5 * away * away, s->most) - log(wide)));
-        }
-        to[s->q] = best;
-    }
-}
-
-/* labels (n,) of what fits best in the cell under each tactel, -1: no symbol. sums: room for
-   (n, q + 1); first: room for n. Cells are few, so each is looked for among those before it. */
-static void choose(const Scene *s, const int64_t *cells, const double *scores, double *sums,
-                   int64_t *first, int64_t *labels) {
-    int64_t known = 0, wide = s->q + 1;
-    for (int64_t t = 0; t < s->n; t++) {
-        int64_t k = 0;
-        while (k < known && (cells[2 * first[k]] != cells[2 * t] ||
-                             cells[2 * first[k] + 1] != cells[2 * t + 1])) k++;
-        if (k == known) {
-            first[known++] = t;
-            memset(sums + k * wide, 0, wide * sizeof(double));
-        }
-        for (int64_t c = 0; c < wide; c++) sums[k * wide + c] += scores[t * wide + c];
-        labels[t] = k;
-    }
-    for (int64_t t = 0; t < s->n; t++) {
-        const double *sum = sums + labels[t] * wide;
-        int64_t best = 0;
-        for (int64_t c = 1; c < wide; c++) if (sum[c] > sum[best]) best = c;
-        labels[t] = best == s->q ? -1 : best;
-    }
-}
-
-/* What one candidate needs beside `felt`. */
+/* What one candidate shows, tactel by tactel, and what all candidates have in common. The rows of
+   the normal matrix are filled up with zeros to whole fours. */
 typedef struct {
-    double *felt, *measure, *offsets, *scores, *sums;
-    int64_t *cells, *first, *labels;
-    float *tables;
-    int any_bare, is_loud;
+    double strongest, mean[3];          /* of the forces; of the planes over what is loaded */
+    int any_bare, is_loud;              /* under any of the gains */
+    double *psi, *press, *bare, *contact, *depth, *plain, *lower, *plateau, *unit; /* (n,) */
+    double *none, *scores;              /* (n,) and (q, n): of no symbol, and of each */
+    double *sums, *rows;                /* (n, q + 1); (2, 12, n) */
+    double *shown, *force, *by_psi;     /* (6, n), (n,), (n,) of what is shown */
+    float *value, *x, *y, *by, *square; /* (q, n) psi of symbols, slopes, what scales these; (n,) */
+    int64_t *cells, *first, *labels;    /* (n, 2), (n,), (n,) */
+    int64_t *place;                     /* (n,) in the template */
+    double measure;
 } Work;
+
+enum { ROWS = 12 };
+typedef double Four __attribute__((vector_size(32), aligned(8), may_alias));
+
+static int64_t whole_fours(int64_t n) { return (n + 3) / 4 * 4; }
 
 static Work new_work(const Scene *s) {
     Work w = {0};
-    int64_t bn = s->b * s->n, nq = s->n * (s->q + 1);
-    w.felt = malloc((8 * bn + s->b + 2 * bn + 2 * nq) * sizeof(double));
-    w.measure = w.felt + 8 * bn;
-    w.offsets = w.measure + s->b;
-    w.scores = w.offsets + 2 * bn;
-    w.sums = w.scores + nq;
-    w.cells = malloc((2 * bn + 2 * s->n) * sizeof(int64_t));
-    w.first = w.cells + 2 * bn;
-    w.labels = w.first + s->n;
-    w.tables = malloc(s->n * s->q * FIELDS * sizeof(float));
+    int64_t n = s->n, wide = whole_fours(n), q = s->q;
+    w.psi = malloc((18 * n + q * n + n * (q + 1) + 2 * ROWS * wide) * sizeof(double));
+    w.press = w.psi + n;
+    w.bare = w.press + n;
+    w.contact = w.bare + n;
+    w.depth = w.contact + n;
+    w.plain = w.depth + n;
+    w.lower = w.plain + n;
+    w.plateau = w.lower + n;
+    w.unit = w.plateau + n;
+    w.none = w.unit + n;
+    w.scores = w.none + n;
+    w.sums = w.scores + q * n;
+    w.shown = w.sums + n * (q + 1);
+    w.force = w.shown + FIELDS * n;
+    w.by_psi = w.force + n;
+    w.rows = w.by_psi + n;
+    memset(w.rows, 0, 2 * ROWS * wide * sizeof(double));
+    w.value = malloc((4 * q + 1) * n * sizeof(float));
+    w.x = w.value + q * n;
+    w.y = w.x + q * n;
+    w.by = w.y + q * n;
+    w.square = w.by + q * n;
+    w.cells = malloc(5 * n * sizeof(int64_t));
+    w.first = w.cells + 2 * n;
+    w.labels = w.first + n;
+    w.place = w.labels + n;
+    w.strongest = -INFINITY;
+    double count = 0.0;
+    for (int64_t t = 0; t < n; t++) {
+        w.strongest = larger(w.strongest, s->forces[t]);
+        if (!s->loaded[t]) continue;
+        count += 1.0;
+        for (int k = 0; k < 3; k++) w.mean[k] += s->plane[3 * t + k];
+    }
+    for (int k = 0; k < 3; k++) w.mean[k] /= count;
     return w;
 }
 
 static void free_work(Work *w) {
-    free(w->felt);
+    free(w->psi);
+    free(w->value);
     free(w->cells);
-    free(w->tables);
 }
 
-/* psi and slopes of what is shown at a tactel, of the bare face where that is nothing. */
-static void value_of(const Scene *s, const float *tables, int64_t t, int64_t label, double p,
-                     double bare, double v[FIELDS]) {
-    memset(v, 0, FIELDS * sizeof(double));
-    if (label >= 0) {
-        const float *from = tables + (t * s->q + label) * FIELDS;
-        for (int f = 0; f < FIELDS; f++) v[f] = from[f];
-    } else {
-        double floor_ = psi(bare);
-        if (p > floor_ / 2) v[0] = floor_;
+/* Depths under a gain, and what they press, (n,); returns the least plateau over the scale. */
+static double press_plane(const Scene *s, Work *w, int64_t i, const double *g) {
+    const double *drop = s->falls ? s->drop + (s->falls > 1 ? i : 0) * s->n : NULL;
+    const double *plane = s->plane, beyond = stiffness(s->deepest), deepest = s->deepest;
+    double most = 0.0;
+    for (int64_t t = 0; t < s->n; t++) {
+        double d = g[1] * plane[3 * t] + g[2] * plane[3 * t + 1] + g[3] * plane[3 * t + 2];
+        w->depth[t] = drop ? d - drop[t] : d;
+    }
+    for (int64_t t = 0; t < s->n; t++) {
+        w->plain[t] = force_of(s->hardens, deepest, beyond, w->depth[t]);
+        w->lower[t] = force_of(s->hardens, deepest, beyond, w->depth[t] - s->symbol);
+    }
+    for (int64_t t = 0; t < s->n; t++) if (s->loaded[t]) most = larger(most, w->plain[t]);
+    return s->least_gain * most;
+}
+
+/* What some candidate has makes all of them work it out. */
+static void look_at_gains(const Scene *s, Work *w, const double *gain) {
+    w->any_bare = w->is_loud = 0;
+    for (int64_t i = 0; i < s->b && !(w->any_bare && (w->is_loud || s->noise == 0.0)); i++) {
+        const double *g = gain + 4 * i;
+        if (i && !memcmp(g, g - 4, 4 * sizeof(double)) && s->falls < 2) continue;
+        double least = press_plane(s, w, i, g), scale = exp(g[0]);
+        for (int64_t t = 0; t < s->n; t++) {
+            double plateau = s->loaded[t] ? scale * larger(w->plain[t], least) : w->strongest;
+            w->any_bare |= s->loaded[t] && w->lower[t] > 0.0;
+            w->is_loud |= s->noise / plateau >= s->loud;
+        }
     }
 }
 
-/* Spread of psi about it, in units of the noise. */
-static double deviation(const Scene *s, const double v[FIELDS], double faint, double unit,
-                        int is_loud) {
-    double square = s->quiet * s->quiet + v[0] * v[0] +
-                    s->displaced * s->displaced * (v[1] * v[1] + v[2] * v[2]);
-    if (is_loud) square += readings(3.0 / LOG4 * exp(-LOG4 * v[0]), faint, unit);
-    return (double)(float)sqrt(square);
+/* The image under the gain g (4,) of candidate i. */
+static void normalize(const Scene *s, Work *w, int64_t i, const double *g) {
+    double least = press_plane(s, w, i, g), scale = exp(g[0]), sum = 0.0;
+    double usual = g[1] * w->mean[0] + g[2] * w->mean[1] + g[3] * w->mean[2];
+    double full = s->full_press * larger(usual, 1e-9);
+    for (int64_t t = 0; t < s->n; t++) {
+        double share = larger(w->plain[t], least);
+        w->plateau[t] = s->loaded[t] ? scale * share : w->strongest;
+        w->press[t] = smaller(larger(w->depth[t] / full, s->least_press), 1.0);
+        w->bare[t] = s->loaded[t] ? w->lower[t] / share : 0.0;
+        w->contact[t] = smaller(larger(w->plain[t] / least, 0.0), 1.0);
+    }
+    for (int64_t t = 0; t < s->n; t++) {
+        w->psi[t] = psi(s->forces[t] / w->plateau[t]);
+        if (s->trust[t] != 0.0) sum += s->trust[t] * (log(w->plateau[t]) + LOG4 * w->psi[t]);
+    }
+    w->measure = -sum;
 }
 
-/* A tactel under a gain, as `normalize` has it. */
-typedef struct { double bare, depth, plain, lower, plateau; } Felt;
+static inline int64_t grid(const Scene *s, double offset) {
+    double at = rint((offset + s->half) / s->step);
+    return (int64_t)smaller(larger(at, -1.0), (double)s->size) + 1;
+}
 
-/* The force at a tactel that shows v, and what changes with pose and gain; c, n: cosine and sine of
-   the pose, scale: of the force, by: out, of psi there. */
-static inline double force_at(const Scene *s, int64_t t, const double v[FIELDS], Felt f, double c,
-                              double n, double scale, double *by_psi, double J[UNKNOWNS]) {
-    double total = expm1(v[0] * (double)(float)LOG4) / 3.0;
-    double by = (1 + 3.0 * total) * LOG4 / 3.0 * f.plateau;
-    double symbol = smaller(larger((total - f.bare) / larger(1 - f.bare, 1e-3), 0.0), 1.5);
-    double rest = total > 0 ? 1 - symbol : 0.0;
-    double force = scale * (symbol * f.plain + rest * f.lower);
-    double slope = scale * (symbol * slope_of(s, f.depth) + rest * slope_of(s, f.depth - s->symbol));
-    double x = s->points[2 * t], y = s->points[2 * t + 1];
-    double across = c * x - n * y, up = n * x + c * y;
-    const double *plane = s->plane + 3 * t;
-    const double by_each[UNKNOWNS] = {
-        v[1] * by, v[2] * by, (v[2] * across - v[1] * up) * by, v[3] * by, v[4] * by, v[5] * by,
-        (v[1] * across + v[2] * up) * by, force, slope * plane[0], slope * plane[1],
-        slope * plane[2]};
-    memcpy(J, by_each, sizeof by_each);
-    *by_psi = by;
-    return force;
+/* Column and upward row of the cell under each tactel, and where that is in its template. */
+static void find_cells(const Scene *s, Work *w, const double *pose) {
+    double c = cos(pose[2]) * (1 + pose[6]), n = sin(pose[2]) * (1 + pose[6]);
+    for (int64_t t = 0; t < s->n; t++) {
+        double x = s->points[2 * t], y = s->points[2 * t + 1], offset[2];
+        double u[2] = {pose[0] + c * x - n * y, pose[1] + n * x + c * y};
+        for (int k = 0; k < 2; k++) {
+            double cell = floor(u[k] / s->pitch);
+            w->cells[2 * t + k] = (int64_t)cell;
+            offset[k] = u[k] - (cell + 0.5) * s->pitch;
+        }
+        w->place[t] = grid(s, offset[1]) * (s->size + 2) + grid(s, offset[0]);
+        for (int64_t at = 0; at < s->q * FIELDS; at += 16)
+            __builtin_prefetch(s->rimmed + w->place[t] * s->q * FIELDS + at);
+    }
+}
+
+/* psi of each symbol at each tactel and its slopes, for what is fitted of form and gain. */
+static void look_up(const Scene *s, Work *w, const double *pose) {
+    const float form[3] = {(float)pose[3], (float)pose[4], (float)pose[5]}, log4 = (float)LOG4;
+    int64_t n = s->n;
+    for (int64_t t = 0; t < n; t++) {
+        const float *from = s->rimmed + w->place[t] * s->q * FIELDS;
+        float hold = (float)w->contact[t];
+        for (int64_t k = 0; k < s->q; k++, from += FIELDS) {
+            float v = from[0] + from[3] * form[0] + from[4] * form[1] + from[5] * form[2];
+            w->value[k * n + t] = v * hold;
+            w->x[k * n + t] = from[1] * hold;
+            w->y[k * n + t] = from[2] * hold;
+        }
+    }
+    for (int64_t k = 0; k < s->q && w->any_bare; k++) {
+        float *value = w->value + k * n, *x = w->x + k * n, *y = w->y + k * n, *by = w->by + k * n;
+        for (int64_t t = 0; t < n; t++) { /* 1 + 3 y is 4^psi; `less` is what a sum of 1 rounds off */
+            float face = (float)w->bare[t], power = power_of_two(2.0f * value[t]);
+            float more = (power - 1.0f) + (4.0f - power) * face, whole = 1.0f + more;
+            float inverse = 1.0f / whole, less = (more - (whole - 1.0f)) * inverse;
+            float total = (logarithm(more > 0.0f ? whole : 1.0f) + less) / log4;
+            float alone = value[t] > 0.0f ? value[t] : 0.0f;
+            by[t] = face > 0.0f ? (1.0f - face) * power * inverse : 1.0f;
+            x[t] *= by[t];
+            y[t] *= by[t];
+            value[t] = face > 0.0f ? (more > 0.0f ? total : 0.0f) : alone;
+        }
+    }
+}
+
+/* What the noise of readings adds to the square of a spread at a value of psi. */
+static inline double readings(const Scene *s, double value, double plateau, double unit) {
+    double share = 3.0 / LOG4 * exp(-LOG4 * value) * (s->noise / plateau) / unit;
+    return share * share;
+}
+
+/* Scores of each symbol at each tactel, and of none; noise: deviation of psi on a covered one. */
+static void score(const Scene *s, Work *w, double noise) {
+    const float quiet = (float)(s->quiet * s->quiet), aside = (float)(s->displaced * s->displaced);
+    const double alone = s->quiet * s->quiet, width = log(sqrt(alone));
+    int64_t n = s->n;
+    for (int64_t t = 0; t < n; t++) w->unit[t] = noise / larger(w->press[t], 1e-3);
+    for (int64_t k = 0; k < s->q; k++) {
+        const float *value = w->value + k * n, *x = w->x + k * n, *y = w->y + k * n;
+        float *square = w->square;
+        double *to = w->scores + k * n;
+        for (int64_t t = 0; t < n; t++)
+            square[t] = quiet + value[t] * value[t] + aside * (x[t] * x[t] + y[t] * y[t]);
+        for (int64_t t = 0; t < n && w->is_loud; t++)
+            square[t] += (float)readings(s, value[t], w->plateau[t], w->unit[t]);
+        for (int64_t t = 0; t < n; t++) {
+            double away = w->psi[t] - value[t], unit = w->unit[t];
+            double loss = smaller(0.5 * away * away / (unit * unit * square[t]), s->most);
+            to[t] = s->trust[t] * (-loss - 0.5f * logarithm(square[t]));
+        }
+    }
+    for (int64_t t = 0; t < n; t++) { /* beyond the edge of the face, or on it */
+        double away = w->psi[t] / w->unit[t];
+        w->none[t] = s->trust[t] * (-smaller(0.5 * away * away / alone, s->most) - width);
+    }
+    for (int64_t t = 0; t < n; t++) {
+        if (!(w->bare[t] > 0.0) && !w->is_loud) continue;
+        double best = -INFINITY, unit = w->unit[t];
+        for (int k = 0; k < 2; k++) {
+            double floor_ = k ? psi(w->bare[t]) : 0.0, square = alone + floor_ * floor_;
+            if (w->is_loud) square += readings(s, floor_, w->plateau[t], unit);
+            double away = (w->psi[t] - floor_) / unit;
+            double one = -smaller(0.5 * away * away / square, s->most) - 0.5 * log(square);
+            best = larger(best, s->trust[t] * one);
+        }
+        w->none[t] = best;
+    }
+}
+
+/* The score of one symbol at a tactel as the reference rounds it, under the usual noise. */
+static double score_rounded(const Scene *s, const Work *w, const double *pose, int64_t t,
+                            int64_t k) {
+    const float *from = s->rimmed + (w->place[t] * s->q + k) * FIELDS, log4 = (float)LOG4;
+    const float quiet = (float)(s->quiet * s->quiet), aside = (float)(s->displaced * s->displaced);
+    float hold = (float)w->contact[t], face = (float)w->bare[t], by = 1.0f;
+    float v = from[0] + from[3] * (float)pose[3] + from[4] * (float)pose[4] +
+              from[5] * (float)pose[5];
+    v *= hold;
+    if (face > 0.0f) {
+        float response = expm1f(v * log4) / 3.0f, total = response + (1.0f - response) * face;
+        by = (1.0f - face) * (1.0f + 3.0f * response) / (1.0f + 3.0f * total);
+        v = log1pf(3.0f * (total > 0.0f ? total : 0.0f)) / log4;
+    } else if (w->any_bare) {
+        v = v > 0.0f ? v : 0.0f;
+    }
+    float x = from[1] * hold * by, y = from[2] * hold * by;
+    float square = quiet + v * v + aside * (x * x + y * y), wide = sqrtf(square);
+    double unit = s->first / larger(w->press[t], 1e-3);
+    if (w->is_loud) {
+        float change = (float)(3.0 / LOG4) * expf((float)-LOG4 * v);
+        double share = change * (s->noise / w->plateau[t]) / unit;
+        wide = (float)sqrt(square + share * share);
+    }
+    double away = (w->psi[t] - v) / (unit * wide);
+    return s->trust[t] * (-smaller(0.5 * away * away, s->most) - logf(wide));
+}
+
+enum { NEAR_TIES = 100000 }; /* one over the nats within which rounding may decide */
+
+/* The number of the largest sum (q + 1,) of a cell. Where a cell is seen by its rim alone, symbols
+   and none often differ by rounding: there the reference's decides. */
+static int64_t largest(const Scene *s, const Work *w, const double *pose, int64_t cell,
+                       double *sum) {
+    int64_t best = 0, near = 0;
+    for (int64_t c = 1; c <= s->q; c++) if (sum[c] > sum[best]) best = c;
+    for (int64_t c = 0; c <= s->q; c++) near += (sum[best] - sum[c]) * NEAR_TIES < 1.0;
+    if (near == 1) return best;
+    for (int64_t c = 0; c < s->q; c++) {
+        sum[c] = 0.0;
+        for (int64_t t = 0; t < s->n; t++)
+            if (w->labels[t] == cell) sum[c] += score_rounded(s, w, pose, t, c);
+    }
+    best = 0;
+    for (int64_t c = 1; c <= s->q; c++) if (sum[c] > sum[best]) best = c;
+    return best;
+}
+
+/* labels (n,) of what fits best in the cell under each tactel, -1: no symbol. Cells are few, and
+   mostly that of the tactel before. */
+static void choose(const Scene *s, Work *w, const double *pose) {
+    const int64_t *cells = w->cells, wide = s->q + 1;
+    int64_t known = 0, k = 0;
+    for (int64_t t = 0; t < s->n; t++) {
+        const int64_t *cell = cells + 2 * t;
+#define IS_CELL(k) (cells[2 * w->first[k]] == cell[0] && cells[2 * w->first[k] + 1] == cell[1])
+        if (!(known && IS_CELL(k)))
+            for (k = 0; k < known && !IS_CELL(k); k++) {}
+        if (k == known) {
+            w->first[known++] = t;
+            memset(w->sums + k * wide, 0, wide * sizeof(double));
+        }
+        for (int64_t c = 0; c < s->q; c++) w->sums[k * wide + c] += w->scores[c * s->n + t];
+        w->sums[k * wide + s->q] += w->none[t];
+        w->labels[t] = k;
+    }
+    for (k = 0; k < known; k++) {
+        int64_t best = largest(s, w, pose, k, w->sums + k * wide);
+        w->first[k] = best == s->q ? -1 : best;
+    }
+    for (int64_t t = 0; t < s->n; t++) w->labels[t] = w->first[w->labels[t]];
 }
 
 /* Labels (n,) of what cells show, -1 beyond the table. */
-static void read_labels(const Scene *s, const int8_t *given, const int64_t *corner,
-                        const int64_t *cells, int64_t *labels) {
+static void read_labels(const Scene *s, Work *w, const int8_t *given, const int64_t *corner) {
     for (int64_t t = 0; t < s->n; t++) {
-        int64_t x = cells[2 * t] - corner[0], y = cells[2 * t + 1] - corner[1];
+        int64_t x = w->cells[2 * t] - corner[0], y = w->cells[2 * t + 1] - corner[1];
         int inside = x >= 0 && x < s->wide && y >= 0 && y < s->high;
-        labels[t] = inside ? given[y * s->wide + x] : -1;
+        w->labels[t] = inside ? given[y * s->wide + x] : -1;
     }
 }
 
-/* Candidates somewhere: pose (b, 7), gain (b, 4), value (b,), normal (b, 11, 11), right (b, 11). */
-typedef struct { double *pose, *gain, *value, *normal, *right; } Lattices;
+/* psi and slopes (6, n) of what is shown, of the bare face where that is nothing. */
+static void value_shown(const Scene *s, Work *w) {
+    int64_t n = s->n;
+    double *v = w->shown;
+    for (int64_t t = 0; t < n; t++) {
+        int64_t label = w->labels[t], at = label * n + t;
+        if (label < 0) {
+            double floor_ = psi(w->bare[t]);
+            v[t] = w->psi[t] > floor_ / 2 ? floor_ : 0.0;
+            for (int f = 1; f < FIELDS; f++) v[f * n + t] = 0.0;
+            continue;
+        }
+        const float *from = s->rimmed + (w->place[t] * s->q + label) * FIELDS;
+        float scale = w->any_bare ? w->by[at] : 1.0f, hold = (float)w->contact[t];
+        v[t] = w->value[at];
+        v[n + t] = w->x[at];
+        v[2 * n + t] = w->y[at];
+        for (int f = 3; f < FIELDS; f++) v[f * n + t] = from[f] * hold * scale;
+    }
+}
 
-/* given: (b, high, wide) labels of cells from `corner` (b, 2) on, or NULL. */
-static void evaluate(const Scene *s, const int8_t *given, const int64_t *corner, Work *w,
-                     Lattices at) {
-    normalize(s, at.gain, w->felt, w->measure, &w->any_bare, &w->is_loud);
-    cells_under(s, at.pose, w->cells, w->offsets);
-    double *felt = w->felt;
-    for (int64_t i = 0; i < s->b; i++) {
-        const double *p = FELT(0), *press = FELT(1), *bare = FELT(2), *contact = FELT(3);
-        const double *depth = FELT(4), *plain = FELT(5), *lower = FELT(6), *plateau = FELT(7);
-        const double *pose = at.pose + 7 * i, *gain = at.gain + 4 * i;
-        const int64_t *under = w->cells + 2 * i * s->n;
-        const float *tables = w->tables;
-        const int64_t *shown = given ? w->labels : NULL;
-        if (given) read_labels(s, given + i * s->high * s->wide, corner + 2 * i, under, w->labels);
-        look_up(s, w->offsets + 2 * i * s->n, pose, bare, contact, w->any_bare, shown, w->tables);
-        score(s, s->first, p, press, bare, plateau, tables, w->is_loud, shown, w->scores);
-        if (!given) choose(s, under, w->scores, w->sums, w->first, w->labels);
-        double c = cos(pose[2]), n = sin(pose[2]), scale = exp(gain[0]), level = 0.0, sum = 0.0;
-        double N[UNKNOWNS][UNKNOWNS], r[UNKNOWNS];
-        memset(N, 0, sizeof N);
-        memset(r, 0, sizeof r);
+/* Spread of psi about what is shown, in units of the noise. */
+static inline double deviation(const Scene *s, const Work *w, int64_t t, double unit) {
+    const double *v = w->shown + t;
+    double x = v[s->n], y = v[2 * s->n], square = s->quiet * s->quiet + v[0] * v[0];
+    square += s->displaced * s->displaced * (x * x + y * y);
+    if (w->is_loud) square += readings(s, v[0], w->plateau[t], unit);
+    return (double)(float)sqrt(square);
+}
+
+/* Forces (n,) of what is shown, what changes with pose and gain (11, n), and by how much forces
+   change with psi (n,). */
+static void press_shown(const Scene *s, Work *w, const double *pose, const double *gain) {
+    const double c = cos(pose[2]), r = sin(pose[2]), scale = exp(gain[0]), *points = s->points;
+    const int64_t n = s->n, wide = whole_fours(n);
+    double *by = w->by_psi, *rows = w->rows, *v = w->shown;
+    for (int64_t t = 0; t < n; t++) by[t] = exp(v[t] * (double)(float)LOG4);
+    for (int64_t t = 0; t < n; t++) {
+        double total = (by[t] - 1.0) / 3.0, bare = w->bare[t], depth = w->depth[t];
+        double symbol = smaller(larger((total - bare) / larger(1 - bare, 1e-3), 0.0), 1.5);
+        double rest = v[t] > 0 ? 1 - symbol : 0.0;
+        double force = scale * (symbol * w->plain[t] + rest * w->lower[t]);
+        double slope = symbol * slope_of(s, depth) + rest * slope_of(s, depth - s->symbol);
+        w->force[t] = rows[7 * wide + t] = force;
+        for (int k = 0; k < 3; k++) rows[(8 + k) * wide + t] = scale * slope * s->plane[3 * t + k];
+    }
+    for (int64_t t = 0; t < n; t++) {
+        double x = points[2 * t], y = points[2 * t + 1], across = c * x - r * y, up = r * x + c * y;
+        double by_x = v[n + t], by_y = v[2 * n + t], change = by[t] * LOG4 / 3.0 * w->plateau[t];
+        rows[t] = by_x * change;
+        rows[wide + t] = by_y * change;
+        rows[2 * wide + t] = (by_y * across - by_x * up) * change;
+        for (int f = 3; f < FIELDS; f++) rows[f * wide + t] = v[f * n + t] * change;
+        rows[6 * wide + t] = (by_x * across + by_y * up) * change;
+        by[t] = change;
+    }
+}
+
+/* given: (b, high, wide) labels of cells from `corner` (b, 2) on, or NULL: what fits best. */
+typedef struct { const int8_t *given; const int64_t *corner; } Shown;
+
+/* See the image as candidate i does; returns its log-likelihood. */
+static double explain(const Scene *s, Work *w, Shown shown, int64_t i, const double *pose,
+                      const double *gain) {
+    double sum = 0.0, level = 0.0;
+    find_cells(s, w, pose);
+    look_up(s, w, pose);
+    score(s, w, s->first);
+    if (shown.given)
+        read_labels(s, w, shown.given + i * s->high * s->wide, shown.corner + 2 * i);
+    else
+        choose(s, w, pose);
+    for (int64_t t = 0; t < s->n; t++) {
+        int64_t label = w->labels[t];
+        sum += label < 0 ? w->none[t] : w->scores[label * s->n + t];
+        if (w->press[t] != 1.0 && s->trust[t] != 0.0) level += s->trust[t] * log(w->press[t]);
+    }
+    for (int k = 3; k < 8; k++) {
+        double away = k < 7 ? pose[k] : gain[0] - s->usual_scale;
+        sum -= 0.5 * away * away * s->precision[k];
+    }
+    return sum + w->measure + level;
+}
+
+/* Normal matrix (11, 11) and right-hand side (11,) of the candidate that was seen last. */
+static void linear_system(const Scene *s, Work *w, const double *pose, const double *gain,
+                          double *normal, double *right) {
+    int64_t wide = whole_fours(s->n);
+    double *rows = w->rows, *weighed = w->rows + ROWS * wide; /* the last row: what is left */
+    value_shown(s, w);
+    press_shown(s, w, pose, gain);
+    for (int64_t t = 0; t < s->n; t++) {
+        double unit = s->first / w->press[t], left = s->forces[t] - w->force[t];
+        double width = unit * deviation(s, w, t, unit) * w->by_psi[t];
+        int pulls = fabs(left / width) < s->far && s->trust[t] != 0.0;
+        w->unit[t] = pulls ? s->trust[t] / (width * width) : 0.0;
+        rows[UNKNOWNS * wide + t] = pulls ? left : 0.0;
+    }
+    for (int k = 0; k < UNKNOWNS; k++)
         for (int64_t t = 0; t < s->n; t++) {
-            int64_t label = w->labels[t];
-            sum += w->scores[t * (s->q + 1) + (label < 0 ? s->q : label)];
-            if (press[t] != 1.0) level += s->trust[t] * log(press[t]);
-            double v[FIELDS], unit = s->first / press[t];
-            value_of(s, tables, t, label, p[t], bare[t], v);
-            Felt f = {bare[t], depth[t], plain[t], lower[t], plateau[t]};
-            double J[UNKNOWNS], by, force = force_at(s, t, v, f, c, n, scale, &by, J);
-            double wide = unit * deviation(s, v, s->noise / plateau[t], unit, w->is_loud) * by;
-            double left = s->forces[t] - force;
-            if (!(fabs(left / wide) < s->far) || s->trust[t] == 0.0) continue;
-            double sure = s->trust[t] / (wide * wide);
-            for (int k = 0; k < UNKNOWNS; k++) {
-                double weighed = J[k] * sure;
-                r[k] += weighed * left;
-                for (int m = 0; m <= k; m++) N[k][m] += weighed * J[m];
+            rows[k * wide + t] = w->unit[t] != 0.0 ? rows[k * wide + t] : 0.0;
+            weighed[k * wide + t] = rows[k * wide + t] * w->unit[t];
+        }
+    for (int k = 0; k < UNKNOWNS; k++) {
+        const double *one = weighed + k * wide;
+        for (int m = k / 4 * 4; m < ROWS; m += 4) { /* four dot products at once, from the left */
+            const double *a = rows + m * wide, *b = a + wide, *d = b + wide, *e = d + wide;
+            Four sums[4] = {{0}, {0}, {0}, {0}};
+            for (int64_t t = 0; t < wide; t += 4) {
+                Four at = *(const Four *)(one + t);
+                sums[0] += at * *(const Four *)(a + t);
+                sums[1] += at * *(const Four *)(b + t);
+                sums[2] += at * *(const Four *)(d + t);
+                sums[3] += at * *(const Four *)(e + t);
+            }
+            for (int j = 0; j < 4; j++) {
+                double sum = (sums[j][0] + sums[j][1]) + (sums[j][2] + sums[j][3]);
+                if (m + j == UNKNOWNS) right[k] = sum;
+                else normal[k * UNKNOWNS + m + j] = normal[(m + j) * UNKNOWNS + k] = sum;
             }
         }
-        for (int k = 0; k < UNKNOWNS; k++) {
-            double away = k < 3 || k > 7 ? 0.0 : k < 7 ? pose[k] : gain[0] - s->usual_scale;
-            for (int m = 0; m < k; m++) N[m][k] = N[k][m];
-            N[k][k] += s->precision[k];
-            r[k] -= away * s->precision[k];
-            sum -= 0.5 * away * away * s->precision[k];
-        }
-        at.value[i] = sum + w->measure[i] + level;
-        memcpy(at.normal + i * UNKNOWNS * UNKNOWNS, N, sizeof N);
-        memcpy(at.right + i * UNKNOWNS, r, sizeof r);
+    }
+    for (int k = 0; k < UNKNOWNS; k++) {
+        double away = k < 3 || k > 7 ? 0.0 : k < 7 ? pose[k] : gain[0] - s->usual_scale;
+        normal[k * UNKNOWNS + k] += s->precision[k];
+        right[k] -= away * s->precision[k];
     }
 }
 
@@ -360,19 +514,19 @@ void linearize(const Scene *s, const int8_t *given, const int64_t *corner, const
                const double *gain, double *values, double *forces, double *jacobian,
                double *unit) {
     Work w = new_work(s);
-    double *felt = w.felt;
-    const int64_t i = 0;
-    normalize(s, gain, w.felt, w.measure, &w.any_bare, &w.is_loud);
-    cells_under(s, pose, w.cells, w.offsets);
-    read_labels(s, given, corner, w.cells, w.labels);
-    look_up(s, w.offsets, pose, FELT(2), FELT(3), w.any_bare, w.labels, w.tables);
-    double c = cos(pose[2]), n = sin(pose[2]), scale = exp(gain[0]), by;
+    look_at_gains(s, &w, gain);
+    normalize(s, &w, 0, gain);
+    find_cells(s, &w, pose);
+    look_up(s, &w, pose);
+    read_labels(s, &w, given, corner);
+    value_shown(s, &w);
+    press_shown(s, &w, pose, gain);
     for (int64_t t = 0; t < s->n; t++) {
-        Felt f = {FELT(2)[t], FELT(4)[t], FELT(5)[t], FELT(6)[t], FELT(7)[t]};
-        value_of(s, w.tables, t, w.labels[t], FELT(0)[t], f.bare, values + FIELDS * t);
-        forces[t] = force_at(s, t, values + FIELDS * t, f, c, n, scale, &by,
-                             jacobian + UNKNOWNS * t);
-        unit[t] = by / FELT(1)[t];
+        for (int f = 0; f < FIELDS; f++) values[FIELDS * t + f] = w.shown[f * s->n + t];
+        for (int k = 0; k < UNKNOWNS; k++)
+            jacobian[UNKNOWNS * t + k] = w.rows[k * whole_fours(s->n) + t];
+        forces[t] = w.force[t];
+        unit[t] = w.by_psi[t] / w.press[t];
     }
     free_work(&w);
 }
@@ -427,51 +581,56 @@ static void move(const Scene *s, const double *normal, const double *right, doub
     to_gain[3] *= factor;
 }
 
-/* Move candidates by damped steps, `steps` at most; pose and gain are where they begin and end. */
+/* Move candidates by damped steps, `steps` at most; pose and gain (b, 7), (b, 4) are where they begin
+   and end. Normal matrices and right-hand sides are worked out where a step begins, and in the end. */
 void refine(const Scene *s, int64_t steps, const int8_t *given, const int64_t *corner,
             double *pose, double *gain, double *value, double *normal, double *right) {
-    const int64_t each[5] = {7, 4, 1, UNKNOWNS * UNKNOWNS, UNKNOWNS};
-    Work work = new_work(s);
-    Lattices best = {pose, gain, value, normal, right}, tried;
-    double *room = malloc(s->b * (7 + 4 + 2 + UNKNOWNS * (UNKNOWNS + 1)) * sizeof(double));
-    tried.pose = room;
-    tried.gain = tried.pose + 7 * s->b;
-    tried.value = tried.gain + 4 * s->b;
-    tried.normal = tried.value + s->b;
-    tried.right = tried.normal + UNKNOWNS * UNKNOWNS * s->b;
-    double *damping = tried.right + UNKNOWNS * s->b;
-    double *to[5] = {pose, gain, value, normal, right};
-    double *from[5] = {tried.pose, tried.gain, tried.value, tried.normal, tried.right};
-    evaluate(s, given, corner, &work, best);
-    for (int64_t i = 0; i < s->b; i++) damping[i] = s->damping;
+    const int64_t square = UNKNOWNS * UNKNOWNS;
+    Work w = new_work(s);
+    Shown shown = {given, corner};
+    double *damping = malloc(s->b * (2 + 7 + 4) * sizeof(double)), *tried = damping + s->b;
+    double *to_pose = tried + s->b, *to_gain = to_pose + 7 * s->b;
+    look_at_gains(s, &w, gain);
+    for (int64_t i = 0; i < s->b; i++) {
+        const double *g = gain + 4 * i;
+        if (i == 0 || memcmp(g, g - 4, 4 * sizeof(double)) || s->falls > 1) normalize(s, &w, i, g);
+        value[i] = explain(s, &w, shown, i, pose + 7 * i, g);
+        linear_system(s, &w, pose + 7 * i, g, normal + i * square, right + i * UNKNOWNS);
+        damping[i] = s->damping;
+    }
     for (int64_t step = 0, done = 0; step < steps && !done; step++) {
         for (int64_t i = 0; i < s->b; i++)
-            move(s, normal + i * UNKNOWNS * UNKNOWNS, right + i * UNKNOWNS, damping[i],
-                 pose + 7 * i, gain + 4 * i, tried.pose + 7 * i, tried.gain + 4 * i);
-        evaluate(s, given, corner, &work, tried);
+            move(s, normal + i * square, right + i * UNKNOWNS, damping[i], pose + 7 * i,
+                 gain + 4 * i, to_pose + 7 * i, to_gain + 4 * i);
+        look_at_gains(s, &w, to_gain);
         done = 1;
         for (int64_t i = 0; i < s->b; i++) {
-            if (!(fabs(tried.value[i] - value[i]) < s->settled)) done = 0;
-            if (tried.value[i] > value[i]) {
-                damping[i] /= s->easier;
-                for (int k = 0; k < 5; k++)
-                    memcpy(to[k] + each[k] * i, from[k] + each[k] * i, each[k] * sizeof(double));
-            } else {
+            const double *p = to_pose + 7 * i, *g = to_gain + 4 * i;
+            normalize(s, &w, i, g);
+            tried[i] = explain(s, &w, shown, i, p, g);
+            if (!(fabs(tried[i] - value[i]) < s->settled)) done = 0;
+            if (!(tried[i] > value[i])) {
                 damping[i] = smaller(damping[i] * s->harder, 1e6);
+                continue;
             }
+            damping[i] /= s->easier;
+            value[i] = tried[i];
+            memcpy(pose + 7 * i, p, 7 * sizeof(double));
+            memcpy(gain + 4 * i, g, 4 * sizeof(double));
+            linear_system(s, &w, p, g, normal + i * square, right + i * UNKNOWNS);
         }
     }
-    free(room);
-    free_work(&work);
+    free(damping);
+    free_work(&w);
 }
 
 /* Sums over the cells of one candidate, columns and then rows rising: names (m, 2), scores
    (m, q + 1), tactels that look at them by how hard they press (m,). Returns m. */
-static int64_t sum_cells(const Scene *s, const int64_t *cells, const double *each,
-                         const double *press, int64_t *names, double *scores, double *seen) {
+static int64_t sum_cells(const Scene *s, const Work *w, int64_t *names, double *scores,
+                         double *seen) {
     int64_t known = 0, wide = s->q + 1;
     for (int64_t t = 0; t < s->n; t++) {
-        const int64_t *cell = cells + 2 * t;
+        const int64_t *cell = w->cells + 2 * t;
         int64_t k = 0;
         while (k < known && (names[2 * k] < cell[0] ||
                              (names[2 * k] == cell[0] && names[2 * k + 1] < cell[1]))) k++;
@@ -484,8 +643,9 @@ static int64_t sum_cells(const Scene *s, const int64_t *cells, const double *eac
             memset(scores + wide * k, 0, wide * sizeof(double));
             seen[k] = 0.0;
         }
-        for (int64_t c = 0; c < wide; c++) scores[wide * k + c] += each[wide * t + c];
-        seen[k] += press[t] * s->trust[t];
+        for (int64_t c = 0; c < s->q; c++) scores[wide * k + c] += w->scores[c * s->n + t];
+        scores[wide * k + s->q] += w->none[t];
+        seen[k] += w->press[t] * s->trust[t];
     }
     return known;
 }
@@ -497,41 +657,32 @@ double score_cells(const Scene *s, int64_t best, double least, double *pose, dou
                    int64_t *count, int64_t *names, double *scores, double *seen, double *level,
                    double *left) {
     Work w = new_work(s);
-    double *felt = w.felt, whole = 0.0, sum = 0.0, noise = 0.0;
-    float *all = malloc(s->b * s->n * s->q * FIELDS * sizeof(float));
-    normalize(s, gain, w.felt, w.measure, &w.any_bare, &w.is_loud);
-    cells_under(s, pose, w.cells, w.offsets);
-    for (int64_t i = 0; i < s->b; i++) {
-        const double *p = FELT(0), *press = FELT(1), *bare = FELT(2), *plateau = FELT(7);
-        float *tables = all + i * s->n * s->q * FIELDS;
-        look_up(s, w.offsets + 2 * i * s->n, pose + 7 * i, bare, FELT(3), w.any_bare, NULL, tables);
-        score(s, s->first, p, press, bare, plateau, tables, w.is_loud, NULL, w.scores);
-        choose(s, w.cells + 2 * i * s->n, w.scores, w.sums, w.first, w.labels);
-        level[i] = w.measure[i];
-        double pressed = 0.0;
+    double whole = 0.0, sum = 0.0, noise = 0.0;
+    look_at_gains(s, &w, gain);
+    for (int64_t k = 0; k < s->b; k++) { /* the likeliest first: it tells the noise */
+        int64_t i = k == 0 ? best : k <= best ? k - 1 : k;
+        normalize(s, &w, i, gain + 4 * i);
+        find_cells(s, &w, pose + 7 * i);
+        look_up(s, &w, pose + 7 * i);
+        score(s, &w, s->first);
+        choose(s, &w, pose + 7 * i);
+        value_shown(s, &w);
+        level[i] = w.measure;
         for (int64_t t = 0; t < s->n; t++) {
-            double v[FIELDS], unit = s->first / press[t];
-            value_of(s, tables, t, w.labels[t], p[t], bare[t], v);
-            left[i * s->n + t] = (p[t] - v[0]) * press[t] /
-                                 deviation(s, v, s->noise / plateau[t], unit, w.is_loud);
-            pressed += s->trust[t] * log(press[t]);
+            double press = w.press[t], away = (w.psi[t] - w.shown[t]) * press;
+            left[i * s->n + t] = away / deviation(s, &w, t, s->first / press);
+            level[i] += s->trust[t] * log(press);
         }
-        level[i] += pressed;
+        for (int64_t t = 0; t < s->n && k == 0; t++) {
+            double away = smaller(fabs(left[best * s->n + t]), s->far * s->first);
+            sum += s->trust[t] * (away * away);
+            whole += s->trust[t];
+        }
+        if (k == 0) noise = larger(least, sqrt(sum / whole));
+        score(s, &w, noise);
+        count[i] = sum_cells(s, &w, names + 2 * i * s->n, scores + i * s->n * (s->q + 1),
+                             seen + i * s->n);
     }
-    for (int64_t t = 0; t < s->n; t++) {
-        double away = smaller(fabs(left[best * s->n + t]), s->far * s->first);
-        sum += s->trust[t] * (away * away);
-        whole += s->trust[t];
-    }
-    noise = larger(least, sqrt(sum / whole));
-    for (int64_t i = 0; i < s->b; i++) {
-        const double *press = FELT(1);
-        const float *tables = all + i * s->n * s->q * FIELDS;
-        score(s, noise, FELT(0), press, FELT(2), FELT(7), tables, w.is_loud, NULL, w.scores);
-        count[i] = sum_cells(s, w.cells + 2 * i * s->n, w.scores, press, names + 2 * i * s->n,
-                             scores + i * s->n * (s->q + 1), seen + i * s->n);
-    }
-    free(all);
     free_work(&w);
     return noise;
 }
