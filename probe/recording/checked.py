@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.errors import RecordingError
+from probe.recording.heap import strings_end
 from probe.recording.layout import (
     DATASETS,
     FORMAT,
@@ -64,6 +65,8 @@ def check_recording(path: Path, *, live: bool = False) -> CheckedFile:
 def check_open_file(file: h5py.File, path: Path) -> CheckedFile:
     """Check that an open file is a recording; see `check_recording`."""
     with explain_errors(path, "read"):
+        if not strings_end(path):
+            raise ValueError("a collection of strings without end")
         attributes = {name: _attribute_value(value) for name, value in file.attrs.items()}
         names = [name for name in DATASETS if name in file]
         others = ", ".join(sorted(file)) or "nothing"
