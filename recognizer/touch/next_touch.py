@@ -26,6 +26,7 @@ from probe.surface.polygon import polygon
 from recognizer.touch.felt_area import EarlierTouch, FeltArea, felt_area, strongest_reading
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.locate import Hypothesis
+from recognizer.touch.next_limits import next_limits
 from recognizer.touch.pose import face_pose
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, NextTouch, Recognition
@@ -83,9 +84,9 @@ def propose_next(
     earlier
         Touches before: what they have seen is not new, and says where the face is.
     """
-    settings = reader.settings.next
-    if answer and not _is_unsure(answer, settings):
+    if answer and not _is_unsure(answer, reader.settings.next):
         return None
+    settings = next_limits(reader.sensor, reader.settings.next)
     if not signal.contact:
         return NextTouch(0.0, 0.0, 0.0, settings.force_n, "nothing is felt: press onto the object")
     steps = _steps(settings)

@@ -1,6 +1,7 @@
 """Touches until one is answered: where the answers propose against a random walk.
 
     python tests/campaigns/next_touch.py LAB.db --touches 200 --seed 17 --engine mujoco
+    python tests/campaigns/next_touch.py GEL.db --sensor-type gel-24x32 --kinds edge,corner
 
 Touches registered faces of a lab (parts made by `validate-set SPEC -o DIR`), as `validate-set
 --policy next` does, up to `--most` of them, and the same first touches again with steps of 10 mm in
@@ -16,6 +17,7 @@ from collections import Counter
 
 import numpy as np
 
+from probe.sensor_types.read import sensor_type_named
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import NextTouch, Recognition
@@ -39,15 +41,17 @@ def main() -> None:
     parser.add_argument("--kinds", default="face=.55,edge=.1,corner=.05,worn=.1")
     parser.add_argument("--levels", default="typical,mismatch")
     parser.add_argument("--engine", default="own")
+    parser.add_argument("--sensor-type", default="fsr-16")
     parser.add_argument("--most", type=int, default=3)
     parser.add_argument("--policy", choices=("next", "walk"), action="append")
     parser.add_argument("--seconds", type=float, default=math.inf, help="end after so many")
     options = parser.parse_args()
     campaign = Campaign(
         seed=options.seed, kinds=kinds_of(options.kinds), levels=levels_of(options.levels),
-        engine=options.engine,
+        engine=options.engine, sensor_type=options.sensor_type,
     )  # fmt: skip
-    series, reader = series_of(campaign)[0], Reader(open_lab(options.database))
+    series = series_of(campaign)[0]
+    reader = Reader(open_lab(options.database), sensor_type_named(options.sensor_type))
     policies: dict[str, Proposal] = {"next": as_told, "walk": walk}
     found: dict[tuple[str, str], Counter[tuple[str, int]]] = {}
     end, number = time.monotonic() + options.seconds, options.first

@@ -90,15 +90,22 @@ class FirstLookSettings:
 
 @dataclass(frozen=True, slots=True)
 class NextSettings:
-    """Which steps are weighed, and what they are worth (`tests/campaigns/next_touch.py`)."""
+    """Which steps are weighed, and what they are worth (`tests/campaigns/next_touch.py`).
+
+    Lengths, forces and counts are those of `fsr-16`; `next_limits` makes another type's of them.
+    """
 
     lengths_mm: tuple[float, ...] = (4.0, 7.0, 10.0, 14.0)  #: of steps
     directions: int = 16  #: of steps
     turns_rad: tuple[float, ...] = (0.0, math.pi / 4)  #: a row of symbols fits along a diagonal
     force_n: float = 80.0  #: at which touches are read best
+    #: the same for a gel: its mean imprint; of 100 touches at edges and corners 90 are answered by
+    #: the second at .2 mm, 79 at .5 mm, 55 at 1.2 mm
+    imprint_mm: float = 0.2
     strongest: int = 12  #: tactels that say how hard is pressed
     faint: float = 0.08  #: share of that from which a tactel lies on something ...
-    least_counts: float = 16.0  #: ... and readings over the background: less is noise
+    least_counts: float = 16.0  #: ... and readings over the background: less is noise, ...
+    quiet_sigmas: float = 4.0  #: ... and deviations of the type's noise, where that is more
     least_n: float = 0.1  #: the same where readings are newtons
     gap: int = 5  #: tactels, side of the square that closes gaps between strokes
     clear_mm: float = 2.5  #: from where the face may end to the centre: nearer, the plate tips

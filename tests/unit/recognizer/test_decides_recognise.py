@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import recognizer.touch.recognise
+from probe.sensor import SensorType
 from recognizer.touch.belief import Support
 from recognizer.touch.locate import Hypothesis
 from recognizer.touch.recognise import recognise, recognise_with_hypothesis
@@ -22,7 +23,9 @@ from recognizer.touch.recognition import (
 from recognizer.touch.settings import ReaderSettings
 
 TOUCHED = SimpleNamespace(contact=True)
-READER = SimpleNamespace(settings=ReaderSettings(), lab=SimpleNamespace(arrays=("one", "two")))
+READER = SimpleNamespace(
+    sensor=SensorType(), settings=ReaderSettings(), lab=SimpleNamespace(arrays=("one", "two"))
+)
 SURE = Support(surprise=20.0, explained=0.95, inliers=16, clear=0, plain=0, wider=0.0)
 T_OBJECT_FACE = np.array([[0.0, 0, 1, 5], [1, 0, 0, 6], [0, 1, 0, 7], [0, 0, 0, 1]])
 
