@@ -146,32 +146,38 @@ def refine_compiled(
     return pose, gain, value, normal, right
 
 
-def linearize_compiled(
+def linearizer_compiled(
     library: ctypes.CDLL,
     image: Image,
     template: ResponseTemplate,
     pose: Array,
-    gain: Array,
+    steps: int,
     shown: Callable[[Ints], Ints],
-) -> tuple[Array, Array, Array, Array]:
-    """Return an image about the lattice (7,) under the gain (4,), whose symbols are known.
+) -> Callable[[Array, Array], tuple[Array, Array, Array, Array]]:
+    """Return what linearizes an image about a lattice whose symbols are known.
 
-    psi and slopes (n, 6) of what is shown, forces (n,), derivatives (n, 11) by pose and gain, and
-    (n,) by how much forces change with psi, over `NormalizedImage.press`.
+    Of a pose (7,), no more than `steps` from the one that is given, and a gain (4,): psi and slopes
+    (n, 6) of what is shown, forces (n,), derivatives (n, 11) by pose and gain, and (n,) by how much
+    forces change with psi, over `NormalizedImage.press`.
     """
-    tactels = len(image.forces)
-    pose, gain = np.ascontiguousarray(pose), np.ascontiguousarray(gain)
-    labels, corner = _label_tables(image, template, pose[None], 0, shown)
+    tactels, fields = len(image.forces), template.rimmed.shape[-1]
+    labels, corner = _label_tables(image, template, pose[None], steps, shown)
     scene = _scene_of(image, template, 1, np.zeros(UNKNOWNS), *labels.shape[1:])
-    found = (
-        np.empty((tactels, template.rimmed.shape[-1])), np.empty(tactels),
-        np.empty((tactels, UNKNOWNS)), np.empty(tactels),
-    )  # fmt: skip
-    library.linearize(
-        ctypes.addressof(scene.value),
-        *(one.ctypes.data for one in (labels, corner, pose, gain, *found)),
-    )
-    return found
+
+    def linearize(pose: Array, gain: Array) -> tuple[Array, Array, Array, Array]:
+        pose, gain = np.ascontiguousarray(pose), np.ascontiguousarray(gain)
+        values, jacobian = np.empty((tactels, fields)), np.empty((tactels, UNKNOWNS))
+        forces, unit = np.empty(tactels), np.empty(tactels)
+        library.linearize(
+            ctypes.addressof(scene.value),
+            *(
+                one.ctypes.data
+                for one in (labels, corner, pose, gain, values, forces, jacobian, unit)
+            ),
+        )
+        return values, forces, jacobian, unit
+
+    return linearize
 
 
 @dataclass(frozen=True, slots=True, eq=False)

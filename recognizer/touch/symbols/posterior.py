@@ -10,6 +10,7 @@ makes slopes less steep than the template's. Damped least squares; lattice and s
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from recognizer.touch.settings import PosteriorSettings
 from recognizer.touch.symbols.blur import second_differences
-from recognizer.touch.symbols.compiled import compiled_kernels, linearize_compiled
+from recognizer.touch.symbols.compiled import compiled_kernels, linearizer_compiled
 from recognizer.touch.symbols.covariance import invert_normal
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.gain import Image, bounded_gain
@@ -38,6 +39,9 @@ from recognizer.touch.symbols.spread import TactelScatter, fit_spread, usual_spr
 from recognizer.touch.symbols.template import ResponseTemplate
 
 Array = NDArray[np.float64]
+
+#: Pose (7,) and gain (4,) -> what `compiled.linearizer_compiled` says.
+Linearizer = Callable[[Array, Array], tuple[Array, Array, Array, Array]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,7 +98,8 @@ def fit_posterior(
     settings, spreads = image.settings.posterior, image.settings.spread
     known = np.diag(_precision(image, settings))
     trust, freedom = image.trust, spreads.freedom
-    at = _linearize(image, template, pose, gain, np.zeros(3), shown)
+    linearizer = _linearizer(image, template, pose, settings.steps, shown)
+    at = _linearize(image, linearizer, pose, gain, np.zeros(3))
     spread, damping = usual_spread(spreads), image.settings.refine.damping
     for step in range(settings.steps + 1):
         spread = fit_spread(spread, at.left, at.parts, at.jacobian, known, trust, spreads)
@@ -104,7 +109,7 @@ def fit_posterior(
         if step == settings.steps:
             break
         right = weighted @ at.left - known @ at.departure
-        tried = _move(image, template, at, normal, right, damping, shown)
+        tried = _move(image, linearizer, at, normal, right, damping)
         before, after = (
             spread.log_likelihood(one.left, one.parts, trust, freedom)
             - 0.5 * float(one.departure @ known @ one.departure)
@@ -122,10 +127,10 @@ def fit_posterior(
 
 
 def _linearize(
-    image: Image, template: ResponseTemplate, pose: Array, gain: Array, more: Array, shown: Shown
+    image: Image, linearizer: Linearizer, pose: Array, gain: Array, more: Array
 ) -> _Linearized:
     noise = image.settings.noise
-    value, force, jacobian, unit = _linearize_lattice(image, template, pose, gain, shown)
+    value, force, jacobian, unit = linearizer(pose, gain)
     across = second_differences(np.column_stack([force, jacobian]), image.shape)
     blurred = [one[:, 0] for one in across]
     jacobian = jacobian + sum(
@@ -141,24 +146,27 @@ def _linearize(
     return _Linearized(pose, gain, more, left, parts, jacobian, departure)
 
 
-def _linearize_lattice(
-    image: Image, template: ResponseTemplate, pose: Array, gain: Array, shown: Shown
-) -> tuple[Array, Array, Array, Array]:
-    """Return what `compiled.linearize_compiled` does."""
+def _linearizer(
+    image: Image, template: ResponseTemplate, pose: Array, steps: int, shown: Shown
+) -> Linearizer:
     library = compiled_kernels()
     if library is not None:
-        return linearize_compiled(library, image, template, pose, gain, shown)
-    under = project_template(image, template, pose[None], gain[None])
-    values = values_of(under, shown(under.cells))
-    jacobian, force = force_jacobian(image, pose[None], gain[None], values, under.felt)
-    plateau, press = under.felt.plateau[0], under.felt.press[0]
-    unit = response_by_psi(response_of(values[0, :, 0])) * plateau / press
-    return values[0], force[0], jacobian[0], unit
+        return linearizer_compiled(library, image, template, pose, steps, shown)
+
+    def linearize(pose: Array, gain: Array) -> tuple[Array, Array, Array, Array]:
+        under = project_template(image, template, pose[None], gain[None])
+        values = values_of(under, shown(under.cells))
+        jacobian, force = force_jacobian(image, pose[None], gain[None], values, under.felt)
+        plateau, press = under.felt.plateau[0], under.felt.press[0]
+        unit = response_by_psi(response_of(values[0, :, 0])) * plateau / press
+        return values[0], force[0], jacobian[0], unit
+
+    return linearize
 
 
 def _move(
-    image: Image, template: ResponseTemplate, at: _Linearized, normal: Array, right: Array,
-    damping: float, shown: Shown,
+    image: Image, linearizer: Linearizer, at: _Linearized, normal: Array, right: Array,
+    damping: float,
 ) -> _Linearized:  # fmt: skip
     """Return the image about the lattice a damped step further."""
     refine, settings = image.settings.refine, image.settings.posterior
@@ -173,7 +181,7 @@ def _move(
     pose[3:] = np.clip(pose[3:], -limits, limits)
     gain[1] = np.clip(gain[1], refine.shallower * at.gain[1], refine.deepest)
     gain = bounded_gain(gain[None], image.settings.gain.steepest)[0]
-    return _linearize(image, template, pose, gain, at.more + step[lattice:], shown)
+    return _linearize(image, linearizer, pose, gain, at.more + step[lattice:])
 
 
 def _precision(image: Image, settings: PosteriorSettings) -> Array:

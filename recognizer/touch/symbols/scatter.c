@@ -36,40 +36,61 @@ static int factor(int64_t k, double A[MOST][MOST], double unseen, double L[MOST]
     return 1.0 / trace > unseen;
 }
 
+typedef double Four __attribute__((vector_size(32), aligned(8), may_alias));
+
+/* A (k, k) = known + J' W J of a jacobian (k, wide) by columns, its lower half alone. */
+static void weigh(int64_t k, int64_t wide, const double *jacobian, const double *weights,
+                  const double *known, double *weighed, double A[MOST][MOST]) {
+    for (int64_t i = 0; i < k; i++) {
+        const double *row = jacobian + i * wide;
+        for (int64_t t = 0; t < wide; t++) weighed[t] = row[t] * weights[t];
+        for (int64_t j = 0; j <= i; j++) {
+            Four sum = {0};
+            for (int64_t t = 0; t < wide; t += 4)
+                sum += *(const Four *)(weighed + t) * *(const Four *)(jacobian + j * wide + t);
+            A[i][j] = known[i * k + j] + ((sum[0] + sum[1]) + (sum[2] + sum[3]));
+        }
+    }
+}
+
+/* taken (wide,): the diagonal of J A^-1 J', A as `factor` leaves it. */
+static void leverages(int64_t k, int64_t wide, const double *jacobian, double L[MOST][MOST],
+                      const double U[MOST], double *taken) {
+    for (int64_t t = 0; t < wide; t += 4) {
+        Four x[MOST], whole = {0};
+        for (int64_t i = 0; i < k; i++) {
+            Four sum = *(const Four *)(jacobian + i * wide + t) * U[i];
+            for (int64_t m = 0; m < i; m++) sum -= L[i][m] * x[m];
+            x[i] = sum * (1.0 / L[i][i]);
+            whole += x[i] * x[i];
+        }
+        *(Four *)(taken + t) = whole;
+    }
+}
+
 /* usual, now: (2,) variances of a covered tactel and of a tip's place, the latter to begin with and
    in the end. left, trust (n,); parts (2, n); jacobian (n, k); known (k, k). Returns 0 where a
    normal matrix shows too little to be inverted so. */
 int fit_spread(int64_t n, int64_t k, int64_t rounds, double freedom, double touches, double unseen,
                const double *usual, const double *left, const double *parts,
                const double *jacobian, const double *known, const double *trust, double *now) {
-    double *weights = malloc(2 * n * sizeof(double)), *variance = weights + n;
+    int64_t wide = (n + 3) / 4 * 4; /* what is filled up weighs nothing */
+    double *weights = calloc((k + 4) * wide, sizeof(double)), *variance = weights + wide;
+    double *weighed = variance + wide, *taken = weighed + wide, *columns = taken + wide;
     int seen = k <= MOST;
+    for (int64_t t = 0; t < n; t++)
+        for (int64_t i = 0; i < k; i++) columns[i * wide + t] = jacobian[t * k + i];
     for (int64_t round = 0; round < rounds && seen; round++) {
         double A[MOST][MOST], L[MOST][MOST], U[MOST], asked[2] = {0}, shares[2] = {0};
-        for (int64_t i = 0; i < k; i++)
-            for (int64_t j = 0; j < k; j++) A[i][j] = 0.0;
         for (int64_t t = 0; t < n; t++) {
-            const double *row = jacobian + k * t;
             variance[t] = now[0] * parts[t] + now[1] * parts[n + t];
             weights[t] = trust[t] * (freedom + 1) / (freedom * variance[t] + left[t] * left[t]);
-            for (int64_t i = 0; i < k; i++) {
-                double weighed = row[i] * weights[t];
-                for (int64_t j = 0; j <= i; j++) A[i][j] += weighed * row[j];
-            }
         }
-        for (int64_t i = 0; i < k; i++)
-            for (int64_t j = 0; j <= i; j++) A[i][j] += known[i * k + j];
+        weigh(k, wide, columns, weights, known, weighed, A);
         seen = factor(k, A, unseen, L, U);
+        if (seen) leverages(k, wide, columns, L, U, taken);
         for (int64_t t = 0; t < n && seen; t++) {
-            const double *row = jacobian + k * t;
-            double x[MOST], taken = 0.0;
-            for (int64_t i = 0; i < k; i++) {
-                double sum = row[i] * U[i];
-                for (int64_t m = 0; m < i; m++) sum -= L[i][m] * x[m];
-                x[i] = sum / L[i][i];
-                taken += x[i] * x[i];
-            }
-            double told = weights[t] * (left[t] * left[t] + taken);
+            double told = weights[t] * (left[t] * left[t] + taken[t]);
             for (int part = 0; part < 2; part++) {
                 double share = trust[t] * now[part] * parts[part * n + t] / variance[t];
                 asked[part] += share * told;
