@@ -134,22 +134,18 @@ class PrintedFace:
 
     def _excess(self, print_: Array) -> float:
         """Return lattice over print, less 1, as a touch of the face feels it."""
-        scales = np.linalg.svd(_print_matrix(print_) @ self.T_part_face[:3, :2], compute_uv=False)
-        return 1.0 / float(scales.mean()) - 1.0
+        return 1.0 / _polar(_print_matrix(print_) @ self.T_part_face[:3, :2])[1] - 1.0
 
     def _printed(self, print_: Array, T_face_probe: Array) -> Array:
         S, R = _print_matrix(print_), self.T_part_face[:3, :3]
-        left, _, right = np.linalg.svd(S @ R[:, :2], full_matrices=False)
-        Q = left @ right
-        T_part_probe = np.eye(4)
-        axes = np.column_stack([Q, np.cross(Q[:, 0], Q[:, 1])])
-        T_part_probe[:3, :3] = axes @ T_face_probe[:3, :3]
-        at = R @ T_face_probe[:3, 3] + self.T_part_face[:3, 3]
-        T_part_probe[:3, 3] = S @ at
-        T_face_part = np.eye(4)
-        T_face_part[:3, :3] = R.T
-        T_face_part[:3, 3] = -R.T @ self.T_part_face[:3, 3]
-        return np.asarray(T_face_part @ T_part_probe)
+        (ax, ay, az), (bx, by, bz) = _polar(S @ R[:, :2])[0].T.tolist()
+        across = (ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
+        printed = np.array([(ax, ay, az), (bx, by, bz), across]).T  # axes of the face, as printed
+        at = S @ (R @ T_face_probe[:3, 3] + self.T_part_face[:3, 3]) - self.T_part_face[:3, 3]
+        found = np.eye(4)
+        found[:3, :3] = R.T @ printed @ T_face_probe[:3, :3]
+        found[:3, 3] = R.T @ at
+        return found
 
 
 _PRINT = ("scale_x", "scale_y", "skew_rad")  # what of a print moves places
@@ -159,6 +155,18 @@ def _print_matrix(print_: Array) -> Array:
     scale_x, scale_y, skew = print_.tolist()
     sin, cos = math.sin(skew), math.cos(skew)
     return np.array([[scale_x, scale_y * sin, 0.0], [0.0, scale_y * cos, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _polar(B: Array) -> tuple[Array, float]:
+    """Return the orthonormal Q of B = Q U (3, 2), and the mean of the eigenvalues of U.
+
+    By the Cayley-Hamilton theorem U is (B'B + s 1) / t, s^2 the determinant of B'B, t^2 its trace
+    and 2 s: L. P. Franca, Comput. Math. Appl. 18 (1989) 459.
+    """
+    (a, c), (_, b) = (B.T @ B).tolist()
+    s = math.sqrt(a * b - c * c)
+    t = math.sqrt(a + b + 2.0 * s)
+    return B @ np.array([[b + s, -c], [-c, a + s]]) / (t * s), t / 2.0
 
 
 def _slopes(of: Callable[[Array], Array], at: Array, step: float) -> Array:
