@@ -148,7 +148,8 @@ def diagnose(
     symbols = 0 if support is None else support.inliers
     if image.width_mm < settings.narrow_mm and image.length_mm > settings.longer * image.width_mm:
         return Cause(cause.ONE_ROW, {"width_mm": image.width_mm, "symbols": float(symbols)})
-    if not shows_strokes(reader, signal) or _is_plain(signal, settings):
+    bare = support is None and not shows_strokes(reader, signal)  # no symbols were looked for
+    if bare or _is_plain(signal, settings):
         return Cause(cause.PLAIN, {"variation": image.variation, "plateau": image.plateau})
     if support is None:
         code = cause.EDGE if image.loaded < settings.loaded else cause.UNCLEAR

@@ -76,7 +76,7 @@ def recognise_with_rivals(
         return refusal(seq, NOT_ENCODED), []
     settings, limits = reader.settings, reader.settings.belief
     first = verify_hypotheses(reader, signal, settings.first)
-    answer, inliers = _answer(first, settings, seq)
+    answer, inliers = _answer(first, settings, seq, again=True)
     if answer and inliers >= limits.many_inliers:
         return _refuse_by_chance(reader, first[0], answer), first
     if not may_tell_more(reader, signal, answer, first[0] if first else None, inliers):
@@ -92,9 +92,11 @@ def recognise_with_rivals(
 
 
 def _answer(
-    found: list[VerifiedHypothesis], settings: ReaderSettings, seq: int
+    found: list[VerifiedHypothesis], settings: ReaderSettings, seq: int, *, again: bool = False
 ) -> tuple[Recognition, int]:
     """Return what hypotheses, best first, say together, and how many cells speak for it.
+
+    With `again`, an answer that few cells speak for lacks the last fit: it is made a second time.
 
     A place one pitch beside is the same place up to a cell's rounding and tells nothing of the
     margin, but for one case: it explains the image nearly as well. So it does where fewer cells
@@ -121,7 +123,8 @@ def _answer(
             margin = min(margin, best.score - beside.score)
         if margin < limits.margin:
             reason = AMBIGUOUS
-    fit = best.fit if reason else best.last_fit()
+    enough = not again or support.inliers >= limits.many_inliers
+    fit = best.fit if reason or not enough else best.last_fit()
     answer = answer_at(
         best.embossed, fit, best.hypothesis, settings, seq,
         reason=reason, margin=margin, runner_up=runner_up,

@@ -12,17 +12,18 @@ from __future__ import annotations
 import ctypes
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import SensorType
 from recognizer.touch.settings import DEFAULTS, SearchSettings
-from recognizer.touch.symbols.compiled import compiled_kernels
+from recognizer.touch.symbols.compiled import compiled_kernels, kernels_in_use
 from recognizer.touch.symbols.template import Floats, ResponseTemplate
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Bank:
     """Everything about the search that does not depend on the image."""
 
@@ -118,16 +119,31 @@ def search(
     -------
     (n, 3) x, y (mm), theta: sensor point s lies at R(theta) s + (x, y) in the lattice frame.
     """
+    seen = np.stack([values, weights]).astype(np.float32)
+    kernels = kernels_in_use()  # what a try was searched with serves the next one, and `diagnose`
+    scores, around = _scores_of(bank, seen.tobytes(), order, kernels)
+    return _peaks(bank, scores, around, keep)
+
+
+@lru_cache(maxsize=4)
+def _scores_of(bank: Bank, seen: bytes, order: int, _kernels: str) -> tuple[Floats, Floats]:
+    """Return the scores of an image, (2, rows, columns), and the best beside each of them."""
+    values, weights = np.frombuffer(seen, np.float32).reshape(2, *bank.shape)
     scores = lattice_scores(bank, values, weights, order)
-    return _peaks(bank, scores, keep)
+    turns, n = len(bank.rotations_rad), math.isqrt(scores.shape[1])
+    most = scores.reshape(turns, n, n)
+    for axis in range(3):
+        most = np.maximum(most, np.maximum(np.roll(most, 1, axis), np.roll(most, -1, axis)))
+    return scores, most
 
 
 def lattice_scores(bank: Bank, values: Floats, weights: Floats, order: int) -> Floats:
     """Return the score of every rotation and shift, (rotations, shifts^2)."""
     pad = bank.reach + bank.rim
     k = 2 * bank.reach + 1
-    stacked = np.stack([2 * weights * values, -weights]).astype(np.float32)
-    padded = np.pad(stacked, ((0, 0), (pad, pad), (pad, pad)))
+    rows, columns = bank.shape
+    padded = np.zeros((2, rows + 2 * pad, columns + 2 * pad), np.float32)
+    padded[:, pad : pad + rows, pad : pad + columns] = 2 * weights * values, -weights
     patches = np.lib.stride_tricks.sliding_window_view(padded, (k, k), axis=(1, 2))
     height, width = patches.shape[1:3]
     flat = patches.transpose(1, 2, 0, 3, 4).reshape(height * width, -1)
@@ -163,15 +179,10 @@ def _sum_lattices(
     return scores
 
 
-def _peaks(bank: Bank, scores: Floats, keep: int) -> NDArray[np.float64]:
+def _peaks(bank: Bank, scores: Floats, around: Floats, keep: int) -> NDArray[np.float64]:
     """Return the best lattices of which no two are neighbours."""
-    turns = len(bank.rotations_rad)
-    n = round(math.sqrt(scores.shape[1]))
-    cube = scores.reshape(turns, n, n)
-    most = cube
-    for axis in range(3):
-        most = np.maximum(most, np.maximum(np.roll(most, 1, axis), np.roll(most, -1, axis)))
-    peaks = np.flatnonzero((cube >= most).ravel())
-    order = peaks[np.argsort(-cube.ravel()[peaks], kind="stable")][:keep]
-    turn, shift = np.divmod(order, n * n)
+    shifts, flat = scores.shape[1], scores.ravel()
+    peaks = np.flatnonzero(flat >= around.ravel())
+    order = peaks[np.argsort(-flat[peaks], kind="stable")][:keep]
+    turn, shift = np.divmod(order, shifts)
     return np.column_stack([bank.shifts_mm[shift], bank.rotations_rad[turn]])
