@@ -40,7 +40,7 @@ def init(
         from encoded_objects.console import output
         from generator.spec.starter import starter_named
 
-        kind, text = starter_named(shape)
+        kind, text = starter_named(shape, file.name if file else "")
         if file is not None:
             _write_new(file, text, force)
         if as_json:

@@ -51,8 +51,10 @@ name: {name}
 """
 
 
-def starter(shape: str) -> str:
+def starter(shape: str, file: str = "") -> str:
     """Return a commented spec for one of the shapes of `EXAMPLES`; it can be made as it is.
+
+    Its first line names `file`, or the shape where none is given.
 
     >>> starter("cube").splitlines()[5]
     'shape: {cube: 60 mm}'
@@ -63,15 +65,16 @@ def starter(shape: str) -> str:
     if shape == "file":
         line += "    # .step, .stl or .obj, relative to this file"
         line += "\n# shape: {file: part.stl, scale: 25.4}    # a model in inches"
-    return _TEMPLATE.format(name=name, file=f"{folder}.yaml", shape=line, folder=folder)
+    file = file or f"{folder}.yaml"
+    return _TEMPLATE.format(name=name, file=file, shape=line, folder=folder)
 
 
-def starter_named(shape: str) -> tuple[str, str]:
-    """Return the shape's own name and its commented spec; raises `SpecError` for no shape."""
+def starter_named(shape: str, file: str = "") -> tuple[str, str]:
+    """Return the shape's own name and its spec for `file`; raises `SpecError` for no shape."""
     word = shape.lower().replace("-", "_").replace(" ", "_")
     kind = OTHER_NAMES.get(word, word)
     if kind not in EXAMPLES:
         near = did_you_mean(word, EXAMPLES)
         fix = f"did you mean '{near}'?" if near else f"choose one of {', '.join(EXAMPLES)}"
         raise SpecError([Problem(f"unknown shape '{shape}'", fix)])
-    return kind, starter(kind)
+    return kind, starter(kind, file)

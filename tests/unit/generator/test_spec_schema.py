@@ -80,6 +80,12 @@ def test_starter_shows_the_values_that_hold_without_it(tmp_path):
     assert set(ObjectSettings.model_fields) - {"encoding"} <= written
 
 
+def test_starter_names_the_file_that_it_is_in():
+    assert starter("cube").startswith("# Cube: make it with  encode-object cube.yaml\n")
+    kind, text = starter_named("cube", "mine.yaml")
+    assert text == starter(kind).replace("cube.yaml", "mine.yaml")
+
+
 def test_starter_by_other_names():
     assert starter_named("Parallelepiped")[0] == "box"
     assert starter_named("triangular-prism")[0] == "triangular_prism"
