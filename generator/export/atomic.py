@@ -33,7 +33,7 @@ class StagedFile:
     path: Path  #: final name
     staged: Path  #: where it is until then
     size: int  #: bytes
-    sha256: str
+    sha256: str = ""  #: of its bytes, where it was asked for
 
 
 class Staging:
@@ -89,11 +89,16 @@ class Staging:
         os.close(self._lock)
         self._remove_made()
 
-    def write(self, name: str, content: bytes | Iterable[bytes]) -> StagedFile:
-        """Write one file into the staging folder, from bytes or from a stream of pieces."""
+    def write(
+        self, name: str, content: bytes | Iterable[bytes | memoryview], *, digest: bool = False
+    ) -> StagedFile:
+        """Write one file into the staging folder, from bytes or from a stream of pieces.
+
+        With `digest` its sha256 is told: of a large file that takes as long as writing it.
+        """
         final = self.folder / name
         pieces = (content,) if isinstance(content, bytes) else content
-        digest = hashlib.sha256()
+        sha256 = hashlib.sha256()
         size = 0
         with _named_errors(final, "write the file"):
             if final.is_dir():
@@ -101,11 +106,13 @@ class Staging:
             with open(self._hidden / name, "xb") as file:
                 for piece in pieces:
                     file.write(piece)
-                    digest.update(piece)
                     size += len(piece)
+                    if digest:
+                        sha256.update(piece)
                 file.flush()
                 os.fsync(file.fileno())
-        self.written.append(StagedFile(final, self._hidden / name, size, digest.hexdigest()))
+        told = sha256.hexdigest() if digest else ""
+        self.written.append(StagedFile(final, self._hidden / name, size, told))
         return self.written[-1]
 
     def commit(self) -> tuple[StagedFile, ...]:

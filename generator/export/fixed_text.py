@@ -23,6 +23,13 @@ NAMES = "\x03\x04\x05"  #: marks of up to three kinds of names
 REFERENCE = "\x06"  #: before the digits that say which of a file's own entities is meant
 _SPACE, _ZERO, _POINT, _MINUS = 32, 48, 46, 45
 
+_FOUR_DIGITS = np.stack(
+    [np.arange(10_000) // 10**place % 10 + _ZERO for place in (3, 2, 1, 0)],
+    1,
+    dtype=np.uint8,
+    casting="unsafe",
+).view(np.uint32)[:, 0]  #: (10000,) the text of each, as one item
+
 
 @dataclass(frozen=True, slots=True)
 class TextTemplate:
@@ -30,18 +37,18 @@ class TextTemplate:
 
     text: Bytes  #: (length,) ASCII with marked fields
     numbers: NDArray[np.int64]  #: (n,) value of each number field, relative to the instance
-    number_columns: NDArray[np.intp]  #: (n * width,) bytes of the number fields
+    number_columns: NDArray[np.intp]  #: (n,) first byte of each number field
     decimal_columns: NDArray[np.intp]  #: (d * width,) bytes of the decimal fields
     name_columns: tuple[NDArray[np.intp], ...]  #: per kind of name: (k * width,) bytes
 
 
-def template_of(text: str, numbers: list[int]) -> TextTemplate:
-    """Return the template of `text`, whose number fields hold `numbers` in their order."""
+def template_of(text: str, numbers: list[int], width: int) -> TextTemplate:
+    """Return the template of `text`, whose number fields, `width` long, hold `numbers` in turn."""
     array = np.frombuffer(text.encode("ascii"), np.uint8)
     return TextTemplate(
         array,
         np.array(numbers, np.int64),
-        np.flatnonzero(array == ord(NUMBER)),
+        np.flatnonzero(array == ord(NUMBER))[::width],
         np.flatnonzero(array == ord(DECIMAL)),
         tuple(np.flatnonzero(array == ord(mark)) for mark in NAMES),
     )
@@ -68,7 +75,7 @@ def stamp(
     width: int,
     decimals: Bytes,
     names: tuple[Bytes, ...],
-) -> bytes:
+) -> memoryview:
     """Return the text of m instances.
 
     Parameters
@@ -84,27 +91,34 @@ def stamp(
     names
         Per kind of name: (m, width) text that fills every field of that kind.
     """
-    m = len(first)
-    block = np.empty((m, len(template.text)), np.uint8)
+    m, length = len(first), len(template.text)
+    block = np.empty((m, length), np.uint8)
     block[:] = template.text
     span = int(template.numbers.max(initial=0)) + 1
-    table = whole_numbers(first[:, None] + np.arange(span), width)
-    block[:, template.number_columns] = table[:, template.numbers].reshape(m, -1)
+    table = whole_numbers(first[:, None] + np.arange(span), width).view(f"V{width}")[..., 0]
+    # All bytes from which a field can begin, so that a number is copied as one item.
+    fields = np.ndarray((m, length - width + 1), f"V{width}", block, 0, (length, 1))
+    fields[:, template.number_columns] = table[:, template.numbers]
     block[:, template.decimal_columns] = decimals.reshape(m, -1)
     for columns, rows in zip(template.name_columns, names, strict=True):
         if len(columns):
             block[:, columns] = np.tile(rows, (1, len(columns) // rows.shape[1]))
-    return block.tobytes()
+    return block.reshape(-1).data
 
 
 def whole_numbers(values: NDArray[np.int64], width: int) -> Bytes:
     """Return the decimal digits of non-negative integers, shape (..., width), zero-padded."""
     out = np.empty((*values.shape, width), np.uint8)
     rest = values
-    for column in range(width - 1, -1, -1):
-        quotient = rest // 10
-        out[..., column] = rest - 10 * quotient + _ZERO
-        rest = quotient
+    for end in range(width, 0, -4):  # four digits at a time
+        rest, low = np.divmod(rest, 10_000)
+        four, start = _FOUR_DIGITS[low], max(end - 4, 0)
+        if end >= 4:
+            np.ndarray(values.shape, np.uint32, out, start, out.strides[:-1])[...] = four
+        else:
+            digits = four.view(np.uint8).reshape(*values.shape, 4)
+            for column in range(end):
+                out[..., column] = digits[..., column - end]
     return out
 
 

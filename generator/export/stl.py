@@ -19,7 +19,7 @@ _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute
 _BLOCK = 65_536  # triangles written at once
 
 
-def stl_chunks(mesh: Mesh) -> Iterator[bytes]:
+def stl_chunks(mesh: Mesh) -> Iterator[bytes | memoryview]:
     """Yield the file of a mesh, piece by piece.
 
     Normals are of unit length, or zero where the corners lie on a line.
@@ -32,4 +32,4 @@ def stl_chunks(mesh: Mesh) -> Iterator[bytes]:
         facets = np.zeros(len(corners), _FACET)
         facets["normal"] = np.divide(normals, lengths, out=normals, where=lengths > 0)
         facets["corners"] = corners
-        yield facets.tobytes()
+        yield facets.view(np.uint8).data

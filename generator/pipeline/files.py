@@ -101,10 +101,10 @@ def stage(
         progress(f"writing {part.name}", 0.1 + 0.6 * number / len(parts))
         step = stl = None
         if "step" in formats:
-            step = staging.write(f"{part.name}.step", step_chunks(part))
+            step = staging.write(f"{part.name}.step", step_chunks(part), digest=True)
             registered.append(_part_entry(part, "step", step))
         if "stl" in formats:
-            stl = staging.write(f"{part.name}.stl", stl_chunks(mesh))
+            stl = staging.write(f"{part.name}.stl", stl_chunks(mesh), digest=True)
             registered.append(_part_entry(part, "stl", stl))
             panel_files.append(PanelFile(part.name, stl.staged, part.T_object_part))
         if verify and (step or stl):

@@ -45,7 +45,7 @@ _GZIP_LEVEL = 6
 _ASSEMBLY_ENTITIES = 40  # for each part, besides its own
 
 
-def step_chunks(part: Part) -> Iterator[bytes]:
+def step_chunks(part: Part) -> Iterator[bytes | memoryview]:
     """Yield the STEP text of a part, ASCII, in consecutive pieces.
 
     Parameters
@@ -66,7 +66,7 @@ def step_chunks(part: Part) -> Iterator[bytes]:
     yield FOOTER
 
 
-def assembly_chunks(name: str, parts: Sequence[Part]) -> Iterator[bytes]:
+def assembly_chunks(name: str, parts: Sequence[Part]) -> Iterator[bytes | memoryview]:
     """Yield the STEP text of an assembly: each part a product, placed by its `T_object_part`.
 
     Parameters
@@ -89,7 +89,7 @@ def assembly_chunks(name: str, parts: Sequence[Part]) -> Iterator[bytes]:
     yield FOOTER
 
 
-def gzip_chunks(chunks: Iterable[bytes]) -> Iterator[bytes]:
+def gzip_chunks(chunks: Iterable[bytes | memoryview]) -> Iterator[bytes]:
     """Yield a text gzipped, without name or date: `.stpz`, which CAD programs open as STEP.
 
     Names and numbers of 20,000 symbols repeat: a sixth is left.

@@ -16,12 +16,12 @@ from generator.export.step.symbol import KINDS, outline_points, symbol_entities,
 from generator.solid.emboss import turn
 from generator.solid.part import Embossing, Part
 
-_CHUNK_BYTES = 4_000_000
+_CHUNK_BYTES = 400_000  # of symbols stamped at once: they stay in the cache
 
 
 def write_part(
     part: Part, entities: Entities, shared: Shared, body_style: str
-) -> Generator[bytes, None, ProductReferences]:
+) -> Generator[bytes | memoryview, None, ProductReferences]:
     """Write one part and the product that it is the shape of."""
     name, units, style = step_string(part.name), shared.units, shared.symbols
     body = StepBody(part, entities)
@@ -61,7 +61,7 @@ def _write_symbols(
     body: StepBody,
     shell: list[NDArray[np.int64]],
     coloured: list[NDArray[np.int64]],
-) -> Iterator[bytes]:
+) -> Iterator[bytes | memoryview]:
     """Write the symbols of one embossing; append to the lists what refers to them."""
     facet_axes = embossing.T_part_facet[:3, :3].T
     axes = np.vstack([turn(embossing.rotation_rad).T @ facet_axes[:2], facet_axes[2:]])

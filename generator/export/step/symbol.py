@@ -195,7 +195,7 @@ class _SymbolBuilder:
                 self.sides(low, high)
         self.flat(rings[-1], "top")
         return SymbolTemplate(
-            template_of("".join(self.text), self.numbers),
+            template_of("".join(self.text), self.numbers, self.width),
             self.count,
             footprint,
             np.array(self.faces, np.int64),

@@ -26,7 +26,7 @@ def test_commit_moves_all_files_and_leaves_nothing_hidden(tmp_path: Path) -> Non
     (tmp_path / "a.stl").write_bytes(b"old")
     with Staging(tmp_path) as staging:
         first = staging.write("a.stl", b"new")
-        staging.write("b.step", (piece for piece in (b"one", b"two")))
+        staging.write("b.step", (piece for piece in (b"one", memoryview(b"two"))), digest=True)
         assert (tmp_path / "a.stl").read_bytes() == b"old"
         assert not (tmp_path / "b.step").exists()
         committed = staging.commit()
@@ -34,6 +34,7 @@ def test_commit_moves_all_files_and_leaves_nothing_hidden(tmp_path: Path) -> Non
     assert (tmp_path / "b.step").read_bytes() == b"onetwo"
     assert committed[0] == first
     assert committed[1].size == 6
+    assert committed[0].sha256 == ""
     assert committed[1].sha256 == hashlib.sha256(b"onetwo").hexdigest()
     assert hidden(tmp_path) == []
 
