@@ -45,9 +45,11 @@ class SymbolStyle:
         return self.height_mm * math.tan(self.draft_rad)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Tiers:
     """A symbol as outlines at rising (emboss) or falling (engrave) heights.
+
+    All parts of an object hold the same ones: what follows from one is kept by its identity.
 
     Every tier has the same number of rings, and ring k the same number of corners on every
     tier; edge i of ring k (corner i to i + 1) has one direction on all tiers, so

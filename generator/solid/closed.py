@@ -9,6 +9,7 @@ part is closed, and its facets meet in their edges alone. No symbol is expanded.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -36,14 +37,12 @@ def prove_closed(part: Part) -> None:
     """
     _check_edges(part)
     size = float(np.ptp(part.vertices, axis=0).max())
-    shapes: set[int] = set()
     on: dict[int, list[Embossing]] = {}
     for embossing in part.embossings:
         on.setdefault(embossing.facet, []).append(embossing)
         for tiers in embossing.tiers:
-            if id(tiers) not in shapes:
-                shapes.add(id(tiers))
-                _check_shape(tiers, f"{part.name}: {part.facets[embossing.facet].name}")
+            if fault := _shape_fault(tiers):
+                raise SolidError(fault, place=f"{part.name}: {part.facets[embossing.facet].name}")
     for facet, plain in enumerate(part.facets):
         if len(plain.loops) == 1 and len(plain.loops[0]) == 3 and facet not in on:
             continue  # a triangle is planar
@@ -81,23 +80,25 @@ def _check_edges(part: Part) -> None:
         )
 
 
-def _check_shape(tiers: Tiers, place: str) -> None:
-    """(2) A symbol closes up to its foot, with planar sides."""
+@lru_cache(maxsize=256)
+def _shape_fault(tiers: Tiers) -> str:
+    """(2) Say why a symbol does not close up to its foot with planar sides; "" where it does."""
     steps = np.diff(tiers.z_mm)
     sizes = [[len(ring) for ring in rings] for rings in tiers.rings]
     fit = tiers.z_mm[0] == 0.0 and len(sizes) == len(tiers.z_mm) > 1
     fit = fit and all(size == sizes[0] for size in sizes)
     if not fit or not ((steps > 0).all() or (steps < 0).all()):
-        raise SolidError("tiers of a symbol do not correspond", place=place)
+        return "tiers of a symbol do not correspond"
     for lower, upper in pairwise(tiers.rings):
         for a, b in zip(lower, upper, strict=True):
             u, v = np.roll(a, -1, axis=0) - a, np.roll(b, -1, axis=0) - b
             length = np.hypot(*u.T) * np.hypot(*v.T)
             cross = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
             if (np.abs(cross) > 1e-12 * length).any() or ((u * v).sum(axis=1) <= 0).any():
-                raise SolidError("a side of a symbol is not planar", place=place)
+                return "a side of a symbol is not planar"
     if any(edges_cross(rings) for rings in tiers.rings):
-        raise SolidError("an outline of a symbol crosses itself", place=place)
+        return "an outline of a symbol crosses itself"
+    return ""
 
 
 def _check_inside(embossing: Embossing, corners: list[Ring], place: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,7 @@ class SymbolSolid:
     foot: tuple[Index, ...]  #: points of each ring in the facet
 
 
+@lru_cache(maxsize=256)  # some 10 KB each
 def template_of(tiers: Tiers, pitch_mm: float) -> SymbolSolid:
     """Return the template of a symbol on a facet.
 
@@ -42,6 +44,7 @@ def template_of(tiers: Tiers, pitch_mm: float) -> SymbolSolid:
     return SymbolSolid(points, own, base, tuple(rings[0]))
 
 
+@lru_cache(maxsize=256)
 def closed_template(tiers: Tiers) -> SymbolSolid:
     """Return the template of a symbol as a solid of its own, with its foot as a bottom."""
     points, rings = _number_points(tiers)

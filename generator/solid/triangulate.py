@@ -89,7 +89,6 @@ class _MeshBuilder:
         self.points = [part.vertices] if body else []
         self.count = len(part.vertices) if body else 0
         self.found: list[tuple[Index, int, int, Index | None]] = []
-        self.templates: dict[tuple[int, float, bool], SymbolSolid] = {}
         self.on: dict[int, list[int]] = {}
         for number, embossing in enumerate(part.embossings):
             self.on.setdefault(embossing.facet, []).append(number)
@@ -194,18 +193,13 @@ class _MeshBuilder:
     def _template(
         self, embossing: Embossing, label: int, pitch: float, closed: bool
     ) -> SymbolSolid:
-        """Return the template of a label, made once."""
+        """Return the template of a label."""
         tiers = embossing.tiers[label]
-        key = (id(tiers), pitch, closed)
-        if key not in self.templates:
-            try:
-                self.templates[key] = (
-                    closed_template(tiers) if closed else template_of(tiers, pitch)
-                )
-            except SolidError as error:
-                error.place = self.part.facets[embossing.facet].name
-                raise
-        return self.templates[key]
+        try:
+            return closed_template(tiers) if closed else template_of(tiers, pitch)
+        except SolidError as error:
+            error.place = self.part.facets[embossing.facet].name
+            raise
 
     def _stamp(self, embossing: Embossing, template: SymbolSolid, chosen: Index) -> Index:
         """Append the template's vertices at the chosen centres; return their numbers, (m, k)."""

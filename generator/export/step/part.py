@@ -27,8 +27,9 @@ def write_part(
     body = StepBody(part, entities)
     shell: list[NDArray[np.int64]] = []
     coloured: list[NDArray[np.int64]] = []
+    width = decimal_width(_largest_mm(part), PLACES)
     for embossing in part.embossings:
-        yield from _write_symbols(part, embossing, entities, style, body, shell, coloured)
+        yield from _write_symbols(part, embossing, entities, style, width, body, shell, coloured)
     shell.append(body.faces())
     coloured.append(_wrapped_colour(part, body.planar, shell[-1], entities, style))
     faces, styled = write_round_faces(body, entities, style)
@@ -58,11 +59,15 @@ def _write_symbols(
     embossing: Embossing,
     entities: Entities,
     style: str,
+    width: int,
     body: StepBody,
     shell: list[NDArray[np.int64]],
     coloured: list[NDArray[np.int64]],
 ) -> Iterator[bytes | memoryview]:
-    """Write the symbols of one embossing; append to the lists what refers to them."""
+    """Write the symbols of one embossing; append to the lists what refers to them.
+
+    `width`: of a coordinate.
+    """
     facet_axes = embossing.T_part_facet[:3, :3].T
     axes = np.vstack([turn(embossing.rotation_rad).T @ facet_axes[:2], facet_axes[2:]])
     centres = embossing.centres_mm @ facet_axes[:2] + embossing.T_part_facet[:3, 3]
@@ -71,7 +76,6 @@ def _write_symbols(
         pad([f"'{step_string(f'{prefix}/{name}/{kind}')}'" for name in embossing.names])
         for kind in KINDS
     )
-    width = decimal_width(_largest_mm(part), PLACES)
     for label in np.unique(embossing.labels).tolist():
         tiers = embossing.tiers[label]
         symbol = symbol_template(

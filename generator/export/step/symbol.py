@@ -1,10 +1,11 @@
 """One symbol as a template of STEP entities: points, edges, sides, top.
 
-Panels of an object share their templates: what a template refers to in a file, directions and
-colours, is filled in for each file. The points of a symbol are numbered tier by tier and ring by
-ring. Point i is entity i of the template and its vertex entity n + i, so that the coordinates of
-all symbols of one outline are filled in as one array. The footprint (the outer ring of the first
-tier, seen as a hole of the facet) is a bound that the facet refers to.
+Outlines with as many points share their entities, parts and files share the directions that they
+have: what a template refers to in a file is filled in for each file. The points of a symbol are
+numbered tier by tier and ring by ring. Point i is entity i of the template and its vertex entity
+n + i, so that the coordinates of all symbols of one outline are filled in as one array. The
+footprint (the outer ring of the first tier, seen as a hole of the facet) is a bound that the facet
+refers to.
 
 Engraved symbols have the same topology: with falling z the same vertex order turns the
 sides towards the cavity, which is outside the material.
@@ -34,7 +35,9 @@ from generator.export.step.entities import Entities, unit, unit_text
 KINDS = ("top", "side", "inside")  #: of a symbol's faces; "inside": the facet within a ring
 
 _DIRECTION, _VECTOR, _STYLE = "direction", "vector", "style"  # of a file, that a symbol refers to
+_AXIS, _SIDE, _FOOT, _EDGE = "axis", "side", "foot", "edge"  # along which: side's normal, its foot
 
+_Referred = tuple[str, str, tuple[int, ...]]  # kind, along which, numbers of that
 _Term = int | str  # a number of the template, or literal text such as "#100017"
 
 
@@ -49,6 +52,7 @@ class SymbolTemplate:
     coloured: NDArray[np.int64]  #: styled items
 
 
+@lru_cache(maxsize=128)
 def outline_points(tiers: Tiers) -> NDArray[np.float64]:
     """Return all points of an outline, (n, 3) mm in the symbol's axes, tier by tier."""
     blocks = [
@@ -89,81 +93,89 @@ def symbol_template(
     """
     sizes = tuple(tuple(len(ring) for ring in rings) for rings in tiers.rings)
     points = outline_points(tiers) @ axes
-    shape = points.tobytes(), sizes, axes[[2, 0]].tobytes()
-    pattern = _pattern(*shape, entities.width, decimal_width, name_widths, bool(style))
-    return pattern.bound(entities, style)
+    frame = axes[[2, 0]]
+    topology = _topology(sizes, entities.width, decimal_width, name_widths, bool(style))
+    along = _components(topology, points.tobytes(), frame.tobytes())
+    find = {_DIRECTION: entities.direction_along, _VECTOR: entities.vector_along}
+    references = [
+        find[kind](components) if components else style
+        for (kind, _, _), components in zip(topology.referred, along, strict=True)
+    ]
+    template = topology.symbol.template
+    text = with_references(template.text, references, entities.width)
+    return replace(topology.symbol, template=replace(template, text=text))
 
 
-@dataclass(frozen=True, slots=True)
-class _SymbolPattern:
-    """The entities of a symbol in any file: what they refer to in it is asked for by `bound`."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _SymbolTopology:
+    """The entities of all symbols whose rings have as many points, in any file."""
 
     symbol: SymbolTemplate
-    referred: tuple[tuple[str, str], ...]  #: kind and components, in the order of their first use
-    width: int  #: digits of a number
-
-    def bound(self, entities: Entities, style: str) -> SymbolTemplate:
-        """Return the template in a file; directions that it has not yet are written to it."""
-        find = {_DIRECTION: entities.direction_along, _VECTOR: entities.vector_along}
-        references = [
-            style if kind == _STYLE else find[kind](components)
-            for kind, components in self.referred
-        ]
-        template = self.symbol.template
-        text = with_references(template.text, references, self.width)
-        return replace(self.symbol, template=replace(template, text=text))
+    referred: tuple[_Referred, ...]  #: what its reference fields mean, in the order of first use
+    quads: NDArray[np.int64]  #: (q, 4) points of each side, counter-clockwise from outside
 
 
-@lru_cache(maxsize=128)  # a template takes some .1 MB; panels of an object share theirs
-def _pattern(
-    points: bytes,
+@lru_cache(maxsize=128)  # some .1 MB each; figures and symbols of many outlines share theirs
+def _topology(
     sizes: tuple[tuple[int, ...], ...],
-    axes: bytes,
     width: int,
     decimal_width: int,
     name_widths: tuple[int, ...],
     coloured: bool,
-) -> _SymbolPattern:
-    """Return the entities of an outline.
+) -> _SymbolTopology:
+    """Return the entities of an outline with as many points in each ring of each tier.
+
+    `width`: digits of a number.
+    """
+    return _SymbolBuilder(sizes, width, decimal_width, name_widths, coloured).built()
+
+
+@lru_cache(maxsize=256)
+def _components(topology: _SymbolTopology, points: bytes, frame: bytes) -> tuple[str, ...]:
+    """Return the components of all that a topology refers to, as STEP writes them; "" for a style.
 
     Parameters
     ----------
-    points, sizes
-        (n, 3) mm, part frame; how many of them each ring of each tier has.
-    axes
+    points
+        (n, 3) mm, part frame.
+    frame
         (2, 3) the symbol's z and x axis in the part frame.
-    width
-        Digits of a number.
     """
-    builder = _SymbolBuilder(
-        np.frombuffer(points).reshape(-1, 3), sizes, np.frombuffer(axes).reshape(2, 3),
-        width, decimal_width, name_widths, coloured,
-    )  # fmt: skip
-    return _SymbolPattern(builder.built(), tuple(builder.referred), width)
+    corners, axes = np.frombuffer(points).reshape(-1, 3), np.frombuffer(frame).reshape(2, 3)
+    a, a_next, b_next, b = corners[topology.quads.T]
+    edges = np.array([ends for _, what, ends in topology.referred if what == _EDGE], np.int64)
+    found = {
+        _AXIS: axes,
+        _SIDE: unit(np.cross(b_next - a, b - a_next)),
+        _FOOT: unit(a_next - a),
+        _EDGE: unit(corners[edges[:, 1]] - corners[edges[:, 0]]),
+    }
+    texts = {what: map(unit_text, rows) for what, rows in found.items()}
+    return tuple(next(texts[what]) if what else "" for _, what, _ in topology.referred)
 
 
 class _SymbolBuilder:
     def __init__(
         self,
-        points: NDArray[np.float64],
         sizes: tuple[tuple[int, ...], ...],
-        axes: NDArray[np.float64],
         width: int,
         decimal_width: int,
         name_widths: tuple[int, ...],
         coloured: bool,
     ) -> None:
-        self.points = points
         self.sizes = sizes
         self.width = width
-        self.referred: dict[tuple[str, str], int] = {}
-        self.normal, self.along = self.direction(axes[0]), self.direction(axes[1])
+        self.referred: dict[_Referred, int] = {}
+        self.normal = self.reference(_DIRECTION, _AXIS, 0)
+        self.along = self.reference(_DIRECTION, _AXIS, 1)
         self.number = NUMBER * width
         self.names = {
             kind: mark * width for kind, mark, width in zip(KINDS, NAMES, name_widths, strict=True)
         }
         self.coordinates = ",".join([DECIMAL * decimal_width] * 3)
         self.style = self.reference(_STYLE, "") if coloured else ""
+        self.points = sum(map(sum, sizes))
+        self.quads: list[list[int]] = []
         self.text: list[str] = []
         self.numbers: list[int] = []
         self.count = 0
@@ -171,16 +183,13 @@ class _SymbolBuilder:
         self.faces: list[int] = []
         self.coloured: list[int] = []
 
-    def reference(self, kind: str, components: str) -> str:
+    def reference(self, kind: str, what: str, *which: int) -> str:
         """Return the field that refers to an entity of the file."""
-        number = self.referred.setdefault((kind, components), len(self.referred))
+        number = self.referred.setdefault((kind, what, which), len(self.referred))
         return reference_field(number, self.width)
 
-    def direction(self, along: NDArray[np.float64]) -> str:
-        return self.reference(_DIRECTION, unit_text(along))
-
-    def built(self) -> SymbolTemplate:
-        n = len(self.points)
+    def built(self) -> _SymbolTopology:
+        n = self.points
         for _ in range(n):
             self.add(f"CARTESIAN_POINT('',({self.coordinates}))")
         for i in range(n):
@@ -194,13 +203,14 @@ class _SymbolBuilder:
             for low, high in zip(below, above, strict=True):
                 self.sides(low, high)
         self.flat(rings[-1], "top")
-        return SymbolTemplate(
+        symbol = SymbolTemplate(
             template_of("".join(self.text), self.numbers, self.width),
             self.count,
             footprint,
             np.array(self.faces, np.int64),
             np.array(self.coloured, np.int64),
         )
+        return _SymbolTopology(symbol, tuple(self.referred), np.array(self.quads, np.int64))
 
     def rings(self) -> list[list[list[int]]]:
         """Return the numbers of the points, [tier][ring][point]."""
@@ -233,9 +243,9 @@ class _SymbolBuilder:
         low, high = min(start, end), max(start, end)
         edge = self.edges.get((low, high))
         if edge is None:
-            along = self.reference(_VECTOR, unit_text(unit(self.points[high] - self.points[low])))
+            along = self.reference(_VECTOR, _EDGE, low, high)
             line = self.add("LINE('',", low, f",{along})")
-            n = len(self.points)
+            n = self.points
             edge = self.add("EDGE_CURVE('',", n + low, ",", n + high, ",", line, ",.T.)")
             self.edges[low, high] = edge
         return self.add("ORIENTED_EDGE('',*,*,", edge, ",.T.)" if start == low else ",.F.)")
@@ -254,18 +264,12 @@ class _SymbolBuilder:
 
     def sides(self, low: list[int], high: list[int]) -> None:
         """Write the quadrilaterals between two rings."""
-        a, b = self.points[low], self.points[high]
-        a_next, b_next = np.roll(a, -1, axis=0), np.roll(b, -1, axis=0)
-        normals = unit(np.cross(b_next - a, b - a_next))
-        along = unit(a_next - a)
         for i, point in enumerate(low):
             j = (i + 1) % len(low)
-            self.face(
-                [[point, low[j], high[j], high[i]]],
-                self.direction(normals[i]),
-                self.direction(along[i]),
-                "side",
-            )
+            number = len(self.quads)
+            self.quads.append([point, low[j], high[j], high[i]])
+            normal = self.reference(_DIRECTION, _SIDE, number)
+            self.face([self.quads[-1]], normal, self.reference(_DIRECTION, _FOOT, number), "side")
 
     def face(self, loops: list[list[int]], normal: str, along: str, kind: str) -> None:
         terms: list[_Term] = [f"ADVANCED_FACE({self.names[kind]},("]

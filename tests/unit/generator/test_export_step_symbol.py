@@ -6,11 +6,13 @@ import re
 import numpy as np
 
 from generator.export.step import assembly_chunks, gzip_chunks, step_chunks
-from generator.export.step.symbol import _pattern
+from generator.export.step.symbol import _components, _topology, outline_points
 from generator.pipeline.files import parts_of
 from generator.pipeline.place import place_object
 from generator.pipeline.plan import plan_object
 from generator.spec import read_specs
+
+CACHES = (_topology, _components, outline_points)
 
 
 def panels_of(tmp_path):
@@ -28,12 +30,17 @@ def test_shared_templates_change_no_byte(tmp_path):
     parts = panels_of(tmp_path)
     alone = []
     for part in parts:
-        _pattern.cache_clear()
+        for cache in CACHES:
+            cache.cache_clear()
         alone.append(whole_text(step_chunks(part)))
-    _pattern.cache_clear()
+    for cache in CACHES:
+        cache.cache_clear()
     shared = [whole_text(step_chunks(part)) for part in parts]
     assert shared == alone
-    assert _pattern.cache_info().hits > 0
+    for cache in CACHES:
+        assert cache.cache_info().hits > 0
+    # Outlines with as many points share their entities.
+    assert _topology.cache_info().misses < _components.cache_info().misses
 
 
 def test_every_reference_is_to_an_entity_of_the_file(tmp_path):
