@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import SensorType
+from recognizer.touch.around import combine_around
 from recognizer.touch.settings import NextSettings
 from recognizer.touch.signal import Signal
 
@@ -89,19 +90,14 @@ def loaded_tactels(signal: Signal, settings: NextSettings) -> Flags:
     least = settings.least_n if signal.newtons else settings.least_counts
     pressed = forces > max(settings.faint * strongest_reading(signal, settings), least)
     reach = settings.gap // 2
-    near = _windows(np.pad(pressed, reach), settings.gap).any(axis=(2, 3))
-    closed = _windows(np.pad(near, reach, constant_values=True), settings.gap)
-    return np.asarray(closed.all(axis=(2, 3)))
+    near = combine_around(pressed, reach, np.logical_or)
+    return combine_around(near, reach, np.logical_and)
 
 
 def strongest_reading(signal: Signal, settings: NextSettings) -> float:
     """Return the mean of the strongest readings."""
     forces = np.sort(signal.forces * signal.trust, axis=None)
     return float(forces[-settings.strongest :].mean())
-
-
-def _windows(values: Flags, size: int) -> Flags:
-    return np.lib.stride_tricks.sliding_window_view(values, (size, size))
 
 
 def _tactels(sensor: SensorType, points_mm: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

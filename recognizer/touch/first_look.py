@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from recognizer.touch.around import quantile
 from recognizer.touch.belief import VerifiedHypothesis, null_log_likelihood, symbols_to_name
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.prepare import PreparedLab
@@ -40,10 +41,12 @@ def gap_share(signal: Signal, settings: FirstLookSettings) -> float:
     """Return which share of the tactels that lie beside strong ones feel little."""
     forces = signal.forces * signal.trust
     reach = settings.around // 2
+    rows, columns = (np.arange(-reach, n + reach).clip(0, n - 1) for n in forces.shape)
     windows = np.lib.stride_tricks.sliding_window_view(
-        np.pad(forces, reach, mode="edge"), (settings.around, settings.around)
+        forces[rows[:, None], columns], (settings.around, settings.around)
     )
-    near = np.quantile(windows, settings.high, axis=(2, 3))
+    ordered = np.sort(windows.reshape(*forces.shape, -1), axis=-1)
+    near = quantile(ordered, settings.high)
     beside = (near > _pressed_from(signal, settings)) & (signal.trust > 0)
     weak = beside & (forces < settings.weak * near)
     return float(weak.sum()) / max(int(beside.sum()), 1)

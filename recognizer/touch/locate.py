@@ -211,15 +211,22 @@ def _window_candidates(
     symbols = np.sort(fit.scores[:, :order], axis=1)
     sure = np.minimum(symbols[:, -1] - symbols[:, -2], symbols[:, -1] - fit.scores[:, order])
     labels = fit.scores[:, :order].argmax(axis=1)
-    named = {cell: n for n, cell in enumerate(map(tuple, fit.cells.tolist()))}
+    # on a grid of cells in view, columns and upward rows, none of them sure where none is
+    i, j = (fit.cells - fit.cells.min(axis=0)).T
+    number = np.full((i.max() + 1, j.max() + 1), -1)
+    number[i, j] = np.arange(len(fit.cells))
+    whole = np.append(sure, -np.inf)[number]
     seen: list[tuple[float, int, list[int]]] = []
     for k, index in enumerate(embossed.windows()):
         down, right = index.shape
-        for i, j in named:
-            inside = [named.get((i + c, j - r)) for r in range(down) for c in range(right)]
-            cells = [n for n in inside if n is not None]
-            if len(cells) == len(inside) and (least := float(sure[cells].min())) > settings.sure:
-                seen.append((least, k, cells))
+        wide, high = whole.shape[0] - right + 1, whole.shape[1] - down + 1
+        if wide < 1 or high < 1:
+            continue
+        corners = [(c, down - 1 - r) for r in range(down) for c in range(right)]
+        least = np.min([whole[x : x + wide, y : y + high] for x, y in corners], axis=0)
+        for left, low in np.argwhere(least > settings.sure).tolist():
+            cells = [int(number[left + x, low + y]) for x, y in corners]
+            seen.append((float(least[left, low]), k, cells))
     if not seen:
         return None
     largest = max(len(cells) for _, _, cells in seen)

@@ -8,6 +8,7 @@ its cell (0, 0) lies, and the face that holds the symbols. Thesis 6.3.
 from __future__ import annotations
 
 import ctypes
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,6 +117,7 @@ def count_places(embossed: EmbossedArray, cells: Ints, prices: Array, slack: flo
     return len(row)
 
 
+@lru_cache(maxsize=8)
 def _held_by(embossed: EmbossedArray) -> _Held:
     array, dense = embossed.array, embossed.dense
     return _Held(

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import SensorType
+from recognizer.touch.around import quantile
 from recognizer.touch.sensor_state import SensorState
 from recognizer.touch.settings import DEFAULTS, SignalSettings
 
@@ -69,10 +70,11 @@ def signal_of(
     good = readings[known > 0]
     if good.size == 0:
         return Signal(np.zeros(readings.shape), known, contact=False, newtons=newtons)
-    lowest = float(np.quantile(good, settings.background)) if floor is None else floor
+    good = np.sort(good)
+    lowest = float(quantile(good, settings.background)) if floor is None else floor
     level = _background(good, lowest, settings) if floor is None else floor
     forces = np.maximum(readings - level, 0.0)
-    strongest = max(float(np.sort(good)[-settings.strongest :][0]) - lowest, 0.0)
+    strongest = max(float(good[-settings.strongest :][0]) - lowest, 0.0)
     if sensor is not None and sensor.exponent != 1.0 and not newtons:
         forces = forces ** (1.0 / sensor.exponent)
         strongest **= 1.0 / sensor.exponent
@@ -131,15 +133,17 @@ def _background(readings: Array, low: float, settings: SignalSettings) -> float:
 
     Parameters
     ----------
+    readings
+        (n,) rising.
     low
         What a few readings lie below.
     """
-    lowest = np.sort(readings)[: max(math.ceil(settings.lowest * readings.size), 2)]
+    lowest = readings[: max(math.ceil(settings.lowest * readings.size), 2)]
     count = math.ceil(settings.densest * (lowest.size - 1))
     first = int(np.argmin(lowest[count:] - lowest[: lowest.size - count]))
-    most = low + settings.above * (float(np.quantile(readings, settings.fifth)) - low)
+    most = low + settings.above * (float(quantile(readings, settings.fifth)) - low)
     level = min(float(lowest[first : first + count + 1].mean()), most)
-    middle, strong = np.quantile(readings, [0.5, settings.strong]).tolist()
+    middle, strong = (float(quantile(readings, share)) for share in (0.5, settings.strong))
     even = strong - middle < settings.tail * (middle - low)  # strokes leave few strong ones
     return low if even else level
 
@@ -149,9 +153,11 @@ def _live_mask(forces: Array, known: Array, settings: SignalSettings) -> Array:
     alive = np.ones(forces.shape)
     for axis in (0, 1):
         total = (forces * known).sum(axis=1 - axis)
-        middle = np.median(total)
+        middle = quantile(np.sort(total), 0.5)
         dead = total < settings.dead * middle
         dead[0] = dead[-1] = False  # at the rim: rather the edge of a face
+        if not dead.any():
+            continue
         neighbours = np.minimum(np.roll(total, 1), np.roll(total, -1)) > settings.beside * middle
         where = np.flatnonzero(dead & neighbours)
         if axis == 0:

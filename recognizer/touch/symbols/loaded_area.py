@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import SensorType
+from recognizer.touch.around import combine_around
 from recognizer.touch.settings import DEFAULTS, LoadedAreaSettings
 from recognizer.touch.signal import Signal
 
@@ -32,15 +33,9 @@ def find_loaded_area(
     forces = np.where(signal.trust > 0, signal.forces, 0.0)
     strongest = float(np.sort(forces, axis=None)[-settings.strongest :].mean())
     noise = min(signal.noise, settings.quiet * strongest)
-    high = _windows(forces, settings.around, 0.0).max(axis=(2, 3))
+    reach = settings.around // 2
+    high = combine_around(forces, reach, np.maximum)
     least = np.maximum(settings.faint * high, settings.sigmas * noise)
-    pressed = np.asarray(forces > least, np.bool_)
-    near = np.asarray(_windows(pressed, settings.around, 0.0).any(axis=(2, 3)), np.bool_)
-    closed = np.asarray(_windows(near, settings.around, 1.0).all(axis=(2, 3)))
+    near = combine_around(forces > least, reach, np.logical_or)
+    closed = combine_around(near, reach, np.logical_and)
     return closed if closed.any() else everywhere
-
-
-def _windows(values: NDArray[np.generic], size: int, beyond: float) -> NDArray[np.generic]:
-    """Return the neighbourhoods (rows, columns, size, size) of tactels."""
-    padded = np.pad(values, size // 2, constant_values=beyond)
-    return np.lib.stride_tricks.sliding_window_view(padded, (size, size))
