@@ -44,6 +44,7 @@ class Support:
     clear: int  #: cells that speak clearly for another symbol
     plain: int  #: and plainly
     wider: float  #: tenths of a mm by which strokes would be wider than asked
+    worn: int = 0  #: cells that are seen, with a registered symbol that is not felt
 
     def holds(self, limits: BeliefSettings) -> bool:
         """Return whether an encoded surface is believed."""
@@ -113,6 +114,7 @@ class VerifiedHypothesis:
             clear=int((cells.seen & (cells.against > limits.clearly)).sum()),
             plain=int((cells.seen & (cells.against > limits.plainly)).sum()),
             wider=fit.wider,
+            worn=int((cells.worn & cells.seen).sum()),
         )
 
 

@@ -17,7 +17,7 @@ import math
 from dataclasses import replace
 
 from recognizer.touch.belief import VerifiedHypothesis
-from recognizer.touch.chance import expected_matches
+from recognizer.touch.chance import expected_by_border, expected_matches
 from recognizer.touch.diagnose import diagnose
 from recognizer.touch.first_look import may_tell_more, shows_strokes
 from recognizer.touch.lab import EmbossedArray
@@ -155,10 +155,29 @@ def _refuse_by_chance(
         return answer
     settings, arrays = reader.settings, reader.lab.arrays
     doubt = expected_matches(arrays, best.embossed, best.fit, best.hypothesis, settings)
+    if doubt > settings.belief.doubt and _is_plain(reader, best, answer):
+        tip_mm = reader.sensor.overlay.tab_diameter_mm
+        doubt = min(doubt, expected_by_border(arrays, best, tip_mm, settings))
     if doubt <= settings.belief.doubt:
         return replace(answer, doubt=doubt)
     margin, runner_up = answer.margin, answer.runner_up
     return refusal(answer.seq, BY_CHANCE, margin=margin, runner_up=runner_up, doubt=doubt)
+
+
+def _is_plain(reader: PreparedLab, best: VerifiedHypothesis, answer: Recognition) -> bool:
+    """Return whether only too few symbols speak against a place, so that its border may count.
+
+    Where symbols of it are not felt, or read as others, the face may be another one, whose border
+    lies elsewhere, and the plate lifts off where that of the place is taken to be. Under a pad or a
+    gel nothing tells where a face ends.
+    """
+    support, settings = best.support(), reader.settings
+    return (
+        reader.sensor.overlay.kind == "tab"
+        and support.worn <= settings.border.worn
+        and support.clear == 0
+        and (answer.margin is None or answer.margin >= settings.belief.margin_by_few)
+    )
 
 
 def answer_at(

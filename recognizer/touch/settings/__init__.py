@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 from recognizer.touch.settings.answer import (
     BeliefSettings,
+    BorderSettings,
     FirstLookSettings,
     HypothesisSettings,
     NextSettings,
@@ -42,6 +43,7 @@ __all__ = [
     "DEFAULTS",
     "BeliefSettings",
     "BendSettings",
+    "BorderSettings",
     "ContactSettings",
     "CovarianceSettings",
     "FirstLookSettings",
@@ -96,6 +98,7 @@ class ReaderSettings:
     thorough: FitSettings = field(default_factory=lambda: FitSettings(12, 4, 6, 6, crossed=3))
     hypotheses: HypothesisSettings = field(default_factory=HypothesisSettings)
     belief: BeliefSettings = field(default_factory=BeliefSettings)
+    border: BorderSettings = field(default_factory=BorderSettings)
     bends: BendSettings = field(default_factory=BendSettings)
     round: RoundSettings = field(default_factory=RoundSettings)
     printed: PrintedSettings = field(default_factory=PrintedSettings)

@@ -67,6 +67,35 @@ class BeliefSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class BorderSettings:
+    """How the border of a face is weighed, and where (`recognizer.touch.border`).
+
+    Tuned on touches near edges and corners of the forty objects: own engine, seeds 501 and 502,
+    MuJoCo, seeds 900 and 902.
+    """
+
+    worn: int = 1  #: symbols seen and not felt, with more of which borders are not asked
+    strongest: int = 12  #: tactels that say how hard is pressed
+    sigmas: float = 5.0  #: deviations of the noise of readings ...
+    pressed: float = 0.08  #: ... and share of the strongest from which the bare face is pressed
+    symbol: float = 0.15  #: the same of a symbol, for a bare cell to be one
+    bare: float = 0.1  #: psi of a symbol from which a tactel feels it
+    reach_mm: float = 3.2  #: from a line within which tactels are asked
+    ends_mm: float = 1.0  #: at the ends of a line that are left out
+    apart_mm: float = 1.5  #: from any other line
+    few: int = 3  #: tactels, at least
+    step_mm: float = 0.1  #: of shifts
+    gains: int = 5  #: factors that the force on the bare face may be off by, evenly spread ...
+    gain: float = 0.5  #: ... over 1.5 of this deviation of their logarithm, both ways
+    noise: float = 0.12  #: least deviation of psi on a covered tactel ...
+    quiet: float = 0.8  #: ... and that where nothing is felt, against it
+    most: float = 4.0  #: nats that one tactel can cost
+    slack: float = 0.25  #: nats by which a shift may be less likely that fits as well
+    least: float = 0.25  #: share that a line leaves at least
+    alike_rad: float = 0.2  #: by which lines differ that tell the same
+
+
+@dataclass(frozen=True, slots=True)
 class FirstLookSettings:
     """Which touches are refused before a search, or before a wide one.
 

@@ -165,6 +165,7 @@ def test_what_speaks_for_a_place(small, monkeypatch):
     assert found.explained == 0.77
     assert (found.clear, found.plain) == (4, 1)  # 8.1, 15.9, 16.0 and 16.1; 16.1
     assert found.inliers == 7  # of sixteen: one is worn, seven speak otherwise, one is hardly seen
+    assert found.worn == 1
     assert found.wider == 0.7
     each = np.log(np.exp(scores).sum(axis=1) / 5)
     assert found.surprise == pytest.approx(-4.0 - (each.sum() - 5.0 + math.log(48)))

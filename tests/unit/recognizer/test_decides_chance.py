@@ -1,13 +1,15 @@
 """How many places match by chance: against every combination of symbols, and random ones."""
 
 import itertools
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from recognizer.touch.chance import chance_of_match, expected_matches
+import recognizer.touch.chance
+from recognizer.touch.chance import chance_of_match, expected_by_border, expected_matches
 from recognizer.touch.locate import Hypothesis, bounded_scores
 from recognizer.touch.settings import BeliefSettings, HypothesisSettings, ReaderSettings
 
@@ -170,3 +172,90 @@ def test_scores_are_rounded_by_the_grain_that_is_set(small):
 
 def test_the_limit_and_the_grain():
     assert (SETTINGS.belief.doubt, SETTINGS.belief.grain) == (1e-4, 0.25)
+
+
+def places_that_match(lab, cells, scores, held, anchor, behind):
+    """Every combination of symbols of every place that holds the cell seen best, one by one."""
+    own, total = sum(row[k] for row, k in zip(scores, held, strict=True)), 0.0
+    embossed = lab.embossed
+    for key, owner in zip(embossed.keys.tolist(), embossed.owners.tolist(), strict=False):
+        row, column = divmod(key, embossed.array.columns)
+        row, column = row + cells[anchor][1], column - cells[anchor][0]
+        bears = [label < lab.order for label in lab.shows(row, column, owner, cells)]
+        each = [line[:-1] if here else line[-1:] for line, here in zip(scores, bears, strict=True)]
+        sums = np.array([sum(one) for one in itertools.product(*each)])
+        total += float((sums >= own - behind).mean())
+    return total
+
+
+@pytest.fixture
+def by_border(small, monkeypatch):
+    """The doubt of a hypothesis, shares of borders and of what is pressed as they are given."""
+
+    def doubt(lab, fit, place, arrays=None, share=1.0, pressed=1.0, settings=SETTINGS):
+        monkeypatch.setattr(recognizer.touch.chance, "share_of_borders", lambda *_: share)
+        monkeypatch.setattr(
+            recognizer.touch.chance, "_pressed_share", lambda *_: np.full(len(fit.cells), pressed)
+        )
+        found = SimpleNamespace(embossed=lab.embossed, fit=fit, hypothesis=place)
+        return expected_by_border(arrays or [lab.embossed], found, 1.3, settings)
+
+    return doubt
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(("row", "column"), [(3, 4), (0, 4), (1, 0), (4, 2)])
+def test_places_are_counted_with_what_their_outlines_cost(small, by_border, seed, row, column):
+    """A place may be matched that is bare where a symbol is seen, or bears one where none is."""
+    rng, cells = np.random.default_rng(seed), [(0, 0), (1, 0), (0, 1), (1, 1), (2, 0)]
+    lab = square(small, 5)
+    held = lab.shows(row, column, 0, cells)
+    scores = -rng.exponential(4.0, (5, 5))
+    scores[np.arange(5), held] = -rng.exponential(1.0, 5)
+    scores -= scores.max(axis=1, keepdims=True)
+    fine = ReaderSettings(belief=BeliefSettings(grain=1e-2))
+    fit, place = small.fit_of(cells, scores), Hypothesis(0, row, column, 0, 0.0)
+    bounded = bounded_scores(fit, fine.hypotheses).tolist()
+    anchor = next(n for n, label in enumerate(held) if label < lab.order)
+    about = (lab, cells, bounded, held, anchor)
+    truth, rounded = places_that_match(*about, 1e-9), places_that_match(*about, 0.05)
+    found = by_border(lab, fit, place, settings=fine)
+    assert truth * (1 - 1e-9) <= found <= rounded * (1 + 1e-9)
+    assert truth * (1 - 1e-9) <= by_border(lab, fit, place) <= 5 * truth
+    assert by_border(lab, fit, place, share=0.1, settings=fine) == pytest.approx(found / 10)
+
+
+def sure_touch(small, lab, row, column):
+    place = Hypothesis(0, row, column, 0, 0.0)
+    return small.fit_of(SEEN, small.sure_of(lab.shows(row, column, 0, SEEN), lab.order)), place
+
+
+def test_corners_count_in_a_corner_and_edges_at_an_edge(small, by_border):
+    lab = square(small, 8)
+    assert by_border(lab, *sure_touch(small, lab, 4, 4)) == pytest.approx(36 / 4**9)
+    assert by_border(lab, *sure_touch(small, lab, 4, 7)) == pytest.approx(6 / 4**3)
+    assert by_border(lab, *sure_touch(small, lab, 0, 7)) == pytest.approx(1 / 4)
+
+
+def test_what_the_plate_does_not_press_is_no_border(small, by_border):
+    lab = square(small, 8)
+    fit, place = sure_touch(small, lab, 4, 7)
+    # all places that bear the three symbols: 8 x 6 of 8 x 8
+    assert by_border(lab, fit, place, pressed=0.0) == pytest.approx(48 / 4**3)
+    assert by_border(lab, fit, place, pressed=0.02) == pytest.approx(48 / 4**3)
+    assert by_border(lab, fit, place, pressed=0.2) == pytest.approx(6 / 4**3)
+
+
+def test_borders_count_in_arrays_that_are_embossed_alike_and_small_enough(small, by_border):
+    lab, other = square(small, 8), square(small, 10)
+    larger = SimpleNamespace(pitch_mm=8.0, height_mm=1.2, stroke_mm=1.4)
+    both = [lab.embossed, replace(other.embossed, style=lab.embossed.style)]
+    unlike = [lab.embossed, replace(other.embossed, style=larger)]
+    letters = [lab.embossed, replace(both[1], alphabet="letters-4")]
+    fit, place = sure_touch(small, lab, 4, 4)
+    assert by_border(lab, fit, place, both) == pytest.approx((36 + 64) / 4**9)
+    assert by_border(lab, fit, place, unlike) == pytest.approx(36 / 4**9)
+    assert by_border(lab, fit, place, letters) == pytest.approx(36 / 4**9)
+    for large, told in ((163, math.inf), (164, 100 / 4**9)):
+        settings = ReaderSettings(hypotheses=HypothesisSettings(large=large))
+        assert by_border(lab, fit, place, both, settings=settings) == pytest.approx(told)

@@ -83,7 +83,7 @@ def reads(small, lab, monkeypatch):
         covariance=np.diag([1.0, 2.0, 3.0]),
     )  # fmt: skip
 
-    def read(first, second=None, signal=TOUCHED, doubt=1e-5, named=0.5):
+    def read(first, second=None, signal=TOUCHED, doubt=1e-5, named=0.5, by_border=math.inf):
         tries = []
 
         def matches(arrays, embossed, fit, hypothesis, settings, *, borders=True):
@@ -93,6 +93,12 @@ def reads(small, lab, monkeypatch):
             assert (embossed, fit, hypothesis) == (best.embossed, best.fit, best.hypothesis)
             return doubt if borders else named
 
+        def matches_by_border(arrays, best, tip_mm, settings):
+            assert (arrays, settings) == (READER.lab.arrays, READER.settings)
+            assert best is (first if len(tries) == 1 else second)[0]
+            assert tip_mm == READER.sensor.overlay.tab_diameter_mm
+            return by_border
+
         def found(reader, given, effort):
             assert reader is READER
             assert given is signal
@@ -101,6 +107,7 @@ def reads(small, lab, monkeypatch):
 
         monkeypatch.setattr(recognizer.touch.recognise, "verify_hypotheses", found)
         monkeypatch.setattr(recognizer.touch.recognise, "expected_matches", matches)
+        monkeypatch.setattr(recognizer.touch.recognise, "expected_by_border", matches_by_border)
         monkeypatch.setattr(recognizer.touch.recognise, "propose_next", lambda *_: None)
         monkeypatch.setattr(recognizer.touch.recognise, "diagnose", lambda *_: None)
         monkeypatch.setattr(recognizer.touch.recognise, "shows_strokes", lambda *_: True)
@@ -305,6 +312,33 @@ def test_what_many_places_match_by_chance_is_refused(reads, doubt, reason, inlie
     assert (answer.margin, answer.runner_up.face) == (40.0, "F2")
     assert judged is found[0]
     assert tries == (1 if inliers == 16 else 2)
+
+
+@pytest.mark.parametrize(
+    ("changed", "rival", "by_border", "doubt"),
+    [
+        ({}, -40.0, 1e-4, 1e-4),
+        ({}, -40.0, 1.01e-4, 1.01e-4),
+        ({}, -40.0, 0.5, 0.3),  # never more than by symbols alone
+        ({"worn": 1}, -40.0, 1e-5, 1e-5),
+        ({"worn": 2}, -40.0, 1e-5, 0.3),
+        ({"clear": 1}, -40.0, 1e-5, 0.3),
+        ({}, -14.0, 1e-5, 1e-5),
+        ({}, -13.9, 1e-5, 0.3),
+    ],
+)
+def test_the_border_of_a_plain_place_counts(reads, changed, rival, by_border, doubt):
+    found = [reads.one(**changed), reads.one("rival", rival, face=1, index=(9, 12))]
+    answer, _, _ = reads.read(found, found, doubt=0.3, by_border=by_border)
+    assert answer.doubt == doubt
+    assert answer.reason == ("" if doubt <= 1e-4 else BY_CHANCE)
+
+
+def test_borders_are_felt_by_tabs_alone(reads, monkeypatch):
+    found = [reads.one()]
+    assert reads.read(found, found, doubt=0.3, by_border=1e-5)[0]
+    monkeypatch.setattr(READER, "sensor", SensorType().with_overlay("pad"))
+    assert reads.read(found, found, doubt=0.3, by_border=1e-5)[0].reason == BY_CHANCE
 
 
 def test_an_answer_is_where_its_last_fit_lies_and_a_refusal_needs_none(reads):
