@@ -6,37 +6,33 @@ import math
 from dataclasses import replace
 
 from probe.sensor import SensorType
+from probe.sensor_types import force_share
 from recognizer.touch.settings import DEFAULTS, NextSettings
 
 
 def next_limits(sensor: SensorType, settings: NextSettings = DEFAULTS.next) -> NextSettings:
-    """Return the settings for a type: steps as long for its size, forces for its area.
+    """Return the settings for a type: steps as long for its size, as hard as it is pressed.
 
     Steps of larger sensors are no longer than those of `fsr-16`: 16 of 16 touches of `mat-32x32`
-    at edges were answered by the third, 13 with steps as long for its size. A gel is pressed until
-    its imprint is as deep as it reads best, whatever it is made of. What is felt at all is told by
-    the full scale, or by the noise where that is more; gaps between strokes are no wider in mm
-    where tactels are coarse.
+    at edges were answered by the third, 13 with steps as long for its size. What is felt at all is
+    told by the full scale, or by the noise where that is more; gaps between strokes are no wider in
+    mm where tactels are coarse.
 
     Examples
     --------
     >>> next_limits(SensorType()) == NextSettings()
     True
     """
-    usual, overlay = SensorType(), sensor.overlay
-    area_mm2 = 4 * math.prod(sensor.half_mm)
-    share = area_mm2 / (4 * math.prod(usual.half_mm))
-    size, scale = min(1.0, math.sqrt(share)), sensor.full / usual.full
-    force_n = share * settings.force_n
-    if overlay.kind == "gel":
-        force_n = settings.imprint_mm * overlay.young_mpa / overlay.height_mm * area_mm2
+    usual = SensorType()
+    size = min(1.0, math.sqrt(math.prod(sensor.half_mm) / math.prod(usual.half_mm)))
+    scale = sensor.full / usual.full
     reach = settings.gap // 2
     reach = max(1, min(reach, round(reach * usual.pitch_mm / max(sensor.step_mm))))
     return replace(
         settings,
         lengths_mm=tuple(size * length for length in settings.lengths_mm),
         clear_mm=size * settings.clear_mm,
-        force_n=round(force_n, 1),
+        force_n=round(force_share(sensor) * settings.force_n, 1),
         least_counts=max(scale * settings.least_counts, settings.quiet_sigmas * sensor.noise),
         soft_counts=scale * settings.soft_counts,
         gap=2 * reach + 1,

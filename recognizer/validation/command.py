@@ -103,7 +103,7 @@ def touch_set(
     sensor_type: Annotated[
         str, typer.Option("--sensor-type", metavar="NAME|FILE", show_default=False,
                           help="What touches: a name that probe-sensor types lists, or a file; "
-                               "fsr-16. Forces are for its area."),
+                               "fsr-16. It is pressed as hard."),
     ] = "",
     overlay: Annotated[
         str, typer.Option(metavar="tab|pad", show_default=False,

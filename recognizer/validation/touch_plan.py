@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from probe.sensor import SensorType
-from probe.sensor_types import choose_sensor_type
+from probe.sensor_types import choose_sensor_type, force_share
 from probe.simulate.registered import registered_object, registered_objects, registered_surface
 from probe.simulate.scene import Scene
 from probe.simulate.touch import TouchRanges
@@ -60,10 +59,10 @@ def sensor_of(sensor_type: str, overlay: str) -> SensorType:
 def ranges_of(plan: TouchPlan, level: Level, sensor: SensorType) -> TouchRanges:
     """Return forces and tilts of a plan, or those of a level that has its own.
 
-    Forces are those on `fsr-16`; another sensor is pressed as hard for its area.
+    Forces are those on `fsr-16`; another sensor is pressed as hard (`force_share`).
     """
     tilt = plan.tilt_rad if level.tilt_rad is None else level.tilt_rad
-    share = math.prod(sensor.half_mm) / math.prod(SensorType().half_mm)
+    share = force_share(sensor)
     low, high = level.force_n or plan.force_n
     return TouchRanges(force_n=(low * share, high * share), tilt_rad=tilt)
 

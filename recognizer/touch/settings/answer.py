@@ -128,9 +128,6 @@ class NextSettings:
     directions: int = 16  #: of steps
     turns_rad: tuple[float, ...] = (0.0, math.pi / 4)  #: a row of symbols fits along a diagonal
     force_n: float = 80.0  #: at which touches are read best
-    #: the same for a gel: its mean imprint; of 100 touches at edges and corners 90 are answered by
-    #: the second at .2 mm, 79 at .5 mm, 55 at 1.2 mm
-    imprint_mm: float = 0.2
     strongest: int = 12  #: tactels that say how hard is pressed
     faint: float = 0.08  #: share of that from which a tactel lies on something ...
     least_counts: float = 16.0  #: ... and readings over the background: less is noise, ...

@@ -20,6 +20,7 @@ from probe.sensor import Overlay, SensorType
 from probe.sensor_types import (
     SensorTypeError,
     choose_sensor_type,
+    force_share,
     proposed_pitch_mm,
     sensor_type_text,
 )
@@ -241,3 +242,15 @@ def test_rows_may_stand_farther_apart_than_columns():
         parse_sensor_type(UNEQUAL + "overlay: {kind: pad}\n", "cloth.yaml")
     with pytest.raises(ContactError, match=r"rows 2\.1 mm and columns 1\.5 mm apart"):
         cloth.with_overlay("pad")
+
+
+def test_a_type_is_pressed_as_hard_for_its_area_and_a_gel_as_deep():
+    assert force_share(SensorType()) == 1.0
+    assert force_share(replace(SensorType(), rows=32)) == 2.0
+    stiff = replace(SensorType(), overlay=replace(SensorType().overlay, young_mpa=3.0))
+    assert force_share(stiff) == 1.0
+    gel = sensor_type_named("gel-24x32")
+    area, bed = 18.56 * 13.92, 0.3 / 3.0  # mm^2; N/mm^3
+    assert 80 * force_share(gel) == pytest.approx(0.2 * bed * area)
+    soft = replace(gel, overlay=replace(gel.overlay, young_mpa=0.15))
+    assert force_share(soft) == pytest.approx(force_share(gel) / 2)
