@@ -1,13 +1,15 @@
 """Every shipped sensor type on symbols of the pitch that it proposes: right, wrong, refused.
 
-    python tests/campaigns/sensor_types.py -o out/types                # hours; goes on where it was
+    python tests/campaigns/sensor_types.py -o out/types -j 2  # an hour; goes on where it was
     python tests/campaigns/sensor_types.py -o out/types --rounds 1 fsr-8x8  # 500 touches of a type
     python tests/campaigns/sensor_types.py -o out/types --table             # of what is there
 
 Rounds of 500 touches a type, each with its own seed, so that all types have about as many whenever
 it is stopped: the usual kinds (faces, edges, corners, worn, blank and foreign surfaces) and levels
-of `validate-set` on written files; and 40 of faces in MuJoCo, where the type has tabs. 5,000
-touches each are ten rounds. Interrupted by Ctrl-C it goes on with the touches that are there.
+of `validate-set` on written files; 40 of faces in MuJoCo, where the type has tabs; and 40 of faces
+of a block as filament printers leave it with the usual faults, where its symbols are not too fine
+(needs PrusaSlicer; each block is printed once). 5,000 touches each are ten rounds. Interrupted by
+Ctrl-C it goes on with the touches that are there.
 """
 
 from __future__ import annotations
@@ -15,7 +17,8 @@ from __future__ import annotations
 import argparse
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -32,24 +35,45 @@ SHAPES = {
     "Prism": "{triangular_prism: {side: 80 mm, height: 90 mm}}",
     "Pyramid": "{pyramid: {sides: 4, side: 90 mm, height: 70 mm}}",
 }
+BLOCK = {"Block": "{box: [80 mm, 64 mm, 40 mm]}"}  #: that is printed
 KEY = "VA11-DATE-0000-0002"  #: of the labs, so that a run can be repeated
 FINE_MM = 4.0  #: below this filament printers make no strokes
 INSIDE = 7.815  #: chi square of three numbers at 95 %
-WORLDS: dict[str, tuple[int, tuple[str, ...]]] = {
-    "own": (500, ()),
-    "mujoco": (40, ("--engine", "mujoco", "--kinds", "face", "--levels", "typical")),
+
+
+@dataclass(frozen=True)
+class World:
+    """Where a type touches."""
+
+    touches: int  #: of a round
+    options: tuple[str, ...] = ()
+    shapes: Mapping[str, str] | None = None  #: of a lab of its own, which is printed
+
+    def serves(self, name: str) -> bool:
+        """Whether a type can touch here: MuJoCo has tabs, filament no fine symbols."""
+        sensor = sensor_type_named(name)
+        if self.shapes:
+            return proposed_pitch_mm(sensor) >= FINE_MM
+        return not self.options or sensor.overlay.kind == "tab"
+
+
+FACES = ("--kinds", "face", "--levels", "typical")
+PRINTED = ("--surfaces", "printed", "--print-profile", "fdm-0.4-0.2", "--faults", "usual")
+WORLDS = {
+    "own": World(500),
+    "mujoco": World(40, ("--engine", "mujoco", *FACES)),
+    "printed": World(40, (*PRINTED, *FACES), BLOCK),
 }
 
 
-def make_lab(folder: Path, name: str) -> Path:
+def make_lab(place: Path, name: str, shapes: Mapping[str, str]) -> Path:
     """Make the parts of a type and return their database."""
-    place = folder / name
     database = place / "lab.db"
     if not (place / "made").exists():
         place.mkdir(parents=True, exist_ok=True)
         pitch = proposed_pitch_mm(sensor_type_named(name))
         printer = "resin" if pitch < FINE_MM else "fdm-0.4"
-        objects = [f"  - {{name: {key}, shape: {shape}}}" for key, shape in SHAPES.items()]
+        objects = [f"  - {{name: {key}, shape: {shape}}}" for key, shape in shapes.items()]
         lines = [f"sensor_type: {name}", f"print: {{printer: {printer}}}", "objects:"]
         spec = place / "set.yaml"
         spec.write_text("\n".join([*lines, *objects, ""]))
@@ -59,14 +83,20 @@ def make_lab(folder: Path, name: str) -> Path:
     return database
 
 
-def touch(folder: Path, name: str, world: str, number: int) -> None:
+def touch(folder: Path, name: str, world: str, number: int, processes: int) -> None:
     """Do a round of a type in a world, or go on with it."""
-    touches, options = WORLDS[world]
-    here = folder / name / f"{world}-{number}"
-    if not (here / "results.json").exists():
-        _run("recognizer.validation", "--database", str(make_lab(folder, name)), "--sensor-type",
-             name, "--touches", str(touches), "--seed", str(100 + number), "--shard", "100",
-             "--study", "0", "--resume", "-o", str(here), *options)  # fmt: skip
+    one = WORLDS[world]
+    here, place = folder / name / f"{world}-{number}", folder / name
+    if (here / "results.json").exists():
+        return
+    options = one.options
+    if one.shapes:
+        place = place / "block"
+        options = (*options, "--prints", str(place / "prints"))
+    database = make_lab(place, name, one.shapes or SHAPES)
+    _run("recognizer.validation", "--database", str(database), "--sensor-type", name, "--touches",
+         str(one.touches), "--seed", str(100 + number), "--shard", "100", "--study", "0",
+         "--resume", "-j", str(processes), "-o", str(here), *options)  # fmt: skip
 
 
 def _run(package: str, *arguments: str) -> None:
@@ -130,15 +160,21 @@ def main() -> None:
     parser.add_argument("types", nargs="*", default=list(shipped_names()))
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--rounds", type=int, default=10)
+    parser.add_argument("-j", "--processes", type=int, default=1)
+    parser.add_argument("--worlds", default=",".join(WORLDS), help="own,mujoco,printed")
     parser.add_argument("--table", action="store_true", help="of the runs that are there")
     asked = parser.parse_args()
     folder = asked.output.absolute()
-    for number in range(0 if asked.table else asked.rounds):
-        for world in WORLDS:
-            for name in asked.types:
-                if world == "own" or sensor_type_named(name).overlay.kind == "tab":
-                    print(f"round {number + 1} of {asked.rounds}: {name}, {world}", flush=True)
-                    touch(folder, name, world, number)
+    runs = [
+        (number, world, name)
+        for number in range(0 if asked.table else asked.rounds)
+        for world in asked.worlds.split(",")
+        for name in asked.types
+        if WORLDS[world].serves(name)
+    ]
+    for done, (number, world, name) in enumerate(runs, 1):
+        print(f"run {done} of {len(runs)}: {name}, {world}, round {number + 1}", flush=True)
+        touch(folder, name, world, number, asked.processes)
     table(folder, asked.types)
 
 
