@@ -58,6 +58,7 @@ def _packed(template: ResponseTemplate, bank: Bank) -> bytes:
         np.array(numbers, "<f8"),
         np.array((template.order, *bank.shape, bank.reach, bank.rim), _NUMBERS),
         template.rimmed.astype("<f4"),
+        bank.taps.astype("<i4"),
         bank.kernels.astype("<f4"),
         bank.lookups.astype("<i4"),
         bank.rotations_rad.astype("<f8"),
@@ -88,6 +89,7 @@ def _unpacked(content: bytes) -> tuple[ResponseTemplate, Bank]:
     order, rows, columns, reach, rim = counts
     template = ResponseTemplate(pitch_mm, order, half_mm, read("<f4"), ink, step_mm)
     bank = Bank(
-        (rows, columns), reach, rim, read("<f4"), read("<i4"), read("<f8"), read("<f8")
+        (rows, columns), reach, rim, read("<i4"), read("<f4"), read("<i4"), read("<f8"),
+        read("<f8"),
     )  # fmt: skip
     return template, bank

@@ -91,6 +91,7 @@ class SearchSettings:
     shifts: int = 10  #: of the lattice along each axis
     rim: float = 1.0  #: tactels beyond the matrix at which a symbol's centre may lie
     reach: float = 1.1  #: of a template's half width that kernels cover
+    nothing: float = 1e-9  #: response below which it is what rounding leaves of none
     least_rest: float = 0.1  #: of a tactel's force that is left beside the bare face's
     same_shift: float = 0.08  #: pitches by which two lattices that are one may differ
     same_turn: float = 0.02  #: and half turns

@@ -30,7 +30,8 @@ class Bank:
     shape: tuple[int, int]  #: rows and columns of the image
     reach: int  #: kernels are (2 reach + 1) tactels wide
     rim: int  #: how many tactels around the matrix are places
-    kernels: Floats  #: (2 K K, order * rotations * phases^2): T, then T^2
+    taps: NDArray[np.int32]  #: (m,) places in (2, K, K), T and T^2, where symbols are felt
+    kernels: Floats  #: (m, order * rotations * phases^2) of them there
     lookups: NDArray[np.int32]  #: (rotations, shifts^2, cells) into places, last one = none
     rotations_rad: NDArray[np.float64]  #: (rotations,)
     shifts_mm: NDArray[np.float64]  #: (shifts^2, 2) of the lattice
@@ -59,11 +60,15 @@ def bank_of(
         kernels[0, :, :, i] = value.swapaxes(1, 2)
         kernels[1, :, :, i] = kernels[0, :, :, i] ** 2
     lookups, shifts_mm = _lookups(template, sensor, turns, rim, phases, shifts)
+    flat = kernels.reshape(2 * len(k) ** 2, -1)
+    felt = np.abs(flat).max(axis=1) > settings.nothing  # in the corners nothing is
+    taps = np.flatnonzero(felt).astype(np.int32)
     return Bank(
         (sensor.rows, sensor.columns),
         reach,
         rim,
-        kernels.reshape(2 * len(k) ** 2, -1),
+        taps,
+        flat[taps],
         lookups,
         turns,
         shifts_mm,
@@ -140,13 +145,11 @@ def _scores_of(bank: Bank, seen: bytes, order: int, _kernels: str) -> tuple[Floa
 def lattice_scores(bank: Bank, values: Floats, weights: Floats, order: int) -> Floats:
     """Return the score of every rotation and shift, (rotations, shifts^2)."""
     pad = bank.reach + bank.rim
-    k = 2 * bank.reach + 1
     rows, columns = bank.shape
+    height, width = rows + 2 * bank.rim, columns + 2 * bank.rim
     padded = np.zeros((2, rows + 2 * pad, columns + 2 * pad), np.float32)
     padded[:, pad : pad + rows, pad : pad + columns] = 2 * weights * values, -weights
-    patches = np.lib.stride_tricks.sliding_window_view(padded, (k, k), axis=(1, 2))
-    height, width = patches.shape[1:3]
-    flat = patches.transpose(1, 2, 0, 3, 4).reshape(height * width, -1)
+    flat = padded.ravel().take(_tactels_of(bank))
     turns = len(bank.rotations_rad)
     products = flat @ bank.kernels
     library = compiled_kernels()
@@ -160,6 +163,17 @@ def lattice_scores(bank: Bank, values: Floats, weights: Floats, order: int) -> F
     places[:, :-1] = grid.reshape(turns, -1)
     base = (np.arange(turns) * places.shape[1])[:, None, None]
     return np.asarray(np.take(places.ravel(), bank.lookups + base).sum(axis=2))
+
+
+@lru_cache(maxsize=16)
+def _tactels_of(bank: Bank) -> NDArray[np.intp]:
+    """Return (places, m) which tactel of a padded image lies at each tap about each place."""
+    side, around = 2 * bank.reach + 1, 2 * (bank.reach + bank.rim)
+    shape = (2, bank.shape[0] + around, bank.shape[1] + around)
+    layer, down, along = np.unravel_index(bank.taps, (2, side, side))
+    height, width = shape[1] - 2 * bank.reach, shape[2] - 2 * bank.reach
+    y, x = (part.reshape(-1, 1) for part in np.indices((height, width)))
+    return np.ravel_multi_index((layer + 0 * y, y + down, x + along), shape)
 
 
 def _sum_lattices(
