@@ -33,20 +33,23 @@ void sum_lattices(int64_t height, int64_t width, int64_t order, int64_t turns, i
                   int64_t lattices, int64_t cells, const float *products, const int32_t *lookups,
                   float *scores) {
     int64_t each = phases * phases, count = height * width * each;
-    float *places = malloc(turns * (count + 1) * sizeof(float));
+    int64_t all = turns * each;
+    float *places = malloc((turns * (count + 1) + all) * sizeof(float));
+    float *best = places + turns * (count + 1); /* (turns, phases^2) of one tactel */
     for (int64_t y = 0; y < height; y++) {
         for (int64_t x = 0; x < width; x++) {
-            const float *from = products + (y * width + x) * order * turns * each;
-            for (int64_t turn = 0; turn < turns; turn++) {
-                float *to = places + turn * (count + 1);
-                for (int64_t k = 0; k < each; k++) {
-                    float best = 0.0f;
-                    for (int64_t label = 0; label < order; label++) {
-                        float one = from[(label * turns + turn) * each + k];
-                        best = one > best ? one : best;
-                    }
-                    to[((y * phases + k / phases) * width + x) * phases + k % phases] = best;
+            const float *from = products + (y * width + x) * order * all;
+            for (int64_t k = 0; k < all; k++) best[k] = from[k] > 0.0f ? from[k] : 0.0f;
+            for (int64_t label = 1; label < order; label++)
+                for (int64_t k = 0; k < all; k++) {
+                    float one = from[label * all + k];
+                    best[k] = one > best[k] ? one : best[k];
                 }
+            for (int64_t down = 0; down < phases; down++) {
+                float *to = places + ((y * phases + down) * width + x) * phases;
+                for (int64_t turn = 0; turn < turns; turn++, to += count + 1)
+                    for (int64_t k = 0; k < phases; k++)
+                        to[k] = best[turn * each + down * phases + k];
             }
         }
     }

@@ -84,7 +84,7 @@ def load_kernels(file: Path) -> ctypes.CDLL | None:
     if library.source_sum() != zlib.crc32(b"".join(one.read_bytes() for one in SOURCES)):
         return None
     pointer, whole = ctypes.c_void_p, ctypes.c_int64
-    library.refine.argtypes = [pointer, whole, *[pointer] * 7]
+    library.refine.argtypes = [pointer, whole, whole, *[pointer] * 7]
     library.refine.restype = None
     library.linearize.argtypes = [pointer] * 9
     library.linearize.restype = None
@@ -115,6 +115,8 @@ def refine_compiled(
     precision: Array,
     steps: int,
     shown: Callable[[Ints], Ints] | None,
+    *,
+    told: bool,
 ) -> tuple[Array, Array, Array, Array, Array]:
     """Return pose, gain, value, normal and right of `refine.Lattices` after damped steps.
 
@@ -128,6 +130,8 @@ def refine_compiled(
         How many, at most.
     shown
         (b, n, 2) cells -> (b, n) labels; None: each cell shows what fits best.
+    told
+        Whether normal and right are those of the end.
     """
     count = len(pose)
     pose, gain = np.array(pose, np.float64, order="C"), np.array(gain, np.float64, order="C")
@@ -137,10 +141,10 @@ def refine_compiled(
         labels, corner = _label_tables(image, template, pose, steps, shown)
         high, wide = labels.shape[1:]
     scene = _scene_of(image, template, count, precision, high, wide)
-    value, right = np.empty(count), np.empty((count, UNKNOWNS))
-    normal = np.empty((count, UNKNOWNS, UNKNOWNS))
+    value, right = np.empty(count), np.zeros((count, UNKNOWNS))
+    normal = np.zeros((count, UNKNOWNS, UNKNOWNS))
     library.refine(
-        ctypes.addressof(scene.value), steps, _address(labels), _address(corner),
+        ctypes.addressof(scene.value), steps, int(told), _address(labels), _address(corner),
         *(one.ctypes.data for one in (pose, gain, value, normal, right)),
     )  # fmt: skip
     return pose, gain, value, normal, right

@@ -88,6 +88,7 @@ static inline double psi(double y) { return y > 0.0 ? log(1.0 + 3.0 * y) / LOG4 
 typedef struct {
     double strongest, mean[3];          /* of the forces; of the planes over what is loaded */
     int any_bare, is_loud;              /* under any of the gains */
+    int known;                          /* labels are: symbols (1, n) are what is shown alone */
     double *psi, *press, *bare, *contact, *depth, *plain, *lower, *plateau, *unit; /* (n,) */
     double *none, *scores;              /* (n,) and (q, n): of no symbol, and of each */
     double *sums, *rows;                /* (n, q + 1); (2, 12, n) */
@@ -223,6 +224,8 @@ static void find_cells(const Scene *s, Work *w, const double *pose) {
     }
 }
 
+static inline int64_t symbols(const Scene *s, const Work *w) { return w->known ? 1 : s->q; }
+
 /* psi of each symbol at each tactel and its slopes, for what is fitted of form and gain. */
 static void look_up(const Scene *s, Work *w, const double *pose) {
     const float form[3] = {(float)pose[3], (float)pose[4], (float)pose[5]}, log4 = (float)LOG4;
@@ -230,14 +233,15 @@ static void look_up(const Scene *s, Work *w, const double *pose) {
     for (int64_t t = 0; t < n; t++) {
         const float *from = s->rimmed + w->place[t] * s->q * FIELDS;
         float hold = (float)w->contact[t];
-        for (int64_t k = 0; k < s->q; k++, from += FIELDS) {
+        if (w->known && w->labels[t] > 0) from += w->labels[t] * FIELDS;
+        for (int64_t k = 0; k < symbols(s, w); k++, from += FIELDS) {
             float v = from[0] + from[3] * form[0] + from[4] * form[1] + from[5] * form[2];
             w->value[k * n + t] = v * hold;
             w->x[k * n + t] = from[1] * hold;
             w->y[k * n + t] = from[2] * hold;
         }
     }
-    for (int64_t k = 0; k < s->q && w->any_bare; k++) {
+    for (int64_t k = 0; k < symbols(s, w) && w->any_bare; k++) {
         float *value = w->value + k * n, *x = w->x + k * n, *y = w->y + k * n, *by = w->by + k * n;
         for (int64_t t = 0; t < n; t++) { /* 1 + 3 y is 4^psi; `less` is what a sum of 1 rounds off */
             float face = (float)w->bare[t], power = power_of_two(2.0f * value[t]);
@@ -265,7 +269,7 @@ static void score(const Scene *s, Work *w, double noise) {
     const double alone = s->quiet * s->quiet, width = log(sqrt(alone));
     int64_t n = s->n;
     for (int64_t t = 0; t < n; t++) w->unit[t] = noise / larger(w->press[t], 1e-3);
-    for (int64_t k = 0; k < s->q; k++) {
+    for (int64_t k = 0; k < symbols(s, w); k++) {
         const float *value = w->value + k * n, *x = w->x + k * n, *y = w->y + k * n;
         float *square = w->square;
         double *to = w->scores + k * n;
@@ -384,7 +388,7 @@ static void value_shown(const Scene *s, Work *w) {
     int64_t n = s->n;
     double *v = w->shown;
     for (int64_t t = 0; t < n; t++) {
-        int64_t label = w->labels[t], at = label * n + t;
+        int64_t label = w->labels[t], at = (w->known ? 0 : label) * n + t;
         if (label < 0) {
             double floor_ = psi(w->bare[t]);
             v[t] = w->psi[t] > floor_ / 2 ? floor_ : 0.0;
@@ -444,16 +448,15 @@ typedef struct { const int8_t *given; const int64_t *corner; } Shown;
 static double explain(const Scene *s, Work *w, Shown shown, int64_t i, const double *pose,
                       const double *gain) {
     double sum = 0.0, level = 0.0;
+    w->known = shown.given != NULL;
     find_cells(s, w, pose);
+    if (w->known) read_labels(s, w, shown.given + i * s->high * s->wide, shown.corner + 2 * i);
     look_up(s, w, pose);
     score(s, w, s->first);
-    if (shown.given)
-        read_labels(s, w, shown.given + i * s->high * s->wide, shown.corner + 2 * i);
-    else
-        choose(s, w, pose);
+    if (!w->known) choose(s, w, pose);
     for (int64_t t = 0; t < s->n; t++) {
         int64_t label = w->labels[t];
-        sum += label < 0 ? w->none[t] : w->scores[label * s->n + t];
+        sum += label < 0 ? w->none[t] : w->scores[(w->known ? 0 : label) * s->n + t];
         if (w->press[t] != 1.0 && s->trust[t] != 0.0) level += s->trust[t] * log(w->press[t]);
     }
     for (int k = 3; k < 8; k++) {
@@ -516,9 +519,10 @@ void linearize(const Scene *s, const int8_t *given, const int64_t *corner, const
     Work w = new_work(s);
     look_at_gains(s, &w, gain);
     normalize(s, &w, 0, gain);
+    w.known = 1;
     find_cells(s, &w, pose);
-    look_up(s, &w, pose);
     read_labels(s, &w, given, corner);
+    look_up(s, &w, pose);
     value_shown(s, &w);
     press_shown(s, &w, pose, gain);
     for (int64_t t = 0; t < s->n; t++) {
@@ -582,8 +586,9 @@ static void move(const Scene *s, const double *normal, const double *right, doub
 }
 
 /* Move candidates by damped steps, `steps` at most; pose and gain (b, 7), (b, 4) are where they begin
-   and end. Normal matrices and right-hand sides are worked out where a step begins, and in the end. */
-void refine(const Scene *s, int64_t steps, const int8_t *given, const int64_t *corner,
+   and end. Normal matrices and right-hand sides are worked out where a step begins, and in the end
+   if `told`. */
+void refine(const Scene *s, int64_t steps, int64_t told, const int8_t *given, const int64_t *corner,
             double *pose, double *gain, double *value, double *normal, double *right) {
     const int64_t square = UNKNOWNS * UNKNOWNS;
     Work w = new_work(s);
@@ -595,7 +600,8 @@ void refine(const Scene *s, int64_t steps, const int8_t *given, const int64_t *c
         const double *g = gain + 4 * i;
         if (i == 0 || memcmp(g, g - 4, 4 * sizeof(double)) || s->falls > 1) normalize(s, &w, i, g);
         value[i] = explain(s, &w, shown, i, pose + 7 * i, g);
-        linear_system(s, &w, pose + 7 * i, g, normal + i * square, right + i * UNKNOWNS);
+        if (told || steps)
+            linear_system(s, &w, pose + 7 * i, g, normal + i * square, right + i * UNKNOWNS);
         damping[i] = s->damping;
     }
     for (int64_t step = 0, done = 0; step < steps && !done; step++) {
@@ -617,7 +623,8 @@ void refine(const Scene *s, int64_t steps, const int8_t *given, const int64_t *c
             value[i] = tried[i];
             memcpy(pose + 7 * i, p, 7 * sizeof(double));
             memcpy(gain + 4 * i, g, 4 * sizeof(double));
-            linear_system(s, &w, p, g, normal + i * square, right + i * UNKNOWNS);
+            if (told || step + 1 < steps)
+                linear_system(s, &w, p, g, normal + i * square, right + i * UNKNOWNS);
         }
     }
     free(damping);

@@ -88,7 +88,7 @@ def fit_lattices(
         return ()
     each = [len(start) for start in starts]
     pose, gain = np.concatenate(starts), np.repeat(gains, each, axis=0)
-    lattices = refine_lattices(image, template, pose, gain, steps=settings.steps)
+    lattices = refine_lattices(image, template, pose, gain, steps=settings.steps, told=False)
     if settings.crossed:
         lattices = _cross_gains(image, template, lattices, settings.crossed)
     best = _distinct_lattices(image, template, lattices)[: settings.finalists]
@@ -127,8 +127,8 @@ def _cross_gains(image: Image, template: ResponseTemplate, found: Lattices, gain
         pose[:, 2] += math.pi / 2
     poses = np.concatenate([*tried, found.pose[np.sort(best[2 * gains :])]])
     each = [
-        refine_lattices(image, template, poses, np.tile(gain, (len(poses), 1)), steps=1)
-        for gain in found.gain[best[:gains]]
+        refine_lattices(image, template, poses, one, steps=1, told=False)
+        for one in np.repeat(found.gain[best[:gains], None], len(poses), axis=1)
     ]
     kept = np.argmax([lattices.value for lattices in each], axis=0)
     rows = np.arange(len(poses))

@@ -52,6 +52,7 @@ def refine_lattices(
     *,
     steps: int,
     shown: Shown | None = None,
+    told: bool = True,
 ) -> Lattices:
     """Return candidates after damped steps, with their log-likelihoods.
 
@@ -65,13 +66,17 @@ def refine_lattices(
         How many, at most.
     shown
         What the cells show, where that is known; otherwise each cell shows what fits best.
+    told
+        Whether `normal` and `right` are asked for: without, they are those of some step.
     """
     whole = np.pad(pose, ((0, 0), (0, POSE - pose.shape[1])))
     library = compiled_kernels()
     if library is not None:
         precision = prior_precision(image)
         return Lattices(
-            *refine_compiled(library, image, template, whole, gain, precision, steps, shown)
+            *refine_compiled(
+                library, image, template, whole, gain, precision, steps, shown, told=told
+            )
         )
     settings = image.settings.refine
     least, most = np.array(settings.least), np.array(settings.step)
