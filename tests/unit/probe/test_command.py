@@ -73,6 +73,25 @@ def error_of(result):
     return code, err
 
 
+def test_a_part_alone_is_touched_without_a_database(tmp_path):
+    part = tmp_path / "plate.stl"
+    corners = np.array([[0, 0, 0], [40, 0, 0], [40, 40, 0], [0, 40, 0]], "<f4")
+    facets = np.zeros(2, [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    facets["corners"] = corners[[[0, 1, 2], [0, 2, 3]]]
+    part.write_bytes(bytes(80) + np.uint32(2).tobytes() + facets.tobytes())
+    script = (
+        "import sys\n"
+        "from probe.command import run\n"
+        f"code = run(['simulate', {str(part)!r}, '--x', '0', '--y', '0', '-o', 'a.h5'])\n"
+        "heavy = ('sqlalchemy', 'scipy.signal', 'skfem')\n"
+        "print([name for name in heavy if name in sys.modules], code)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, cwd=tmp_path
+    )
+    assert done.stdout.splitlines()[-1] == "[] 0", done.stderr
+
+
 def test_the_help_loads_nothing_heavy():
     script = (
         "import sys\n"
