@@ -119,28 +119,30 @@ def _draw(
     slope_x = slope_x.clip(-_DEPTH_STEPS, _DEPTH_STEPS)
     slope_y = slope_y.clip(-_DEPTH_STEPS, _DEPTH_STEPS)
     at_origin = z[0] - slope_x * (x[0] - 0.5) - slope_y * (y[0] - 0.5)
-    rows, owner = _rows(y, height)
-    left, length = _spans(x, y, rows, owner, width)
-    depth = at_origin[owner] + slope_x[owner] * left + slope_y[owner] * rows
-    keys = depth.clip(0.0, 2.0 * _DEPTH_STEPS).astype(np.int64) << _NUMBER_BITS
-    keys += (facing + first)[owner]
-    steps = slope_x.astype(np.int64)[owner] << _NUMBER_BITS
+    rows, count = _rows(y, height)
+    left, length = _spans(x, y, rows, count, width)
+    depth = np.repeat(at_origin, count)
+    depth += np.repeat(slope_x, count) * left
+    depth += np.repeat(slope_y, count) * rows
+    keys = depth.clip(0.0, 2.0 * _DEPTH_STEPS, out=depth).astype(np.int64) << _NUMBER_BITS
+    keys += np.repeat(facing + first, count)
+    steps = np.repeat(slope_x.astype(np.int64) << _NUMBER_BITS, count)
     _fill(buffer, rows * width + left, length, keys, steps)
 
 
 def _rows(y: Floats, height: int) -> tuple[Index, Index]:
-    """Return the pixel rows whose centre lines cross each triangle, and the triangle."""
+    """Return the pixel rows whose centre lines cross each triangle, and how many do."""
     lowest = np.minimum(np.minimum(y[0], y[1]), y[2])
     highest = np.maximum(np.maximum(y[0], y[1]), y[2])
     top = np.ceil(lowest - 0.5).clip(0, height).astype(np.int64)
     end = np.ceil(highest - 0.5).clip(0, height).astype(np.int64)
     count = end - top
-    owner = np.repeat(np.arange(len(count)), count)
-    return np.arange(len(owner)) - (np.cumsum(count) - count - top)[owner], owner
+    before = np.cumsum(count)
+    return np.arange(before[-1] if len(count) else 0) - np.repeat(before - end, count), count
 
 
-def _spans(x: Floats, y: Floats, rows: Index, owner: Index, width: int) -> tuple[Index, Index]:
-    """Return first pixel and number of pixels of each triangle in its rows.
+def _spans(x: Floats, y: Floats, rows: Index, count: Index, width: int) -> tuple[Index, Index]:
+    """Return first pixel and number of pixels of each triangle in its `count` rows.
 
     Edges that lead down the screen bound a triangle on the left, those that lead up on the
     right.
@@ -153,9 +155,9 @@ def _spans(x: Floats, y: Floats, rows: Index, owner: Index, width: int) -> tuple
         start = x[i] + slope * (0.5 - y[i]) - 0.5  # of the edge on the centre line of row 0
         never_left = np.where(dy > 0.0, start, -np.inf)
         never_right = np.where(dy < 0.0, start, np.inf)
-        along = slope[owner] * rows
-        np.maximum(left, never_left[owner] + along, out=left)
-        np.minimum(right, never_right[owner] + along, out=right)
+        along = np.repeat(slope, count) * rows
+        np.maximum(left, np.repeat(never_left, count) + along, out=left)
+        np.minimum(right, np.repeat(never_right, count) + along, out=right)
     first = np.ceil(left).astype(np.int64)
     return first, np.maximum(np.ceil(right).astype(np.int64) - first, 0)
 
@@ -166,9 +168,10 @@ def _fill(buffer: Index, start: Index, length: Index, first: Index, step: Index)
         some = slice(block, block + RASTER.spans)
         count = length[some]
         before = np.cumsum(count) - count
-        span = np.repeat(np.arange(len(count)), count)
-        running = np.arange(len(span))
-        pixels = running + (start[some] - before)[span]
+        pixels = np.repeat(start[some] - before, count)
+        running = np.arange(len(pixels))
+        pixels += running
         # Wrap-around of the products cancels: only the sum must fit 64 bits.
-        keys = running * step[some][span] + (first[some] - before * step[some])[span]
-        np.maximum.at(buffer, pixels, keys)
+        running *= np.repeat(step[some], count)
+        running += np.repeat(first[some] - before * step[some], count)
+        np.maximum.at(buffer, pixels, running)

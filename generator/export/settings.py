@@ -38,7 +38,7 @@ class PreviewSettings:
     """Of edges."""
     paper_rgb: tuple[tuple[int, int, int], ...] = ((250, 251, 253), (224, 230, 238))
     """Top and bottom of the background."""
-    block: int = 131_072
+    block: int = 16_384
     """Triangles shaded at once: bounds the memory."""
 
     # labels.py
@@ -72,7 +72,7 @@ class RasterSettings:
 
     spans: int = 4096  #: at a time, so that they stay in the cache
     rows: int = 32  #: of the picture at a time
-    triangles: int = 131_072  #: drawn at once: bounds the memory
+    triangles: int = 16_384  #: drawn at once: they stay in the cache
 
 
 @dataclass(frozen=True, slots=True)

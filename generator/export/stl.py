@@ -16,7 +16,7 @@ from generator.solid.triangulate import Mesh
 
 _HEADER = b"encoded-objects binary STL, mm".ljust(80, b" ")
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-_BLOCK = 65_536  # triangles written at once
+_BLOCK = 16_384  # triangles written at once: they stay in the cache
 
 
 def stl_chunks(mesh: Mesh) -> Iterator[bytes | memoryview]:

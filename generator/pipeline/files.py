@@ -11,11 +11,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from generator.database.registered import RegisteredPart
 from generator.export.array_svg import FaceOnArray, array_svg
 from generator.export.atomic import StagedFile, Staging
-from generator.export.fit_check import FitReport, PanelFile, verify_fit
 from generator.export.glb import glb_bytes
 from generator.export.preview import preview_png
 from generator.export.robot import ROBOT_FORMATS
@@ -42,6 +46,9 @@ from generator.solid import (
     triangles,
     volume,
 )
+
+if TYPE_CHECKING:
+    from generator.export.fit_check import FitReport
 
 BuiltParts = tuple[tuple[Part, ...], tuple[str, ...]]  #: of `parts_of`: the parts, what they lack
 
@@ -96,7 +103,7 @@ def stage(
         prove_closed(part)
     meshes = [triangles(part) for part in parts]
     registered: list[RegisteredPart] = []
-    panel_files: list[PanelFile] = []
+    panel_files: list[tuple[str, Path, NDArray[np.float64]]] = []
     for number, (part, mesh) in enumerate(zip(parts, meshes, strict=True)):
         progress(f"writing {part.name}", 0.1 + 0.6 * number / len(parts))
         step = stl = None
@@ -106,7 +113,7 @@ def stage(
         if "stl" in formats:
             stl = staging.write(f"{part.name}.stl", stl_chunks(mesh), digest=True)
             registered.append(_part_entry(part, "stl", stl))
-            panel_files.append(PanelFile(part.name, stl.staged, part.T_object_part))
+            panel_files.append((part.name, stl.staged, part.T_object_part))
         if verify and (step or stl):
             progress(f"verifying {part.name}", 0.1 + 0.6 * (number + 0.5) / len(parts))
             from generator.export.check import verify as read_back  # loads the CAD kernel
@@ -128,8 +135,10 @@ def stage(
             staging.write(f"{spec.name}.stpz", gzip_chunks(assembly_chunks(spec.name, parts)))
     fit = None
     if verify and len(panel_files) > 1:
+        from generator.export.fit_check import PanelFile, verify_fit  # loads the readers of models
+
         progress("putting the panels together", 0.7)
-        fit = verify_fit(panel_files, spec.gap_mm)
+        fit = verify_fit([PanelFile(*panel) for panel in panel_files], spec.gap_mm)
     on_sheet: list[SheetPlate] = []
     if "3mf" in formats:
         progress("arranging the bed", 0.7)

@@ -51,6 +51,20 @@ def test_help_loads_nothing_heavy(arguments):
     assert done.stdout.splitlines()[-1] == "[] 0"
 
 
+def test_a_scene_loads_what_it_needs():
+    unused = ("scipy", "matplotlib", "pandas", "OCP", "trimesh", "multiprocessing.pool",
+              "generator.polyhedron.read", "generator.export.fit_check", "generator.export.check",
+              "generator.export.robot.model", "generator.printed",
+              "generator.pipeline.sets")  # fmt: skip
+    program = (
+        "import sys\nfrom generator.command import run\n"
+        f"code = run([{str(FIXTURES / 'cube.yaml')!r}, '-o', 'made', '--database', 'd.db'])\n"
+        f"print([name for name in {unused!r} if name in sys.modules], code)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.stdout.splitlines()[-1] == "[] 0", done.stderr
+
+
 def test_help_names_every_option_and_command(capsys):
     assert run(["--help"]) == 0
     text = capsys.readouterr().out
