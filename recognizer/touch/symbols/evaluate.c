@@ -93,7 +93,8 @@ typedef struct {
     double *none, *scores;              /* (n,) and (q, n): of no symbol, and of each */
     double *sums, *rows;                /* (n, q + 1); (2, 12, n) */
     double *shown, *force, *by_psi;     /* (6, n), (n,), (n,) of what is shown */
-    float *value, *x, *y, *by, *square; /* (q, n) psi of symbols, slopes, what scales these; (n,) */
+    float *value, *x, *y, *by;          /* (q, n) psi of symbols, slopes, what scales these */
+    float *square, *width, *face;       /* (n,) of a spread, its logarithm; `bare` */
     int64_t *cells, *first, *labels;    /* (n, 2), (n,), (n,) */
     int64_t *place;                     /* (n,) in the template */
     double measure;
@@ -124,11 +125,13 @@ static Work new_work(const Scene *s) {
     w.by_psi = w.force + n;
     w.rows = w.by_psi + n;
     memset(w.rows, 0, 2 * ROWS * wide * sizeof(double));
-    w.value = malloc((4 * q + 1) * n * sizeof(float));
+    w.value = malloc((4 * q + 3) * n * sizeof(float));
     w.x = w.value + q * n;
     w.y = w.x + q * n;
     w.by = w.y + q * n;
     w.square = w.by + q * n;
+    w.width = w.square + n;
+    w.face = w.width + n;
     w.cells = malloc(5 * n * sizeof(int64_t));
     w.first = w.cells + 2 * n;
     w.labels = w.first + n;
@@ -203,7 +206,8 @@ static void normalize(const Scene *s, Work *w, int64_t i, const double *g) {
 }
 
 static inline int64_t grid(const Scene *s, double offset) {
-    double at = rint((offset + s->half) / s->step);
+    const double shift = 6755399441055744.0; /* adding it rounds to whole numbers */
+    double at = ((offset + s->half) / s->step + shift) - shift;
     return (int64_t)smaller(larger(at, -1.0), (double)s->size) + 1;
 }
 
@@ -214,9 +218,9 @@ static void find_cells(const Scene *s, Work *w, const double *pose) {
         double x = s->points[2 * t], y = s->points[2 * t + 1], offset[2];
         double u[2] = {pose[0] + c * x - n * y, pose[1] + n * x + c * y};
         for (int k = 0; k < 2; k++) {
-            double cell = floor(u[k] / s->pitch);
-            w->cells[2 * t + k] = (int64_t)cell;
-            offset[k] = u[k] - (cell + 0.5) * s->pitch;
+            double cell = u[k] / s->pitch;
+            w->cells[2 * t + k] = (int64_t)cell - (cell < (double)(int64_t)cell); /* its floor */
+            offset[k] = u[k] - ((double)w->cells[2 * t + k] + 0.5) * s->pitch;
         }
         w->place[t] = grid(s, offset[1]) * (s->size + 2) + grid(s, offset[0]);
         for (int64_t at = 0; at < s->q * FIELDS; at += 16)
@@ -230,6 +234,7 @@ static inline int64_t symbols(const Scene *s, const Work *w) { return w->known ?
 static void look_up(const Scene *s, Work *w, const double *pose) {
     const float form[3] = {(float)pose[3], (float)pose[4], (float)pose[5]}, log4 = (float)LOG4;
     int64_t n = s->n;
+    for (int64_t t = 0; t < n; t++) w->face[t] = (float)w->bare[t];
     for (int64_t t = 0; t < n; t++) {
         const float *from = s->rimmed + w->place[t] * s->q * FIELDS;
         float hold = (float)w->contact[t];
@@ -244,7 +249,7 @@ static void look_up(const Scene *s, Work *w, const double *pose) {
     for (int64_t k = 0; k < symbols(s, w) && w->any_bare; k++) {
         float *value = w->value + k * n, *x = w->x + k * n, *y = w->y + k * n, *by = w->by + k * n;
         for (int64_t t = 0; t < n; t++) { /* 1 + 3 y is 4^psi; `less` is what a sum of 1 rounds off */
-            float face = (float)w->bare[t], power = power_of_two(2.0f * value[t]);
+            float face = w->face[t], power = power_of_two(2.0f * value[t]);
             float more = (power - 1.0f) + (4.0f - power) * face, whole = 1.0f + more;
             float inverse = 1.0f / whole, less = (more - (whole - 1.0f)) * inverse;
             float total = (logarithm(more > 0.0f ? whole : 1.0f) + less) / log4;
@@ -266,26 +271,27 @@ static inline double readings(const Scene *s, double value, double plateau, doub
 /* Scores of each symbol at each tactel, and of none; noise: deviation of psi on a covered one. */
 static void score(const Scene *s, Work *w, double noise) {
     const float quiet = (float)(s->quiet * s->quiet), aside = (float)(s->displaced * s->displaced);
-    const double alone = s->quiet * s->quiet, width = log(sqrt(alone));
+    const double alone = s->quiet * s->quiet, usual = log(sqrt(alone));
     int64_t n = s->n;
     for (int64_t t = 0; t < n; t++) w->unit[t] = noise / larger(w->press[t], 1e-3);
     for (int64_t k = 0; k < symbols(s, w); k++) {
         const float *value = w->value + k * n, *x = w->x + k * n, *y = w->y + k * n;
-        float *square = w->square;
+        float *square = w->square, *width = w->width;
         double *to = w->scores + k * n;
         for (int64_t t = 0; t < n; t++)
             square[t] = quiet + value[t] * value[t] + aside * (x[t] * x[t] + y[t] * y[t]);
         for (int64_t t = 0; t < n && w->is_loud; t++)
             square[t] += (float)readings(s, value[t], w->plateau[t], w->unit[t]);
+        for (int64_t t = 0; t < n; t++) width[t] = 0.5f * logarithm(square[t]);
         for (int64_t t = 0; t < n; t++) {
             double away = w->psi[t] - value[t], unit = w->unit[t];
             double loss = smaller(0.5 * away * away / (unit * unit * square[t]), s->most);
-            to[t] = s->trust[t] * (-loss - 0.5f * logarithm(square[t]));
+            to[t] = s->trust[t] * (-loss - width[t]);
         }
     }
     for (int64_t t = 0; t < n; t++) { /* beyond the edge of the face, or on it */
         double away = w->psi[t] / w->unit[t];
-        w->none[t] = s->trust[t] * (-smaller(0.5 * away * away / alone, s->most) - width);
+        w->none[t] = s->trust[t] * (-smaller(0.5 * away * away / alone, s->most) - usual);
     }
     for (int64_t t = 0; t < n; t++) {
         if (!(w->bare[t] > 0.0) && !w->is_loud) continue;
