@@ -89,6 +89,8 @@ def _text(made: Kit) -> str:
     for part in made.parts:
         x, y, z = part.size_mm
         lines.append(f"  {part.name:16} {x:.1f} x {y:.1f} x {z:.1f} mm, {part.what}")
+        if part.bed_hint:
+            lines.append(f"  {'':16} {part.bed_hint}")
     side = made.coupon.side_mm
     lines.append(f"  {'coupon':16} {side:g} x {side:g} mm, {made.coupon.symbols} symbols, for the "
                  "first touch")  # fmt: skip

@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from encoded_objects.errors import require
 from generator.export.atomic import Staging
 from generator.export.slicer_settings import slicer_settings
@@ -32,13 +34,12 @@ from probe.kit.coupon import DATABASE, Coupon, make_coupon
 from probe.kit.mesh import KitPartReport, check_part, mesh_of, step_text
 from probe.kit.model import PARTS
 from probe.kit.settings import KIT
-from probe.kit.sheet import PrintedPart, sheet_html
+from probe.kit.sheet import FILAMENT, RESIN, PrintedPart, sheet_html
 from probe.kit.sizes import KitSizes, kit_sizes
 from probe.sensor import SensorType
 from probe.sensor_types import proposed_pitch_mm, sensor_type_text
 
 FINE_MM = 4.0  #: pitch below which the coupon is printed in resin
-FILAMENT, RESIN = "fdm-0.4", "resin"
 Progress = Callable[[str, float], None]
 
 
@@ -136,7 +137,8 @@ def _plates(
         printer = printer_named(printer_name)
         settings = slicer_settings(printer, supports=False)
         some = [(n, mesh) for n, mesh, resin in meshes if resin == (printer_name == RESIN)]
-        plates = mesh_print_files(title, some, printer.bed_mm, settings) if some else ()
+        bed = bed_for([mesh for _, mesh in some], printer.bed_mm)
+        plates = mesh_print_files(title, some, bed, settings) if some else ()
         for number, file in enumerate(plates):
             more = f"-{number + 1}" if len(plates) > 1 else ""
             yield f"{printer_name}{more}.3mf", file.prusaslicer
@@ -144,6 +146,16 @@ def _plates(
     settings = slicer_settings(printer, supports=False)
     (file,) = print_files("coupon", [coupon.part], printer.bed_mm, settings)
     yield "coupon.3mf", file.prusaslicer
+
+
+def bed_for(meshes: list[Mesh], usual_mm: tuple[float, float]) -> tuple[float, float]:
+    """Return the usual bed, or one that the largest part lies on as well."""
+    wide, deep = usual_mm
+    for mesh in meshes:
+        x, y = np.ptp(mesh.vertices[:, :2], axis=0).tolist()
+        if max(x, y) > max(wide, deep) or min(x, y) > min(wide, deep):
+            wide, deep = max(wide, x), max(deep, y)
+    return wide, deep
 
 
 def _csv(items: list[Item]) -> str:

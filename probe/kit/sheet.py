@@ -10,11 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
+from generator.printers import Printer, printer_named
 from probe.kit.board import Item, has_board
 from probe.kit.coupon import DATABASE, Coupon
 from probe.kit.sizes import KitSizes
 from probe.kit.tolerances import TOLERANCES
 
+FILAMENT, RESIN = "fdm-0.4", "resin"
 G = 9.80665  #: m / s^2
 PLA_G_MM3 = 1.24e-3
 
@@ -37,6 +39,19 @@ class PrintedPart:
     volume_mm3: float
     resin: bool
 
+    @property
+    def printer(self) -> Printer:
+        """What it is made for."""
+        return printer_named(RESIN if self.resin else FILAMENT)
+
+    @property
+    def bed_hint(self) -> str:
+        """Return the bed that it wants, where the usual ones are too small; else empty."""
+        (x, y, _), bed = self.size_mm, self.printer.bed_mm
+        if max(x, y) <= max(bed) and min(x, y) <= min(bed):
+            return ""
+        return f"wants a bed of {x:.0f} x {y:.0f} mm, more than the usual {bed[0]:g} x {bed[1]:g}"
+
 
 def sheet_html(
     k: KitSizes,
@@ -55,7 +70,9 @@ def sheet_html(
             ("file", "what it does", "size, mm", "print"),
             [
                 (f"{p.name}.stl", p.what, " x ".join(f"{s:.1f}" for s in p.size_mm),
-                 "resin, .05 mm layers" if p.resin else "filament, .2 mm layers, no supports")
+                 "; ".join(filter(None, (
+                     "resin, .05 mm layers" if p.resin else "filament, .2 mm layers, no supports",
+                     p.bed_hint))))
                 for p in parts
             ],
         ),

@@ -4,16 +4,18 @@
     python tests/campaigns/kits_sliced.py -o out/kits gel-24x32
 
 Kits are made with `--verify`. Plates for filament are sliced with the settings in them, those for
-resin (they hold none) on a screen of .05 mm pixels with .05 mm layers, and the white pixels of all
-layers are held against the volume of the parts. A row tells what `prusa-slicer --info` and `admesh`
-say of the meshes. Exit code 1 when one is not manifold, needs a repair or supports, or when its
-layers hold more than 1 % of volume too much or too little. Overhanging perimeters are told.
+resin (they hold none) on a screen of .05 mm pixels (140 x 85 mm, more where the sheet says so) with
+.05 mm layers, and the white pixels of all layers are held against the volume of the parts. A row
+tells what `prusa-slicer --info` and `admesh` say of the meshes. Exit code 1 when one is not
+manifold, needs a repair or supports, or when its layers hold more than 1 % of volume too much or
+too little. Overhanging perimeters are told.
 """
 
 from __future__ import annotations
 
 import argparse
 import io
+import math
 import subprocess
 import sys
 import tempfile
@@ -80,7 +82,9 @@ def plate_of(file: Path) -> Plate:
 
 def resin_layers(file: Path) -> tuple[int, float]:
     """Return the layers of a plate and what they hold over the volume of its meshes."""
-    (wide, deep), step = RESIN.bed_mm, RESIN.layer_mm
+    drawn = trimesh.load_scene(file, file_type="3mf")
+    far, step = drawn.bounds[1], RESIN.layer_mm
+    wide, deep = (max(bed, math.ceil(x)) for bed, x in zip(RESIN.bed_mm, far[:2], strict=True))
     across, down = round(wide / step), round(deep / step)
     profile = {
         "printer_technology": "SLA", "bed_shape": f"0x0,{wide}x0,{wide}x{deep},0x{deep}",
@@ -101,8 +105,7 @@ def resin_layers(file: Path) -> tuple[int, float]:
                 float(np.asarray(Image.open(io.BytesIO(held.read(n))).convert("L")).sum()) / 255
                 for n in images
             )
-    volume = float(trimesh.load_scene(file, file_type="3mf").to_mesh().volume)
-    return len(images), white * step**3 / volume
+    return len(images), white * step**3 / float(drawn.to_mesh().volume)
 
 
 def main() -> int:

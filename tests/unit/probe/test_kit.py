@@ -21,8 +21,10 @@ from probe.kit import model
 from probe.kit.board import connections, has_board, shore_a, wiring_svg
 from probe.kit.command import run
 from probe.kit.coupon import UNDATED, make_coupon
+from probe.kit.make import bed_for
 from probe.kit.mesh import mesh_of, step_text
 from probe.kit.settings import KIT
+from probe.kit.sheet import PrintedPart
 from probe.kit.sizes import frustum_mm3, kit_sizes
 from probe.sensor import Overlay, SensorType
 from probe.sensor_types.read import sensor_type_named, shipped_names
@@ -182,3 +184,16 @@ def test_layers_have_a_closed_mould(kind):
     high = 4 + k.thickness_mm + 3.6
     expected = high * math.prod(k.mould_mm) - (high - 4) * math.prod(k.skin_mm)
     assert solid.volume == pytest.approx(expected - holes(k, high) + 4 * rod(3, high - 4))
+
+
+def test_a_part_that_the_usual_bed_does_not_hold_says_so_and_lies_on_a_larger_one():
+    small = PrintedPart("lid", "presses", (84.9, 139.0, 7.0), 1.0, resin=True)
+    assert small.bed_hint == ""
+    assert replace(small, size_mm=(249.0, 209.0, 7.0), resin=False).bed_hint == ""
+    large = replace(small, size_mm=(108.0, 86.0, 7.0))
+    assert large.bed_hint == "wants a bed of 108 x 86 mm, more than the usual 140 x 85"
+    box = mesh_of(model.PARTS["mould-lid"][1](kit_sizes(sensor_type_named("mat-32x32"), 6.0)), KIT)
+    wide, deep = bed_for([box], (140.0, 85.0))
+    assert wide == 140.0
+    assert deep == pytest.approx(np.ptp(box.vertices[:, 1]))
+    assert bed_for([box], (140.0, 110.0)) == (140.0, 110.0)
