@@ -41,6 +41,7 @@ class Choice:
 
     specs: tuple[LocatedSpec, ...]
     notes: tuple[str, ...] = ()
+    alone: tuple[Layout, ...] = ()  #: of each, on the empty array; () where none was needed
 
 
 def choose_array(
@@ -96,7 +97,7 @@ def choose_array(
         array = lab.of_profile(candidate)
         made = array.definition(), lab.key_of(candidate)
         tried = tuple(_with_array(one, candidate.name, *made) for one in specs)
-        needed, blank = _count_needs(tried, solid)
+        needed, blank, alone = _count_needs(tried, solid)
         room = _room(array, connection)
         size = f"{candidate.name} {array.rows}x{array.columns}"
         if needed is None:
@@ -105,7 +106,7 @@ def choose_array(
             short.append(f"{needed} cells are needed, and {size} has room for {room}")
         else:
             notes = (_larger_note(candidate, array, short[-1]),) if short else ()
-            found = Choice(tried, notes)
+            found = Choice(tried, notes, alone)
             return _choose_finer(found, blank, room, solid) if blank else found
     raise LayoutError(
         f"the objects fit no array that is made here: {short[-1]}",
@@ -128,13 +129,13 @@ def _choose_finer(coarse: Choice, blank: int, room: int, solid: Polyhedron | Non
         pitch = _share_mm(share, coarse.specs[0])
         try:
             finer = tuple(_with_pitch(one, _share_mm(share, one)) for one in coarse.specs)
-            needed, now = _count_needs(finer, solid)
+            needed, now, alone = _count_needs(finer, solid)
         except GeneratorError:  # the printer cannot make them
             break
         if needed is not None and now < left and needed <= room:
             faces = f"{blank - now} of the {blank} faces that coarser symbols leave blank"
             note = f"pitch {pitch:g} mm is taken: it shows places on {faces}"
-            found, left = Choice(finer, (*coarse.notes, note)), now
+            found, left = Choice(finer, (*coarse.notes, note), alone), now
     return found
 
 
@@ -234,10 +235,15 @@ def _follow(
     return with_profile(located, profile, defaults, encoding, array_key)
 
 
-def _count_needs(specs: Sequence[LocatedSpec], solid: Polyhedron | None) -> tuple[int | None, int]:
-    """Return how many cells the objects need, None if one does not fit, and their blank faces."""
-    known: dict[str, tuple[int, int]] = {}
-    needed = blank = 0
+def _count_needs(
+    specs: Sequence[LocatedSpec], solid: Polyhedron | None
+) -> tuple[int | None, int, tuple[Layout, ...]]:
+    """Return how many cells the objects need, None if one does not fit, and their blank faces.
+
+    With the layout of each, on the empty array.
+    """
+    known: dict[str, tuple[int, int, Layout]] = {}
+    found = []
     for one in specs:
         key = repr(one.spec.meaning)
         if key not in known:
@@ -247,10 +253,11 @@ def _count_needs(specs: Sequence[LocatedSpec], solid: Polyhedron | None) -> tupl
             except LayoutError as error:
                 if "is full" not in error.cause:
                     raise error_at(one, error, "shape") from error
-                return None, 0
-            known[key] = _counts(plan, layout)
-        needed, blank = needed + known[key][0], blank + known[key][1]
-    return needed, blank
+                return None, 0, ()
+            known[key] = (*_counts(plan, layout), layout)
+        found.append(known[key])
+    cells, blank, layouts = zip(*found, strict=True)
+    return sum(cells), sum(blank), layouts
 
 
 def _counts(plan: ObjectPlan, layout: Layout) -> tuple[int, int]:

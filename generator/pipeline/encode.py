@@ -22,13 +22,19 @@ from generator.database.cells import occupancy
 from generator.database.lab import lab_key as stored_lab_key
 from generator.database.open import open_database, open_if_there
 from generator.database.transaction import read_transaction
+from generator.layout.placement import Layout
 from generator.pipeline.choose import Choice, choose_array
 from generator.pipeline.faces import face_reports
 from generator.pipeline.files import parts_of
 from generator.pipeline.lab import lab_of
 from generator.pipeline.made import Encoded, MadeObject, describe_object
 from generator.pipeline.make import Order, Rehearsal, make_under_lock
-from generator.pipeline.place import occupancy_of, occupancy_with, place_object
+from generator.pipeline.place import (
+    ObjectPlacement,
+    occupancy_of,
+    occupancy_with,
+    place_object,
+)
 from generator.pipeline.plan import ObjectPlan, plan_object
 from generator.pipeline.progress import Progress, no_progress, part_of_progress
 from generator.polyhedron import Polyhedron
@@ -163,25 +169,28 @@ def plan_in_lab(
         plans = plan_all(choice)
         if engine is not None or not make:
             return engine, plans, None
-        rehearsal = _rehearse_first(plans)
+        rehearsal = _rehearse_first(plans, choice.alone)
         engine = open_database(url, lab_key=lab.key)
         with read_transaction(engine) as connection:
             if stored_lab_key(connection) == lab.key:
                 return engine, plans, rehearsal
 
 
-def _rehearse_first(plans: Sequence[ObjectPlan]) -> Rehearsal | None:
+def _rehearse_first(plans: Sequence[ObjectPlan], alone: Sequence[Layout]) -> Rehearsal | None:
     """Lay out and build one of each kind, so that what is refused leaves no empty database.
 
     Where they fill more than half of the array, places are found for all. What was built of a
-    single object is returned.
+    single object is returned. `alone`: their layouts, where the choice of the array needed them.
     """
     kinds: dict[str, int] = {}
     needed = 0
-    for plan in plans:
+    for number, plan in enumerate(plans):
         kind = json.dumps(plan.meaning, sort_keys=True, default=str)
         if kind not in kinds:
-            place = place_object(None, plan, replace=False)
+            if alone:
+                place = ObjectPlacement(alone[number], taken=0, reused=False, replaces=False)
+            else:
+                place = place_object(None, plan, replace=False)
             rehearsal = Rehearsal(place, parts_of(plan, place.layout))
             kinds[kind] = sum(len(face.labels) for face in place.layout.faces)
         needed += kinds[kind]

@@ -12,7 +12,8 @@ from generator.database import engine
 from generator.database import open as open_module
 from generator.database.open import open_if_there
 from generator.database.transaction import read_transaction
-from generator.pipeline import encode
+from generator.layout.layout import lay_out
+from generator.pipeline import encode, place
 from generator.pipeline.choose import choose_array
 from generator.pipeline.lab import lab_of
 from generator.pipeline.plan import plan_object
@@ -187,3 +188,20 @@ def test_a_set_too_large_for_the_profile_it_names_is_told_of_auto(tmp_path):
     with pytest.raises(SpecError, match="array 63x65 is full") as caught:
         dry(tmp_path, "name: A\nshape: {cube: 60 mm}\ncopies: 12\nprofile: one-touch\n")
     assert "set profile: auto" in caught.value.problems[0].fix
+
+
+@pytest.mark.parametrize("copies", [1, 3])
+def test_a_new_lab_lays_its_first_objects_out_once(tmp_path, monkeypatch, copies):
+    """The choice of the array, the rehearsal and, of one object, the making share the layout."""
+    shapes = []
+
+    def counted(polyhedron, array, *rest, **more):
+        shapes.append(array)
+        return lay_out(polyhedron, array, *rest, **more)
+
+    monkeypatch.setattr(place, "lay_out", counted)
+    spec = tmp_path / "a.yaml"
+    spec.write_text(f"{{name: A, shape: {{cube: 40 mm}}, copies: {copies}}}")
+    url = f"sqlite:///{tmp_path / 'lab.db'}"
+    encode(read_specs([spec], database=url), folder=tmp_path, formats=(), jobs=1)
+    assert len(shapes) == (1 if copies == 1 else 1 + copies)
