@@ -46,14 +46,17 @@ class FeltArea:
         """Return how much of the sensor lies on something."""
         return float(self.loaded.mean())
 
-    def expected(self, points_mm: Array) -> Array:
-        """Return 0 ... 1, how much a face is expected at points (..., 2)."""
+    def look(self, points_mm: Array) -> tuple[Array, Flags]:
+        """Return how much a face is expected at points (..., 2), 0 ... 1, and which were seen."""
         seen, felt = self._felt(points_mm)
-        half = np.array(self.sensor.half_mm)
-        away = np.linalg.norm(np.maximum(np.abs(points_mm) - half, 0.0), axis=-1)
-        inside = np.clip(points_mm, -0.999 * half, 0.999 * half)
-        rim = self.loaded[_tactels(self.sensor, inside)] * np.exp(-away / self.beyond_mm)
-        return np.asarray(np.where(seen, felt, rim))
+        half, beyond = np.array(self.sensor.half_mm), points_mm[~seen]
+        away = np.linalg.norm(np.maximum(np.abs(beyond) - half, 0.0), axis=-1)
+        inside = np.clip(beyond, -0.999 * half, 0.999 * half)
+        expected = felt.astype(np.float64)
+        expected[~seen] = self.loaded[_tactels(self.sensor, inside)] * np.exp(
+            -away / self.beyond_mm
+        )
+        return expected, seen
 
     def felt(self, points_mm: Array) -> Flags:
         """Return where among points (..., 2) a face was felt."""
@@ -65,9 +68,10 @@ class FeltArea:
 
     def _felt(self, points_mm: Array) -> tuple[Flags, Flags]:
         half = np.array(self.sensor.half_mm)
-        seen = np.zeros(points_mm.shape[:-1], np.bool_)
-        felt = np.zeros(points_mm.shape[:-1], np.bool_)
-        for (x, y, turn), loaded in ((np.zeros(3), self.loaded), *self.earlier):
+        seen = np.asarray((np.abs(points_mm) < half).all(axis=-1))
+        felt = np.zeros(seen.shape, np.bool_)
+        felt[seen] = self.loaded[_tactels(self.sensor, points_mm[seen])]
+        for (x, y, turn), loaded in self.earlier:
             c, s = math.cos(turn), math.sin(turn)
             own = (points_mm - (x, y)) @ np.array([[c, -s], [s, c]])
             under = (np.abs(own) < half).all(axis=-1)

@@ -142,8 +142,8 @@ def _symbols_by_image(
     y = steps[:, 1, None] + s * grid[:, 0] + c * grid[:, 1]
     points = np.stack([x, y], axis=-1)
     cells = 4 * half[0] * half[1] / pitch_mm**2
-    new = settings.novelty * ~area.seen(points)
-    worth = cells * (area.expected(points) * (1 + new)).mean(axis=1)
+    expected, seen = area.look(points)
+    worth = cells * (expected * (1 + settings.novelty * ~seen)).mean(axis=1)
     around = settings.clear_mm * np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)])
     return worth, np.asarray(area.felt(steps[:, None, :2] + around).all(axis=1))
 

@@ -137,8 +137,13 @@ def _scores_of(bank: Bank, seen: bytes, order: int, _kernels: str) -> tuple[Floa
     scores = lattice_scores(bank, values, weights, order)
     turns, n = len(bank.rotations_rad), math.isqrt(scores.shape[1])
     most = scores.reshape(turns, n, n)
-    for axis in range(3):
-        most = np.maximum(most, np.maximum(np.roll(most, 1, axis), np.roll(most, -1, axis)))
+    for axis in range(3):  # all three go round
+        one = np.moveaxis(most, axis, 0)
+        line = one.copy()
+        np.maximum(line[1:], one[:-1], out=line[1:])
+        np.maximum(line[:-1], one[1:], out=line[:-1])
+        line[0], line[-1] = np.maximum(line[0], one[-1]), np.maximum(line[-1], one[0])
+        most = np.moveaxis(line, 0, axis)
     return scores, most
 
 
