@@ -74,7 +74,9 @@ class PrintedFace:
     """A flat face of a part, and what is known of how it was printed."""
 
     as_built: AsBuilt
-    T_part_face: Array  #: (4, 4), mm
+    #: (4, 4), mm, but with the origin where a print keeps its place: places on a face are counted
+    #: from the middle of its printed symbols, which backlash and layers move with the whole face
+    T_part_face: Array
 
     def pose(
         self, T_face_probe: Array, covariance: Array, felt: FeltScale | None = None

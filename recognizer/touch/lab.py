@@ -243,8 +243,9 @@ def _encoded_faces(
             if part is not None:
                 T_part_face = np.linalg.inv(part.T_object_part) @ face.T_object_face
                 known = print_of(prints, part.name, printer_of(found))
-            at = _about_middle(face.polygon_mm[0]) if T_part_face is None else T_part_face
-            printed = PrintedFace(known or usual_print(), at)
+            printed = PrintedFace(
+                known or usual_print(), _about_symbols(T_part_face, layout.centres_mm)
+            )
         yield (
             layout.face,
             EncodedFace(
@@ -265,11 +266,20 @@ def _encoded_faces(
         )
 
 
-def _about_middle(outline_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return T_part_face (4, 4) of a face that is a part of its own, printed as it lies."""
-    T_part_face = np.eye(4)
-    T_part_face[:2, 3] = -(outline_mm.min(axis=0) + outline_mm.max(axis=0)) / 2
-    return T_part_face
+def _about_symbols(
+    T_part_face: NDArray[np.float64] | None, centres_mm: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return T_part_face (4, 4) with the origin in the middle of the face's symbols (n, 2).
+
+    Places on a printed face are counted from there (`docs/printed.md`). A face of no registered
+    part is taken to be one of its own, printed as it lies.
+    """
+    about = np.eye(4)
+    if T_part_face is not None:
+        about[:3, :3] = T_part_face[:3, :3]
+    if len(centres_mm):
+        about[:3, 3] = -about[:3, :2] @ centres_mm.mean(axis=0)
+    return about
 
 
 def part_with(found: RegisteredObject, face: str) -> RegisteredPart | None:

@@ -299,6 +299,27 @@ def test_a_place_that_fits_nearly_as_well_is_found_wherever_it_is(reader, other)
     assert all((p.row, p.column) != (place.row, place.column) for p in found)
 
 
+def test_a_print_keeps_the_middle_of_its_symbols(reader):
+    """On a triangle that is 4 mm and more from the middle of its box, whatever its part's frame."""
+    for number in range(len(reader.lab.arrays[0].faces)):
+        face = reader.lab.arrays[0].face(number)
+        about, middle = face.printed.T_part_face, face.centres_mm.mean(axis=0)
+        np.testing.assert_allclose(about @ [*middle, 0.0, 1.0], [0, 0, 0, 1], atol=1e-9)
+        if face.T_part_face is not None:
+            np.testing.assert_array_equal(about[:3, :3], face.T_part_face[:3, :3])
+        outline = face.polygon_mm[0]
+        box = (outline.min(axis=0) + outline.max(axis=0)) / 2
+        assert (np.linalg.norm(box - middle) > 4.0) == (face.object == "Tetra")
+        pose = np.eye(4)
+        pose[:2, 3] = middle
+        tenth = replace(face.printed.as_built, scale_x=0.9, scale_y=0.9)
+        at, _ = replace(face.printed, as_built=tenth).pose(pose, np.eye(3))
+        assert at[:2, 3] == pytest.approx(middle)
+        pose[0, 3] += 10.0
+        at, _ = replace(face.printed, as_built=tenth).pose(pose, np.eye(3))
+        assert at[:2, 3] == pytest.approx(middle + np.array([9.0, 0.0]))
+
+
 def touches_at_the_rim(url, reader):
     """Clean touches ever nearer to an edge and a corner: recognition and what was judged."""
     for x, y in [(6.0, 30.0), (3.0, 30.0), (0.5, 30.0), (6.0, 6.0), (3.0, 5.0), (2.0, 1.0)]:
