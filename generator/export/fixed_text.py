@@ -177,20 +177,18 @@ def number_lines(
         sizes = sizes.astype(np.uint32)
     whole = max(len(str(largest)) - places, 1)
     field = 1 + whole + (1 + places if places else 0)
-    block = np.empty((sum(map(len, words)) + field * len(scaled), len(rows)), np.uint8)
+    line = ("\0" * field).join(words).encode("ascii")
+    block = np.empty((len(rows), len(line)), np.uint8)
+    block[:] = np.frombuffer(line, np.uint8)
+    text = np.empty((field, len(rows)), np.uint8)
     at = 0
     for word, numbers, size in zip(words[:-1], scaled, sizes, strict=True):
-        _put_word(block, at, word)
         at += len(word)
-        _put_digits(block[at + 1 : at + field], size, places)
-        block[at] = _MINUS * (numbers < 0)
+        _put_digits(text[1:], size, places)
+        text[0] = _MINUS * (numbers < 0)
+        block[:, at : at + field] = text.T
         at += field
-    _put_word(block, at, words[-1])
-    return np.ascontiguousarray(block.T).tobytes().translate(None, b"\0")
-
-
-def _put_word(block: Bytes, at: int, word: str) -> None:
-    block[at : at + len(word)] = np.frombuffer(word.encode("ascii"), np.uint8)[:, None]
+    return block.tobytes().translate(None, b"\0")
 
 
 def _put_digits(field: Bytes, rest: NDArray[np.unsignedinteger | np.int64], places: int) -> None:

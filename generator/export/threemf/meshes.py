@@ -19,7 +19,7 @@ from generator.solid.triangulate import Mesh, body_mesh, symbol_meshes
 
 PLACES = 6  #: decimals of a coordinate in mm
 BODY, SYMBOLS = 0, 1  #: materials
-_BLOCK = 2_048  # vertices or triangles formatted at once: their text stays in the cache
+_BLOCK = 8_192  # vertices or triangles formatted at once: their text stays in the cache
 
 
 @dataclass(frozen=True, slots=True)
