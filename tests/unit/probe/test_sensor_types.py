@@ -251,6 +251,6 @@ def test_a_type_is_pressed_as_hard_for_its_area_and_a_gel_as_deep():
     assert force_share(stiff) == 1.0
     gel = sensor_type_named("gel-24x32")
     area, bed = 18.56 * 13.92, 0.3 / 3.0  # mm^2; N/mm^3
-    assert 80 * force_share(gel) == pytest.approx(0.2 * bed * area)
+    assert 80 * force_share(gel) == pytest.approx(0.3 * bed * area)
     soft = replace(gel, overlay=replace(gel.overlay, young_mpa=0.15))
     assert force_share(soft) == pytest.approx(force_share(gel) / 2)
