@@ -307,9 +307,9 @@ static void score(const Scene *s, Work *w, double noise) {
     }
 }
 
-/* The score of one symbol at a tactel as the reference rounds it, under the usual noise. */
-static double score_rounded(const Scene *s, const Work *w, const double *pose, int64_t t,
-                            int64_t k) {
+/* The score of one symbol at a tactel as the reference rounds it. */
+static double score_rounded(const Scene *s, const Work *w, const double *pose, double noise,
+                            int64_t t, int64_t k) {
     const float *from = s->rimmed + (w->place[t] * s->q + k) * FIELDS, log4 = (float)LOG4;
     const float quiet = (float)(s->quiet * s->quiet), aside = (float)(s->displaced * s->displaced);
     float hold = (float)w->contact[t], face = (float)w->bare[t], by = 1.0f;
@@ -325,7 +325,7 @@ static double score_rounded(const Scene *s, const Work *w, const double *pose, i
     }
     float x = from[1] * hold * by, y = from[2] * hold * by;
     float square = quiet + v * v + aside * (x * x + y * y), wide = sqrtf(square);
-    double unit = s->first / larger(w->press[t], 1e-3);
+    double unit = noise / larger(w->press[t], 1e-3);
     if (w->is_loud) {
         float change = (float)(3.0 / LOG4) * expf((float)-LOG4 * v);
         double share = change * (s->noise / w->plateau[t]) / unit;
@@ -348,7 +348,7 @@ static int64_t largest(const Scene *s, const Work *w, const double *pose, int64_
     for (int64_t c = 0; c < s->q; c++) {
         sum[c] = 0.0;
         for (int64_t t = 0; t < s->n; t++)
-            if (w->labels[t] == cell) sum[c] += score_rounded(s, w, pose, t, c);
+            if (w->labels[t] == cell) sum[c] += score_rounded(s, w, pose, s->first, t, c);
     }
     best = 0;
     for (int64_t c = 1; c <= s->q; c++) if (sum[c] > sum[best]) best = c;
@@ -639,8 +639,8 @@ void refine(const Scene *s, int64_t steps, int64_t told, const int8_t *given, co
 
 /* Sums over the cells of one candidate, columns and then rows rising: names (m, 2), scores
    (m, q + 1), tactels that look at them by how hard they press (m,). Returns m. */
-static int64_t sum_cells(const Scene *s, const Work *w, int64_t *names, double *scores,
-                         double *seen) {
+static int64_t sum_cells(const Scene *s, const Work *w, const double *pose, double noise,
+                         int64_t *names, double *scores, double *seen) {
     int64_t known = 0, wide = s->q + 1;
     for (int64_t t = 0; t < s->n; t++) {
         const int64_t *cell = w->cells + 2 * t;
@@ -659,6 +659,17 @@ static int64_t sum_cells(const Scene *s, const Work *w, int64_t *names, double *
         for (int64_t c = 0; c < s->q; c++) scores[wide * k + c] += w->scores[c * s->n + t];
         scores[wide * k + s->q] += w->none[t];
         seen[k] += w->press[t] * s->trust[t];
+    }
+    for (int64_t k = 0; k < known; k++) { /* whether a symbol is worn is told from none */
+        double *sum = scores + wide * k;
+        int near = 0;
+        for (int64_t c = 0; c < s->q; c++) near |= fabs(sum[c] - sum[s->q]) * NEAR_TIES < 1.0;
+        for (int64_t c = 0; c < s->q && near; c++) {
+            sum[c] = 0.0;
+            for (int64_t t = 0; t < s->n; t++)
+                if (w->cells[2 * t] == names[2 * k] && w->cells[2 * t + 1] == names[2 * k + 1])
+                    sum[c] += score_rounded(s, w, pose, noise, t, c);
+        }
     }
     return known;
 }
@@ -693,8 +704,8 @@ double score_cells(const Scene *s, int64_t best, double least, double *pose, dou
         }
         if (k == 0) noise = larger(least, sqrt(sum / whole));
         score(s, &w, noise);
-        count[i] = sum_cells(s, &w, names + 2 * i * s->n, scores + i * s->n * (s->q + 1),
-                             seen + i * s->n);
+        count[i] = sum_cells(s, &w, pose + 7 * i, noise, names + 2 * i * s->n,
+                             scores + i * s->n * (s->q + 1), seen + i * s->n);
     }
     free_work(&w);
     return noise;

@@ -158,6 +158,20 @@ def test_cells_seen_by_their_rim_alone_show_what_the_reference_says(use):
     assert away.max() < 1e-5  # a label of one tactel that differs: 1e-3
 
 
+def test_whether_a_symbol_is_worn_is_what_the_reference_says(use):
+    image, template, gain = over_a_corner(scene(tilt=0.6))
+    pose = np.zeros((60, 7))
+    pose[:, :3] = np.random.default_rng(5).random((60, 3)) * [5.0, 5.0, 6.3]
+    use("numpy")
+    lattices = refine_lattices(image, template, pose, np.repeat(gain, 60, axis=0), steps=0)
+    worn = []
+    for kind in ("numpy", "compiled"):
+        use(kind)
+        fits = score_cells(image, template, lattices)
+        worn.append([(fit.scores[:, :-1] < fit.scores[:, -1:]).tolist() for fit in fits])
+    assert worn[0] == worn[1]  # seen by their rim alone, symbols lie 1e-8 from none
+
+
 def test_what_is_missing_is_said(tmp_path, monkeypatch):
     monkeypatch.delenv(compiled.CHOICE, raising=False)
     monkeypatch.setattr(compiled, "FILE", tmp_path / "kernels.so")
