@@ -43,10 +43,11 @@ SHIPPED = Path(__file__).parents[2] / "generator" / "layout" / "answers_of_types
 def touches_of(folder: Path, sensor: SensorSize) -> Array:
     """Return (N, 3) of a type's touches: the usual sensor's probability, loaded share, right."""
     files = sorted(folder.glob("own-*/shards/touches/*.parquet"))
-    rows = pa.concat_tables([pq.read_table(file) for file in files]).to_pylist() if files else []
-    engine = open_if_there(f"sqlite:///{folder / 'lab.db'}", writable=False)
-    if engine is None:
+    if not files:
         return np.empty((0, 3))
+    rows = pa.concat_tables([pq.read_table(file) for file in files]).to_pylist()
+    engine = open_if_there(f"sqlite:///{folder / 'lab.db'}", writable=False)
+    assert engine is not None, f"{folder}: touches of a lab that is not there"
     with read_transaction(engine) as connection:
         held = {n: read_object(connection, n) for n in {r["object"] for r in rows} - {""}}
     return np.array([
