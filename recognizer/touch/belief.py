@@ -135,7 +135,7 @@ def weigh_cells(
     order = embossed.array.order
     held = labels_at(embossed, hypothesis, fit.cells)
     own = fit.scores[np.arange(len(held)), held]
-    worn = np.asarray((held < order) & (fit.scores[:, order] > own))
+    worn = np.asarray((held < order) & (fit.scores[:, order] > own + settings.tie))
     seen = np.asarray(fit.seen >= settings.whole)
     against = np.where(worn, 0.0, fit.scores[:, :order].max(axis=1) - own)
     tells = own > _marginal(fit) - math.log(2.0)

@@ -80,6 +80,7 @@ class NoiseSettings:
     hidden: float = 0.5  #: most of an image's variance that is taken for that noise
     above: float = 0.5  #: share of it that is seen where nothing is felt: no force is negative
     far: float = 4.0  #: deviations beyond which a tactel neither pulls nor counts as noise
+    grazed: float = 1e-6  #: psi up to which nothing is felt: what rounding leaves of none
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,8 +37,8 @@ UNKNOWNS = len(DEFAULTS.refine.least)  #: pose (7,) and gain (4,)
 _WHOLE = ("b", "n", "q", "size", "hardens", "falls", "high", "wide")
 _REAL = (
     "symbol", "deepest", "pitch", "half", "step", "noise", "least_gain", "full_press",
-    "least_press", "steepest", "quiet", "displaced", "loud", "most", "first", "far", "damping",
-    "easier", "harder", "settled", "shallower", "deepest_gain",
+    "least_press", "steepest", "quiet", "displaced", "loud", "most", "first", "far", "grazed",
+    "damping", "easier", "harder", "settled", "shallower", "deepest_gain",
 )  # fmt: skip
 _ROWS = {
     "least": UNKNOWNS, "largest": UNKNOWNS, "limits": len(DEFAULTS.refine.limits),
@@ -272,8 +272,8 @@ def _scene_of(
         half=template.half_mm, step=template.step_mm, noise=image.noise,
         least_gain=gain.least_gain, full_press=gain.full_press, least_press=gain.least_press,
         steepest=gain.steepest, quiet=noise.quiet, displaced=noise.displaced_mm, loud=noise.loud,
-        most=noise.most, first=noise.first, far=noise.far, damping=refine.damping,
-        easier=refine.easier, harder=refine.harder, settled=refine.settled,
+        most=noise.most, first=noise.first, far=noise.far, grazed=noise.grazed,
+        damping=refine.damping, easier=refine.easier, harder=refine.harder, settled=refine.settled,
         shallower=refine.shallower, deepest_gain=refine.deepest, least=refine.least,
         largest=refine.step, limits=refine.limits, precision=tuple(precision.tolist()),
         usual_scale=math.log(pressing.scale) if image.newtons else 0.0,

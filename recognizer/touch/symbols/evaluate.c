@@ -21,7 +21,7 @@ typedef struct {
     double pitch, half, step;   /* ResponseTemplate, mm */
     double noise;               /* of the readings */
     double least_gain, full_press, least_press, steepest;       /* GainSettings */
-    double quiet, displaced, loud, most, first, far;            /* NoiseSettings */
+    double quiet, displaced, loud, most, first, far, grazed;    /* NoiseSettings */
     double damping, easier, harder, settled, shallower, deepest_gain; /* RefineSettings */
     double least[UNKNOWNS], largest[UNKNOWNS], limits[4];
     double precision[UNKNOWNS], usual_scale;    /* what is known beforehand; log of the scale */
@@ -429,7 +429,7 @@ static void press_shown(const Scene *s, Work *w, const double *pose, const doubl
     for (int64_t t = 0; t < n; t++) {
         double total = (by[t] - 1.0) / 3.0, bare = w->bare[t], depth = w->depth[t];
         double symbol = smaller(larger((total - bare) / larger(1 - bare, 1e-3), 0.0), 1.5);
-        double rest = v[t] > 0 ? 1 - symbol : 0.0;
+        double rest = v[t] > s->grazed ? 1 - symbol : 0.0;
         double force = scale * (symbol * w->plain[t] + rest * w->lower[t]);
         double slope = symbol * slope_of(s, depth) + rest * slope_of(s, depth - s->symbol);
         w->force[t] = rows[7 * wide + t] = force;

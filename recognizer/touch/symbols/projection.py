@@ -115,7 +115,7 @@ def explained_share(
     mean = (trust * seen).sum() / max(trust.sum(), 1e-12)
     whole = float((trust * (seen - mean) ** 2).sum())
     left = float((trust * (seen - values) ** 2).sum())
-    above = np.where(values > 0, 1.0, settings.above)
+    above = np.where(values > settings.grazed, 1.0, settings.above)
     noise_alone = min(float((trust * above * noise**2).sum()), settings.hidden * whole, left)
     return 1.0 - (left - noise_alone) / max(whole - noise_alone, 1e-12)
 

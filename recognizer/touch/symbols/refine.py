@@ -185,7 +185,8 @@ def force_jacobian(
     total = response_of(values[..., 0])
     by_pose = by_pose * (response_by_psi(total) * felt.plateau)[..., None]
     symbol = np.clip((total - felt.bare) / np.maximum(1 - felt.bare, 1e-3), 0.0, 1.5)
-    rest = np.where(total > 0, 1 - symbol, 0.0)  # beyond the edge of the face there is none
+    # beyond the edge of the face there is none
+    rest = np.where(values[..., 0] > image.settings.noise.grazed, 1 - symbol, 0.0)
     unit = np.exp(gain[:, :1])
     lower = felt.depth - pressing.symbol
     force = unit * (symbol * felt.plain + rest * felt.lower)

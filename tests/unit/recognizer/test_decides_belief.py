@@ -73,6 +73,9 @@ def one_cell(small, scores, seen=20.0, held=2, order=4):
         ([-2, -9, -3, -9, 0], 20, 2, (True, True, False, 0.0)),
         ([-9, -9, 0, -9, 0], 20, 2, (False, True, False, 0.0)),
         ([-1000, -1000, 0, -1000, 0], 20, 2, (False, True, False, 0.0)),  # as likely as all else
+        # but not where rounding alone tells the two apart
+        ([-9, -9, 0, -9, 0.9e-4], 20, 2, (False, True, False, 0.0)),
+        ([-9, -9, 0, -9, 1.1e-4], 20, 2, (True, True, False, 0.0)),
         # another symbol is likelier
         ([0, -9, -4.5, -9, -9], 20, 2, (False, True, False, 4.5)),
         ([0, -9, -4.5, -9, -4.4], 20, 2, (True, True, False, 0.0)),

@@ -68,6 +68,17 @@ def away(found):
     return np.append(pose, found.pose[6])
 
 
+@pytest.mark.parametrize(("value", "presses"), [(0.0, False), (9e-7, False), (1.1e-6, True)])
+def test_what_rounding_leaves_of_no_symbol_presses_nothing(template, touch, value, presses):
+    image = touch()
+    under = project_template(image, template, TRUE[None], GAIN[None])
+    values = np.zeros_like(values_of(under, shown(under.cells)))
+    values[0, 100, 0] = value
+    force = force_jacobian(image, TRUE[None], GAIN[None], values, under.felt)[1][0]
+    assert bool(force[100] > 1e-3) is presses
+    assert not np.delete(force, 100).any()
+
+
 @pytest.mark.parametrize(("aside_mm", "gain"), [(0.03, 0.05), (0.08, 0.12), (0.2, 0.05)])
 def test_errors_are_as_large_as_the_covariance_says(template, touch, aside_mm, gain):
     squares, felt = [], []
