@@ -5,8 +5,10 @@
     python tests/campaigns/other_labs.py -o out/labs --touches 0 --own 0  # the table
 
 Touches are read as `Reader` does but without its limit of doubt, and doubt and margin of each are
-kept, so that the table says how many would be accepted at any limit: of other labs' parts, where
-every answer is wrong, and of the lab's own. What is there is kept, and an interrupted run goes on.
+kept, so that the table says how many would be accepted at any limit by their symbols alone: of
+other labs' parts, where every answer is wrong, and of the lab's own. What is answered so is read
+again by the reader as it is, which counts borders, too (`recognizer.touch.chance`): "accepted".
+What is there is kept, and an interrupted run goes on.
 """
 
 from __future__ import annotations
@@ -116,6 +118,7 @@ def touch_labs(
 ) -> Iterator[dict[str, Any]]:
     """Yield what became of touches of labs' parts; each is drawn from seed and number alone."""
     makers = [Reader(open_lab(lab)) for lab in labs]
+    usual = Reader(reader.lab)
     for number in numbers:
         rng = np.random.default_rng([seed, number, 8])
         lab = int(rng.integers(len(labs)))
@@ -123,6 +126,7 @@ def touch_labs(
         plan = TouchPlan(labs[lab], seed, level, kind)
         drawn = draw_touch(plan, number, makers[lab])
         answer, _ = recognise_with_rivals(reader, reader.signal(drawn.counts), number)
+        accepted = bool(answer) and bool(usual.read(drawn.counts, seq=number))
         if not registered:  # every answer is wrong
             drawn = replace(drawn, scene=None)
         yield {
@@ -130,7 +134,7 @@ def touch_labs(
             "verdict": judge(plan, number, drawn, answer, 0.0).verdict,
             "answer": f"{answer.object}/{answer.face}" if answer else "",
             "reason": answer.reason, "doubt": answer.doubt if answer else None,
-            "margin": answer.margin,
+            "margin": answer.margin, "accepted": accepted,
         }  # fmt: skip
 
 
@@ -141,13 +145,16 @@ def _choose(rng: np.random.Generator, shares: tuple[tuple[str, float], ...]) -> 
 
 def table(rows: list[dict[str, Any]]) -> None:
     """Print how many touches are accepted at each limit, by kind, and why others are not."""
-    print("| touches of | number | " + " | ".join(f"accepted at {x:g}" for x in LIMITS) + " |")
-    print("| --- " * (2 + len(LIMITS)) + "|")
+    print(
+        "| touches of | number | " + " | ".join(f"doubt <= {x:g}" for x in LIMITS) + " | accepted |"
+    )
+    print("| --- " * (3 + len(LIMITS)) + "|")
     for kind in ("all", *(kind for kind, _ in KINDS)):
         some = [row for row in rows if kind in ("all", row["kind"])]
         doubts = [row["doubt"] for row in some if row["answer"]]
         counts = " | ".join(str(sum(doubt <= limit for doubt in doubts)) for limit in LIMITS)
-        print(f"| {kind} | {len(some)} | {counts} |")
+        accepted = sum(row["accepted"] for row in some)
+        print(f"| {kind} | {len(some)} | {counts} | {accepted} |")
     reasons = [row["reason"] for row in rows if row["reason"]]
     print({reason: reasons.count(reason) for reason in sorted(set(reasons))})
     for row in rows:
