@@ -46,7 +46,7 @@ def test_a_bracket_of_narrow_legs_is_not_readable_and_says_so():
     assert by_name["F6"].place == "the 12 x 48 mm face at x = 12"
     for name in ("F1", "F3", "F5", "F6", "F8"):
         assert by_name[name].promise.one_row
-        assert by_name[name].promise.at_once < PROMISE.nothing
+        assert by_name[name].promise.at_once < 0.25
     assert by_name["F4"].symbols == 0
     assert by_name["F4"].promise.at_once == 0.0
     text = "\n".join(promise_lines(faces))
@@ -58,10 +58,10 @@ def test_a_bracket_of_narrow_legs_is_not_readable_and_says_so():
 
 
 def test_what_would_help_does_help():
-    narrow = reports("name: Bar\nshape: {box: [80 mm, 40 mm, 17 mm]}\n")
-    (face, *_) = [f for f in narrow if sorted(f.size_mm) == pytest.approx([17, 80])]
+    narrow = reports("name: Bar\nshape: {box: [80 mm, 40 mm, 14 mm]}\n")
+    (face, *_) = [f for f in narrow if sorted(f.size_mm) == pytest.approx([14, 80])]
     assert face.promise.at_once < PROMISE.low
-    width = float(face.promise.remedy.split(" mm wide instead of 17")[0])
+    width = float(face.promise.remedy.split(" mm wide instead of 14")[0])
     wide = reports(f"name: Bar\nshape: {{box: [80 mm, 40 mm, {width} mm]}}\n")
     (again, *_) = [f for f in wide if sorted(f.size_mm) == pytest.approx([width, 80])]
     assert again.promise.at_once > PROMISE.low - 0.03
@@ -70,17 +70,17 @@ def test_what_would_help_does_help():
 
 def test_a_large_cube_promises_more_than_a_small_one_and_names_no_face():
     shares = []
-    for side in (28, 60, 200):
+    for side in (20, 60, 200):
         faces = reports(f"name: Cube\nshape: {{cube: {side} mm}}\n", "auto")
         promised = [face.promise for face in faces]
         assert len(promised) == 6
         shares.append(promised[0].at_once)
-        if side > 28:
+        if side > 20:
             (line,) = promise_lines(faces)
             assert line.startswith(f"  {shares[-1]:.0%} of touches".replace("%", " %"))
             assert line.endswith(" of touches are answered at once, over 99 % within three")
             assert promised[0].within_three > 0.99
-    assert shares[0] < 0.8 < shares[1] < 0.9 < shares[2] < 1
+    assert shares[0] < 0.7 < shares[1] < 0.95 < shares[2] < 1
 
 
 def bracket(leg_mm):
