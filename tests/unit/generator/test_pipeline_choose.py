@@ -203,5 +203,5 @@ def test_a_new_lab_lays_its_first_objects_out_once(tmp_path, monkeypatch, copies
     spec = tmp_path / "a.yaml"
     spec.write_text(f"{{name: A, shape: {{cube: 40 mm}}, copies: {copies}}}")
     url = f"sqlite:///{tmp_path / 'lab.db'}"
-    encode(read_specs([spec], database=url), folder=tmp_path, formats=(), jobs=1)
+    encode(read_specs([spec]), database=url, folder=tmp_path, formats=(), jobs=1)
     assert len(shapes) == (1 if copies == 1 else 1 + copies)
