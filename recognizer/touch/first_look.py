@@ -3,10 +3,11 @@
 Signal -> whether there are strokes under the sensor: beside them it hangs over the bare face, so
 that within a pitch of the strongest readings lie weak ones. A blank plate presses evenly.
 
-Signal and what the first try found -> whether a wider search can change the answer. It cannot where
-symbols explain the image and are so few that they stand elsewhere as well, where fewer tactels are
-pressed than the symbols would press that it takes to name a place, and where the image speaks for
-symbols of no registered place. Thesis 6.3.
+Signal and what the first try found -> whether a wider search can change the answer. It hardly can
+where the first try is sure; where symbols explain the image and are so few that they stand
+elsewhere as well; where fewer tactels are pressed than the symbols would press that it takes to
+name a place; where the image speaks for symbols of no registered place; and where symbols of a
+place are plainly there and most of the image is something else. Thesis 6.3.
 """
 
 from __future__ import annotations
@@ -15,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.touch.around import quantile
-from recognizer.touch.belief import VerifiedHypothesis, null_log_likelihood, symbols_to_name
+from recognizer.touch.belief import Support, VerifiedHypothesis, symbols_to_name
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.prepare import PreparedLab
-from recognizer.touch.recognition import AMBIGUOUS, Recognition
+from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, TOO_FEW, Recognition
 from recognizer.touch.settings import FirstLookSettings
 from recognizer.touch.signal import Signal
 
@@ -56,27 +57,51 @@ def may_tell_more(
     reader: PreparedLab,
     signal: Signal,
     answer: Recognition,
+    judged: Recognition,
     best: VerifiedHypothesis | None,
-    inliers: int,
+    support: Support | None,
 ) -> bool:
     """Return whether a wide search may find what the first try has not.
 
     Parameters
     ----------
-    answer, best, inliers
-        Of the first try: what it says, the hypothesis that was judged (None: there was none) and
-        how many of its cells speak for it.
+    answer, judged
+        What the first try says; the same, or refused because few symbols say it.
+    best, support
+        The hypothesis that was judged, and what speaks for it; None: there was none.
     """
-    settings, arrays = reader.settings.first_look, reader.lab.arrays
-    if answer or best is None or reader.sensor.overlay.kind != "tab":
+    arrays, belief = reader.lab.arrays, reader.settings.belief
+    if best is None or support is None:
         return True
-    if any(each.radii_mm for each in arrays):
-        return True  # on a round face few tactels are pressed
-    if answer.reason == AMBIGUOUS and inliers < symbols_to_name(best.embossed):
+    if answer and support.inliers >= belief.many_inliers:
+        return False
+    if reader.sensor.overlay.kind != "tab" or any(each.radii_mm for each in arrays):
+        return True  # what few symbols say is confirmed; on a round face few tactels are pressed
+    if answer:
+        return not judged and _is_nearly_sure(judged, reader.settings.first_look)
+    if answer.reason == AMBIGUOUS and support.inliers < symbols_to_name(best.embossed):
         return False  # the image is explained, and it shows no more
-    least = min(_tactels_to_name(reader, each, settings) for each in arrays)
-    surprise = best.score - null_log_likelihood(best.embossed, best.fit)
-    return pressed_tactels(signal, settings) >= least and surprise >= settings.foreign
+    if answer.reason == TOO_FEW:
+        return False
+    return _is_unexplained(reader, signal, support)
+
+
+def _is_nearly_sure(judged: Recognition, settings: FirstLookSettings) -> bool:
+    """Return whether little is missing to the answer that few symbols give."""
+    if judged.reason == BY_CHANCE:
+        return judged.doubt is not None and judged.doubt <= settings.doubt
+    if judged.reason == AMBIGUOUS:
+        return judged.margin is not None and judged.margin >= settings.margin
+    return False
+
+
+def _is_unexplained(reader: PreparedLab, signal: Signal, support: Support) -> bool:
+    """Return whether symbols are pressed that are those of a place, or may be under another fit."""
+    settings = reader.settings.first_look
+    least = min(_tactels_to_name(reader, each, settings) for each in reader.lab.arrays)
+    if pressed_tactels(signal, settings) < least or support.surprise < settings.foreign:
+        return False
+    return support.surprise < settings.plain or support.explained >= settings.explained
 
 
 def pressed_tactels(signal: Signal, settings: FirstLookSettings) -> int:

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from recognizer.touch.belief import VerifiedHypothesis
+from recognizer.touch.belief import Support, VerifiedHypothesis
 from recognizer.touch.chance import expected_by_border, expected_matches
 from recognizer.touch.diagnose import diagnose
 from recognizer.touch.first_look import may_tell_more, shows_strokes
@@ -74,36 +74,31 @@ def recognise_with_rivals(
         return refusal(seq, NO_CONTACT), []
     if not shows_strokes(reader, signal):
         return refusal(seq, NOT_ENCODED), []
-    settings, limits = reader.settings, reader.settings.belief
+    settings = reader.settings
     first = verify_hypotheses(reader, signal, settings.first)
-    answer, inliers = _answer(first, settings, seq, again=True)
-    if answer and inliers >= limits.many_inliers:
-        return _refuse_by_chance(reader, first[0], answer), first
-    if not may_tell_more(reader, signal, answer, first[0] if first else None, inliers):
-        return answer, first
+    answer, support = _answer(first, settings, seq)
+    judged = _judge(reader, first, answer, support)
+    if not may_tell_more(reader, signal, answer, judged, first[0] if first else None, support):
+        return judged, first
     # Spend more where it is needed: no answer yet, or one that few cells speak for.
     second = verify_hypotheses(reader, signal, settings.thorough)
-    final, inliers = _answer(second, settings, seq)
+    final, support = _answer(second, settings, seq)
     if answer and final and not first[0].coincides(second[0]):
         return refusal(seq, AMBIGUOUS, margin=0.0, runner_up=answer.runner_up), second
-    if final and inliers < limits.many_inliers:
-        final = _refuse_few(reader, second[0], final)
-    return _refuse_by_chance(reader, second[0], final) if second else final, second
+    return _judge(reader, second, final, support), second
 
 
 def _answer(
-    found: list[VerifiedHypothesis], settings: ReaderSettings, seq: int, *, again: bool = False
-) -> tuple[Recognition, int]:
-    """Return what hypotheses, best first, say together, and how many cells speak for it.
-
-    With `again`, an answer that few cells speak for lacks the last fit: it is made a second time.
+    found: list[VerifiedHypothesis], settings: ReaderSettings, seq: int
+) -> tuple[Recognition, Support | None]:
+    """Return what hypotheses, best first, say together, and what speaks for the best; None of none.
 
     A place one pitch beside is the same place up to a cell's rounding and tells nothing of the
     margin, but for one case: it explains the image nearly as well. So it does where fewer cells
     are seen than the array's window takes (large pitches, product arrays), or next to an edge.
     """
     if not found:
-        return refusal(seq, TOO_FEW), 0
+        return refusal(seq, TOO_FEW), None
     best, limits = found[0], settings.belief
     other = next((one for one in found[1:] if not best.same_place(one)), None)
     margin = math.inf if other is None else best.score - other.score
@@ -123,13 +118,25 @@ def _answer(
             margin = min(margin, best.score - beside.score)
         if margin < limits.margin:
             reason = AMBIGUOUS
-    enough = not again or support.inliers >= limits.many_inliers
-    fit = best.fit if reason or not enough else best.last_fit()
     answer = answer_at(
-        best.embossed, fit, best.hypothesis, settings, seq,
+        best.embossed, best.fit if reason else best.last_fit(), best.hypothesis, settings, seq,
         reason=reason, margin=margin, runner_up=runner_up,
     )  # fmt: skip
-    return answer, support.inliers
+    return answer, support
+
+
+def _judge(
+    reader: PreparedLab,
+    found: list[VerifiedHypothesis],
+    answer: Recognition,
+    support: Support | None,
+) -> Recognition:
+    """Return an answer with its doubt, or as refused: for few symbols, or for chance."""
+    if not answer or support is None:
+        return answer
+    if support.inliers < reader.settings.belief.many_inliers:
+        answer = _refuse_few(reader, found[0], answer)
+    return _refuse_by_chance(reader, found[0], answer)
 
 
 def _refuse_few(reader: PreparedLab, best: VerifiedHypothesis, answer: Recognition) -> Recognition:

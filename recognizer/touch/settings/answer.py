@@ -115,7 +115,11 @@ class FirstLookSettings:
     finest: float = 3.1  #: tactels, pitches between which gaps were measured
     coarsest: float = 5.0
     ink: float = 0.44  #: share of a cell's tactels that its symbol presses, and some beside it
-    foreign: float = -4.0  #: nats over symbols of no registered place
+    foreign: float = 3.0  #: nats over symbols of no registered place
+    plain: float = 20.0  #: the same from which a place's symbols are plainly there, and then ...
+    explained: float = 0.6  #: ... the share of the image that they explain
+    doubt: float = 1e-3  #: of an answer by few symbols that a better fit may bring below the limit
+    margin: float = 12.0  #: nats that it leaves other places behind, likewise
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import recognizer.touch.first_look as first_look
 from probe.sensor import Overlay, SensorType
+from recognizer.touch.belief import Support
 from recognizer.touch.first_look import gap_share, may_tell_more, pressed_tactels, shows_strokes
-from recognizer.touch.recognition import AMBIGUOUS, NOT_ENCODED, refusal
+from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, NOT_ENCODED, TOO_FEW, refusal
 from recognizer.touch.settings import ReaderSettings
 from recognizer.touch.signal import signal_of
 
@@ -63,45 +63,77 @@ def touch_of(tactels):
 
 
 @pytest.fixture
-def first(small, monkeypatch):
-    """A hypothesis so many nats over symbols of no registered place; four symbols name a cell."""
-    monkeypatch.setattr(first_look, "null_log_likelihood", lambda embossed, fit: -50.0)
-    embossed = small.two_faces().embossed  # 48 cells of four symbols: three name one
+def asked(small):
+    """Ask for a wide search after a first try; four symbols and 48 cells: three name one."""
+    best = SimpleNamespace(embossed=small.two_faces().embossed)
 
-    def one(surprise):
-        return SimpleNamespace(embossed=embossed, fit=None, score=surprise - 50.0)
+    def ask(*, tactels=200, reason=NOT_ENCODED, judged=None, lab=None, **speaks):
+        answer = refusal(0, reason)
+        if not reason:
+            answer = replace(answer, object="Thing")
+        support = replace(Support(5.0, 0.9, 5, clear=0, plain=0, wider=0.0), **speaks)
+        given = answer if judged is None else judged
+        return may_tell_more(
+            reader(small, **(lab or {})), touch_of(tactels), answer, given, best, support
+        )
 
-    return one
+    return ask
 
 
-def asked(small, first, *, tactels=200, surprise=5.0, reason=NOT_ENCODED, inliers=5, **lab):
-    answer = refusal(0, reason)
-    if not reason:
-        answer = replace(answer, object="Thing")
-    return may_tell_more(reader(small, **lab), touch_of(tactels), answer, first(surprise), inliers)
+LABS = ({}, {"radii": (20.0,)}, {"kind": "pad"})
 
 
-def test_few_pressed_tactels_can_name_no_place(small, first):
+def test_few_pressed_tactels_can_name_no_place(asked):
     # 0.44 of the 19.4 tactels of a cell, three times: 25.7
     assert pressed_tactels(touch_of(25), SETTINGS.first_look) == 25
-    assert not asked(small, first, tactels=25)
-    assert asked(small, first, tactels=26)
-    assert asked(small, first, tactels=25, radii=(20.0,))  # a strip of a round face
+    assert not asked(tactels=25)
+    assert asked(tactels=26)
+    assert asked(tactels=25, lab={"radii": (20.0,)})  # a strip of a round face
 
 
-def test_symbols_of_no_registered_place_are_not_sought_further(small, first):
-    assert asked(small, first, surprise=-3.9)
-    assert not asked(small, first, surprise=-4.1)
+def test_symbols_of_no_registered_place_are_not_sought_further(asked):
+    assert asked(surprise=3.0)
+    assert not asked(surprise=2.9)
 
 
-def test_an_image_that_is_explained_shows_no_more(small, first):
-    assert not asked(small, first, reason=AMBIGUOUS, inliers=2)
-    assert asked(small, first, reason=AMBIGUOUS, inliers=3)
+def test_plain_symbols_that_explain_little_stand_beside_something_else(asked):
+    assert asked(surprise=19.9, explained=0.1)
+    assert not asked(surprise=20.0, explained=0.59)
+    assert asked(surprise=20.0, explained=0.6)
 
 
-def test_an_answer_is_always_confirmed(small, first):
-    assert asked(small, first, reason="", inliers=1, tactels=10, surprise=-9.0)
+def test_an_image_that_is_explained_shows_no_more(asked):
+    assert not asked(reason=AMBIGUOUS, inliers=2)
+    assert asked(reason=AMBIGUOUS, inliers=3)
+    assert not asked(reason=TOO_FEW, inliers=3)
+
+
+@pytest.mark.parametrize("lab", LABS)
+def test_what_many_symbols_say_is_sure_anywhere(asked, lab):
+    assert not asked(reason="", inliers=11, lab=lab)
+    assert not asked(reason="", inliers=11, judged=refusal(0, BY_CHANCE, doubt=1e-4), lab=lab)
+
+
+@pytest.mark.parametrize(("lab", "confirmed"), list(zip(LABS, (False, True, True), strict=True)))
+def test_what_few_symbols_say_is_confirmed_where_that_was_not_measured(asked, lab, confirmed):
+    assert asked(reason="", inliers=10, lab=lab) == confirmed
+
+
+@pytest.mark.parametrize(
+    ("judged", "again"),
+    [
+        (refusal(0, BY_CHANCE, doubt=1.0e-3), True),
+        (refusal(0, BY_CHANCE, doubt=1.1e-3), False),
+        (refusal(0, AMBIGUOUS, margin=12.0), True),
+        (refusal(0, AMBIGUOUS, margin=11.9), False),
+        (refusal(0, TOO_FEW, margin=30.0), False),
+    ],
+)
+def test_an_answer_that_is_refused_is_sought_again_where_little_is_missing(asked, judged, again):
+    assert asked(reason="", inliers=10, judged=judged) == again
+    assert asked(reason="", inliers=10, judged=judged, lab={"radii": (20.0,)})
 
 
 def test_without_a_hypothesis_the_search_goes_on(small):
-    assert may_tell_more(reader(small), touch_of(10), refusal(0, NOT_ENCODED), None, 0)
+    nothing = refusal(0, NOT_ENCODED)
+    assert may_tell_more(reader(small), touch_of(10), nothing, nothing, None, None)
