@@ -20,6 +20,21 @@ from probe.surface.polygon import polygon
 def registered_part_surface(path: Path, database: str, object_name: str, face: str) -> Scene:
     """Return the surface of a registered part; see `part_surface`."""
     held, part = _registered_part(database, path, object_name)
+    return scene_of_part(path, held, part, face)
+
+
+def scene_of_part(path: Path, held: RegisteredObject, part: RegisteredPart, face: str) -> Scene:
+    """Return the surface of a part of an object that was read before; see `part_surface`.
+
+    Parameters
+    ----------
+    path
+        Of the part's file.
+    held, part
+        What the database knows of it.
+    face
+        Which face lies up; empty: as in `part_surface`.
+    """
     up = _face_up(held, part, face)
     if up.round is not None:
         return round_part(path, held, part, up).scene()

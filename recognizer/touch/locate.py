@@ -17,7 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.touch.lab import EmbossedArray
-from recognizer.touch.place_scores import Places, add_scores, name_places, place_keys
+from recognizer.touch.place_scores import (
+    Places,
+    add_scores,
+    count_names,
+    name_places,
+    place_keys,
+)
 from recognizer.touch.settings import HypothesisSettings
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.projection import Shown
@@ -286,7 +292,7 @@ def _origins(
     else:
         known, place = np.unique(place_keys(embossed, at, cells), return_inverse=True)
         names = place * faces + embossed.owners[at]
-    both, votes = np.unique(names, return_counts=True)
+    both, votes = count_names(names)
     if len(both) > settings.many and (votes > 1).any():
         both = both[votes > 1]  # several windows say the same
     place, once = np.divmod(both, faces)

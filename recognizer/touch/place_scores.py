@@ -88,6 +88,17 @@ def place_keys(embossed: EmbossedArray, at: Ints, cells: Ints) -> NDArray[np.uin
     return cell_keys(array.columns, row, column)
 
 
+def count_names(names: Ints) -> tuple[Ints, Ints]:
+    """Return numbers (n,), none negative, each once and rising, and how often each was there."""
+    library = compiled_kernels()
+    if library is None:
+        known, votes = np.unique(names, return_counts=True)
+        return known, votes.astype(np.int64)
+    known, spare, votes = names.copy(), np.empty_like(names), np.empty_like(names)
+    count = library.count_names(len(names), known.ctypes.data, spare.ctypes.data, votes.ctypes.data)
+    return known[:count], votes[:count]
+
+
 def count_places(embossed: EmbossedArray, cells: Ints, prices: Array, slack: float) -> int:
     """Return how many registered cells can be the one that cells are counted from.
 

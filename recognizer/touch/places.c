@@ -3,6 +3,7 @@
    The numpy forms of `locate` and `chance` are the reference: the same sums in the same order. */
 
 #include <stdint.h>
+#include <string.h>
 
 /* Which text the library was made of; `compiled.load_kernels` leaves out what is older. */
 uint32_t source_sum(void) { return SOURCE_SUM; }
@@ -77,4 +78,36 @@ void name_places(const Held *h, int64_t n, const int64_t *at, const int64_t *cel
             along = (along % h->columns + h->columns) % h->columns;
         names[k] = (down * h->columns + along) * faces + h->owners[at[k]];
     }
+}
+
+enum { DIGIT = 11, DIGITS = 1 << DIGIT };
+
+/* Numbers (n,), none negative: sorted in place, each once, with how often it was there. They are
+   sorted digit by digit, every other pass into `spare` (n,). Returns how many there are. */
+int64_t count_names(int64_t n, int64_t *names, int64_t *spare, int64_t *votes) {
+    int64_t most = 0, *from = names, *to = spare;
+    for (int64_t k = 0; k < n; k++) most |= names[k];
+    for (int shift = 0; shift < 63 && most >> shift; shift += DIGIT) {
+        int64_t starts[DIGITS];
+        memset(starts, 0, sizeof starts);
+        for (int64_t k = 0; k < n; k++) starts[(from[k] >> shift) & (DIGITS - 1)]++;
+        for (int64_t d = 0, sum = 0; d < DIGITS; d++) {
+            int64_t count = starts[d];
+            starts[d] = sum;
+            sum += count;
+        }
+        for (int64_t k = 0; k < n; k++) to[starts[(from[k] >> shift) & (DIGITS - 1)]++] = from[k];
+        int64_t *was = from;
+        from = to;
+        to = was;
+    }
+    int64_t found = 0;
+    for (int64_t k = 0; k < n; k++) {
+        if (found && from[k] == names[found - 1]) votes[found - 1]++;
+        else {
+            votes[found] = 1;
+            names[found++] = from[k];
+        }
+    }
+    return found;
 }

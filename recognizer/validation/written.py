@@ -8,6 +8,7 @@ there is nothing. Thesis 6.3.
 from __future__ import annotations
 
 import hashlib
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +16,8 @@ from numpy.typing import NDArray
 
 from generator.database.registered import RegisteredObject, RegisteredPart
 from generator.database.url import normal_url, part_path
-from probe.simulate.part import part_surface
 from probe.simulate.registered import registered_object
+from probe.simulate.registered_part import scene_of_part
 from probe.simulate.scene import Scene
 from recognizer.validation.errors import SetError
 
@@ -41,10 +42,17 @@ def written_surface(database: str, object_name: str, face: str) -> Scene:
     SurfaceError
         The database cannot be read.
     """
-    part = stl_part(registered_object(database, object_name), face)
+    held = _object_of_run(database, object_name)
+    part = stl_part(held, face)
     path = part_path(normal_url(database), part.file)
     check_file(path, part)
-    return part_surface(path, database=database, object_name=object_name, face=face)
+    return scene_of_part(path, held, part, face)
+
+
+@lru_cache(maxsize=64)
+def _object_of_run(database: str, object_name: str) -> RegisteredObject:
+    """Return an object of a set, which stays as it is while it is touched (`set_digest`)."""
+    return registered_object(database, object_name)
 
 
 def stl_part(held: RegisteredObject, face: str) -> RegisteredPart:

@@ -102,8 +102,13 @@ class FirstLookSettings:
 
     Chosen with pitches of 5 mm (seed 902) and 5.5 mm (720 touches of faulty sensors): of 1,008
     touches of registered faces none had fewer gaps than .30, of 112 of a blank plate nine in ten
-    fewer than .275; of 583 that the first try did not answer, six were answered by the wide search,
-    all of them with 94 tactels pressed or more and 2 nats over symbols of no registered place.
+    fewer than .275.
+
+    When a wide search is asked for: chosen on 2,326 touches of forty and of forty small objects,
+    most of them at edges and corners, worn or soft (own engine, seeds 1001 and 1002, MuJoCo, 1003).
+    Of 274 answers by few symbols that chance allows none was wrong, and a wide search would refuse
+    15 of them. It is asked 303 times of 921 where no such answer is, and makes 42 touches right of
+    the 50 that it can.
     """
 
     strongest: int = 12  #: tactels that say how hard is pressed

@@ -101,6 +101,8 @@ def load_kernels(file: Path) -> ctypes.CDLL | None:
     library.fit_spread.restype = ctypes.c_int
     library.name_places.argtypes = [pointer, whole, pointer, pointer, whole, pointer]
     library.name_places.restype = None
+    library.count_names.argtypes = [whole, pointer, pointer, pointer]
+    library.count_names.restype = whole
     library.count_places.argtypes = [pointer, whole, pointer, pointer, ctypes.c_double]
     library.count_places.restype = whole
     return library

@@ -4,6 +4,7 @@ import re
 import shutil
 import subprocess
 import zlib
+from collections import Counter
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -16,7 +17,7 @@ from generator.alphabet import SymbolStyle, alphabet_named
 from probe.sensor import SensorType
 from recognizer.touch.lab import EmbossedArray, cell_keys
 from recognizer.touch.locate import find_hypotheses
-from recognizer.touch.place_scores import add_scores, count_places, name_places
+from recognizer.touch.place_scores import add_scores, count_names, count_places, name_places
 from recognizer.touch.settings import DEFAULTS
 from recognizer.touch.signal import Signal
 from recognizer.touch.symbols import compiled
@@ -277,6 +278,18 @@ def test_places_score_alike(held, dense, seed, library):
             count_ = count_places(embossed, borders, prices, 1.2)
             found.append((sums.tolist(), count_, names.tolist()))
     assert found[0] == found[1]
+
+
+@drawn(names=st.lists(st.integers(0, 2**62) | st.integers(0, 40) | st.integers(2**22, 2**22 + 9)))
+def test_names_are_counted_alike(names, library):
+    given_ = np.array(names, np.int64)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(compiled, "FILE", library)
+        patched.setenv(compiled.CHOICE, "compiled")
+        known, votes = count_names(given_)
+    assert dict(zip(known.tolist(), votes.tolist(), strict=True)) == Counter(names)
+    assert known.tolist() == sorted(set(names))
+    assert given_.tolist() == names
 
 
 def test_places_of_an_array_of_2_to_the_64_cells_are_named_alike(use):
