@@ -31,12 +31,12 @@ def combine_around(image: NDArray[Kind], reach: int, combine: np.ufunc) -> NDArr
     """
     found: Any = image
     for axis in (0, 1):
-        line = np.moveaxis(found, axis, 0)
+        line = found.swapaxes(0, axis)
         found = line.copy()
         for away in range(1, min(reach, len(line) - 1) + 1):
             combine(found[away:], line[:-away], out=found[away:])
             combine(found[:-away], line[away:], out=found[:-away])
-        found = np.moveaxis(found, 0, axis)
+        found = found.swapaxes(0, axis)
     return np.asarray(found)
 
 

@@ -108,13 +108,15 @@ class PrintedFace:
             print_, spread = self._with_scale(print_, spread, felt, settings.step)
 
         def posed(print_: Array) -> Array:
+            S = _print_matrix(print_)
+            axes, scale = _polar(S @ self.T_part_face[:3, :2])
             moved = T_face_probe
             if felt is not None:
-                moved = _moved(T_face_probe, slope * (self._excess(print_) - felt.excess))
-            return self._printed(print_, moved)
+                moved = _moved(T_face_probe, slope * (1.0 / scale - 1.0 - felt.excess))
+            return self._printed(S, axes, moved)
 
         printed = posed(print_)
-        by_print = _slopes(lambda one: _planar(posed(one)), print_, settings.step)
+        by_print = _slopes(lambda one: _planar(posed(one)), print_, _planar(printed), settings.step)
         along = np.eye(3)
         R = self.T_part_face[:3, :3]
         along[:2, :2] = (R.T @ _print_matrix(print_) @ R)[:2, :2]
@@ -129,18 +131,18 @@ class PrintedFace:
         told = 1.0 / variance - 1.0 / felt.expected**2  # by the image alone
         if not told > 0:
             return print_, spread
-        by = _slopes(lambda one: np.array([self._excess(one)]), print_, step)[0]
+        excess = self._excess(print_)
+        by = _slopes(self._excess, print_, excess, step)[0]
         gain = spread @ by / (by @ spread @ by + 1.0 / told)
-        away = felt.excess / (variance * told) - self._excess(print_)
+        away = felt.excess / (variance * told) - float(excess[0])
         return print_ + gain * away, spread - np.outer(gain, by @ spread)
 
-    def _excess(self, print_: Array) -> float:
-        """Return lattice over print, less 1, as a touch of the face feels it."""
-        return 1.0 / _polar(_print_matrix(print_) @ self.T_part_face[:3, :2])[1] - 1.0
+    def _excess(self, print_: Array) -> Array:
+        """Return lattice over print, less 1, as a touch of the face feels it: (1,)."""
+        return np.array([1.0 / _polar(_print_matrix(print_) @ self.T_part_face[:3, :2])[1] - 1.0])
 
-    def _printed(self, print_: Array, T_face_probe: Array) -> Array:
-        S, R = _print_matrix(print_), self.T_part_face[:3, :3]
-        (ax, ay, az), (bx, by, bz) = _polar(S @ R[:, :2])[0].T.tolist()
+    def _printed(self, S: Array, axes: Array, T_face_probe: Array) -> Array:
+        R, ((ax, ay, az), (bx, by, bz)) = self.T_part_face[:3, :3], axes.T.tolist()
         across = (ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
         printed = np.array([(ax, ay, az), (bx, by, bz), across]).T  # axes of the face, as printed
         at = S @ (R @ T_face_probe[:3, 3] + self.T_part_face[:3, 3]) - self.T_part_face[:3, 3]
@@ -171,10 +173,9 @@ def _polar(B: Array) -> tuple[Array, float]:
     return B @ np.array([[b + s, -c], [-c, a + s]]) / (t * s), t / 2.0
 
 
-def _slopes(of: Callable[[Array], Array], at: Array, step: float) -> Array:
-    """Return the derivatives (m, 3) of a function of a print."""
-    here = of(at)
-    return np.column_stack([(of(at + step * one) - here) / step for one in np.eye(3)])
+def _slopes(of: Callable[[Array], Array], at: Array, here: Array, step: float) -> Array:
+    """Return the derivatives (m, 3) of a function of a print, which is `here` (m,) at it."""
+    return np.array([(of(at + step * one) - here) / step for one in np.eye(3)]).T
 
 
 def _moved(T_face_probe: Array, by: Array) -> Array:

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,22 +101,27 @@ class VerifiedHypothesis:
 
     def support(self) -> Support:
         """Return what speaks for it."""
-        embossed, fit, limits = self.embossed, self.fit, self.image.settings.belief
-        cells = weigh_cells(embossed, fit, self.hypothesis, limits)
-        worn = fit.cells[cells.worn]
+        return _support_of(self)
 
-        def shown(at: Ints) -> Ints:
-            return unworn_labels_at(embossed, self.hypothesis, worn, at)
 
-        return Support(
-            surprise=self.score - null_log_likelihood(embossed, fit),
-            explained=explained_share(self.image, self.template, fit.pose, fit.gain, shown),
-            inliers=int(cells.agree.sum()),
-            clear=int((cells.seen & (cells.against > limits.clearly)).sum()),
-            plain=int((cells.seen & (cells.against > limits.plainly)).sum()),
-            wider=fit.wider,
-            worn=int((cells.worn & cells.seen).sum()),
-        )
+@lru_cache(maxsize=8)
+def _support_of(found: VerifiedHypothesis) -> Support:
+    embossed, fit, limits = found.embossed, found.fit, found.image.settings.belief
+    cells = weigh_cells(embossed, fit, found.hypothesis, limits)
+    worn = fit.cells[cells.worn]
+
+    def shown(at: Ints) -> Ints:
+        return unworn_labels_at(embossed, found.hypothesis, worn, at)
+
+    return Support(
+        surprise=found.score - null_log_likelihood(embossed, fit),
+        explained=explained_share(found.image, found.template, fit.pose, fit.gain, shown),
+        inliers=int(cells.agree.sum()),
+        clear=int((cells.seen & (cells.against > limits.clearly)).sum()),
+        plain=int((cells.seen & (cells.against > limits.plainly)).sum()),
+        wider=fit.wider,
+        worn=int((cells.worn & cells.seen).sum()),
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,6 +134,7 @@ class CellEvidence:
     against: NDArray[np.float64]  #: nats by which they speak for another symbol
 
 
+@lru_cache(maxsize=16)
 def weigh_cells(
     embossed: EmbossedArray, fit: Fit, hypothesis: Hypothesis, settings: BeliefSettings
 ) -> CellEvidence:
@@ -139,7 +146,10 @@ def weigh_cells(
     seen = np.asarray(fit.seen >= settings.whole)
     against = np.where(worn, 0.0, fit.scores[:, :order].max(axis=1) - own)
     tells = own > _marginal(fit) - math.log(2.0)
-    return CellEvidence(worn, seen, seen & (held < order) & tells, against)
+    told = CellEvidence(worn, seen, seen & (held < order) & tells, against)
+    for flags in (told.worn, told.seen, told.agree, told.against):
+        flags.setflags(write=False)
+    return told
 
 
 def unworn_labels_at(
@@ -170,7 +180,9 @@ def null_log_likelihood(embossed: EmbossedArray, fit: Fit) -> float:
     return float(each.sum()) + fit.value + math.log(len(embossed.keys))
 
 
+@lru_cache(maxsize=16)
 def _marginal(fit: Fit) -> NDArray[np.float64]:
     """Return the log of each cell's likelihoods (m,), summed over all that it may show."""
     total: NDArray[np.float64] = np.log(np.exp(fit.scores).sum(axis=1))
+    total.setflags(write=False)
     return total

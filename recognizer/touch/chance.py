@@ -153,9 +153,12 @@ def _share_within(behind: Ints, most: int) -> float:
         return 0.0
     reached = np.zeros(slack + 1)
     reached[0] = 1.0
-    for cell in np.minimum(behind - ahead[:, None], slack + 1):
-        each = np.bincount(cell, minlength=slack + 2)[: slack + 1] / behind.shape[1]
-        reached = np.convolve(reached, each)[: slack + 1]
+    for cell in (behind - ahead[:, None]).tolist():
+        before, reached = reached, np.zeros(slack + 1)
+        for step in cell:
+            if step <= slack:
+                reached[step:] += before[: slack + 1 - step]
+        reached /= len(cell)
     return float(reached.sum())
 
 

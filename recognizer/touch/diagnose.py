@@ -22,7 +22,7 @@ from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.signal import Signal
 from recognizer.touch.symbols.fit import fit_lattices
 from recognizer.touch.symbols.gain import image_of_signal
-from recognizer.touch.symbols.projection import explained_share, project_template, values_of
+from recognizer.touch.symbols.projection import explained_share, project_symbols
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -222,9 +222,14 @@ def _disagreement(best: VerifiedHypothesis, settings: CauseSettings) -> tuple[fl
     """
     fit, embossed, place = best.fit, best.embossed, best.hypothesis
     worn = fit.cells[weigh_cells(embossed, fit, place, best.image.settings.belief).worn]
-    under = project_template(best.image, best.template, fit.pose[None], fit.gain[None])
-    labels = unworn_labels_at(embossed, place, worn, under.cells)
-    value, felt = values_of(under, labels)[0, :, 0], under.felt.psi[0]
+
+    def shown(at: Ints) -> Ints:
+        return unworn_labels_at(embossed, place, worn, at)
+
+    under, labels, shows = project_symbols(
+        best.image, best.template, fit.pose[None], fit.gain[None], shown
+    )
+    value, felt = shows[0, :, 0], under.psi[0]
     known = best.image.trust > 0
     pressed = known & (labels[0] >= 0) & (value > settings.pressed)
     free = known & (value < settings.silent)

@@ -12,6 +12,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache, reduce
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,14 +109,18 @@ def log_likelihoods_at(
     return add_scores(embossed, places, fit.cells, scores, none) + fit.value
 
 
+@lru_cache(maxsize=16)
 def bounded_scores(fit: Fit, settings: HypothesisSettings) -> Array:
     """Return scores (m, q + 1) in which a registered symbol may be worn away, or read wrong.
 
     Of a cell of which the sensor sees only a corner, less is believed.
     """
-    symbols = np.maximum(fit.scores[:, :-1], fit.scores[:, -1:] - settings.worn)
     least = settings.cap * np.minimum(1.0, fit.seen / settings.corner)[:, None]
-    return np.asarray(np.maximum(np.concatenate([symbols, fit.scores[:, -1:]], axis=1), -least))
+    bounded = np.array(fit.scores)
+    np.maximum(bounded[:, :-1], fit.scores[:, -1:] - settings.worn, out=bounded[:, :-1])
+    np.maximum(bounded, -least, out=bounded)
+    bounded.setflags(write=False)
+    return bounded
 
 
 def labels_at(embossed: EmbossedArray, hypothesis: Hypothesis, cells: Ints) -> Ints:
@@ -223,22 +229,25 @@ def _window_candidates(
     number[i, j] = np.arange(len(fit.cells))
     whole = np.append(sure, -np.inf)[number]
     seen: list[tuple[float, int, list[int]]] = []
+    largest = 0
     for k, index in enumerate(embossed.windows()):
         down, right = index.shape
         wide, high = whole.shape[0] - right + 1, whole.shape[1] - down + 1
-        if wide < 1 or high < 1:
+        if wide < 1 or high < 1 or down * right < largest:
             continue
         corners = [(c, down - 1 - r) for r in range(down) for c in range(right)]
-        least = np.min([whole[x : x + wide, y : y + high] for x, y in corners], axis=0)
-        for left, low in np.argwhere(least > settings.sure).tolist():
+        least = reduce(np.minimum, [whole[x : x + wide, y : y + high] for x, y in corners])
+        surest = np.sort(least, axis=None)[-settings.windows :]  # no others are looked up
+        kept = (least > settings.sure) & (least >= surest[0])
+        for left, low in np.argwhere(kept).tolist():
             cells = [int(number[left + x, low + y]) for x, y in corners]
             seen.append((float(least[left, low]), k, cells))
+            largest = len(cells)
+    seen = [window for window in seen if len(window[2]) == largest]
     if not seen:
         return None
-    largest = max(len(cells) for _, _, cells in seen)
-    seen = [window for window in seen if len(window[2]) == largest]
-    found: list[Ints] = []
-    shifts: list[Ints] = []
+    found: list[NDArray[np.integer[Any]]] = []
+    first: list[int] = []
     for _, k, cells in sorted(seen, reverse=True)[: settings.windows]:
         weakest = min(cells, key=lambda n: float(sure[n]))
         second = int(np.argsort(fit.scores[weakest, :order])[-2])
@@ -246,10 +255,9 @@ def _window_candidates(
             code = 0
             for n in cells:
                 code = code * order + (other if n == weakest else int(labels[n]))
-            at = embossed.windows()[k].at(code).astype(np.int64)
-            found.append(at)
-            shifts.append(np.tile(fit.cells[cells[0]], (len(at), 1)))
-    return _origins(embossed, np.concatenate(found), np.concatenate(shifts), settings)
+            found.append(embossed.windows()[k].at(code))
+            first.append(cells[0])
+    return _origins(embossed, fit, found, first, settings)
 
 
 def _anchor_candidates(
@@ -270,22 +278,31 @@ def _anchor_candidates(
         (m,) nats by which cells hold a symbol; the first `anchors` of them are tried.
     """
     order = embossed.array.order
-    found: list[Ints] = [np.zeros(0, np.int64)]
-    shifts: list[Ints] = [np.zeros((0, 2), np.int64)]
     small = len(embossed.keys) <= settings.large
     tried = np.argsort(-symbol, kind="stable")[: anchors if small else 0]
-    for anchor in tried[symbol[tried] > 0]:
-        likely = scores[anchor, :order] > -settings.cap
-        at = np.flatnonzero(likely[embossed.labels[:-1]])
-        found.append(at)
-        shifts.append(np.tile(fit.cells[anchor], (len(at), 1)))
-    return _origins(embossed, np.concatenate(found), np.concatenate(shifts), settings)
+    tried = tried[symbol[tried] > 0]
+    likely = scores[tried, :order] > -settings.cap
+    found = [np.flatnonzero(one[embossed.labels[:-1]]) for one in likely]
+    return _origins(embossed, fit, found, tried.tolist(), settings)
 
 
 def _origins(
-    embossed: EmbossedArray, at: Ints, cells: Ints, settings: HypothesisSettings
+    embossed: EmbossedArray,
+    fit: Fit,
+    found: Sequence[NDArray[np.integer[Any]]],
+    numbers: list[int],
+    settings: HypothesisSettings,
 ) -> Places:
-    """Return where (0, 0) lies, each place once, if cells (n, 2) are the registered ones `at`."""
+    """Return where (0, 0) lies, each place once.
+
+    Parameters
+    ----------
+    found, numbers
+        Registered cells (n,), and the number of the fit's cell that may be any of them; several
+        such.
+    """
+    at = np.concatenate([*found, np.zeros(0, np.int64)])
+    cells = np.repeat(fit.cells[numbers], np.array([len(one) for one in found], int), axis=0)
     array, faces = embossed.array, len(embossed.faces) + 1
     if array.rows * array.columns < 2**63 // faces:
         known, names = None, name_places(embossed, at, cells)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.touch.lab import EmbossedArray, cell_keys
-from recognizer.touch.symbols.compiled import compiled_kernels
+from recognizer.touch.symbols.compiled import addresses, compiled_kernels
 
 Ints = NDArray[np.int64]
 Array = NDArray[np.float64]
@@ -49,9 +49,8 @@ def add_scores(
     if library is not None:
         held = _held_by(embossed)
         library.add_scores(
-            ctypes.addressof(held), len(total), rows.ctypes.data, columns.ctypes.data,
-            owners.ctypes.data, len(cells), cells.ctypes.data, scores.ctypes.data,
-            total.ctypes.data,
+            ctypes.addressof(held), len(total), *addresses(rows, columns, owners),
+            len(cells), *addresses(cells, scores, total),
         )  # fmt: skip
         return total
     array = embossed.array
@@ -73,8 +72,7 @@ def name_places(embossed: EmbossedArray, at: Ints, cells: Ints) -> Ints:
     held, names = _held_by(embossed), np.empty(len(at), np.int64)
     at, cells = np.ascontiguousarray(at), np.ascontiguousarray(cells)
     library.name_places(
-        ctypes.addressof(held), len(at), at.ctypes.data, cells.ctypes.data, faces,
-        names.ctypes.data,
+        ctypes.addressof(held), len(at), *addresses(at, cells), faces, *addresses(names)
     )  # fmt: skip
     return names
 
@@ -95,7 +93,7 @@ def count_names(names: Ints) -> tuple[Ints, Ints]:
         known, votes = np.unique(names, return_counts=True)
         return known, votes.astype(np.int64)
     known, spare, votes = names.copy(), np.empty_like(names), np.empty_like(names)
-    count = library.count_names(len(names), known.ctypes.data, spare.ctypes.data, votes.ctypes.data)
+    count = library.count_names(len(names), *addresses(known, spare, votes))
     return known[:count], votes[:count]
 
 
@@ -114,9 +112,7 @@ def count_places(embossed: EmbossedArray, cells: Ints, prices: Array, slack: flo
     if library is not None:
         held = _held_by(embossed)
         at = ctypes.addressof(held)
-        return int(
-            library.count_places(at, len(cells), cells.ctypes.data, prices.ctypes.data, slack)
-        )
+        return int(library.count_places(at, len(cells), *addresses(cells, prices), slack))
     array, keys, owners = embossed.array, embossed.keys, embossed.owners[:-1]
     row, column = (part.astype(np.int64) for part in np.divmod(keys, np.uint64(array.columns)))
     left = np.full(len(keys), slack)
@@ -130,9 +126,8 @@ def count_places(embossed: EmbossedArray, cells: Ints, prices: Array, slack: flo
 
 @lru_cache(maxsize=8)
 def _held_by(embossed: EmbossedArray) -> _Held:
-    array, dense = embossed.array, embossed.dense
+    array = embossed.array
     return _Held(
-        registered=len(embossed.keys), rows=array.rows, columns=array.columns, order=array.order,
-        keys=embossed.keys.ctypes.data, owners=embossed.owners.ctypes.data,
-        labels=embossed.labels.ctypes.data, dense=None if dense is None else dense.ctypes.data,
+        len(embossed.keys), array.rows, array.columns, array.order,
+        *addresses(embossed.keys, embossed.owners, embossed.labels, embossed.dense),
     )  # fmt: skip

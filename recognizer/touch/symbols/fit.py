@@ -35,7 +35,7 @@ from recognizer.touch.symbols.template import PSI, ResponseTemplate, psi
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Fit:
     """One way to see symbols in an image."""
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +23,12 @@ from recognizer.touch.signal import Signal
 from recognizer.touch.symbols.loaded_area import find_loaded_area
 from recognizer.touch.symbols.noise import NormalizedImage
 from recognizer.touch.symbols.pressing import Pressing, pressing_of
-from recognizer.touch.symbols.template import PSI, psi
+from recognizer.touch.symbols.template import psi
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Image:
     """What is fitted: forces of the tactels that tell something."""
 
@@ -158,7 +159,7 @@ def bounded_gain(gain: Array, steepest: float) -> Array:
     slope = np.abs(gain[:, 2:]).sum(axis=1)
     limit = steepest * gain[:, 1]
     factor = np.where(slope > limit, limit / np.maximum(slope, 1e-300), 1.0)
-    return np.column_stack([gain[:, :2], gain[:, 2:] * factor[:, None]])
+    return np.concatenate([gain[:, :2], gain[:, 2:] * factor[:, None]], axis=1)
 
 
 def normalize_image(image: Image, gain: Array) -> NormalizedImage:
@@ -174,18 +175,15 @@ def normalize_image(image: Image, gain: Array) -> NormalizedImage:
     scale, loaded = np.exp(gain[:, :1]), image.loaded
     plateau = np.where(loaded, scale * np.maximum(plain, least), image.forces.max())
     share = plateau / scale
-    usual = gain[:, 1:] @ image.plane[loaded].mean(axis=0)
+    usual = gain[:, 1:] @ _mean_plane(image)
+    press = depth / (settings.full_press * np.maximum(usual, 1e-9))[:, None]
     return NormalizedImage(
         psi=psi(image.forces / plateau),
-        press=np.clip(
-            depth / (settings.full_press * np.maximum(usual, 1e-9))[:, None],
-            settings.least_press,
-            1.0,
-        ),
+        press=np.minimum(np.maximum(press, settings.least_press), 1.0),
         bare=np.where(loaded, lower / share, 0.0),
-        contact=np.clip(plain / least, 0.0, 1.0),
+        contact=np.minimum(np.maximum(plain / least, 0.0), 1.0),
         trust=image.trust,
-        measure=-(image.trust * np.log(plateau + PSI * image.forces)).sum(axis=1),
+        forces=image.forces,
         depth=depth,
         plain=plain,
         lower=lower,
@@ -193,3 +191,9 @@ def normalize_image(image: Image, gain: Array) -> NormalizedImage:
         faint=image.noise / plateau,
         settings=image.settings.noise,
     )
+
+
+@lru_cache(maxsize=8)
+def _mean_plane(image: Image) -> Array:
+    """Return the mean (3,) of the planes' basis over what is loaded."""
+    return np.asarray(image.plane[image.loaded].mean(axis=0))

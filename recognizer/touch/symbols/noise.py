@@ -29,13 +29,18 @@ class NormalizedImage:
     bare: Array  #: (b, n) force over the bare face, as a share of that on a symbol
     contact: Array  #: (b, n) 1, falling to 0 where the sensor hangs in the air
     trust: Array  #: (n,)
-    measure: Array  #: (b,) sum of log |d psi / d force|: makes planes of other gain comparable
+    forces: Array  #: (n,) of the image
     depth: Array  #: (b, n) of the plate below the tops of the symbols, heights of the overlay
     plain: Array  #: (b, n) F of `pressing` there
     lower: Array  #: (b, n) and over the bare face
     plateau: Array  #: (b, n) force on a plateau, no less than where the sensor hangs in the air
     faint: Array  #: (b, n) noise of the readings as a share of that force
     settings: NoiseSettings
+
+    @property
+    def measure(self) -> Array:
+        """Return (b,) sums of log |d psi / d force|: they make planes of other gain comparable."""
+        return -np.asarray((self.trust * np.log(self.plateau + PSI * self.forces)).sum(axis=1))
 
 
 def psi_deviation(felt: NormalizedImage, tables: Floats | Array, unit: Array) -> Floats:

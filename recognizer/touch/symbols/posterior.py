@@ -24,10 +24,9 @@ from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.gain import Image, bounded_gain
 from recognizer.touch.symbols.projection import (
     Shown,
-    project_template,
+    project_symbols,
     response_by_psi,
     response_of,
-    values_of,
 )
 from recognizer.touch.symbols.refine import (
     POSE,
@@ -99,6 +98,7 @@ def fit_posterior(
     known = np.diag(_precision(image, settings))
     trust, freedom = image.trust, spreads.freedom
     linearizer = _linearizer(image, template, pose, settings.steps, shown)
+    bounds = _step_bounds(image)
     at = _linearize(image, linearizer, pose, gain, np.zeros(3))
     spread, damping = usual_spread(spreads), image.settings.refine.damping
     for step in range(settings.steps + 1):
@@ -109,7 +109,7 @@ def fit_posterior(
         if step == settings.steps:
             break
         right = weighted @ at.left - known @ at.departure
-        tried = _move(image, linearizer, at, normal, right, damping)
+        tried = _move(image, linearizer, at, normal, right, damping, bounds)
         before, after = (
             spread.log_likelihood(one.left, one.parts, trust, freedom)
             - 0.5 * float(one.departure @ known @ one.departure)
@@ -121,7 +121,7 @@ def fit_posterior(
             damping *= image.settings.refine.harder
     told = invert_normal(normal, image.settings.covariance.unseen)
     rows = [0, 1, 2, POSE - 1]
-    covariance = _size(image, at) * told[np.ix_(rows, rows)]
+    covariance = _size(image, at) * told[rows][:, rows]
     blur = float(at.more[1]), float(at.more[2])
     return PosePosterior(at.pose, at.gain, covariance, spread, blur)
 
@@ -131,18 +131,18 @@ def _linearize(
 ) -> _Linearized:
     noise = image.settings.noise
     value, force, jacobian, unit = linearizer(pose, gain)
-    across = second_differences(np.column_stack([force, jacobian]), image.shape)
-    blurred = [one[:, 0] for one in across]
-    jacobian = jacobian + sum(
-        share * one[:, 1:] for share, one in zip(more[1:], across, strict=True)
-    )
-    parts = unit**2 * np.stack(
-        [noise.quiet**2 + value[:, 0] ** 2, image.aside * (value[:, 1] ** 2 + value[:, 2] ** 2)]
-    )
-    columns = np.column_stack([np.ones_like(force), *blurred])
+    columns = np.ones((len(force), 3))
+    columns[:, 1:2], columns[:, 2:] = second_differences(force[:, None], image.shape)
+    if more[1:].any():
+        rows, across = second_differences(jacobian, image.shape)
+        jacobian = jacobian + (more[1] * rows + more[2] * across)
+    parts = np.empty((2, len(force)))
+    parts[0] = noise.quiet**2 + value[:, 0] ** 2
+    parts[1] = image.aside * (value[:, 1] ** 2 + value[:, 2] ** 2)
+    parts *= unit**2
     left = image.forces - force - columns @ more
     departure = np.concatenate([prior_departure(image, pose[None], gain[None])[0], more])
-    jacobian = np.column_stack([jacobian, columns])
+    jacobian = np.concatenate([jacobian, columns], axis=1)
     return _Linearized(pose, gain, more, left, parts, jacobian, departure)
 
 
@@ -154,10 +154,9 @@ def _linearizer(
         return linearizer_compiled(library, image, template, pose, steps, shown)
 
     def linearize(pose: Array, gain: Array) -> tuple[Array, Array, Array, Array]:
-        under = project_template(image, template, pose[None], gain[None])
-        values = values_of(under, shown(under.cells))
-        jacobian, force = force_jacobian(image, pose[None], gain[None], values, under.felt)
-        plateau, press = under.felt.plateau[0], under.felt.press[0]
+        felt, _, values = project_symbols(image, template, pose[None], gain[None], shown)
+        jacobian, force = force_jacobian(image, pose[None], gain[None], values, felt)
+        plateau, press = felt.plateau[0], felt.press[0]
         unit = response_by_psi(response_of(values[0, :, 0])) * plateau / press
         return values[0], force[0], jacobian[0], unit
 
@@ -166,22 +165,31 @@ def _linearizer(
 
 def _move(
     image: Image, linearizer: Linearizer, at: _Linearized, normal: Array, right: Array,
-    damping: float,
+    damping: float, bounds: tuple[Array, Array, Array],
 ) -> _Linearized:  # fmt: skip
     """Return the image about the lattice a damped step further."""
-    refine, settings = image.settings.refine, image.settings.posterior
-    least = np.array([*refine.least, *settings.least])
-    most = np.array([*refine.step, *settings.step])
+    refine, (least, most, limits) = image.settings.refine, bounds
     lattice = len(at.pose) + len(at.gain)
-    most[lattice] *= float(image.forces.max())
-    limits = np.array(refine.limits)
-    system = normal + np.diag(np.diag(normal) * damping + least)
-    step = np.clip(np.linalg.solve(system, right), -most, most)
+    system = normal.copy()
+    system.flat[:: len(system) + 1] += np.diagonal(normal) * damping + least
+    step = _clip(np.asarray(np.linalg.solve(system, right)), most)
     pose, gain = at.pose + step[:POSE], at.gain + step[POSE:lattice]
-    pose[3:] = np.clip(pose[3:], -limits, limits)
-    gain[1] = np.clip(gain[1], refine.shallower * at.gain[1], refine.deepest)
+    pose[3:] = _clip(pose[3:], limits)
+    gain[1] = min(max(gain[1], refine.shallower * at.gain[1]), refine.deepest)
     gain = bounded_gain(gain[None], image.settings.gain.steepest)[0]
     return _linearize(image, linearizer, pose, gain, at.more + step[lattice:])
+
+
+def _step_bounds(image: Image) -> tuple[Array, Array, Array]:
+    """Return what the diagonal gains (14,), the largest step (14,) and the limits of form (4,)."""
+    refine, settings = image.settings.refine, image.settings.posterior
+    most = np.array([*refine.step, *settings.step])
+    most[len(refine.step)] *= float(image.forces.max())
+    return np.array([*refine.least, *settings.least]), most, np.array(refine.limits)
+
+
+def _clip(values: Array, most: Array) -> Array:
+    return np.asarray(np.minimum(np.maximum(values, -most), most))
 
 
 def _precision(image: Image, settings: PosteriorSettings) -> Array:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,11 +32,12 @@ class Pressing:
 
     def force(self, depth: Array) -> Array:
         """Return F (0 without contact) at depths in heights of the overlay."""
-        u = np.clip(depth, 0.0, self.deepest)
+        above = np.maximum(depth, 0.0)
         if not self.hardens:
-            return 3.0 * np.maximum(depth, 0.0)
+            return np.asarray(3.0 * above)
+        rest = 1 - np.minimum(above, self.deepest)
         beyond = np.maximum(depth - self.deepest, 0.0) * _stiffness(self.deepest)
-        return np.asarray((1 - u) ** -2 - (1 - u) + beyond)
+        return np.asarray(rest**-2 - rest + beyond)
 
     def slope(self, depth: Array) -> Array:
         """Return dF/du, 0 without contact."""
@@ -47,8 +49,7 @@ class Pressing:
         """Return the depths at which F has given values, at most `deepest`."""
         if not self.hardens:
             return np.asarray(force / 3.0)
-        table = np.linspace(0.0, self.deepest, 257)
-        return np.asarray(np.interp(force, self.force(table), table))
+        return np.asarray(np.interp(force, *_forces_by_depth(self)))
 
 
 def pressing_of(
@@ -66,6 +67,13 @@ def pressing_of(
         deepest=settings.deepest,
         scale=overlay.young_mpa / 3.0 * area,
     )
+
+
+@lru_cache(maxsize=16)
+def _forces_by_depth(pressing: Pressing) -> tuple[Array, Array]:
+    """Return rising forces and the depths at which they are."""
+    table = np.linspace(0.0, pressing.deepest, 257)
+    return pressing.force(table), table
 
 
 def _stiffness(depth: Array | float) -> Array:

@@ -39,13 +39,19 @@ def project_template(
 ) -> Projection:
     """Return what lies under the tactels for poses (b, 7) and gains (b, 4)."""
     felt = normalize_image(image, gain)
-    c, s = np.cos(pose[:, 2, None]), np.sin(pose[:, 2, None])
-    x, y = image.points_mm.T
-    c, s = c * (1 + pose[:, 6, None]), s * (1 + pose[:, 6, None])
-    u = np.stack([pose[:, 0, None] + c * x - s * y, pose[:, 1, None] + s * x + c * y], axis=-1)
-    cells = np.floor(u / template.pitch_mm)
-    tables = _tables(template, u - (cells + 0.5) * template.pitch_mm, pose, felt)
-    return Projection(felt, cells.astype(np.int64), tables)
+    cells, offsets = _cells_under(image, template, pose)
+    return Projection(felt, cells, _fit_form(template.at(offsets), pose, felt))
+
+
+def project_symbols(
+    image: Image, template: ResponseTemplate, pose: Array, gain: Array, shown: Shown
+) -> tuple[NormalizedImage, Ints, Array]:
+    """Return an image under gains, labels (b, n) of what is shown, and `values_of` these."""
+    felt = normalize_image(image, gain)
+    cells, offsets = _cells_under(image, template, pose)
+    labels = shown(cells)
+    tables = _fit_form(template.of(offsets, labels.clip(min=0)), pose, felt)
+    return felt, labels, _with_bare_face(felt, labels, tables[:, :, 0].astype(np.float64))
 
 
 def likeliest_labels(cells: Ints, scores: Array) -> Ints:
@@ -78,10 +84,13 @@ def values_of(under: Projection, labels: Ints) -> Array:
 
     Beyond the edge of a face nothing is felt: a tactel without a symbol shows what is nearer.
     """
-    tables, felt = under.tables, under.felt
+    tables = under.tables
     every = np.arange(labels.size) * tables.shape[2] + labels.clip(min=0).ravel()
     found = tables.reshape(-1, tables.shape[3]).take(every, axis=0).astype(np.float64)
-    found = found.reshape(*labels.shape, -1)
+    return _with_bare_face(under.felt, labels, found.reshape(*labels.shape, -1))
+
+
+def _with_bare_face(felt: NormalizedImage, labels: Ints, found: Array) -> Array:
     found[labels < 0] = 0.0
     floor = psi(felt.bare)
     bare = (labels < 0) & (felt.psi > floor / 2)
@@ -102,15 +111,14 @@ def explained_share(
     pose, gain
         (7,) and (4,) of one lattice.
     """
-    under = project_template(image, template, pose[None], gain[None])
-    labels = shown(under.cells)
-    values, seen = values_of(under, labels)[0, :, 0], under.felt.psi[0]
+    felt, labels, shows = project_symbols(image, template, pose[None], gain[None], shown)
+    values, seen = shows[0, :, 0], felt.psi[0]
     trust = image.trust * (labels[0] >= 0)
     if image.falls is not None:  # where the face has fallen away there is nothing to explain
-        trust = trust * under.felt.contact[0]
+        trust = trust * felt.contact[0]
     # no symbol explains the noise of readings: it counts less where it is large, and is taken off
     settings = image.settings.noise
-    noise = reading_deviation(under.felt, values[None, :, None])[0, :, 0]
+    noise = reading_deviation(felt, values[None, :, None])[0, :, 0]
     trust = trust / (1.0 + (noise / (settings.quiet * settings.first)) ** 2)
     mean = (trust * seen).sum() / max(trust.sum(), 1e-12)
     whole = float((trust * (seen - mean) ** 2).sum())
@@ -130,11 +138,18 @@ def response_by_psi(response: Array) -> Array:
     return (1 + PSI * response) * math.log(1 + PSI) / PSI
 
 
-def _tables(
-    template: ResponseTemplate, offsets: Array, pose: Array, felt: NormalizedImage
-) -> Floats:
-    """Return templates (b, n, q, 6) at offsets, for what is fitted of form and gain."""
-    tables = template.at(offsets)
+def _cells_under(image: Image, template: ResponseTemplate, pose: Array) -> tuple[Ints, Array]:
+    """Return the cell (b, n, 2) under each tactel, and where in it that lies, mm."""
+    c, s = np.cos(pose[:, 2, None]), np.sin(pose[:, 2, None])
+    x, y = image.points_mm.T
+    c, s = c * (1 + pose[:, 6, None]), s * (1 + pose[:, 6, None])
+    u = np.stack([pose[:, 0, None] + c * x - s * y, pose[:, 1, None] + s * x + c * y], axis=-1)
+    cells = np.floor(u / template.pitch_mm)
+    return cells.astype(np.int64), u - (cells + 0.5) * template.pitch_mm
+
+
+def _fit_form(tables: Floats, pose: Array, felt: NormalizedImage) -> Floats:
+    """Return templates (b, n, q, 6), their own to be changed, as form and gain are fitted."""
     for slope, by in enumerate(pose[:, 3:6, None, None].astype(np.float32).swapaxes(0, 1), 3):
         tables[..., 0] += tables[..., slope] * by
     if (felt.contact < 1).any():

@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from recognizer.touch.settings import RefineSettings
 from recognizer.touch.symbols.compiled import compiled_kernels, refine_compiled
 from recognizer.touch.symbols.damped import ascend, damped_step
 from recognizer.touch.symbols.gain import Image, bounded_gain
@@ -69,7 +71,8 @@ def refine_lattices(
     told
         Whether `normal` and `right` are asked for: without, they are those of some step.
     """
-    whole = np.pad(pose, ((0, 0), (0, POSE - pose.shape[1])))
+    whole = np.zeros((len(pose), POSE))
+    whole[:, : pose.shape[1]] = pose
     library = compiled_kernels()
     if library is not None:
         precision = prior_precision(image)
@@ -157,10 +160,16 @@ def prior_departure(image: Image, pose: Array, gain: Array) -> Array:
 
 def prior_precision(image: Image) -> Array:
     """Return what is known of each unknown beforehand, one over its variance (11,)."""
-    settings = image.settings.refine
-    scale = settings.scale_known if image.newtons else 0.0
+    return _precision_of(image.settings.refine, newtons=image.newtons)
+
+
+@lru_cache(maxsize=8)
+def _precision_of(settings: RefineSettings, *, newtons: bool) -> Array:
+    scale = settings.scale_known if newtons else 0.0
     deviation = np.array([*settings.prior, scale, 0.0, 0.0, 0.0])
-    return np.where(deviation > 0, 1 / np.maximum(deviation, 1e-9) ** 2, 0.0)
+    precision = np.where(deviation > 0, 1 / np.maximum(deviation, 1e-9) ** 2, 0.0)
+    precision.setflags(write=False)
+    return precision
 
 
 def _width(values: Array, felt: NormalizedImage, noise: float) -> Array:

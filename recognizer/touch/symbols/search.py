@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from probe.sensor import SensorType
 from recognizer.touch.settings import DEFAULTS, SearchSettings
-from recognizer.touch.symbols.compiled import compiled_kernels, kernels_in_use
+from recognizer.touch.symbols.compiled import addresses, compiled_kernels, kernels_in_use
 from recognizer.touch.symbols.template import Floats, ResponseTemplate
 
 
@@ -124,7 +124,7 @@ def search(
     -------
     (n, 3) x, y (mm), theta: sensor point s lies at R(theta) s + (x, y) in the lattice frame.
     """
-    seen = np.stack([values, weights]).astype(np.float32)
+    seen = np.array([values, weights], np.float32)
     kernels = kernels_in_use()  # what a try was searched with serves the next one, and `diagnose`
     scores, around = _scores_of(bank, seen.tobytes(), order, kernels)
     return _peaks(bank, scores, around, keep)
@@ -138,12 +138,12 @@ def _scores_of(bank: Bank, seen: bytes, order: int, _kernels: str) -> tuple[Floa
     turns, n = len(bank.rotations_rad), math.isqrt(scores.shape[1])
     most = scores.reshape(turns, n, n)
     for axis in range(3):  # all three go round
-        one = np.moveaxis(most, axis, 0)
+        one = most.swapaxes(0, axis)
         line = one.copy()
         np.maximum(line[1:], one[:-1], out=line[1:])
         np.maximum(line[:-1], one[1:], out=line[:-1])
         line[0], line[-1] = np.maximum(line[0], one[-1]), np.maximum(line[-1], one[0])
-        most = np.moveaxis(line, 0, axis)
+        most = line.swapaxes(0, axis)
     return scores, most
 
 
@@ -193,7 +193,7 @@ def _sum_lattices(
     scores = np.empty((turns, lattices), np.float32)
     library.sum_lattices(
         height, width, order, turns, phases, lattices, cells,
-        products.ctypes.data, lookups.ctypes.data, scores.ctypes.data,
+        *addresses(products, lookups, scores),
     )  # fmt: skip
     return scores
 
@@ -204,4 +204,4 @@ def _peaks(bank: Bank, scores: Floats, around: Floats, keep: int) -> NDArray[np.
     peaks = np.flatnonzero(flat >= around.ravel())
     order = peaks[np.argsort(-flat[peaks], kind="stable")][:keep]
     turn, shift = np.divmod(order, shifts)
-    return np.column_stack([bank.shifts_mm[shift], bank.rotations_rad[turn]])
+    return np.concatenate([bank.shifts_mm[shift], bank.rotations_rad[turn, None]], axis=1)

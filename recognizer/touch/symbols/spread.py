@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.touch.settings import SpreadSettings
-from recognizer.touch.symbols.compiled import compiled_kernels
+from recognizer.touch.symbols.compiled import addresses, compiled_kernels
 from recognizer.touch.symbols.covariance import invert_normal
 
 Array = NDArray[np.float64]
@@ -101,6 +101,6 @@ def _fit_compiled(
     given = [np.ascontiguousarray(one) for one in (usual, left, parts, jacobian, known, trust)]
     seen = library.fit_spread(
         *jacobian.shape, settings.rounds, settings.freedom, settings.touches, settings.unseen,
-        *(one.ctypes.data for one in (*given, now)),
+        *addresses(*given, now),
     )  # fmt: skip
     return TactelScatter(math.sqrt(now[0]), math.sqrt(now[1])) if seen else None

@@ -39,7 +39,7 @@ def psi(response: NDArray[np.float64] | Floats) -> NDArray[np.float64]:
     return np.log1p(PSI * np.maximum(response, 0.0)) / math.log1p(PSI)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ResponseTemplate:
     """Responses of all symbols of an alphabet on a fine grid of offsets."""
 
@@ -62,11 +62,19 @@ class ResponseTemplate:
 
     def at(self, offsets_mm: NDArray[np.float64]) -> Floats:
         """Return psi and slopes (..., order, 6) at offsets (..., 2); 0 outside the grid."""
-        index = np.rint((offsets_mm + self.half_mm) / self.step_mm)
-        np.clip(index, -1, self.size, out=index)
-        place = ((index[..., 1] + 1) * (self.size + 2) + index[..., 0] + 1).astype(np.intp)
+        place = self._places(offsets_mm)
         found = self.rimmed.reshape(-1, self.order * 6).take(place, axis=0)
         return found.reshape(*place.shape, self.order, 6)
+
+    def of(self, offsets_mm: NDArray[np.float64], labels: NDArray[np.int64]) -> Floats:
+        """Return those (..., 1, 6) of one symbol each alone, labels (...)."""
+        place = self._places(offsets_mm) * self.order + labels
+        return self.rimmed.reshape(-1, 6).take(place[..., None], axis=0)
+
+    def _places(self, offsets_mm: NDArray[np.float64]) -> NDArray[np.intp]:
+        index = np.rint((offsets_mm + self.half_mm) / self.step_mm)
+        np.minimum(np.maximum(index, -1, out=index), self.size, out=index)
+        return ((index[..., 1] + 1) * (self.size + 2) + index[..., 0] + 1).astype(np.intp)
 
 
 @lru_cache(maxsize=16)

@@ -292,13 +292,11 @@ def test_names_are_counted_alike(names, library):
     assert given_.tolist() == names
 
 
-def test_places_of_an_array_of_2_to_the_64_cells_are_named_alike(use):
+def test_places_of_an_array_of_2_to_the_64_cells_are_named_alike(use, small):
     held = [(row, column, row % 3, 0) for row in range(7) for column in range(9)]
     scores = np.full((2, 5), -9.0)
     scores[:, 0] = 0.0
-    fit = SimpleNamespace(
-        cells=np.array([[0, 0], [1, 0]]), scores=scores, seen=np.full(2, 20.0), value=0.0
-    )
+    fit = small.fit_of([[0, 0], [1, 0]], scores)
     use("compiled")
     found = []
     for rows, columns in ((7, 9), (2**32 - 1, 2**32 + 1)):
