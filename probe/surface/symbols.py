@@ -78,26 +78,33 @@ class SymbolReliefs:
         Pieces are 0 the face, 1 the top, and 2 + k m + i the stretch i of m of the profile
         on the side of edge k.
         """
-        away, heights = self.relief.profile()
         eps = SURFACE.overlap * (float(np.abs(self.tops).max()) + self.relief.stroke_mm)
         piece, z = np.zeros(len(x), dtype=np.int64), np.zeros(len(x))
+        for label in np.unique(labels).tolist():
+            here = np.flatnonzero(labels == label)
+            piece[here], z[here] = self._pieces_of(label, x[here], y[here], eps)
+        return piece, z
+
+    def _pieces_of(self, label: int, x: Array, y: Array, eps: float) -> tuple[Index, Array]:
+        """Return the pieces over points of one symbol, and the heights there."""
+        away, heights = self.relief.profile()
+        piece, z = np.zeros(len(x), dtype=np.int64), np.zeros(len(x))
         if len(away) > 1:
-            nx, ny = self.normals[:, labels]
-            s = nx * x[:, None] + ny * y[:, None] - self.supports[labels]
-            rows, edges = np.nonzero((s >= away[0] - eps) & (s <= away[-1] + eps))
-            s = s[rows, edges]
-            here = labels[rows], edges
-            t = self.normals[0][here] * y[rows] - self.normals[1][here] * x[rows]
-            a, b, c, d = self.spans[:, here[0], here[1]]
+            nx, ny = self.normals[:, label, :, None]
+            s = nx * x + ny * y - self.supports[label, :, None]
+            edges, points = np.nonzero((s >= away[0] - eps) & (s <= away[-1] + eps))
+            s = s[edges, points]
+            t = nx[edges, 0] * y[points] - ny[edges, 0] * x[points]
+            a, b, c, d = self.spans[:, label, edges]
             on = (t >= a + b * s - eps) & (t <= c + d * s + eps)
-            rows, edges, s = rows[on], edges[on], s[on]
+            points, edges, s = points[on], edges[on], s[on]
             side = np.interp(s, away, heights)
             # Of two sides that overlap (a corner, by rounding) the higher one is written last.
             order = np.argsort(side, kind="stable")
             stretch = np.clip(np.searchsorted(away, s) - 1, 0, len(away) - 2)
-            piece[rows[order]] = (2 + edges * (len(away) - 1) + stretch)[order]
-            z[rows[order]] = side[order]
-        flat = self._in_tops(labels, x, y)
+            piece[points[order]] = (2 + edges * (len(away) - 1) + stretch)[order]
+            z[points[order]] = side[order]
+        flat = self._in_top(label, x, y)
         piece[flat], z[flat] = 1, self.relief.height_mm
         return piece, z
 
@@ -110,13 +117,15 @@ class SymbolReliefs:
         sides = np.stack([level, nx, ny], axis=-1).reshape(-1, 3)
         return np.concatenate([[[0.0, 0.0, 0.0], [self.relief.height_mm, 0.0, 0.0]], sides])
 
-    def _in_tops(self, labels: Index, x: Array, y: Array) -> NDArray[np.bool_]:
-        """Whether points lie in the tops, by the parity of crossed edges."""
-        x0, y0, x1, y1 = self.tops[:, labels]
-        up = y0 <= y[:, None]
-        crosses = up != (y1 <= y[:, None])
-        left = (x1 - x0) * (y[:, None] - y0) - (y1 - y0) * (x[:, None] - x0) > 0
-        inside: NDArray[np.bool_] = np.logical_xor.reduce(crosses & (left == up), axis=1)
+    def _in_top(self, label: int, x: Array, y: Array) -> NDArray[np.bool_]:
+        """Whether points lie in the top of a symbol, by the parity of crossed edges."""
+        x0, y0, x1, y1 = self.tops[:, label, :, None]
+        up = y0 <= y
+        edges, points = np.nonzero(up != (y1 <= y))
+        x0, y0, x1, y1 = self.tops[:, label, edges]
+        left = (x1 - x0) * (y[points] - y0) - (y1 - y0) * (x[points] - x0) > 0
+        met = points[left == up[edges, points]]
+        inside: NDArray[np.bool_] = np.bincount(met, minlength=len(x)) % 2 == 1
         return inside
 
 

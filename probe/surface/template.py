@@ -3,6 +3,7 @@
 One cell of the lattice is cut into fine square bins. A bin that no edge of the symbol
 crosses lies under one planar piece; the table names that piece, and the height is its
 plane's, exact. The few bins that an edge crosses ask `SymbolReliefs`. No interpolation anywhere.
+A bin is looked into when it is first asked: letters that are touched once need few of them.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from probe.surface.symbols import SymbolReliefs
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_CROSSED = -1
+_CROSSED, _OPEN = -1, -2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,8 +30,10 @@ class HeightTemplate:
 
     symbols: SymbolReliefs
     pitch_mm: float
-    table: NDArray[np.int16]  #: [label, bin down, bin right] -> line of `planes`, -1: crossed
+    table: NDArray[np.int16]
+    """[label, bin down, bin right] -> line of `planes`; -1: crossed, -2: not looked into yet."""
     planes: Array  #: (n, 3) z = a + b x + c y, symbol's axes
+    first: Index  #: (labels,) by which a label's pieces stand later in `planes`
 
     def heights_mm(self, labels: Index, right: Array, down: Array) -> Array:
         """Return the height over the face at a place each.
@@ -47,6 +50,8 @@ class HeightTemplate:
         cell *= SURFACE.bins
         cell += (right * SURFACE.bins).astype(np.int64)
         piece = self.table.ravel().take(cell, mode="wrap")
+        if (left := np.flatnonzero(piece == _OPEN)).size:
+            piece[left] = self._look_into(cell[left])
         z: Array = self.planes[:, 0].take(piece, mode="clip")
         sloped = np.flatnonzero(piece > 1)
         b, c = self.planes[piece[sloped], 1:].T
@@ -55,6 +60,18 @@ class HeightTemplate:
         x, y = self._x(right[asked]), self._y(down[asked])
         z[asked] = self.symbols.heights_mm(labels[asked], x, y)
         return z
+
+    def _look_into(self, cell: Index) -> NDArray[np.int16]:
+        """Return the pieces over bins that no edge crosses, and keep them in the table."""
+        label, within = np.divmod(cell, SURFACE.bins**2)
+        down, right = np.divmod(within, SURFACE.bins)
+        middle = _middles()
+        piece, _ = self.symbols.pieces(
+            label, self.pitch_mm * middle[right], self.pitch_mm * -middle[down]
+        )
+        found = np.where(piece > 1, piece + self.first[label], piece).astype(np.int16)
+        self.table.ravel()[cell] = found
+        return found
 
     def _x(self, right: Array) -> Array:
         return (right - 0.5) * self.pitch_mm
@@ -78,24 +95,23 @@ def template(symbols: SymbolReliefs, pitch_mm: float) -> HeightTemplate:
             f"{pitch_mm:g} mm",
             fix="take a larger pitch, or thinner strokes",
         )
-    count = len(symbols.rings)
-    table = np.zeros(
-        (count + 1, SURFACE.bins, SURFACE.bins), dtype=np.int16
-    )  # the last one is label -1
-    planes = [symbols.planes(0)[:2]]
-    middle = (np.arange(SURFACE.bins) + 0.5) / SURFACE.bins - 0.5
-    x, y = (pitch_mm * grid.ravel() for grid in np.meshgrid(middle, -middle))
+    foot, count = symbols.foot_half_mm, len(symbols.rings)
+    beside = np.abs(pitch_mm * _middles()) > foot + pitch_mm / SURFACE.bins
+    table = np.full((count + 1, SURFACE.bins, SURFACE.bins), _OPEN, dtype=np.int16)
+    table[:, beside] = table[:, :, beside] = 0
+    table[count] = 0  # of label -1
+    planes, first = [symbols.planes(0)[:2]], np.zeros(count, dtype=np.int64)
     for label in range(count):
-        crossed = _crossed_bins(symbols, label, pitch_mm)
-        first = sum(map(len, planes)) - 2
+        table[label][_crossed_bins(symbols, label, pitch_mm)] = _CROSSED
+        first[label] = sum(map(len, planes)) - 2
         planes.append(symbols.planes(label)[2:])
-        near = np.maximum(np.abs(x), np.abs(y)) <= symbols.foot_half_mm + pitch_mm / SURFACE.bins
-        ask = np.flatnonzero(near & ~crossed.ravel())
-        piece, _ = symbols.pieces(np.full(len(ask), label), x[ask], y[ask])
-        table[label].ravel()[ask] = np.where(piece > 1, piece + first, piece)
-        table[label][crossed] = _CROSSED
-    table.setflags(write=False)
-    return HeightTemplate(symbols, pitch_mm, table, np.concatenate(planes))
+    return HeightTemplate(symbols, pitch_mm, table, np.concatenate(planes), first)
+
+
+def _middles() -> Array:
+    """Return the places (bins,) of the bins' middles in a cell, from its middle, over the pitch."""
+    middles: Array = (np.arange(SURFACE.bins) + 0.5) / SURFACE.bins - 0.5
+    return middles
 
 
 def _crossed_bins(symbols: SymbolReliefs, label: int, pitch_mm: float) -> NDArray[np.bool_]:
@@ -103,7 +119,7 @@ def _crossed_bins(symbols: SymbolReliefs, label: int, pitch_mm: float) -> NDArra
     away = symbols.relief.profile()[0]
     found = np.zeros((SURFACE.bins, SURFACE.bins), dtype=bool)
     half = pitch_mm / SURFACE.bins / 2
-    middle = (np.arange(SURFACE.bins) + 0.5) / SURFACE.bins - 0.5
+    middle = _middles()
     for ring in symbols.rings[label]:
         levels = [ring.moved(float(d)) for d in away]
         lines = [(a, b) for tier in levels for a, b in zip(tier, np.roll(tier, -1, 0), strict=True)]
