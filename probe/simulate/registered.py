@@ -61,7 +61,11 @@ def registered_surface(database: str, object_name: str, face: str = "") -> Scene
         When the database cannot be read, or holds no such object or face; the message lists
         those that it holds.
     """
-    held = registered_object(database, object_name)
+    return scene_of_face(database, registered_object(database, object_name), face)
+
+
+def scene_of_face(database: str, held: RegisteredObject, face: str = "") -> Scene:
+    """Return a face of an object that was read before; raises as `registered_surface`."""
     found = face_of(held, face)
     if found.round is not None:
         return round_scene(database, held, found)

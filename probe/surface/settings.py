@@ -16,6 +16,8 @@ class SurfaceSettings:
     far_mm: float = 1e9  #: support of an edge that is not there
     bins: int = 192  #: of a template, along a side of a cell
     pairs: int = 1 << 25  #: of bins and triangles at most
+    beside_bin: float = 1e-6
+    """By which a triangle's stretch over bins is taken too long, of a bin; rounding is 1e-12."""
 
 
 SURFACE = SurfaceSettings()

@@ -7,14 +7,14 @@ from functools import lru_cache
 
 from probe.sensor import SensorType
 from probe.sensor_types import choose_sensor_type, force_share
-from probe.simulate.registered import registered_object, registered_objects, registered_surface
+from probe.simulate.registered import registered_object, registered_objects, scene_of_face
 from probe.simulate.scene import Scene
 from probe.simulate.touch import TouchRanges
 from probe.simulate.world.levels import LEVELS, Level
 from recognizer.touch.lab import EmbossedArray
 from recognizer.validation.made_kinds import SIDE, is_extra
 from recognizer.validation.settings import DRAWING
-from recognizer.validation.written import written_surface
+from recognizer.validation.written import object_of_run, written_surface
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,4 +114,4 @@ def scene_of(database: str, object_name: str, face: str, files: bool, prints: st
         return printed_scene(prints, database, object_name, face)
     if files:
         return written_surface(database, object_name, face)
-    return registered_surface(database, object_name, face)
+    return scene_of_face(database, object_of_run(database, object_name), face)

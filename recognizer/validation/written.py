@@ -13,10 +13,13 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from sqlalchemy import Engine
 
+from generator.database.open import open_database
+from generator.database.read import read_object
 from generator.database.registered import RegisteredObject, RegisteredPart
+from generator.database.transaction import read_transaction
 from generator.database.url import normal_url, part_path
-from probe.simulate.registered import registered_object
 from probe.simulate.registered_part import scene_of_part
 from probe.simulate.scene import Scene
 from recognizer.validation.errors import SetError
@@ -39,10 +42,10 @@ def written_surface(database: str, object_name: str, face: str) -> Scene:
     SetError
         The object has no STL part that bears the face, the file is not there, or its bytes
         are not those that were registered.
-    SurfaceError
-        The database cannot be read.
+    DatabaseError
+        The database cannot be read, or does not hold the object.
     """
-    held = _object_of_run(database, object_name)
+    held = object_of_run(database, object_name)
     part = stl_part(held, face)
     path = part_path(normal_url(database), part.file)
     check_file(path, part)
@@ -50,9 +53,22 @@ def written_surface(database: str, object_name: str, face: str) -> Scene:
 
 
 @lru_cache(maxsize=64)
-def _object_of_run(database: str, object_name: str) -> RegisteredObject:
-    """Return an object of a set, which stays as it is while it is touched (`set_digest`)."""
-    return registered_object(database, object_name)
+def object_of_run(database: str, object_name: str) -> RegisteredObject:
+    """Return an object of a set, which stays as it is while it is touched (`set_digest`).
+
+    Raises
+    ------
+    DatabaseError
+        The database cannot be read, or does not hold it.
+    """
+    with read_transaction(_database_of_run(database)) as connection:
+        return read_object(connection, object_name)
+
+
+@lru_cache(maxsize=4)
+def _database_of_run(database: str) -> Engine:
+    """Return a database that stays open, so that each query is put into words once."""
+    return open_database(database, writable=False)
 
 
 def stl_part(held: RegisteredObject, face: str) -> RegisteredPart:

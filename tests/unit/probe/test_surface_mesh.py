@@ -135,3 +135,36 @@ def test_face_sees_its_surroundings_beyond_its_edges_and_above_itself():
     assert alone.heights_mm(at).tolist() == [0.0, 0.0, -np.inf, -np.inf]
     over = FaceSurface(None, polygon([SQUARE]), FlatPlate(3.0))
     assert (over.heights_mm(at) == 3.0).all()
+
+
+def test_level_ground_is_answered_by_its_bins_as_by_its_triangles():
+    """A plate at z = 0 with a block on it: inside each bin, and on the plate's rim."""
+    n = 40
+    x, y = np.meshgrid(np.linspace(0, 10, n + 1), np.linspace(0, 10, n + 1), indexing="ij")
+    high = ((x > 4.9) & (x < 7.1) & (y > 2.9) & (y < 8.1)).astype(float)
+    top = np.stack([x, y, high], -1)
+    low = np.stack([x, y, np.full_like(x, -1)], -1)
+    quads = [(top[:-1, :-1], top[1:, :-1], top[1:, 1:], top[:-1, 1:]),
+             (low[:-1, :-1], low[:-1, 1:], low[1:, 1:], low[1:, :-1])]  # fmt: skip
+    for way in (0, 1):  # walls along x and along y, at both ends
+        for end in (0, -1):
+            a, b = top.take(end, axis=way), low.take(end, axis=way)
+            a, b = (a[::-1], b[::-1]) if (way == 0) == (end == 0) else (a, b)
+            quads.append((a[:-1], b[:-1], b[1:], a[1:]))
+    found = []
+    for corners in quads:
+        a, b, c, d = (corner.reshape(-1, 3) for corner in corners)
+        found += [np.stack([a, b, c], 1), np.stack([a, c, d], 1)]
+    triangles = np.concatenate(found)
+    closed, apart = mesh(triangles), mesh(triangles[:-1])  # without one wall it is no body
+    assert len(closed.corners) == 2 * n * n
+    assert closed.level.sum() > n * n
+    assert not apart.level.any()
+    points = np.random.default_rng(7).uniform(-1, 11, (20_000, 2))
+    points = np.concatenate([points, np.round(4 * points) / 4, np.round(points)])
+    heights = closed.heights_mm(points)
+    assert np.array_equal(heights, apart.heights_mm(points))
+    inside = ((points >= 0) & (points <= 10)).all(axis=1)
+    assert (np.isfinite(heights) == inside).all()
+    cell, _ = closed._bins.of(points)
+    assert 0.4 < closed._bins.level[cell].mean() < 0.95
