@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 
 from probe.sensor import SensorType
 from recognizer.touch import cause
+from recognizer.touch.around import combine_around, quantile
 from recognizer.touch.belief import VerifiedHypothesis, unworn_labels_at, weigh_cells
 from recognizer.touch.cause import Cause
 from recognizer.touch.first_look import shows_strokes
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.signal import Signal
-from recognizer.touch.symbols.fit import fit_lattices
-from recognizer.touch.symbols.gain import image_of_signal
 from recognizer.touch.symbols.projection import explained_share, project_symbols
+from recognizer.touch.verify import fit_touch
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -84,11 +84,9 @@ def image_features(
     forces = np.where(good, signal.forces, 0.0)
     noise = signal.noise
     reach = max(1, round(pitch_mm / max(sensor.step_mm)) // 2)
-    padded = np.pad(forces, reach)
-    windows = np.lib.stride_tricks.sliding_window_view(padded, (2 * reach + 1,) * 2)
-    envelope = windows.max(axis=(-2, -1))
-    top = max(float(np.percentile(envelope, settings.top)), 1e-300)
-    plateau = float(np.percentile(forces[good], settings.plateau))
+    envelope = combine_around(forces, reach, np.maximum)
+    top = max(_percentile(envelope, settings.top), 1e-300)
+    plateau = _percentile(forces[good], settings.plateau)
     points = sensor.centres_mm().reshape(-1, 2)
     basis = np.column_stack([np.ones(len(points)), points / np.array(sensor.half_mm)])
     plane = np.linalg.lstsq(basis, envelope.ravel() / top, rcond=None)[0]
@@ -110,10 +108,13 @@ def image_features(
     )
 
 
-def _is_plain(signal: Signal, settings: CauseSettings) -> bool:
+def _percentile(values: Array, percent: float) -> float:
+    return float(quantile(np.sort(values, axis=None), percent / 100.0))
+
+
+def _is_plain(image: ImageFeatures, signal: Signal, settings: CauseSettings) -> bool:
     """Whether what is pressed is one area without gaps, pressed evenly, up to an edge or not."""
-    good = signal.trust > 0
-    top = float(np.percentile(signal.forces[good], settings.plateau))
+    good, top = signal.trust > 0, image.plateau
     pressed = good & (signal.forces > settings.part * top)
     rows, columns = np.flatnonzero(pressed.any(axis=1)), np.flatnonzero(pressed.any(axis=0))
     if not len(rows):
@@ -149,7 +150,7 @@ def diagnose(
     if image.width_mm < settings.narrow_mm and image.length_mm > settings.longer * image.width_mm:
         return Cause(cause.ONE_ROW, {"width_mm": image.width_mm, "symbols": float(symbols)})
     bare = support is None and not shows_strokes(reader, signal)  # no symbols were looked for
-    if bare or _is_plain(signal, settings):
+    if bare or _is_plain(image, signal, settings):
         return Cause(cause.PLAIN, {"variation": image.variation, "plateau": image.plateau})
     if support is None:
         code = cause.EDGE if image.loaded < settings.loaded else cause.UNCLEAR
@@ -195,9 +196,9 @@ def _read_anywhere(
     Each cell shows what fits it best, whether such a window is registered or not.
     """
     best, read = -math.inf, 0
-    for embossed, template, bank in reader.prepared:
-        image = image_of_signal(reader.sensor, signal, embossed.style.height_mm, reader.settings)
-        for fit in fit_lattices(image, template, bank, reader.settings.first)[:1]:
+    fitted = fit_touch(reader, signal, reader.settings.first)
+    for (_, template, _), (image, fits) in zip(reader.prepared, fitted, strict=True):
+        for fit in fits[:1]:
             order = fit.scores.shape[1] - 1
             labels = fit.scores.argmax(axis=1)
             shows = np.where(labels == order, -1, labels).tolist()

@@ -21,6 +21,7 @@ from recognizer.touch.settings import NextSettings
 from recognizer.touch.signal import Signal
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 
@@ -30,6 +31,26 @@ class EarlierTouch:
 
     pose: Array  #: (3,) x, y (mm) and turn (rad), in the sensor frame of the last touch
     signal: Signal
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlanePoints:
+    """Points of the sensor's plane, as the last touch has them."""
+
+    mm: Array  #: (..., 2)
+    under: Flags  #: (...) whether they lie under the sensor
+    nearest: tuple[Ints, Ints]  #: row and column (...) of the tactel nearest to each
+    away_mm: Array  #: (...) from the sensor's rim
+
+
+def plane_points(sensor: SensorType, points_mm: Array) -> PlanePoints:
+    """Return points (..., 2) of a sensor's plane."""
+    half = np.array(sensor.half_mm)
+    beyond = np.maximum(np.abs(points_mm) - half, 0.0)
+    under = np.asarray((np.abs(points_mm) < half).all(axis=-1))
+    inside = np.clip(points_mm, -0.999 * half, 0.999 * half)
+    nearest = _tactels(sensor, np.where(under[..., None], points_mm, inside))
+    return PlanePoints(points_mm, under, nearest, np.linalg.norm(beyond, axis=-1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,34 +67,26 @@ class FeltArea:
         """Return how much of the sensor lies on something."""
         return float(self.loaded.mean())
 
-    def look(self, points_mm: Array) -> tuple[Array, Flags]:
-        """Return how much a face is expected at points (..., 2), 0 ... 1, and which were seen."""
-        seen, felt = self._felt(points_mm)
-        half, beyond = np.array(self.sensor.half_mm), points_mm[~seen]
-        away = np.linalg.norm(np.maximum(np.abs(beyond) - half, 0.0), axis=-1)
-        inside = np.clip(beyond, -0.999 * half, 0.999 * half)
-        expected = felt.astype(np.float64)
-        expected[~seen] = self.loaded[_tactels(self.sensor, inside)] * np.exp(
-            -away / self.beyond_mm
-        )
-        return expected, seen
+    def look(self, points: PlanePoints) -> tuple[Array, Flags]:
+        """Return how much a face is expected at points (...), 0 ... 1, and which were seen."""
+        seen, felt = self._felt(points)
+        expected = self.loaded[points.nearest] * np.exp(-points.away_mm / self.beyond_mm)
+        return np.where(seen, felt, expected), seen
 
-    def felt(self, points_mm: Array) -> Flags:
-        """Return where among points (..., 2) a face was felt."""
-        return self._felt(points_mm)[1]
+    def felt(self, points: PlanePoints) -> Flags:
+        """Return where among points (...) a face was felt."""
+        return self._felt(points)[1]
 
-    def seen(self, points_mm: Array) -> Flags:
-        """Return which points (..., 2) lay under the sensor."""
-        return self._felt(points_mm)[0]
+    def seen(self, points: PlanePoints) -> Flags:
+        """Return which points (...) lay under the sensor."""
+        return self._felt(points)[0]
 
-    def _felt(self, points_mm: Array) -> tuple[Flags, Flags]:
+    def _felt(self, points: PlanePoints) -> tuple[Flags, Flags]:
         half = np.array(self.sensor.half_mm)
-        seen = np.asarray((np.abs(points_mm) < half).all(axis=-1))
-        felt = np.zeros(seen.shape, np.bool_)
-        felt[seen] = self.loaded[_tactels(self.sensor, points_mm[seen])]
+        seen, felt = points.under.copy(), points.under & self.loaded[points.nearest]
         for (x, y, turn), loaded in self.earlier:
             c, s = math.cos(turn), math.sin(turn)
-            own = (points_mm - (x, y)) @ np.array([[c, -s], [s, c]])
+            own = (points.mm - (x, y)) @ np.array([[c, -s], [s, c]])
             under = (np.abs(own) < half).all(axis=-1)
             seen |= under
             felt[under] |= loaded[_tactels(self.sensor, own[under])]

@@ -205,13 +205,11 @@ def _rank_candidates(
     rows, columns, owners = found
     if len(rows) == 0:
         return []
-    values = _log_likelihoods(embossed, fit, scores, found, settings)
+    followed, values = _log_likelihoods(embossed, fit, scores, found, settings)
     best = np.argsort(-values, kind="stable")[: settings.kept]
     return [
-        Hypothesis(
-            number, int(rows[k]), int(columns[k]), int(owners[k]), float(values[k]) + fit.value
-        )
-        for k in best
+        Hypothesis(number, int(rows[k]), int(columns[k]), int(owners[k]), value + fit.value)
+        for k, value in zip(followed[best].tolist(), values[best].tolist(), strict=True)
     ]
 
 
@@ -324,8 +322,8 @@ def _log_likelihoods(
     scores: Array,
     found: Places,
     settings: HypothesisSettings,
-) -> Array:
-    """Return the log-likelihood of each candidate, 0 if every cell is at its best.
+) -> tuple[Ints, Array]:
+    """Return numbers (k,) of candidates, and their log-likelihoods, 0 if every cell is at its best.
 
     The surest cells come first; of many candidates only the best are followed to the end.
     """
@@ -333,10 +331,8 @@ def _log_likelihoods(
     order = np.argsort(-spread * np.minimum(fit.seen, settings.heavy), kind="stable")
     first, rest = order[: settings.first], order[settings.first :]
     total = add_scores(embossed, found, fit.cells[first], scores[first], np.zeros(len(found[0])))
-    if len(rest) == 0 or len(total) <= settings.followed:
-        return add_scores(embossed, found, fit.cells[rest], scores[rest], total)
-    kept = np.argpartition(-total, settings.followed)[: settings.followed]
-    followed = found[0][kept], found[1][kept], found[2][kept]
-    low = np.full(len(total), -np.inf)
-    low[kept] = add_scores(embossed, followed, fit.cells[rest], scores[rest], total[kept])
-    return low
+    kept = np.arange(len(total))
+    if len(rest) and len(total) > settings.followed:
+        kept = np.sort(np.argpartition(-total, settings.followed)[: settings.followed])
+        found, total = (found[0][kept], found[1][kept], found[2][kept]), total[kept]
+    return kept, add_scores(embossed, found, fit.cells[rest], scores[rest], total)

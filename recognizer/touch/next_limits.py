@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 
 from probe.sensor import SensorType
 from probe.sensor_types import force_share
 from recognizer.touch.settings import DEFAULTS, NextSettings
 
 
+@lru_cache(maxsize=16)
 def next_limits(sensor: SensorType, settings: NextSettings = DEFAULTS.next) -> NextSettings:
     """Return the settings for a type: steps as long for its size, as hard as it is pressed.
 

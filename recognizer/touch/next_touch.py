@@ -17,13 +17,22 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from probe.sensor import SensorType
 from probe.surface.polygon import polygon
-from recognizer.touch.felt_area import EarlierTouch, FeltArea, felt_area, strongest_reading
+from recognizer.touch.felt_area import (
+    EarlierTouch,
+    FeltArea,
+    PlanePoints,
+    felt_area,
+    plane_points,
+    strongest_reading,
+)
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.locate import Hypothesis
 from recognizer.touch.next_limits import next_limits
@@ -94,7 +103,7 @@ def propose_next(
     area = felt_area(reader.sensor, signal, earlier, settings)
     if area.share >= settings.whole_share:
         settings = replace(settings, novelty=settings.novelty_inside)
-    by_image, borne = _symbols_by_image(area, steps, pitch_mm, settings)
+    by_image, borne = _symbols_by_image(area, pitch_mm, settings)
     value = by_image
     # where nothing speaks for symbols of a registered place, hypotheses know no border either
     likely = _likely(hypotheses, settings) if answer or answer.reason in _PLACES_KNOWN else []
@@ -122,6 +131,7 @@ def _is_unsure(answer: Recognition, settings: NextSettings) -> bool:
     return few or (answer.doubt is not None and answer.doubt > settings.doubt)
 
 
+@lru_cache(maxsize=8)
 def _steps(settings: NextSettings) -> Array:
     """Return (n, 3) steps along x and y (mm) and turns (rad); the first one is none."""
     turns = np.arange(settings.directions) * 2 * math.pi / settings.directions
@@ -130,22 +140,30 @@ def _steps(settings: NextSettings) -> Array:
     return np.array([(x, y, turn) for turn in settings.turns_rad for x, y in moves])
 
 
-def _symbols_by_image(
-    area: FeltArea, steps: Array, pitch_mm: float, settings: NextSettings
-) -> tuple[Array, Flags]:
-    """Return (n,) symbols worth at each step, and whether the centre then lies on what was felt."""
-    half = np.array(area.sensor.half_mm)
+@lru_cache(maxsize=8)
+def _views(sensor: SensorType, settings: NextSettings) -> tuple[PlanePoints, PlanePoints]:
+    """Return points that the sensor sees after each step (n, k), and those about its centre."""
+    steps, half = _steps(settings), np.array(sensor.half_mm)
     line = (np.arange(settings.points) + 0.5) / settings.points * 2 - 1
     grid = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2) * half
     c, s = np.cos(steps[:, 2, None]), np.sin(steps[:, 2, None])
     x = steps[:, 0, None] + c * grid[:, 0] - s * grid[:, 1]
     y = steps[:, 1, None] + s * grid[:, 0] + c * grid[:, 1]
-    points = np.stack([x, y], axis=-1)
-    cells = 4 * half[0] * half[1] / pitch_mm**2
+    around = settings.clear_mm * np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)])
+    views = np.stack([x, y], axis=-1), steps[:, None, :2] + around
+    return plane_points(sensor, views[0]), plane_points(sensor, views[1])
+
+
+def _symbols_by_image(
+    area: FeltArea, pitch_mm: float, settings: NextSettings
+) -> tuple[Array, Flags]:
+    """Return (n,) symbols worth at each step, and whether the centre then lies on what was felt."""
+    points, around = _views(area.sensor, settings)
+    half_x, half_y = area.sensor.half_mm
+    cells = 4 * half_x * half_y / pitch_mm**2
     expected, seen = area.look(points)
     worth = cells * (expected * (1 + settings.novelty * ~seen)).mean(axis=1)
-    around = settings.clear_mm * np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)])
-    return worth, np.asarray(area.felt(steps[:, None, :2] + around).all(axis=1))
+    return worth, np.asarray(area.felt(around).all(axis=1))
 
 
 def _likely(
@@ -173,7 +191,7 @@ def _symbols_by_face(
     rim = settings.whole * one.embossed.style.pitch_mm
     half = np.array(area.sensor.half_mm)
     seen = (np.abs(then) < half - rim).all(axis=-1)
-    new = ~area.seen(own)
+    new = ~area.seen(plane_points(area.sensor, own))
     worth = (seen * (1 + settings.novelty * new)).sum(axis=1)
     places = steps[:, :2] @ R.T + at
     region = polygon(list(face.polygon_mm))

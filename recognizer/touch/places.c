@@ -80,23 +80,27 @@ void name_places(const Held *h, int64_t n, const int64_t *at, const int64_t *cel
     }
 }
 
-enum { DIGIT = 11, DIGITS = 1 << DIGIT };
+enum { DIGIT = 12 };
 
 /* Numbers (n,), none negative: sorted in place, each once, with how often it was there. They are
-   sorted digit by digit, every other pass into `spare` (n,). Returns how many there are. */
+   sorted by digits of at most 12 bits, every other pass into `spare` (n,). Returns how many. */
 int64_t count_names(int64_t n, int64_t *names, int64_t *spare, int64_t *votes) {
     int64_t most = 0, *from = names, *to = spare;
+    int bits = 0;
     for (int64_t k = 0; k < n; k++) most |= names[k];
-    for (int shift = 0; shift < 63 && most >> shift; shift += DIGIT) {
-        int64_t starts[DIGITS];
-        memset(starts, 0, sizeof starts);
-        for (int64_t k = 0; k < n; k++) starts[(from[k] >> shift) & (DIGITS - 1)]++;
-        for (int64_t d = 0, sum = 0; d < DIGITS; d++) {
+    while (bits < 63 && most >> bits) bits++;
+    int passes = (bits + DIGIT - 1) / DIGIT, digit = passes ? (bits + passes - 1) / passes : 0;
+    int64_t digits = 1 << digit;
+    for (int shift = 0; shift < bits; shift += digit) {
+        int64_t starts[1 << DIGIT];
+        memset(starts, 0, digits * sizeof *starts);
+        for (int64_t k = 0; k < n; k++) starts[(from[k] >> shift) & (digits - 1)]++;
+        for (int64_t d = 0, sum = 0; d < digits; d++) {
             int64_t count = starts[d];
             starts[d] = sum;
             sum += count;
         }
-        for (int64_t k = 0; k < n; k++) to[starts[(from[k] >> shift) & (DIGITS - 1)]++] = from[k];
+        for (int64_t k = 0; k < n; k++) to[starts[(from[k] >> shift) & (digits - 1)]++] = from[k];
         int64_t *was = from;
         from = to;
         to = was;

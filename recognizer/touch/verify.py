@@ -7,6 +7,7 @@ says are in view, then its rivals under that fit, wherever in the database they 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -23,10 +24,13 @@ from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.round import verify_on_round_faces
 from recognizer.touch.settings import FitSettings
 from recognizer.touch.signal import Signal
+from recognizer.touch.symbols.compiled import kernels_in_use
 from recognizer.touch.symbols.fit import Fit, fit_lattices, score_cells
 from recognizer.touch.symbols.gain import Image, image_of_signal
 from recognizer.touch.symbols.refine import refine_lattices
 from recognizer.touch.symbols.template import ResponseTemplate
+
+Fitted = tuple[tuple[Image, tuple[Fit, ...]], ...]
 
 
 def verify_hypotheses(
@@ -34,14 +38,38 @@ def verify_hypotheses(
 ) -> list[VerifiedHypothesis]:
     """Return the verified places over all arrays of the lab, best first."""
     found: list[VerifiedHypothesis] = []
-    for embossed, template, bank in reader.prepared:
-        height_mm = embossed.style.height_mm
-        image = image_of_signal(reader.sensor, signal, height_mm, reader.settings)
-        fits = fit_lattices(image, template, bank, effort)
+    fitted = fit_touch(reader, signal, effort)
+    for (embossed, template, bank), (image, fits) in zip(reader.prepared, fitted, strict=True):
         found += _verify_on_flat_faces(image, embossed, template, fits)
         if embossed.radii_mm:
             found += verify_on_round_faces(image, reader.sensor, embossed, template, bank, effort)
     return sorted(found, key=lambda verified: -verified.score)
+
+
+def fit_touch(reader: PreparedLab, signal: Signal, effort: FitSettings) -> Fitted:
+    """Return for each array of a lab the image of a touch, and the lattices in it, best first.
+
+    How sure these are is not told. What a try has fitted serves `diagnose`.
+    """
+    return _fit_images(reader, signal, effort, kernels_in_use())
+
+
+@lru_cache(maxsize=2)
+def _fit_images(reader: PreparedLab, signal: Signal, effort: FitSettings, _kernels: str) -> Fitted:
+    return tuple(
+        (image, fit_lattices(image, template, bank, effort, told=False))
+        for image, (_, template, bank) in zip(
+            _images_of(reader, signal), reader.prepared, strict=True
+        )
+    )
+
+
+@lru_cache(maxsize=2)
+def _images_of(reader: PreparedLab, signal: Signal) -> tuple[Image, ...]:
+    return tuple(
+        image_of_signal(reader.sensor, signal, embossed.style.height_mm, reader.settings)
+        for embossed, _, _ in reader.prepared
+    )
 
 
 def _verify_on_flat_faces(
@@ -99,8 +127,11 @@ def _fit_hypotheses(
     # a place is as likely as under the best of the fits that began where its own did: what one of
     # them missed of gain and sharpness is no word against the symbols
     own = np.array([place.fit for place in candidates])
-    scores = np.array([log_likelihoods_at(embossed, fit, candidates, settings) for fit in again])
-    scores[own[:, None] != own] = -np.inf
+    scores = np.full((len(candidates), len(candidates)), -np.inf)
+    for n, fit in enumerate(again):
+        alike = np.flatnonzero(own == own[n])
+        places = [candidates[k] for k in alike.tolist()]
+        scores[n, alike] = log_likelihoods_at(embossed, fit, places, settings)
     for n, (place, best) in enumerate(zip(candidates, scores.argmax(axis=0), strict=True)):
         score = float(scores[best, n])
         verified.append(VerifiedHypothesis(image, template, embossed, place, again[best], score))

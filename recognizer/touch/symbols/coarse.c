@@ -26,6 +26,12 @@ static float sum_pairwise(const float *at, const int32_t *places, int64_t n) {
     return sum;
 }
 
+/* Values (n,) of groups of `size` floats that lie `apart`, one behind the other. */
+static inline void gather(float *to, const float *from, int64_t n, int64_t size, int64_t apart) {
+    for (int64_t x = 0; x < n; x++)
+        for (int64_t k = 0; k < size; k++) to[x * size + k] = from[x * apart + k];
+}
+
 /* products (height, width, order, turns, phases^2) -> scores (turns, lattices): the sum over the
    cells of each lattice of what its likeliest symbol, or none, scores where the cell lies; lookups
    (turns, lattices, cells) are numbers of places (height phases, width phases), the last one none. */
@@ -34,24 +40,26 @@ void sum_lattices(int64_t height, int64_t width, int64_t order, int64_t turns, i
                   float *scores) {
     int64_t each = phases * phases, count = height * width * each;
     int64_t all = turns * each;
-    float *places = malloc((turns * (count + 1) + all) * sizeof(float));
-    float *best = places + turns * (count + 1); /* (turns, phases^2) of one tactel */
+    float *places = malloc((turns * (count + 1) + width * all) * sizeof(float));
+    float *row = places + turns * (count + 1); /* (width, turns, phases^2) of a row of tactels */
     for (int64_t y = 0; y < height; y++) {
         for (int64_t x = 0; x < width; x++) {
             const float *from = products + (y * width + x) * order * all;
+            float *best = row + x * all;
             for (int64_t k = 0; k < all; k++) best[k] = from[k] > 0.0f ? from[k] : 0.0f;
             for (int64_t label = 1; label < order; label++)
                 for (int64_t k = 0; k < all; k++) {
                     float one = from[label * all + k];
                     best[k] = one > best[k] ? one : best[k];
                 }
-            for (int64_t down = 0; down < phases; down++) {
-                float *to = places + ((y * phases + down) * width + x) * phases;
-                for (int64_t turn = 0; turn < turns; turn++, to += count + 1)
-                    for (int64_t k = 0; k < phases; k++)
-                        to[k] = best[turn * each + down * phases + k];
-            }
         }
+        for (int64_t turn = 0; turn < turns; turn++)
+            for (int64_t down = 0; down < phases; down++) {
+                float *to = places + turn * (count + 1) + (y * phases + down) * width * phases;
+                const float *from = row + turn * each + down * phases;
+                if (phases == 2) gather(to, from, width, 2, all); /* usually: without a loop */
+                else gather(to, from, width, phases, all);
+            }
     }
     for (int64_t turn = 0; turn < turns; turn++) {
         float *at = places + turn * (count + 1);
@@ -62,4 +70,31 @@ void sum_lattices(int64_t height, int64_t width, int64_t order, int64_t turns, i
         }
     }
     free(places);
+}
+
+static inline float most(float a, float b, float c) {
+    float one = a > b ? a : b;
+    return one > c ? one : c;
+}
+
+/* to (n, size): the largest of each of n lines `from` and the two beside it, all around. */
+static void look_beside(const float *from, int64_t n, int64_t size, float *to) {
+    for (int64_t line = 0; line < n; line++) {
+        const float *own = from + line * size;
+        const float *before = from + (line ? line - 1 : n - 1) * size;
+        const float *after = from + (line < n - 1 ? line + 1 : 0) * size;
+        for (int64_t k = 0; k < size; k++) to[line * size + k] = most(before[k], own[k], after[k]);
+    }
+}
+
+/* around (turns, n, n): the best of the scores (turns, n, n) of a lattice and of those beside it, one
+   turn and one shift each way; all three go round. */
+void look_around(int64_t turns, int64_t n, const float *scores, float *around) {
+    float *one = malloc(2 * turns * n * n * sizeof(float)), *other = one + turns * n * n;
+    for (int64_t line = 0; line < turns * n; line++)
+        look_beside(scores + line * n, n, 1, one + line * n);
+    for (int64_t turn = 0; turn < turns; turn++)
+        look_beside(one + turn * n * n, n, n, other + turn * n * n);
+    look_beside(other, turns, n * n, around);
+    free(one);
 }

@@ -98,6 +98,8 @@ def load_kernels(file: Path) -> ctypes.CDLL | None:
     library.add_scores.restype = None
     library.sum_lattices.argtypes = [*[whole] * 7, *[pointer] * 3]
     library.sum_lattices.restype = None
+    library.look_around.argtypes = [*[whole] * 2, *[pointer] * 2]
+    library.look_around.restype = None
     real = ctypes.c_double
     library.fit_spread.argtypes = [*[whole] * 3, *[real] * 3, *[pointer] * 7]
     library.fit_spread.restype = ctypes.c_int

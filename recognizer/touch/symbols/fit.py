@@ -49,7 +49,7 @@ class Fit:
     seen: Array  #: (m,) tactels that look at the cell, by how hard they press
     noise: float  #: standard deviation of psi with which the scores were made
     value: float  #: log-likelihood of the image with every cell at its best, nats
-    covariance: Array  #: (3, 3) of x, y (mm) and theta (rad)
+    covariance: Array  #: (3, 3) of x, y (mm) and theta (rad); NaN where it was not asked for
     with_scale: Array | None = None  #: (4,) covariance of scale - 1 with these, and its variance
 
     @property
@@ -74,10 +74,13 @@ def fit_lattices(
     bank: Bank,
     settings: FitSettings,
     gains: Sequence[Array] | None = None,
+    *,
+    told: bool = True,
 ) -> tuple[Fit, ...]:
     """Return the likeliest lattices of an image, best first; none if nothing is pressed.
 
-    Gains to begin with, (4,) each, are guessed from the image if they are not given.
+    Gains to begin with, (4,) each, are guessed from the image if they are not given. `told`:
+    whether covariances are asked for.
     """
     if gains is None:
         deep = deep_gain(image)
@@ -93,8 +96,8 @@ def fit_lattices(
         lattices = _cross_gains(image, template, lattices, settings.crossed)
     best = _distinct_lattices(image, template, lattices)[: settings.finalists]
     pose, gain = lattices.pose[best], lattices.gain[best]
-    lattices = refine_lattices(image, template, pose, gain, steps=settings.final_steps)
-    found = score_cells(image, template, lattices)
+    lattices = refine_lattices(image, template, pose, gain, steps=settings.final_steps, told=told)
+    found = score_cells(image, template, lattices, told=told)
     return tuple(found[b] for b in _distinct_lattices(image, template, lattices))
 
 
@@ -161,13 +164,18 @@ def score_cells(
     image: Image,
     template: ResponseTemplate,
     lattices: Lattices,
+    *,
+    told: bool = True,
 ) -> tuple[Fit, ...]:
     """Return the fits of lattices with the scores of all their cells, in their order.
 
-    Scores are made with the noise that the likeliest lattice leaves.
+    Scores are made with the noise that the likeliest lattice leaves. `told`: whether their normal
+    matrices are, and so covariances can be.
     """
     sums = _sum_cells(image, template, lattices)
-    covariance = covariances(image, lattices, sums.left * image.trust, sums.noise)
+    covariance = np.full((len(lattices.pose), 3, 3), math.nan)
+    if told:
+        covariance = covariances(image, lattices, sums.left * image.trust, sums.noise)
     unit = float(image.trust.sum()) * math.log(sums.noise)
     found = []
     for b, count in enumerate(sums.count.tolist()):

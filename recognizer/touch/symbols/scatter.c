@@ -38,17 +38,28 @@ static int factor(int64_t k, double A[MOST][MOST], double unseen, double L[MOST]
 
 typedef double Four __attribute__((vector_size(32), aligned(8), may_alias));
 
+static inline double total(Four sum) { return (sum[0] + sum[1]) + (sum[2] + sum[3]); }
+
 /* A (k, k) = known + J' W J of a jacobian (k, wide) by columns, its lower half alone. */
 static void weigh(int64_t k, int64_t wide, const double *jacobian, const double *weights,
                   const double *known, double *weighed, double A[MOST][MOST]) {
     for (int64_t i = 0; i < k; i++) {
         const double *row = jacobian + i * wide;
         for (int64_t t = 0; t < wide; t++) weighed[t] = row[t] * weights[t];
-        for (int64_t j = 0; j <= i; j++) {
-            Four sum = {0};
-            for (int64_t t = 0; t < wide; t += 4)
-                sum += *(const Four *)(weighed + t) * *(const Four *)(jacobian + j * wide + t);
-            A[i][j] = known[i * k + j] + ((sum[0] + sum[1]) + (sum[2] + sum[3]));
+        for (int64_t j = 0; j <= i; j += 3) { /* three dot products at once, the last ones twice */
+            int64_t other = j + 1 < i ? j + 1 : i, last = j + 2 < i ? j + 2 : i;
+            const double *a = jacobian + j * wide, *b = jacobian + other * wide;
+            const double *c = jacobian + last * wide;
+            Four sums[3] = {{0}, {0}, {0}};
+            for (int64_t t = 0; t < wide; t += 4) {
+                Four at = *(const Four *)(weighed + t);
+                sums[0] += at * *(const Four *)(a + t);
+                sums[1] += at * *(const Four *)(b + t);
+                sums[2] += at * *(const Four *)(c + t);
+            }
+            A[i][j] = known[i * k + j] + total(sums[0]);
+            A[i][other] = known[i * k + other] + total(sums[1]);
+            A[i][last] = known[i * k + last] + total(sums[2]);
         }
     }
 }
@@ -56,15 +67,24 @@ static void weigh(int64_t k, int64_t wide, const double *jacobian, const double 
 /* taken (wide,): the diagonal of J A^-1 J', A as `factor` leaves it. */
 static void leverages(int64_t k, int64_t wide, const double *jacobian, double L[MOST][MOST],
                       const double U[MOST], double *taken) {
-    for (int64_t t = 0; t < wide; t += 4) {
-        Four x[MOST], whole = {0};
+    double inverse[MOST];
+    for (int64_t i = 0; i < k; i++) inverse[i] = 1.0 / L[i][i];
+    for (int64_t t = 0; t < wide; t += 8) { /* eight tactels side by side */
+        Four x[MOST], y[MOST], whole = {0}, other = {0};
         for (int64_t i = 0; i < k; i++) {
             Four sum = *(const Four *)(jacobian + i * wide + t) * U[i];
-            for (int64_t m = 0; m < i; m++) sum -= L[i][m] * x[m];
-            x[i] = sum * (1.0 / L[i][i]);
+            Four more = *(const Four *)(jacobian + i * wide + t + 4) * U[i];
+            for (int64_t m = 0; m < i; m++) {
+                sum -= L[i][m] * x[m];
+                more -= L[i][m] * y[m];
+            }
+            x[i] = sum * inverse[i];
+            y[i] = more * inverse[i];
             whole += x[i] * x[i];
+            other += y[i] * y[i];
         }
         *(Four *)(taken + t) = whole;
+        *(Four *)(taken + t + 4) = other;
     }
 }
 
@@ -74,7 +94,7 @@ static void leverages(int64_t k, int64_t wide, const double *jacobian, double L[
 int fit_spread(int64_t n, int64_t k, int64_t rounds, double freedom, double touches, double unseen,
                const double *usual, const double *left, const double *parts,
                const double *jacobian, const double *known, const double *trust, double *now) {
-    int64_t wide = (n + 3) / 4 * 4; /* what is filled up weighs nothing */
+    int64_t wide = (n + 7) / 8 * 8; /* what is filled up weighs nothing */
     double *weights = calloc((k + 4) * wide, sizeof(double)), *variance = weights + wide;
     double *weighed = variance + wide, *taken = weighed + wide, *columns = taken + wide;
     int seen = k <= MOST;

@@ -132,10 +132,20 @@ def search(
 
 @lru_cache(maxsize=4)
 def _scores_of(bank: Bank, seen: bytes, order: int, _kernels: str) -> tuple[Floats, Floats]:
-    """Return the scores of an image, (2, rows, columns), and the best beside each of them."""
+    """Return the scores of an image, (2, rows, columns), and `best_around` them."""
     values, weights = np.frombuffer(seen, np.float32).reshape(2, *bank.shape)
     scores = lattice_scores(bank, values, weights, order)
-    turns, n = len(bank.rotations_rad), math.isqrt(scores.shape[1])
+    return scores, best_around(scores)
+
+
+def best_around(scores: Floats) -> Floats:
+    """Return the best of each score (rotations, shifts^2) and those beside it; all go round."""
+    turns, n = len(scores), math.isqrt(scores.shape[1])
+    library = compiled_kernels()
+    if library is not None:
+        around = np.empty_like(scores)
+        library.look_around(turns, n, *addresses(np.ascontiguousarray(scores), around))
+        return around
     most = scores.reshape(turns, n, n)
     for axis in range(3):  # all three go round
         one = most.swapaxes(0, axis)
@@ -144,7 +154,7 @@ def _scores_of(bank: Bank, seen: bytes, order: int, _kernels: str) -> tuple[Floa
         np.maximum(line[:-1], one[1:], out=line[:-1])
         line[0], line[-1] = np.maximum(line[0], one[-1]), np.maximum(line[-1], one[0])
         most = line.swapaxes(0, axis)
-    return scores, most
+    return most.reshape(scores.shape)
 
 
 def lattice_scores(bank: Bank, values: Floats, weights: Floats, order: int) -> Floats:

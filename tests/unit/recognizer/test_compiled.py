@@ -1,5 +1,6 @@
 """The compiled inner loops of reading give what their numpy forms give."""
 
+import itertools
 import re
 import shutil
 import subprocess
@@ -26,7 +27,7 @@ from recognizer.touch.symbols.gain import image_of_signal, normalize_image
 from recognizer.touch.symbols.posterior import fit_posterior
 from recognizer.touch.symbols.projection import project_template
 from recognizer.touch.symbols.refine import refine_lattices
-from recognizer.touch.symbols.search import bank_of, lattice_scores
+from recognizer.touch.symbols.search import bank_of, best_around, lattice_scores
 from recognizer.touch.symbols.spread import fit_spread, usual_spread
 from recognizer.touch.symbols.template import template_of
 
@@ -220,6 +221,18 @@ def test_lattices_of_the_coarse_search_are_summed_alike_to_the_bit(cells, use):
         found.append(lattice_scores(bank, values, weights, template.order))
     assert found[0].shape == (3, 16)
     assert found[0].tobytes() == found[1].tobytes()
+
+
+@pytest.mark.parametrize("shape", [(5, 16), (3, 9), (2, 4), (1, 1)])
+@pytest.mark.parametrize("kind", ["numpy", "compiled"])
+def test_the_best_beside_a_score_goes_round_all_three_ways(kind, shape, use):
+    use(kind)
+    scores = np.random.default_rng(6).random(shape).astype(np.float32)
+    turns, n = shape[0], round(shape[1] ** 0.5)
+    cube = scores.reshape(turns, n, n)
+    steps = list(itertools.product((-1, 0, 1), repeat=3))
+    expected = np.max([np.roll(cube, step, axis=(0, 1, 2)) for step in steps], axis=0)
+    assert best_around(scores).tolist() == expected.reshape(shape).tolist()
 
 
 @pytest.mark.parametrize("name", [name for name in SCENES if not name.endswith("each gain")])

@@ -9,7 +9,11 @@ import pytest
 import recognizer.touch.verify
 from recognizer.touch.locate import Hypothesis
 from recognizer.touch.settings import ReaderSettings
-from recognizer.touch.verify import verify_hypotheses
+from recognizer.touch.verify import fit_touch, verify_hypotheses
+
+
+class Reader(SimpleNamespace):
+    __hash__ = object.__hash__
 
 
 class Stages:
@@ -33,20 +37,22 @@ class Stages:
             monkeypatch.setattr(recognizer.touch.verify, name, getattr(self, "_" + name))
 
     def run(self, *arrays):
-        arrays = arrays or (self.embossed,)
-        reader = SimpleNamespace(
-            prepared=[(one, "template", "bank") for one in arrays],
+        return verify_hypotheses(self.reader(*arrays), "signal", "effort")
+
+    def reader(self, *arrays):
+        return Reader(
+            prepared=[(one, "template", "bank") for one in arrays or (self.embossed,)],
             sensor="sensor",
             settings=self.image.settings,
         )
-        return verify_hypotheses(reader, "signal", "effort")
 
     def _image_of_signal(self, sensor, signal, height_mm, settings):
         assert (sensor, signal, settings) == ("sensor", "signal", self.image.settings)
         self.asked.images.append(height_mm)
         return self.image
 
-    def _fit_lattices(self, image, template, bank, effort):
+    def _fit_lattices(self, image, template, bank, effort, *, told):
+        assert not told
         assert (image, template, bank, effort) == (self.image, "template", "bank", "effort")
         return self.fits
 
@@ -88,6 +94,15 @@ def placed(*scores, fit=0, face=0, first=0):
 
 def rows(found):
     return [one.hypothesis.row for one in found]
+
+
+def test_a_touch_is_fitted_once(stages):
+    one, other = stages.reader(), stages.reader()
+    assert fit_touch(one, "signal", "effort") == ((stages.image, stages.fits),)
+    verify_hypotheses(one, "signal", "effort")
+    assert len(stages.asked.images) == 1
+    fit_touch(other, "signal", "effort")
+    assert len(stages.asked.images) == 2
 
 
 @pytest.mark.parametrize(
