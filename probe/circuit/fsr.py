@@ -17,6 +17,7 @@ N, S (siemens), ohm, s. Arrays are (rows, columns), tactel (0, 0) top left. Figu
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -83,6 +84,7 @@ class FilmState:
     flutter: Image  #: the noise of the contact, unit variance
 
 
+@lru_cache(maxsize=16)
 def fsr_of(rows: int = _USUAL.rows, columns: int = _USUAL.columns) -> Fsr:
     """Return a matrix of equal, sound tactels."""
     one, none = np.ones((rows, columns)), np.zeros((rows, columns))

@@ -61,8 +61,8 @@ class MeshSurface:
             offsets = ends[part] - count[part] - done
             listed = np.repeat(bins.starts[cell[part]] - offsets, count[part])
             listed += np.arange(len(listed))
-            points = np.repeat(points_mm[asked[part]], count[part], axis=0)
-            z = self._over(bins.triangles[listed], points[:, 0], points[:, 1])
+            x, y = (np.repeat(points_mm[asked[part], i], count[part]) for i in (0, 1))
+            z = self._over(bins.triangles[listed], x, y)
             found[asked[part]] = np.maximum.reduceat(z, offsets)
             first = last
         lowered: Array = np.minimum(found, self.top_mm)  # a mean of equal heights may round up

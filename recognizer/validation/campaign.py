@@ -9,8 +9,10 @@ again by readers that spend more or less.
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import accumulate
 
 import numpy as np
 
@@ -250,6 +252,6 @@ def levels_of(text: str) -> Shares:
 
 
 def _draw(shares: Shares, rng: np.random.Generator) -> str:
-    ends = np.cumsum([share for _, share in shares])
-    place = int(np.searchsorted(ends, rng.random() * ends[-1], side="right"))
+    ends = tuple(accumulate(share for _, share in shares))
+    place = bisect_right(ends, rng.random() * ends[-1])
     return shares[min(place, len(shares) - 1)][0]

@@ -7,12 +7,13 @@ EmbossedArray + rng -> HeightMap in the style of the lab's symbols. What they ar
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from generator.alphabet import alphabet_named
-from generator.array import profile
+from generator.array import FoldedArray, ProductArray, profile
 from probe.simulate.world.foreign import draw_dots, draw_ridges, draw_rough, draw_text
 from probe.surface.contract import HeightMap
 from probe.surface.face import endless_face
@@ -50,7 +51,7 @@ def other_lab(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
     """Return another array in the same alphabet, at the same pitch."""
     sizes = (encoding.array.rows, encoding.array.columns)
     names = ("one-touch", "large") if encoding.array.order == 4 else ("thesis",)
-    others = [profile(name).array() for name in names]
+    others = [_array_of(name) for name in names]
     array = next((a for a in others if (a.rows, a.columns) != sizes), others[0])
     if (array.rows, array.columns) == sizes or array.order != encoding.array.order:
         return random_symbols(encoding, rng)
@@ -78,6 +79,11 @@ FOREIGN: dict[str, Callable[[EmbossedArray, np.random.Generator], HeightMap]] = 
     "other lab": other_lab,
     "text": text,
 }
+
+
+@lru_cache(maxsize=4)
+def _array_of(name: str) -> FoldedArray | ProductArray:
+    return profile(name).array()
 
 
 def _embossed_surface(encoding: EmbossedArray, labels: NDArray[np.int64]) -> HeightMap:

@@ -53,15 +53,17 @@ class WornAway:
     def heights_mm(self, points_mm: Array) -> Array:
         """Return the heights, none above the face in the cell of a worn symbol."""
         heights = self.surface.heights_mm(points_mm)
-        if len(self.centres_mm) == 0:
+        if len(self.centres_mm) == 0 or len(points_mm) == 0:
             return heights
         c, s = np.cos(self.rotation_rad), np.sin(self.rotation_rad)
         turned = np.array([[c, s], [-s, c]])
         high = np.flatnonzero(heights > self.bases_mm.min())
-        away = points_mm[high, None, :] @ turned - self.centres_mm @ turned
-        within = (np.abs(away) <= self.pitch_mm / 2).all(axis=2)
+        reach = (points_mm.min(axis=0) - self.pitch_mm, points_mm.max(axis=0) + self.pitch_mm)
+        near = ((self.centres_mm > reach[0]) & (self.centres_mm < reach[1])).all(axis=1)
+        x, y = np.abs((points_mm[high, None, :] @ turned - (self.centres_mm @ turned)[near]).T)
+        within = (x <= self.pitch_mm / 2) & (y <= self.pitch_mm / 2)
         heights = heights.copy()
-        lowest = np.where(within, self.bases_mm, np.inf).min(axis=1)
+        lowest = np.where(within, self.bases_mm[near, None], np.inf).min(axis=0, initial=np.inf)
         heights[high] = np.minimum(heights[high], lowest)
         return heights
 
