@@ -178,7 +178,10 @@ class RoughSurface:
     def heights_mm(self, points_mm: Array) -> Array:
         """Return the sum of the waves."""
         vectors, phases, amplitudes = self._waves()
-        return np.asarray(np.cos(points_mm @ vectors.T + phases) @ amplitudes)
+        at = points_mm @ vectors.T
+        at += phases
+        heights: Array = np.cos(at, out=at) @ amplitudes
+        return heights
 
     def _waves(self) -> tuple[Array, Array, Array]:
         return _waves(self.seed, self.rms_mm, self.shortest_mm, self.waves)

@@ -53,20 +53,26 @@ def bin_triangles(corners_mm: Array, level: Mask) -> TriangleBins:
         (n,) which of them lie at z = 0 and have others beyond each of their edges: bins that
         these alone meet need none of them.
     """
-    (ax, _, cx), ys = corners_mm.transpose(2, 1, 0)[:2]
-    low = np.column_stack([ax, np.minimum.reduce(ys)])
-    high = np.column_stack([cx, np.maximum.reduce(ys)])
-    start, extent = low.min(axis=0), float((high.max(axis=0) - low.min(axis=0)).max())
-    sides = np.sort(np.maximum(*(high - low).T))
-    side = max(float(sides[len(sides) // 2]) / 4, extent / 2048)
+    x, y = corners_mm.transpose(2, 1, 0)[:2]
+    south, north = (end(end(y[0], y[1]), y[2]) for end in (np.minimum, np.maximum))
+    low = np.array([x[0].min(), south.min()])
+    extent = max(x[2].max() - low[0], north.max() - low[1])
+    usual = np.sort(np.maximum(x[2] - x[0], north - south))[len(corners_mm) // 2]
+    side = max(float(usual) / 4, float(extent) / 2048)
     while True:
-        first = ((low - start) / side).astype(np.int64)
-        last = ((high - start) / side).astype(np.int64)
-        if (last - first + 1).prod(axis=1).sum() <= SURFACE.pairs:
+        first, last, lowest, highest = (
+            ((at - start) / side).astype(np.int64)
+            for at, start in ((x[0], low[0]), (x[2], low[0]), (south, low[1]), (north, low[1]))
+        )
+        if ((last - first + 1) * (highest - lowest + 1)).sum() <= SURFACE.pairs:
             break
         side *= 1.5
-    columns, rows = (last.max(axis=0) + 1).tolist()
-    triangle, i, lowest, highest = _cut_strips((corners_mm[:, :, :2] - start) / side, first, last)
+    columns, rows = int(last.max()) + 1, int(highest.max()) + 1
+    triangle, i, from_row, to_row = _cut_strips(
+        (x - low[0]) / side, (y - low[1]) / side, first, last - first + 1
+    )
+    lowest = np.maximum(from_row, lowest[triangle])
+    highest = np.minimum(to_row, highest[triangle])
     count = highest - lowest + 1
     ends = np.cumsum(count)
     cell = np.repeat(i * rows + lowest - (ends - count), count) + np.arange(len(ends) and ends[-1])
@@ -79,7 +85,7 @@ def bin_triangles(corners_mm: Array, level: Mask) -> TriangleBins:
     order = _order(cell)
     many = np.bincount(cell, minlength=columns * rows)
     return TriangleBins(
-        low=start,
+        low=low,
         side_mm=side,
         shape=(columns, rows),
         starts=np.concatenate([[0], np.cumsum(many)]),
@@ -89,34 +95,31 @@ def bin_triangles(corners_mm: Array, level: Mask) -> TriangleBins:
     )
 
 
-def _cut_strips(at: Array, first: Index, last: Index) -> tuple[Index, Index, Index, Index]:
+def _cut_strips(x: Array, y: Array, first: Index, wide: Index) -> tuple[Index, Index, Index, Index]:
     """Return the strips that triangles lie over: triangle, strip, lowest and highest bin in it.
 
-    `at` are the corners (n, 3, 2) and `first`, `last` the boxes (n, 2), in bins. Strips are cut
-    a little wide, so that rounding leaves no bin out.
+    `x` and `y` are the corners (3, n) in bins; triangles lie over `wide` (n,) strips from the
+    `first`. Strips are cut a little wide, so that rounding leaves no bin out.
     """
-    wide = last[:, 0] - first[:, 0] + 1
-    triangle = np.repeat(np.arange(len(at)), wide)
-    strip = np.arange(len(triangle)) - np.repeat(np.cumsum(wide) - wide - first[:, 0], wide)
-    (ax, bx, cx), (ay, by, cy) = at.transpose(2, 1, 0)
-    slopes = [
-        np.divide(rise, run, out=np.zeros(len(at)), where=run > 0)
-        for rise, run in ((by - ay, bx - ax), (cy - by, cx - bx), (cy - ay, cx - ax))
-    ]
-    ax, bx, cx, ay, by, ab, bc, ac = np.stack([ax, bx, cx, ay, by, *slopes])[:, triangle]
+    triangle = np.repeat(np.arange(len(wide)), wide)
+    strip = np.arange(len(triangle)) - np.repeat(np.cumsum(wide) - wide - first, wide)
+    slopes = []  # an edge steeper than a strip is cut too wide spans it by its corners
+    for p, q in ((0, 1), (1, 2), (0, 2)):
+        run, none = x[q] - x[p], np.zeros(len(wide))
+        slopes.append(np.divide(y[q] - y[p], run, out=none, where=run > SURFACE.beside_bin))
+    given = np.stack([*x, *y, *slopes])
+    ax, bx, cx, ay, by, cy, ab, bc, ac = given.take(triangle, axis=1)
     left = np.maximum(strip - SURFACE.beside_bin, ax)
     right = np.minimum(strip + (1 + SURFACE.beside_bin), cx)
     ends = [ay + ac * (left - ax), ay + ac * (right - ax)]
-    ends += [np.where(x < bx, ay + ab * (x - ax), by + bc * (x - bx)) for x in (left, right)]
+    ends += [np.where(at < bx, ay + ab * (at - ax), by + bc * (at - bx)) for at in (left, right)]
     ends.append(np.where((left <= bx) & (bx <= right), by, ends[0]))
-    lowest = np.minimum.reduce(ends) - SURFACE.beside_bin
-    highest = np.maximum.reduce(ends) + SURFACE.beside_bin
-    return (
-        triangle,
-        strip,
-        np.maximum(lowest.astype(np.int64), first[triangle, 1]),
-        np.minimum(highest.astype(np.int64), last[triangle, 1]),
-    )
+    ends.append(np.where(right == cx, cy, ends[0]))
+    lowest, highest = ends[0], ends[0]
+    for end in ends[1:]:
+        lowest, highest = np.minimum(lowest, end), np.maximum(highest, end)
+    lowest, highest = lowest - SURFACE.beside_bin, highest + SURFACE.beside_bin
+    return triangle, strip, lowest.astype(np.int64), highest.astype(np.int64)
 
 
 def _order(cell: Index) -> Index:

@@ -48,7 +48,7 @@ def triangle_mesh(triangles_mm: ArrayLike, *, place: str = "") -> TriangleMesh:
     across = _find_across(index)
     if across is None:
         return TriangleMesh(corners, np.zeros(len(corners), dtype=np.bool_), None)
-    body = _bodies(index)
+    body = _bodies(index, order)
     moved = corners - points.mean(axis=0)
     volume = np.einsum("ij,ij->i", moved[:, 0], np.cross(moved[:, 1], moved[:, 2]))
     outward: NDArray[np.bool_] = (np.bincount(body, volume) > 0)[body]
@@ -69,13 +69,20 @@ def _find_across(index: Index) -> Index | None:
     return across.reshape(-1, 3)
 
 
-def _bodies(index: Index) -> Index:
-    """Return a number (n,) for each triangle, equal where triangles hang together by corners."""
-    label = np.arange(int(index.max()) + 1)
+def _bodies(index: Index, order: Index) -> Index:
+    """Return a number (n,) for each triangle, equal where triangles hang together by corners.
+
+    `order` sorts the corners (3 n,) by their numbers in `index` (n, 3).
+    """
+    a, b, c = np.ascontiguousarray(index.T)
+    number = index.ravel()[order]
+    starts = np.flatnonzero(np.diff(number, prepend=-1))
+    triangle = order // 3
+    label = np.arange(len(starts))
     while True:
-        least = np.minimum.reduce(label[index.T])
-        before = label.copy()
-        np.minimum.at(label, index, least[:, None])
-        label = label[label]
-        if np.array_equal(label, before):
-            return label[index[:, 0]]
+        least = np.minimum(np.minimum(label[a], label[b]), label[c])
+        lowered = np.minimum(label, np.minimum.reduceat(least[triangle], starts))
+        lowered = lowered[lowered]
+        if np.array_equal(lowered, label):
+            return label[a]
+        label = lowered

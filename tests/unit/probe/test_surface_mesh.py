@@ -168,3 +168,23 @@ def test_level_ground_is_answered_by_its_bins_as_by_its_triangles():
     assert (np.isfinite(heights) == inside).all()
     cell, _ = closed._bins.of(points)
     assert 0.4 < closed._bins.level[cell].mean() < 0.95
+
+
+@pytest.mark.parametrize("width", [3.0, 0.05, 1e-7, 1e-12])
+def test_bins_hold_every_triangle_that_points_lie_under(width):
+    """Long, thin and almost upright triangles, turned any way, against all triangles."""
+    rng = np.random.default_rng(11)
+    a = rng.uniform(-20, 20, (150, 2))
+    along, angle = rng.uniform(0.5, 25, 150), rng.choice([0, np.pi / 2, 0.3, 2.0], 150)
+    b = a + along[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    c = (a + b) / 2 + width * np.column_stack([-np.sin(angle), np.cos(angle)])
+    heights = rng.uniform(0, 5, (150, 3, 1))
+    part = mesh(np.concatenate([np.stack([a, b, c], 1), heights], axis=2))
+    weights = rng.dirichlet([0.3, 0.3, 0.3], (len(part.corners), 6))
+    points = np.einsum("npk,nkj->npj", weights, part.corners[:, :, :2]).reshape(-1, 2)
+    x, y = points.T
+    number = np.arange(len(part.corners))
+    over = [part._over(number, np.full(len(number), u), np.full(len(number), v)).max()
+            for u, v in zip(x, y, strict=True)]  # fmt: skip
+    assert np.isfinite(over).mean() > 0.4
+    assert np.array_equal(part.heights_mm(points), np.minimum(over, part.top_mm))
