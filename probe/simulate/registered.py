@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection
 
 from generator.database import DatabaseError
-from generator.database.entries import find_object, object_names
+from generator.database.entries import find_object, list_objects, object_names
 from generator.database.open import open_database
-from generator.database.read import read_object
-from generator.database.registered import RegisteredFace, RegisteredObject
+from generator.database.read import read_object, read_parts
+from generator.database.registered import RegisteredFace, RegisteredObject, RegisteredPart
 from generator.database.transaction import read_transaction
 from probe.errors import SurfaceError
 from probe.simulate.round import round_scene
@@ -105,6 +105,16 @@ def registered_objects(database: str) -> tuple[str, ...]:
     """Return the names of all registered objects, in order."""
     with _connect(database) as connection:
         return object_names(connection)
+
+
+def registered_parts(database: str) -> list[tuple[str, RegisteredPart]]:
+    """Return all parts with the names of their objects, in the order of these."""
+    with _connect(database) as connection:
+        return [
+            (entry.name, part)
+            for entry in list_objects(connection)
+            for part in read_parts(connection, entry.object_id)
+        ]
 
 
 @contextmanager

@@ -9,7 +9,7 @@ import numpy as np
 from generator.database.registered import RegisteredFace, RegisteredObject, RegisteredPart
 from generator.database.url import normal_url, part_file
 from probe.errors import SurfaceError
-from probe.simulate.registered import face_of, registered_object, registered_objects
+from probe.simulate.registered import face_of, registered_object, registered_parts
 from probe.simulate.round import round_part
 from probe.simulate.scene import Scene
 from probe.simulate.settings import FACE_AROUND
@@ -53,20 +53,16 @@ def _registered_part(
     database: str, path: Path, object_name: str
 ) -> tuple[RegisteredObject, RegisteredPart]:
     """Return the part that a file holds: of this path, or else of this file name."""
-    names = [object_name] if object_name else registered_objects(database)
     stated = part_file(normal_url(database), str(path))
-    known = [
-        (held, part)
-        for held in (registered_object(database, name) for name in names)
-        for part in held.parts
-        if part.format == "stl"
-    ]
-    for held, part in known:
-        if part.file == stated:
-            return held, part
-    for held, part in known:
-        if Path(part.file).name == path.name:
-            return held, part
+    if object_name:
+        parts = [(object_name, part) for part in registered_object(database, object_name).parts]
+    else:
+        parts = registered_parts(database)
+    known = [(name, part) for name, part in parts if part.format == "stl"]
+    same = [held for held in known if held[1].file == stated]
+    alike = [held for held in known if Path(held[1].file).name == path.name]
+    for name, part in same + alike:
+        return registered_object(database, name), part
     shown = ", ".join(Path(part.file).name for _, part in known[:8])
     raise SurfaceError(
         f"{path.name} is not registered in {database}",
