@@ -78,11 +78,12 @@ def _bodies(index: Index, order: Index) -> Index:
     number = index.ravel()[order]
     starts = np.flatnonzero(np.diff(number, prepend=-1))
     triangle = order // 3
-    label = np.arange(len(starts))
+    label: Index = np.arange(len(starts))
     while True:
         least = np.minimum(np.minimum(label[a], label[b]), label[c])
-        lowered = np.minimum(label, np.minimum.reduceat(least[triangle], starts))
+        lowered: Index = np.minimum(label, np.minimum.reduceat(least[triangle], starts))
         lowered = lowered[lowered]
         if np.array_equal(lowered, label):
-            return label[a]
+            found: Index = label[a]
+            return found
         label = lowered
