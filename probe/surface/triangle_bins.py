@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.surface.settings import SURFACE
+from probe.surface.triangle_mesh import sort_numbers
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -82,7 +83,7 @@ def bin_triangles(corners_mm: Array, level: Mask) -> TriangleBins:
     steep[cell[~level[triangle]]] = True
     left = np.flatnonzero(steep[cell])
     cell, triangle = cell[left], triangle[left]
-    order = _order(cell)
+    order = sort_numbers(cell)
     many = np.bincount(cell, minlength=columns * rows)
     return TriangleBins(
         low=low,
@@ -120,9 +121,3 @@ def _cut_strips(x: Array, y: Array, first: Index, wide: Index) -> tuple[Index, I
         lowest, highest = np.minimum(lowest, end), np.maximum(highest, end)
     lowest, highest = lowest - SURFACE.beside_bin, highest + SURFACE.beside_bin
     return triangle, strip, lowest.astype(np.int64), highest.astype(np.int64)
-
-
-def _order(cell: Index) -> Index:
-    """Return the stable order of whole numbers below 2^32, by halves: numpy counts short ones."""
-    order = np.argsort((cell & 0xFFFF).astype(np.uint16), kind="stable")
-    return order[np.argsort((cell >> 16).astype(np.uint16)[order], kind="stable")]

@@ -10,6 +10,7 @@ from probe.surface.indenters import FlatPlate, TiltedPlane
 from probe.surface.mesh import mesh
 from probe.surface.polygon import polygon
 from probe.surface.solids import triangulate
+from probe.surface.triangle_mesh import sort_numbers
 
 SQUARE = np.array([[0.0, 0], [10, 0], [10, 10], [0, 10]])
 HOLE = np.array([[4.0, 4], [4, 6], [6, 6], [6, 4]])
@@ -188,3 +189,11 @@ def test_bins_hold_every_triangle_that_points_lie_under(width):
             for u, v in zip(x, y, strict=True)]  # fmt: skip
     assert np.isfinite(over).mean() > 0.4
     assert np.array_equal(part.heights_mm(points), np.minimum(over, part.top_mm))
+
+
+@pytest.mark.parametrize("most", [1, 300, 1 << 17, 1 << 50])
+def test_numbers_are_sorted_as_numpy_sorts_them(most):
+    numbers = np.random.default_rng(2).integers(0, most, 4000)
+    numbers = np.concatenate([numbers, numbers[::3]])
+    assert np.array_equal(sort_numbers(numbers), np.argsort(numbers, kind="stable"))
+    assert len(sort_numbers(numbers[:0])) == 0
