@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import SensorType
-from probe.surface.polygon import polygon
+from probe.surface.polygon import FaceRegion, polygon
 from recognizer.touch.felt_area import (
     EarlierTouch,
     FeltArea,
@@ -33,7 +33,7 @@ from recognizer.touch.felt_area import (
     plane_points,
     strongest_reading,
 )
-from recognizer.touch.lab import EmbossedArray
+from recognizer.touch.lab import EmbossedArray, EncodedFace
 from recognizer.touch.locate import Hypothesis
 from recognizer.touch.next_limits import next_limits
 from recognizer.touch.pose import face_pose
@@ -187,16 +187,21 @@ def _symbols_by_face(
     own = (face.centres_mm - at) @ R  # in the sensor frame of now
     c, s = np.cos(steps[:, 2, None]), np.sin(steps[:, 2, None])
     dx, dy = own[:, 0] - steps[:, 0, None], own[:, 1] - steps[:, 1, None]
-    then = np.stack([c * dx + s * dy, c * dy - s * dx], axis=-1)
+    then = c * dx + s * dy, c * dy - s * dx
     rim = settings.whole * one.embossed.style.pitch_mm
-    half = np.array(area.sensor.half_mm)
-    seen = (np.abs(then) < half - rim).all(axis=-1)
+    half_x, half_y = area.sensor.half_mm
+    seen = (np.abs(then[0]) < half_x - rim) & (np.abs(then[1]) < half_y - rim)
     new = ~area.seen(plane_points(area.sensor, own))
     worth = (seen * (1 + settings.novelty * new)).sum(axis=1)
     places = steps[:, :2] @ R.T + at
-    region = polygon(list(face.polygon_mm))
+    region = _outline_of(face)
     within = region.contains(places) & (region.distance_mm(places) > settings.clear_mm)
     return worth.astype(np.float64), within.astype(np.float64)
+
+
+@lru_cache(maxsize=64)
+def _outline_of(face: EncodedFace) -> FaceRegion:
+    return polygon(list(face.polygon_mm))
 
 
 def _why(

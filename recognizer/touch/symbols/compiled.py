@@ -306,7 +306,11 @@ def _scene_of(image: Image, template: ResponseTemplate) -> _ImageScene:
     return _ImageScene(scene, tuple(held.values()), reach_mm)
 
 
-_BYTES = ctypes.c_char * 0
+class _Start(ctypes.Array[ctypes.c_char]):
+    """Where the values of an array begin."""
+
+    _type_ = ctypes.c_char
+    _length_ = 0
 
 
 def addresses(*arrays: Any) -> list[int | None]:
@@ -316,7 +320,7 @@ def addresses(*arrays: Any) -> list[int | None]:
     """
     return [
         None if one is None
-        else ctypes.addressof(_BYTES.from_buffer(one)) if one.flags.writeable
+        else ctypes.addressof(_Start.from_buffer(one)) if one.flags.writeable
         else one.ctypes.data
         for one in arrays
     ]  # fmt: skip

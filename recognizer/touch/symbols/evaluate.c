@@ -268,6 +268,14 @@ static inline double readings(const Scene *s, double value, double plateau, doub
     return share * share;
 }
 
+/* Score of a tactel that reads the bare face, or nothing, at a value of psi. */
+static inline double bare_score(const Scene *s, const Work *w, int64_t t, double value) {
+    double unit = w->unit[t], square = s->quiet * s->quiet + value * value;
+    if (w->is_loud) square += readings(s, value, w->plateau[t], unit);
+    double away = (w->psi[t] - value) / unit;
+    return s->trust[t] * (-smaller(0.5 * away * away / square, s->most) - 0.5 * log(square));
+}
+
 /* Scores of each symbol at each tactel, and of none; noise: deviation of psi on a covered one. */
 static void score(const Scene *s, Work *w, double noise) {
     const float quiet = (float)(s->quiet * s->quiet), aside = (float)(s->displaced * s->displaced);
@@ -295,15 +303,9 @@ static void score(const Scene *s, Work *w, double noise) {
     }
     for (int64_t t = 0; t < n; t++) {
         if (!(w->bare[t] > 0.0) && !w->is_loud) continue;
-        double best = -INFINITY, unit = w->unit[t];
-        for (int k = 0; k < 2; k++) {
-            double floor_ = k ? psi(w->bare[t]) : 0.0, square = alone + floor_ * floor_;
-            if (w->is_loud) square += readings(s, floor_, w->plateau[t], unit);
-            double away = (w->psi[t] - floor_) / unit;
-            double one = -smaller(0.5 * away * away / square, s->most) - 0.5 * log(square);
-            best = larger(best, s->trust[t] * one);
-        }
-        w->none[t] = best;
+        w->none[t] = bare_score(s, w, t, 0.0);
+        if (w->bare[t] > 0.0)
+            w->none[t] = larger(w->none[t], bare_score(s, w, t, psi(w->bare[t])));
     }
 }
 

@@ -9,6 +9,7 @@ import pytest
 
 from probe.sensor import SensorType
 from recognizer.touch.felt_area import EarlierTouch
+from recognizer.touch.lab import EncodedFace
 from recognizer.touch.locate import Hypothesis
 from recognizer.touch.next_touch import propose_next
 from recognizer.touch.recognition import AMBIGUOUS, NO_CONTACT, TOO_FEW, NextTouch, refusal
@@ -106,9 +107,9 @@ def known_face(small, x_mm, y_mm):
     """A hypothesis of a face of 42 x 42 mm; the sensor's centre stands at (x, y) on it."""
     embossed = small.two_faces().embossed
     i, j = np.meshgrid(np.arange(6), np.arange(6))
-    embossed.known[0] = SimpleNamespace(
-        object="Thing", face="F1", round=None, rotation_rad=0.0, rows=np.array([6]),
-        columns=np.array([2]), printed=None,
+    embossed.known[0] = EncodedFace(
+        object="Thing", face="F1", T_object_face=np.eye(4), rotation_rad=0.0, rows=np.array([6]),
+        columns=np.array([2]), labels=np.array([0]),
         polygon_mm=(np.array([(0, 0), (42, 0), (42, 42), (0, 42)], float),),
         centres_mm=np.stack([i, j], axis=-1).reshape(-1, 2) * 7.0 + 3.5,
     )  # fmt: skip
