@@ -139,7 +139,7 @@ def recognize(
     if version:
         from encoded_objects.console import output
         from recognizer.command import NAME
-        from recognizer.touch.symbols.compiled import kernels_in_use
+        from recognizer.touch.symbols.kernels import kernels_in_use
 
         output.version(NAME, as_json=as_json, kernels=kernels_in_use())
         raise typer.Exit

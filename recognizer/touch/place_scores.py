@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.touch.lab import EmbossedArray, cell_keys
-from recognizer.touch.symbols.compiled import addresses, compiled_kernels
+from recognizer.touch.symbols.kernels import addresses, compiled_kernels
 
 Ints = NDArray[np.int64]
 Array = NDArray[np.float64]

@@ -24,9 +24,9 @@ from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.round import verify_on_round_faces
 from recognizer.touch.settings import FitSettings
 from recognizer.touch.signal import Signal
-from recognizer.touch.symbols.compiled import kernels_in_use
 from recognizer.touch.symbols.fit import Fit, fit_lattices, score_cells
 from recognizer.touch.symbols.gain import Image, image_of_signal
+from recognizer.touch.symbols.kernels import kernels_in_use
 from recognizer.touch.symbols.refine import refine_lattices
 from recognizer.touch.symbols.template import ResponseTemplate
 

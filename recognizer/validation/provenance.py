@@ -18,7 +18,7 @@ from probe.contact.engines import engine_named
 from probe.contact.press import level_for
 from probe.sensor_types.read import sensor_type_named, shipped_names
 from probe.simulate.world.levels import LEVELS
-from recognizer.touch.symbols.compiled import kernels_in_use
+from recognizer.touch.symbols.kernels import kernels_in_use
 from recognizer.validation.campaign import KINDS, LEVEL_SHARES, Campaign, Shares
 from recognizer.validation.encoded_set import members_of
 from recognizer.validation.record import RunRecord

@@ -26,7 +26,7 @@ import numpy as np  # noqa: E402
 
 from recognizer.touch.lab import open_lab  # noqa: E402
 from recognizer.touch.reader import Reader  # noqa: E402
-from recognizer.touch.symbols.compiled import CHOICE, kernels_in_use  # noqa: E402
+from recognizer.touch.symbols.kernels import CHOICE, kernels_in_use  # noqa: E402
 from recognizer.validation.draw import draw_touch  # noqa: E402
 from recognizer.validation.touch_plan import TouchPlan, sensor_of  # noqa: E402
 

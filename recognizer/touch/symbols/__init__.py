@@ -7,5 +7,6 @@ search      coarse: all rotations and shifts of the lattice at once, one matrix 
 projection  what lies under the tactels: cells, templates, labels
 refine      fine: damped least squares over pose and gain, labels chosen anew at every step
 covariance  how sure the pose is
+kernels     the library of compiled loops, where it is there; compiled   those over an image
 fit         all of it, and the scores of every cell; bends   a round face by forces alone
 """

@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.touch.settings import FitSettings
-from recognizer.touch.symbols.compiled import CellSums, compiled_kernels, sum_cells_compiled
+from recognizer.touch.symbols.compiled import CellSums, sum_cells_compiled
 from recognizer.touch.symbols.covariance import covariances
 from recognizer.touch.symbols.deep_press import deep_gain
 from recognizer.touch.symbols.gain import Image, first_gain, normalize_image, tilted_gain
+from recognizer.touch.symbols.kernels import compiled_kernels
 from recognizer.touch.symbols.noise import log_likelihoods, psi_deviation
 from recognizer.touch.symbols.projection import (
     Projection,

@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 
 from recognizer.touch.settings import PosteriorSettings
 from recognizer.touch.symbols.blur import second_differences
-from recognizer.touch.symbols.compiled import compiled_kernels, linearizer_compiled
+from recognizer.touch.symbols.compiled import linearizer_compiled
 from recognizer.touch.symbols.covariance import invert_normal
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.gain import Image, bounded_gain
+from recognizer.touch.symbols.kernels import compiled_kernels
 from recognizer.touch.symbols.projection import (
     Shown,
     project_symbols,

@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.touch.settings import RefineSettings
-from recognizer.touch.symbols.compiled import compiled_kernels, refine_compiled
+from recognizer.touch.symbols.compiled import refine_compiled
 from recognizer.touch.symbols.damped import ascend, damped_step
 from recognizer.touch.symbols.gain import Image, bounded_gain
+from recognizer.touch.symbols.kernels import compiled_kernels
 from recognizer.touch.symbols.noise import NormalizedImage, log_likelihoods, psi_deviation
 from recognizer.touch.symbols.projection import (
     Shown,

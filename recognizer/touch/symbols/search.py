@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from probe.sensor import SensorType
 from recognizer.touch.settings import DEFAULTS, SearchSettings
-from recognizer.touch.symbols.compiled import addresses, compiled_kernels, kernels_in_use
+from recognizer.touch.symbols.kernels import addresses, compiled_kernels, kernels_in_use
 from recognizer.touch.symbols.template import Floats, ResponseTemplate
 
 

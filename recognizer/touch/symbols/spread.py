@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.touch.settings import SpreadSettings
-from recognizer.touch.symbols.compiled import addresses, compiled_kernels
 from recognizer.touch.symbols.covariance import invert_normal
+from recognizer.touch.symbols.kernels import addresses, compiled_kernels
 
 Array = NDArray[np.float64]
 

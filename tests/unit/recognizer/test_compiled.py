@@ -21,7 +21,7 @@ from recognizer.touch.locate import find_hypotheses
 from recognizer.touch.place_scores import add_scores, count_names, count_places, name_places
 from recognizer.touch.settings import DEFAULTS
 from recognizer.touch.signal import Signal
-from recognizer.touch.symbols import compiled
+from recognizer.touch.symbols import compiled, kernels
 from recognizer.touch.symbols.fit import score_cells
 from recognizer.touch.symbols.gain import image_of_signal, normalize_image
 from recognizer.touch.symbols.posterior import fit_posterior
@@ -39,7 +39,7 @@ TRUE = np.array([[1.3, -0.7, 0.4, 0.1, 0.05, -0.02, 0.003]])
 def library(tmp_path_factory):
     """Return the kernels as this machine's compiler makes them: also of a tree not installed."""
     made = tmp_path_factory.mktemp("kernels") / "kernels.so"
-    compile_kernels(compiled.SOURCES, made)
+    compile_kernels(kernels.SOURCES, made)
     return made
 
 
@@ -53,9 +53,9 @@ def compile_kernels(sources, made):
 @pytest.fixture
 def use(library, monkeypatch):
     def chosen(kind):
-        monkeypatch.setattr(compiled, "FILE", library)
-        monkeypatch.setenv(compiled.CHOICE, kind)
-        assert compiled.kernels_in_use() == kind
+        monkeypatch.setattr(kernels, "FILE", library)
+        monkeypatch.setenv(kernels.CHOICE, kind)
+        assert kernels.kernels_in_use() == kind
 
     return chosen
 
@@ -175,17 +175,17 @@ def test_whether_a_symbol_is_worn_is_what_the_reference_says(use):
 
 
 def test_what_is_missing_is_said(tmp_path, monkeypatch):
-    monkeypatch.delenv(compiled.CHOICE, raising=False)
-    monkeypatch.setattr(compiled, "FILE", tmp_path / "kernels.so")
-    assert compiled.compiled_kernels() is None
-    assert compiled.kernels_in_use() == "numpy"
+    monkeypatch.delenv(kernels.CHOICE, raising=False)
+    monkeypatch.setattr(kernels, "FILE", tmp_path / "kernels.so")
+    assert kernels.compiled_kernels() is None
+    assert kernels.kernels_in_use() == "numpy"
 
 
 def test_what_was_made_of_another_text_is_left_out(tmp_path):
     changed = tmp_path / "scatter.c"
-    changed.write_text(compiled.SOURCES[-1].read_text() + "\n")
-    compile_kernels((*compiled.SOURCES[:-1], changed), tmp_path / "kernels.so")
-    assert compiled.load_kernels(tmp_path / "kernels.so") is None
+    changed.write_text(kernels.SOURCES[-1].read_text() + "\n")
+    compile_kernels((*kernels.SOURCES[:-1], changed), tmp_path / "kernels.so")
+    assert kernels.load_kernels(tmp_path / "kernels.so") is None
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -284,8 +284,8 @@ def test_places_score_alike(held, dense, seed, library):
     found = []
     for kind in ("numpy", "compiled"):
         with pytest.MonkeyPatch.context() as patched:
-            patched.setattr(compiled, "FILE", library)
-            patched.setenv(compiled.CHOICE, kind)
+            patched.setattr(kernels, "FILE", library)
+            patched.setenv(kernels.CHOICE, kind)
             sums = add_scores(embossed, places, cells, scores, before)
             names = name_places(embossed, which, cells[which % 6])
             count_ = count_places(embossed, borders, prices, 1.2)
@@ -297,8 +297,8 @@ def test_places_score_alike(held, dense, seed, library):
 def test_names_are_counted_alike(names, library):
     given_ = np.array(names, np.int64)
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(compiled, "FILE", library)
-        patched.setenv(compiled.CHOICE, "compiled")
+        patched.setattr(kernels, "FILE", library)
+        patched.setenv(kernels.CHOICE, "compiled")
         known, votes = count_names(given_)
     assert dict(zip(known.tolist(), votes.tolist(), strict=True)) == Counter(names)
     assert known.tolist() == sorted(set(names))
@@ -337,7 +337,7 @@ def embossed_of(held, *, dense, columns=9):
 
 
 def test_scene_is_as_long_as_in_c():
-    text = (compiled.FOLDER / "symbols/evaluate.c").read_text()
+    text = (kernels.FOLDER / "symbols/evaluate.c").read_text()
     fields = text[text.index("typedef struct {") : text.index("} Scene;")]
     names = re.findall(r"\*?(\w+)(?:\[\w+\])?[,;]", re.sub(r"/\*.*?\*/", "", fields, flags=re.S))
     assert names == [name for name, _ in compiled._Scene._fields_]
