@@ -143,8 +143,9 @@ def best_around(scores: Floats) -> Floats:
     turns, n = len(scores), math.isqrt(scores.shape[1])
     library = compiled_kernels()
     if library is not None:
+        scores = np.ascontiguousarray(scores)  # named, so that it stays while it is looked at
         around = np.empty_like(scores)
-        library.look_around(turns, n, *addresses(np.ascontiguousarray(scores), around))
+        library.look_around(turns, n, *addresses(scores, around))
         return around
     most = scores.reshape(turns, n, n)
     for axis in range(3):  # all three go round
