@@ -54,15 +54,15 @@ def _registered_part(
 ) -> tuple[RegisteredObject, RegisteredPart]:
     """Return the part that a file holds: of this path, or else of this file name."""
     stated = part_file(normal_url(database), str(path))
-    if object_name:
-        parts = [(object_name, part) for part in registered_object(database, object_name).parts]
-    else:
-        parts = registered_parts(database)
+    named = registered_object(database, object_name) if object_name else None
+    parts = (
+        [(named.entry.name, part) for part in named.parts] if named else registered_parts(database)
+    )
     known = [(name, part) for name, part in parts if part.format == "stl"]
     same = [held for held in known if held[1].file == stated]
     alike = [held for held in known if Path(held[1].file).name == path.name]
     for name, part in same + alike:
-        return registered_object(database, name), part
+        return named or registered_object(database, name), part
     shown = ", ".join(Path(part.file).name for _, part in known[:8])
     raise SurfaceError(
         f"{path.name} is not registered in {database}",
