@@ -29,9 +29,10 @@ from probe.simulate.world.levels import TYPICAL, Level
 from probe.simulate.world.reading import read_sensor
 from probe.simulate.world.sensor_copy import SensorCopy, draw_copy
 from recognizer.touch.recognise import recognise
+from recognizer.validation.statistics import chi2_quantile
 
 SHAPES = {"Cube": {"cube": "80 mm"}, "Box": {"box": ["90 mm", "70 mm", "60 mm"]}}
-INSIDE = 7.815  #: chi square of three numbers at 95 %
+INSIDE = chi2_quantile(0.95)  #: chi square of three numbers at 95 %
 
 
 @dataclass(frozen=True)

@@ -58,6 +58,7 @@ from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.settings import SignalSettings
 from recognizer.touch.signal import Signal, signal_of
+from recognizer.validation.statistics import chi2_quantile
 
 SPECS = Path(__file__).parents[2] / "fixtures" / "specs"
 SENSOR = SensorType()
@@ -170,7 +171,9 @@ def pairs(scan: Scan, patches: list[TouchPatch]) -> None:
                 away = found.pose - true
                 ours.append(math.hypot(*away[:2]) / P)
                 turns.append(away[2] / DEG)
-                inside.append(float(away @ np.linalg.solve(found.covariance, away)) < 7.815)
+                inside.append(
+                    float(away @ np.linalg.solve(found.covariance, away)) < chi2_quantile(0.95)
+                )
     for name, errors, each in (("ours", ours, ms), ("product", theirs, their_ms)):
         errors = np.array(errors)
         near = errors[errors <= 1]
@@ -222,7 +225,7 @@ def told(name: str, scan: Scan, touches: list[PlacedTouch], *, face: bool) -> No
         line += f"  absolute rms {rms(np.hypot(*away.T[:2])) / P:.3f}"
         if free.any():
             line += f" (not decoded {rms(np.hypot(*away[free].T[:2])) / P:.3f})"
-        line += f"  chi^2/3 {nees.mean() / 3:.2f} in 95 % {(nees < 7.815).mean():.2f}"
+        line += f"  chi^2/3 {nees.mean() / 3:.2f} in 95 % {(nees < chi2_quantile(0.95)).mean():.2f}"
     reasons = Counter(mosaic.reasons)
     defined = np.array([not reason for reason in mosaic.reasons])
     if not face and not defined.all():

@@ -48,6 +48,7 @@ from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.signal import signal_of
+from recognizer.validation.statistics import chi2_quantile
 from recognizer.validation.surfaces import FOREIGN
 
 SPECS = Path(__file__).parents[2] / "fixtures" / "specs"
@@ -111,7 +112,7 @@ class Tally:
         deg = math.degrees(np.sqrt((away[:, 2] ** 2).mean())) if len(away) else math.nan
         all_ = sum(self.symbols.values()) or math.nan
         nees = np.array(self.nees)
-        inside = (nees * 3 < 7.815).mean() if len(nees) else math.nan
+        inside = (nees * 3 < chi2_quantile(0.95)).mean() if len(nees) else math.nan
         return (
             f"{self.scans:5}{len(known):6}{median:7.0f}{late:5.0f}{self.wrong:6}"
             f"{self.answers / self.touches:8.3f}{self.symbols['right'] / all_:8.3f}"

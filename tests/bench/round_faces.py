@@ -56,6 +56,7 @@ from recognizer.touch.recognise import recognise  # noqa: E402
 from recognizer.touch.recognition import Recognition  # noqa: E402
 from recognizer.touch.signal import signal_of  # noqa: E402
 from recognizer.validation.settings import DRAWING, JUDGING  # noqa: E402
+from recognizer.validation.statistics import chi2_quantile  # noqa: E402
 
 SHAPES = {
     "R20": "{cylinder: {diameter: 40 mm, height: 70 mm}}",
@@ -70,7 +71,7 @@ FELT = 0.02  #: of the strongest tactel
 STEP_MM = 6.75
 MOST = 12  #: touches of a scan
 ARM = (0.5, 0.5, math.radians(1.0))
-CHI2_95 = 7.815  # 3 degrees of freedom
+CHI2_95 = chi2_quantile(0.95)  # 3 degrees of freedom
 
 
 def made(folder: Path, alone: bool) -> dict[str, str]:

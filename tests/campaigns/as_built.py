@@ -40,8 +40,9 @@ from recognizer.errors import AsBuiltError  # noqa: E402
 from recognizer.touch.contacts import TouchImage  # noqa: E402
 from recognizer.touch.lab import open_lab  # noqa: E402
 from recognizer.touch.reader import Reader  # noqa: E402
+from recognizer.validation.statistics import chi2_quantile  # noqa: E402
 
-CHI2_95 = 7.815  # 3 degrees of freedom
+CHI2_95 = chi2_quantile(0.95)  # 3 degrees of freedom
 ON_FACE = TouchRanges(force_n=(20, 120), tilt_rad=math.radians(2), margin_mm=9)
 PRINTS = {  # scale x, scale y, skew (rad)
     "as designed": (1.0, 1.0, 0.0),

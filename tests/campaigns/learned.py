@@ -22,11 +22,12 @@ from recognizer.touch.lab import open_lab  # noqa: E402
 from recognizer.touch.reader import Reader  # noqa: E402
 from recognizer.touch.recognise import recognise  # noqa: E402
 from recognizer.validation.draw import DrawnTouch, draw_touch  # noqa: E402
+from recognizer.validation.statistics import chi2_quantile  # noqa: E402
 from recognizer.validation.touch_plan import TouchPlan  # noqa: E402
 from recognizer.validation.trial import Trial, judge  # noqa: E402
 
 LEVELS = "typical,dead-10,dead-20,dead-40,hot-5,gain-30,places-25,floating"
-INSIDE = 7.815  #: squared error over covariance, 95 % of three degrees of freedom
+INSIDE = chi2_quantile(0.95)  #: squared error over covariance, 95 % of three degrees of freedom
 
 
 def main() -> None:

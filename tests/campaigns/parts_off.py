@@ -26,11 +26,12 @@ from recognizer.touch.reader import Reader  # noqa: E402
 from recognizer.touch.settings import DEFAULTS, ReaderSettings  # noqa: E402
 from recognizer.validation.campaign import LEVEL_SHARES  # noqa: E402
 from recognizer.validation.draw import draw_touch  # noqa: E402
+from recognizer.validation.statistics import chi2_quantile  # noqa: E402
 from recognizer.validation.touch_plan import TouchPlan  # noqa: E402
 from recognizer.validation.trial import judge  # noqa: E402
 
 KINDS = (("face", 0.55), ("edge", 0.3), ("corner", 0.1), ("worn", 0.05))
-INSIDE = 7.815  #: squared error over covariance, 95 % of three degrees of freedom
+INSIDE = chi2_quantile(0.95)  #: squared error over covariance, 95 % of three degrees of freedom
 D = DEFAULTS
 _FORM = (0.0, 0.0, 0.0, 1e-4, 1e-4, 1e-4, 1e-6)  #: deviations that hold width ... scale in place
 #: by name: the reader's settings without it

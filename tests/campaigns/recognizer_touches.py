@@ -20,11 +20,12 @@ import numpy as np  # noqa: E402
 
 from recognizer.touch.lab import open_lab  # noqa: E402
 from recognizer.touch.reader import Reader  # noqa: E402
+from recognizer.validation.statistics import chi2_quantile  # noqa: E402
 from recognizer.validation.surfaces import FOREIGN  # noqa: E402
 from recognizer.validation.touch_plan import TouchPlan, sensor_of  # noqa: E402
 from recognizer.validation.trial import Trial, trial  # noqa: E402
 
-CHI2_95 = 7.815  # 3 degrees of freedom
+CHI2_95 = chi2_quantile(0.95)  # 3 degrees of freedom
 
 
 def several(job: tuple[TouchPlan, str, range]) -> list[Trial]:

@@ -28,6 +28,7 @@ import pyarrow.parquet as pq
 
 from probe.sensor_types import proposed_pitch_mm
 from probe.sensor_types.read import sensor_type_named, shipped_names
+from recognizer.validation.statistics import chi2_quantile
 
 SHAPES = {
     "Cube": "{cube: 80 mm}",
@@ -38,7 +39,7 @@ SHAPES = {
 BLOCK = {"Block": "{box: [80 mm, 64 mm, 40 mm]}"}  #: that is printed
 KEY = "VA11-DATE-0000-0002"  #: of the labs, so that a run can be repeated
 FINE_MM = 4.0  #: below this filament printers make no strokes
-INSIDE = 7.815  #: chi square of three numbers at 95 %
+INSIDE = chi2_quantile(0.95)  #: chi square of three numbers at 95 %
 
 
 @dataclass(frozen=True)
