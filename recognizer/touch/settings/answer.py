@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from recognizer.touch.settings.symbols import TIE_NATS
+
 
 @dataclass(frozen=True, slots=True)
 class HypothesisSettings:
@@ -55,7 +57,7 @@ class BeliefSettings:
     contradicted: int = 1  #: cells that speak `clearly` for another symbol; `plainly`: none
     clearly: float = 8.0  #: nats
     plainly: float = 16.0
-    tie: float = 1e-4  #: nats between a symbol and none that rounding may make
+    tie: float = TIE_NATS  #: by which none is likelier than a symbol that is worn, at least
     whole: float = 6.0  #: tactels that look at a cell which counts as seen
     #: tactels to a symbol below which numbers of tactels shrink with the square of the share: 8x8
     #: at 3 mm, 7 mm symbols, 40 typical touches mid-face, 0 wrong: 38 answered, 0 without it

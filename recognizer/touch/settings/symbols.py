@@ -7,6 +7,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+#: Between a symbol and none where rounding decides: of a cell that is seen by its rim alone.
+TIE_NATS = 1e-4
+
 
 @dataclass(frozen=True, slots=True)
 class TemplateSettings:
@@ -81,6 +84,7 @@ class NoiseSettings:
     above: float = 0.5  #: share of it that is seen where nothing is felt: no force is negative
     far: float = 4.0  #: deviations beyond which a tactel neither pulls nor counts as noise
     grazed: float = 1e-6  #: psi up to which nothing is felt: what rounding leaves of none
+    tie: float = TIE_NATS  #: by which a symbol is likelier than none, at least
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,7 +29,7 @@ _WHOLE = ("b", "n", "q", "size", "hardens", "falls", "high", "wide")
 _REAL = (
     "symbol", "deepest", "pitch", "half", "step", "noise", "least_gain", "full_press",
     "least_press", "steepest", "quiet", "displaced", "loud", "most", "first", "far", "grazed",
-    "damping", "easier", "harder", "settled", "shallower", "deepest_gain",
+    "tie", "damping", "easier", "harder", "settled", "shallower", "deepest_gain",
 )  # fmt: skip
 _ROWS = {
     "least": UNKNOWNS, "largest": UNKNOWNS, "limits": len(DEFAULTS.refine.limits),
@@ -238,7 +238,7 @@ def _scene_of(image: Image, template: ResponseTemplate) -> _ImageScene:
         step=template.step_mm, noise=image.noise,
         least_gain=gain.least_gain, full_press=gain.full_press, least_press=gain.least_press,
         steepest=gain.steepest, quiet=noise.quiet, displaced=noise.displaced_mm, loud=noise.loud,
-        most=noise.most, first=noise.first, far=noise.far, grazed=noise.grazed,
+        most=noise.most, first=noise.first, far=noise.far, grazed=noise.grazed, tie=noise.tie,
         damping=refine.damping, easier=refine.easier, harder=refine.harder, settled=refine.settled,
         shallower=refine.shallower, deepest_gain=refine.deepest, least=refine.least,
         largest=refine.step, limits=refine.limits,

@@ -21,7 +21,7 @@ typedef struct {
     double pitch, half, step;   /* ResponseTemplate, mm */
     double noise;               /* of the readings */
     double least_gain, full_press, least_press, steepest;       /* GainSettings */
-    double quiet, displaced, loud, most, first, far, grazed;    /* NoiseSettings */
+    double quiet, displaced, loud, most, first, far, grazed, tie;   /* NoiseSettings */
     double damping, easier, harder, settled, shallower, deepest_gain; /* RefineSettings */
     double least[UNKNOWNS], largest[UNKNOWNS], limits[4];
     double precision[UNKNOWNS], usual_scale;    /* what is known beforehand; log of the scale */
@@ -309,57 +309,9 @@ static void score(const Scene *s, Work *w, double noise) {
     }
 }
 
-/* The score of one symbol at a tactel as the reference rounds it. */
-static double score_rounded(const Scene *s, const Work *w, const double *pose, double noise,
-                            int64_t t, int64_t k) {
-    const float *from = s->rimmed + (w->place[t] * s->q + k) * FIELDS, log4 = (float)LOG4;
-    const float quiet = (float)(s->quiet * s->quiet), aside = (float)(s->displaced * s->displaced);
-    float hold = (float)w->contact[t], face = (float)w->bare[t], by = 1.0f;
-    float v = from[0] + from[3] * (float)pose[3] + from[4] * (float)pose[4] +
-              from[5] * (float)pose[5];
-    v *= hold;
-    if (face > 0.0f) {
-        float response = expm1f(v * log4) / 3.0f, total = response + (1.0f - response) * face;
-        by = (1.0f - face) * (1.0f + 3.0f * response) / (1.0f + 3.0f * total);
-        v = log1pf(3.0f * (total > 0.0f ? total : 0.0f)) / log4;
-    } else if (w->any_bare) {
-        v = v > 0.0f ? v : 0.0f;
-    }
-    float x = from[1] * hold * by, y = from[2] * hold * by;
-    float square = quiet + v * v + aside * (x * x + y * y), wide = sqrtf(square);
-    double unit = noise / larger(w->press[t], 1e-3);
-    if (w->is_loud) {
-        float change = (float)(3.0 / LOG4) * expf((float)-LOG4 * v);
-        double share = change * (s->noise / w->plateau[t]) / unit;
-        wide = (float)sqrt(square + share * share);
-    }
-    double away = (w->psi[t] - v) / (unit * wide);
-    return s->trust[t] * (-smaller(0.5 * away * away, s->most) - logf(wide));
-}
-
-enum { NEAR_TIES = 100000 }; /* one over the nats within which rounding may decide */
-
-/* The number of the largest sum (q + 1,) of a cell. Where a cell is seen by its rim alone, symbols
-   and none often differ by rounding: there the reference's decides. */
-static int64_t largest(const Scene *s, const Work *w, const double *pose, int64_t cell,
-                       double *sum) {
-    int64_t best = 0, near = 0;
-    for (int64_t c = 1; c <= s->q; c++) if (sum[c] > sum[best]) best = c;
-    for (int64_t c = 0; c <= s->q; c++) near += (sum[best] - sum[c]) * NEAR_TIES < 1.0;
-    if (near == 1) return best;
-    for (int64_t c = 0; c < s->q; c++) {
-        sum[c] = 0.0;
-        for (int64_t t = 0; t < s->n; t++)
-            if (w->labels[t] == cell) sum[c] += score_rounded(s, w, pose, s->first, t, c);
-    }
-    best = 0;
-    for (int64_t c = 1; c <= s->q; c++) if (sum[c] > sum[best]) best = c;
-    return best;
-}
-
 /* labels (n,) of what fits best in the cell under each tactel, -1: no symbol. Cells are few, and
    mostly that of the tactel before. */
-static void choose(const Scene *s, Work *w, const double *pose) {
+static void choose(const Scene *s, Work *w) {
     const int64_t *cells = w->cells, wide = s->q + 1;
     int64_t known = 0, k = 0;
     for (int64_t t = 0; t < s->n; t++) {
@@ -376,8 +328,10 @@ static void choose(const Scene *s, Work *w, const double *pose) {
         w->labels[t] = k;
     }
     for (k = 0; k < known; k++) {
-        int64_t best = largest(s, w, pose, k, w->sums + k * wide);
-        w->first[k] = best == s->q ? -1 : best;
+        const double *sum = w->sums + k * wide;
+        int64_t best = 0;
+        for (int64_t c = 1; c < s->q; c++) if (sum[c] > sum[best]) best = c;
+        w->first[k] = sum[s->q] + s->tie > sum[best] ? -1 : best;
     }
     for (int64_t t = 0; t < s->n; t++) w->labels[t] = w->first[w->labels[t]];
 }
@@ -461,7 +415,7 @@ static double explain(const Scene *s, Work *w, Shown shown, int64_t i, const dou
     if (w->known) read_labels(s, w, shown.given + i * s->high * s->wide, shown.corner + 2 * i);
     look_up(s, w, pose);
     score(s, w, s->first);
-    if (!w->known) choose(s, w, pose);
+    if (!w->known) choose(s, w);
     for (int64_t t = 0; t < s->n; t++) {
         int64_t label = w->labels[t];
         sum += label < 0 ? w->none[t] : w->scores[(w->known ? 0 : label) * s->n + t];
@@ -641,8 +595,8 @@ void refine(const Scene *s, int64_t steps, int64_t told, const int8_t *given, co
 
 /* Sums over the cells of one candidate, columns and then rows rising: names (m, 2), scores
    (m, q + 1), tactels that look at them by how hard they press (m,). Returns m. */
-static int64_t sum_cells(const Scene *s, const Work *w, const double *pose, double noise,
-                         int64_t *names, double *scores, double *seen) {
+static int64_t sum_cells(const Scene *s, const Work *w, int64_t *names, double *scores,
+                         double *seen) {
     int64_t known = 0, wide = s->q + 1;
     for (int64_t t = 0; t < s->n; t++) {
         const int64_t *cell = w->cells + 2 * t;
@@ -662,17 +616,6 @@ static int64_t sum_cells(const Scene *s, const Work *w, const double *pose, doub
         scores[wide * k + s->q] += w->none[t];
         seen[k] += w->press[t] * s->trust[t];
     }
-    for (int64_t k = 0; k < known; k++) { /* whether a symbol is worn is told from none */
-        double *sum = scores + wide * k;
-        int near = 0;
-        for (int64_t c = 0; c < s->q; c++) near |= fabs(sum[c] - sum[s->q]) * NEAR_TIES < 1.0;
-        for (int64_t c = 0; c < s->q && near; c++) {
-            sum[c] = 0.0;
-            for (int64_t t = 0; t < s->n; t++)
-                if (w->cells[2 * t] == names[2 * k] && w->cells[2 * t + 1] == names[2 * k + 1])
-                    sum[c] += score_rounded(s, w, pose, noise, t, c);
-        }
-    }
     return known;
 }
 
@@ -691,7 +634,7 @@ double score_cells(const Scene *s, int64_t best, double least, double *pose, dou
         find_cells(s, &w, pose + 7 * i);
         look_up(s, &w, pose + 7 * i);
         score(s, &w, s->first);
-        choose(s, &w, pose + 7 * i);
+        choose(s, &w);
         value_shown(s, &w);
         level[i] = w.measure;
         for (int64_t t = 0; t < s->n; t++) {
@@ -706,8 +649,8 @@ double score_cells(const Scene *s, int64_t best, double least, double *pose, dou
         }
         if (k == 0) noise = larger(least, sqrt(sum / whole));
         score(s, &w, noise);
-        count[i] = sum_cells(s, &w, pose + 7 * i, noise, names + 2 * i * s->n,
-                             scores + i * s->n * (s->q + 1), seen + i * s->n);
+        count[i] = sum_cells(s, &w, names + 2 * i * s->n, scores + i * s->n * (s->q + 1),
+                             seen + i * s->n);
     }
     free_work(&w);
     return noise;

@@ -230,7 +230,7 @@ def _residuals(under: Projection) -> Array:
     """Return how far (b, n) readings lie from the likeliest labels, on a covered tactel's scale."""
     felt, cells = under.felt, under.cells
     scores = log_likelihoods(felt, under.tables, np.full(len(cells), felt.settings.first))
-    values = values_of(under, likeliest_labels(cells, scores))
+    values = values_of(under, likeliest_labels(cells, scores, felt.settings.tie))
     unit = felt.settings.first / felt.press
     deviation = psi_deviation(felt, values[:, :, None], unit)[..., 0]
     return (felt.psi - values[..., 0]) * felt.press / deviation

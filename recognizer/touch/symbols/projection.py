@@ -54,13 +54,17 @@ def project_symbols(
     return felt, labels, _with_bare_face(felt, labels, tables[:, :, 0].astype(np.float64))
 
 
-def likeliest_labels(cells: Ints, scores: Array) -> Ints:
+def likeliest_labels(cells: Ints, scores: Array, tie: float) -> Ints:
     """Return the label (b, n) of what fits best in the cell under each tactel; -1: no symbol.
+
+    A cell that is seen by its rim alone shows a symbol as well as none but for rounding: none.
 
     Parameters
     ----------
     scores
         (b, n, q + 1) log-likelihoods at each tactel; the last is no symbol.
+    tie
+        Nats by which a symbol fits better at least.
     """
     local = cells - cells.min(axis=1, keepdims=True)
     width = int(local.max()) + 1
@@ -74,8 +78,9 @@ def likeliest_labels(cells: Ints, scores: Array) -> Ints:
         ],
         axis=1,
     )
-    best = sums.argmax(axis=1)
-    best[best == scores.shape[2] - 1] = -1
+    symbols, none = sums[:, :-1], sums[:, -1]
+    best = symbols.argmax(axis=1)
+    best[none + tie > symbols.max(axis=1)] = -1
     return np.asarray(best[dense])
 
 

@@ -137,7 +137,7 @@ def linearize_image(
     under = project_template(image, template, pose, gain)
     felt, cells = under.felt, under.cells
     scores = log_likelihoods(felt, under.tables, np.full(len(pose), noise.first))
-    labels = likeliest_labels(cells, scores) if shown is None else shown(cells)
+    labels = likeliest_labels(cells, scores, noise.tie) if shown is None else shown(cells)
     known, precision = prior_departure(image, pose, gain), prior_precision(image)
     value = np.take_along_axis(scores, labels[..., None], axis=2)[..., 0].sum(axis=1)
     value += felt.measure + (felt.trust * np.log(felt.press)).sum(axis=1)

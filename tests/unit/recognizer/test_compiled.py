@@ -25,7 +25,7 @@ from recognizer.touch.symbols import compiled, kernels
 from recognizer.touch.symbols.fit import score_cells
 from recognizer.touch.symbols.gain import image_of_signal, normalize_image
 from recognizer.touch.symbols.posterior import fit_posterior
-from recognizer.touch.symbols.projection import project_template
+from recognizer.touch.symbols.projection import likeliest_labels, project_template
 from recognizer.touch.symbols.refine import refine_lattices
 from recognizer.touch.symbols.search import bank_of, best_around, lattice_scores
 from recognizer.touch.symbols.spread import fit_spread, usual_spread
@@ -170,8 +170,21 @@ def test_whether_a_symbol_is_worn_is_what_the_reference_says(use):
     for kind in ("numpy", "compiled"):
         use(kind)
         fits = score_cells(image, template, lattices)
-        worn.append([(fit.scores[:, :-1] < fit.scores[:, -1:]).tolist() for fit in fits])
-    assert worn[0] == worn[1]  # seen by their rim alone, symbols lie 1e-8 from none
+        margin = [fit.scores[:, -1:] - fit.scores[:, :-1] for fit in fits]
+        worn.append([(one > DEFAULTS.belief.tie).tolist() for one in margin])
+        assert any((np.abs(one) < 1e-6).any() for one in margin)  # seen by their rim alone
+    assert worn[0] == worn[1]
+
+
+@pytest.mark.parametrize(("ahead", "label"), [(0.5, -1), (2.0, 2)])
+def test_a_symbol_is_shown_where_rounding_could_not_say_so(ahead, label):
+    tie = DEFAULTS.noise.tie
+    cells = np.array([[[0, 0], [0, 0], [1, 0]]])
+    scores = np.array(
+        [[[-5.0, -6.0, -4.0, -4.0], [-5.0, -4.0, -4.0, -4.0], [-1.0, -3.0, -2.0, -9.0]]]
+    )
+    scores[0, 0, 2] += ahead * tie
+    assert likeliest_labels(cells, scores, tie).tolist() == [[label, label, 0]]
 
 
 def test_what_is_missing_is_said(tmp_path, monkeypatch):
