@@ -1,0 +1,184 @@
+"""One campaign over all worlds and kinds, a million touches, that can be stopped and resumed.
+
+    python tests/campaigns/million.py -o out/million -j 2            # about two hours
+    python tests/campaigns/million.py -o out/million -j 2            # again: goes on where it was
+    python tests/campaigns/million.py -o out/million --touches 5000  # the same in small
+    python tests/campaigns/million.py -o out/million --table         # of what is there
+
+Each world is a run of `validate-set` with a share of the touches: 40 objects and 40 small ones,
+own engine and MuJoCo, written files and prints, with what is wrong with sensors, light presses,
+other labs' parts and steps to a next touch. Stopped by Ctrl-C it says so (exit code 130) and goes
+on by the same command; at most a thousand touches are made again. Prints need PrusaSlicer; folders
+of prints that exist are used (--prints, --small-prints). Writes DIR/million.json and a table.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+
+from recognizer.validation.files import write_json
+from recognizer.validation.statistics import chi2_quantile
+
+SPECS = Path("docs/validation")
+INSIDE = chi2_quantile(0.95)  #: chi square of three numbers at 95 %
+#: One of its own each; a quarter turn of the mounting is left out, which no touch tells.
+SENSORS = (
+    "sound,places-08,bleed-2,places-25,domed,dead-10,dead-20,dead-40,hot-5,gain-30,hysteresis-15,"
+    "hysteresis-40,saturated,floating-10,floating-30,floating,slide-2,slide-6,tilt-5,light,"
+    "mirrored,transposed,halves-swapped,rolled"
+)
+MEMBERS = "copy,near,side,same_profile"
+
+
+@dataclass(frozen=True)
+class World:
+    """A run of `validate-set`."""
+
+    share: float  #: of all touches
+    seed: int
+    options: tuple[str, ...] = ()
+    spec: str = "forty"  #: set that is touched
+    makes: bool = False  #: the parts, as all other worlds of the set touch them
+
+
+def _printed(faults: str) -> tuple[str, ...]:
+    return ("--surfaces", "printed", "--faults", faults)
+
+
+NEXT = ("--policy", "next", "--kinds", "face=.5,edge=.4,corner=.1")
+KNOWN = ("--kinds", "face=.55,edge=.1,corner=.05,worn=.1")
+LIGHT = ("--kinds", "face", "--levels", "light")
+MUJOCO = ("--engine", "mujoco", *KNOWN)
+WORLDS = {
+    "own": World(0.0002, 300, makes=True),
+    "small": World(0.0002, 300, spec="small", makes=True),
+    "members": World(0.03, 309, ("--kinds", MEMBERS), makes=True),
+    "mujoco": World(0.0015, 310, MUJOCO),
+    "small-mujoco": World(0.0006, 311, MUJOCO, "small"),
+    "printed-none": World(0.03, 41, _printed("none")),
+    "printed-usual": World(0.06, 41, _printed("usual")),
+    "printed-bad": World(0.03, 41, _printed("bad")),
+    "small-printed-none": World(0.01, 41, _printed("none"), "small"),
+    "small-printed-usual": World(0.02, 41, _printed("usual"), "small"),
+    "small-printed-bad": World(0.01, 41, _printed("bad"), "small"),
+    "light": World(0.02, 312, LIGHT),
+    "small-light": World(0.01, 313, LIGHT, "small"),
+    "next": World(0.01, 314, NEXT),
+    "small-next": World(0.005, 315, NEXT, "small"),
+    "sensors": World(0.048, 316, ("--kinds", "face,edge", "--levels", SENSORS)),
+    "one-sensor": World(0.02, 317, ("--sensor-per", "run")),
+    "pad": World(0.02, 318, ("--overlay", "pad")),
+    "registered": World(0.021, 319, ("--surfaces", "database")),
+    "anything": World(0.0235, 320, ("--kinds", "blank,foreign")),
+    **{f"own-{k}": World(0.09, 300 + k) for k in range(1, 6)},
+    **{f"small-{k}": World(0.09, 300 + k, spec="small") for k in range(1, 3)},
+}
+
+
+def touch(name: str, asked: argparse.Namespace) -> None:
+    """Do a world's run, or go on with it."""
+    world, folder = WORLDS[name], asked.output / name
+    if (folder / "results.json").exists():
+        return
+    touches = max(10, round(world.share * asked.touches))
+    options = [*world.options]
+    if world.makes:
+        options = [str(SPECS / f"{world.spec}.yaml"), *options]
+    else:
+        made = "small" if world.spec == "small" else "own"
+        options += ["--database", str(asked.output / made / "lab.db")]
+    if "printed" in name:
+        shared = asked.small_prints if world.spec == "small" else asked.prints
+        options += ["--prints", str(shared or asked.output / f"prints-{world.spec}")]
+    command = [
+        sys.executable, "-c", "from recognizer.validation.command import main; main()", *options,
+        "--touches", str(touches), "--seed", str(world.seed), "--study", "0", "--resume",
+        "-j", str(asked.jobs), "-o", str(folder),
+    ]  # fmt: skip
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL) as run:
+        try:
+            code = run.wait()
+        except KeyboardInterrupt:  # it hears it too, and writes what it has
+            run.wait()
+            raise
+    if code:
+        raise SystemExit(code)
+
+
+def rows_of(folder: Path) -> pa.Table | None:
+    """Return all touches of a world that are there."""
+    files = sorted((folder / "shards").glob("touches/*.parquet"))
+    return pa.concat_tables([pq.read_table(file) for file in files]) if files else None
+
+
+def line_of(rows: pa.Table) -> dict[str, Any]:
+    """Return what became of the touches of a world."""
+    known = pc.not_equal(rows["object"], "")
+    verdicts = Counter(rows["verdict"].to_pylist())
+    on_faces = Counter(rows.filter(known)["verdict"].to_pylist())
+    right = rows.filter(pc.equal(rows["verdict"], "right"))
+    line: dict[str, Any] = {
+        "touches": len(rows), "on_faces": on_faces.total(), "right": on_faces["right"],
+        "wrong": verdicts["wrong"],
+    }  # fmt: skip
+    if len(right):
+        mm, chi2 = right["error_mm"].to_numpy(), right["chi2"].to_numpy()
+        line["rms_mm"] = round(float(np.sqrt(np.mean(mm**2))), 4)
+        line["worst_mm"] = round(float(mm.max()), 3)
+        line["inside"] = round(float(np.mean(chi2 < INSIDE)), 4)
+    return line
+
+
+def table(lines: Mapping[str, dict[str, Any]]) -> None:
+    """Print what became of all touches, as Markdown."""
+    print("| world | touches | on faces | right | wrong | rms mm | inside |")
+    print("| --- " * 7 + "|")
+    for name, line in lines.items():
+        inside = f"{100 * line['inside']:.0f} %" if "inside" in line else ""
+        counts = " | ".join(f"{line[key]:,}" for key in ("touches", "on_faces", "right", "wrong"))
+        print(f"| {name} | {counts} | {line.get('rms_mm', '')} | {inside} |")
+
+
+def main() -> int:
+    """Run what is left and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser.add_argument("--touches", type=int, default=1_000_000)
+    parser.add_argument("-j", "--jobs", type=int, default=1)
+    parser.add_argument("--prints", type=Path, help="printed surfaces of the forty objects")
+    parser.add_argument("--small-prints", type=Path, help="those of the small ones")
+    parser.add_argument("--table", action="store_true", help="of the touches that are there")
+    asked = parser.parse_args()
+    asked.output = asked.output.absolute()
+    for done, name in enumerate(() if asked.table else WORLDS, 1):
+        start = time.monotonic()
+        print(f"run {done} of {len(WORLDS)}: {name}", end="", flush=True, file=sys.stderr)
+        try:
+            touch(name, asked)
+        except KeyboardInterrupt:
+            print("\nstopped; the same command goes on", file=sys.stderr)
+            return 130
+        print(f", {time.monotonic() - start:.0f} s", flush=True, file=sys.stderr)
+    found = {name: rows for name in WORLDS if (rows := rows_of(asked.output / name)) is not None}
+    lines = {name: line_of(rows) for name, rows in found.items()}
+    lines["all"] = line_of(pa.concat_tables(list(found.values()), promote_options="default"))
+    write_json(asked.output / "million.json", lines)
+    table(lines)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
