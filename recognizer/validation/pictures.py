@@ -113,9 +113,11 @@ def confusion(objects: dict[str, Any]) -> str:
 
 
 def pose(rows: dict[str, Any]) -> str:
-    """Return the distribution of pose errors, and how honest the covariance is."""
-    picture = SvgPicture()
+    """Return the distribution of pose errors, and how honest the covariance is; "" of none."""
     right = rows["verdict"] == RIGHT
+    if not right.any():
+        return ""
+    picture = SvgPicture()
     colours = level_colours(rows["level"])
     with svg_figure(1, 3, (11.5, 3.2), picture) as (_, axes):
         for axis, name, label in (
@@ -189,7 +191,9 @@ def level_colours(levels: Any) -> dict[str, str]:
 
 
 def margins(rows: dict[str, Any]) -> str:
-    """Return how sure right, wrong and refused answers are."""
+    """Return how sure right, wrong and refused answers are; "" where nothing was weighed."""
+    if not np.isfinite(rows["margin"]).any():
+        return ""
     picture = SvgPicture()
     bins = np.linspace(0, 100, 41)
     with svg_figure(1, 1, (6.2, 2.6), picture) as (_, (axis,)):

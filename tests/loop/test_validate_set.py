@@ -195,6 +195,16 @@ def test_repeat_report_and_compare(reference, tmp_path, capsys):
     assert html.stat().st_size > 10_000
 
 
+def test_a_report_of_what_no_database_knows_shows_no_errors_of_right_answers(reference, tmp_path):
+    own = ["--database", str(reference[0] / "lab.db"), "--kinds", "blank", "--study", "0"]
+    assert run([*own, "--touches", "3", "-o", str(tmp_path / "blank")]) == 0
+    page = (tmp_path / "blank" / "report.html").read_text()
+    assert "When it answers" in page
+    assert "How far off" not in page
+    assert "How sure" not in page
+    assert "How far off" in (reference[0] / "report.html").read_text()
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
     [
