@@ -36,7 +36,8 @@ def simulate(
     ] = None,
     force: Annotated[
         float | None, typer.Option(min=0.0, show_default=False,
-                                   help="Force, N; 80, or 20 ... 120 with --touches."),
+                                   help="Force, N; 80, or 20 ... 120 with --touches, on fsr-16; "
+                                        "on another type as hard."),
     ] = None,
     tilt_x: Annotated[
         float | None, typer.Option(show_default=False, help="Tilt about the sensor's x, degrees; "

@@ -15,7 +15,7 @@
 
 from probe.sensor_types.choose import choose_sensor_type
 from probe.sensor_types.errors import SensorTypeError
-from probe.sensor_types.force import force_share
+from probe.sensor_types.force import force_share, usual_force_n
 from probe.sensor_types.propose import proposed_pitch_mm
 from probe.sensor_types.text import sensor_type_text
 
@@ -25,4 +25,5 @@ __all__ = [
     "force_share",
     "proposed_pitch_mm",
     "sensor_type_text",
+    "usual_force_n",
 ]

@@ -16,7 +16,7 @@ from probe.sensor import SensorType
 class TouchForceSettings:
     """A force on `fsr-16`, and what does the same to a gel."""
 
-    force_n: float = 80.0
+    force_n: float = 80.0  #: as the thesis pressed its washer
     imprint_mm: float = 0.3
     """Mean imprint of a gel. Of 300 touches of all kinds 206 are answered at .2 and at .3 mm, 189
     at 1.2 mm, where the share of the area leads; at edges 35, 32 and 17 of 40, of mismatched gels
@@ -40,3 +40,14 @@ def force_share(sensor: SensorType, settings: TouchForceSettings = TOUCH_FORCE) 
         bed_n_mm3 = sensor.overlay.young_mpa / sensor.overlay.height_mm
         return settings.imprint_mm * bed_n_mm3 * area_mm2 / settings.force_n
     return area_mm2 / (4 * math.prod(SensorType().half_mm))
+
+
+def usual_force_n(sensor: SensorType) -> float:
+    """Return what a type is pressed with where nothing else is said, N.
+
+    Examples
+    --------
+    >>> usual_force_n(SensorType())
+    80.0
+    """
+    return TOUCH_FORCE.force_n * force_share(sensor)

@@ -40,7 +40,6 @@ class SimulatedScanSettings:
     lift_mm: float = 10.0
     """Between two touches; the way decides on which side of its play a joint is."""
     gap_mm: float = 3.0  #: from where an approach begins to the surface
-    force_n: float = 80.0  #: as the thesis pressed its washer
 
 
 @dataclass(frozen=True, slots=True)

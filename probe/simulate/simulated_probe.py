@@ -26,11 +26,10 @@ from probe.errors import SurfaceError
 from probe.frame import Frame, frame_from
 from probe.recording.record import Recorder
 from probe.sensor import SensorType
-from probe.sensor_types import choose_sensor_type
+from probe.sensor_types import choose_sensor_type, force_share, usual_force_n
 from probe.simulate.readout import readout_of
 from probe.simulate.scan import ScanKind, ScanPath, scan_path
 from probe.simulate.scene import Scene
-from probe.simulate.settings import SIMULATED_SCAN
 from probe.simulate.target import surface_of
 from probe.simulate.touch import TouchRanges, pose_of, random_touches
 
@@ -52,19 +51,22 @@ class TouchOptions:
     seed: int = 0
     scan: ScanKind | None = None  #: None: touches by themselves
 
-    def draw(self, scene: Scene, rng: np.random.Generator) -> Touch:
-        """Return a touch; what is not named is drawn, or has a default.
+    def draw(self, scene: Scene, sensor: SensorType, rng: np.random.Generator) -> Touch:
+        """Return a touch; what is not named is drawn, or has a default; as hard as the type takes.
 
         Raises
         ------
         SurfaceError
             A value that is no finite number.
         """
+        share = force_share(sensor)
         if self.touches is None:
             x, y = scene.centre_mm()
-            drawn = Touch(float(x), float(y), 0.0, SIMULATED_SCAN.force_n)
+            drawn = Touch(float(x), float(y), 0.0, usual_force_n(sensor))
         else:
-            drawn = next(random_touches(scene.region, rng, TouchRanges()))
+            low, high = TouchRanges().force_n
+            ranges = TouchRanges(force_n=(share * low, share * high))
+            drawn = next(random_touches(scene.region, rng, ranges))
         touch = Touch(
             _given_or_drawn(self.x_mm, drawn.x_mm),
             _given_or_drawn(self.y_mm, drawn.y_mm),
@@ -190,7 +192,9 @@ class SimulatedProbe:
         readout = readout_of(sensor, quiet=self.noise == "quiet")
         for i in range(len(self)):
             rng = np.random.default_rng([options.seed, i])
-            touch = options.draw(self.scene, rng) if self.path is None else self.path.touches[i]
+            touch = (
+                options.draw(self.scene, sensor, rng) if self.path is None else self.path.touches[i]
+            )
             met = self.scene.under(touch)
             contact = press(met.surface, sensor, touch, accuracy=self.level)
             true = believed = wrist = None
@@ -255,7 +259,7 @@ class SimulatedProbe:
         return scan_path(
             self.scene, self.sensor, options.scan, np.random.default_rng([options.seed, _WAY]),
             most=options.touches, theta_rad=math.radians(_given_or_drawn(options.theta_deg, 0.0)),
-            force_n=_given_or_drawn(options.force_n, SIMULATED_SCAN.force_n),
+            force_n=_given_or_drawn(options.force_n, usual_force_n(self.sensor)),
         )  # fmt: skip
 
 

@@ -93,7 +93,7 @@ def simulate(
     theta
         Turn of the sensor, degrees; 0, or any with `touches`.
     force
-        N; 80, or 20 ... 120 with `touches`.
+        N; 80, or 20 ... 120 with `touches`, on `fsr-16`; on another type as hard.
     tilt_x, tilt_y
         Tilts about the sensor's own axes, degrees; 0, or up to 2 with `touches`.
     touches

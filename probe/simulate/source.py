@@ -6,7 +6,7 @@ by a step in a random direction. Options, all optional:
 
     x, y        mm, surface frame: stay at this place
     theta       degrees; any without it
-    force       N, 80
+    force       N, 80 on fsr-16: on another type as hard
     tilt        degrees, largest tilt of a touch: 0
     step        mm from touch to touch while wandering, 5
     period      s from touch to touch, 2
@@ -32,7 +32,7 @@ from probe.contact.press import Accuracy, accuracy_of, level_for, press
 from probe.errors import ContactError, SurfaceError
 from probe.frame import Frame, frame_from
 from probe.sensor import SensorType
-from probe.sensor_types import choose_sensor_type
+from probe.sensor_types import choose_sensor_type, usual_force_n
 from probe.simulate.readout import SensorReadout, readout_of
 from probe.simulate.scene import Scene
 from probe.simulate.settings import SIMULATED_PORT
@@ -41,10 +41,10 @@ from probe.simulate.target import surface_of
 Image = NDArray[np.float64]
 
 DOWN, HELD, UP = 0.15, 0.65, 0.80  #: shares of a period: full force, begin to lift, off
-_DEFAULTS = {"force": 80.0, "tilt": 0.0, "step": 5.0, "period": 2.0, "rate": 100.0, "seed": 0.0}
+_DEFAULTS = {"tilt": 0.0, "step": 5.0, "period": 2.0, "rate": 100.0, "seed": 0.0}
 _CHOICES = {"overlay": ("tab", "pad"), "noise": ("typical", "quiet")}
 _WORDS = ("accuracy", "sensor_type")
-NAMES = ("x", "y", "theta", *_DEFAULTS, *_CHOICES, *_WORDS)
+NAMES = ("x", "y", "theta", "force", *_DEFAULTS, *_CHOICES, *_WORDS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +104,7 @@ def options_of(values: Mapping[str, str], *, place: str = "") -> MotionOptions:
             numbers[name] = _number(name, text, place)
     chosen = choose_sensor_type(values.get("sensor_type"), "", None, place)
     sensor = chosen.with_overlay(values.get("overlay", ""))
+    numbers.setdefault("force", usual_force_n(sensor))
     quiet = values.get("noise") == "quiet"
     readout = readout_of(sensor, quiet=quiet, frame_s=1 / numbers["rate"])
     accuracy = accuracy_of(values.get("accuracy", "auto"))

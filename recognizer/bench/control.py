@@ -14,6 +14,7 @@ from fastapi.responses import FileResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from probe.port.listing import list_ports
+from probe.sensor_types import usual_force_n
 from recognizer.bench.errors import UnknownError
 from recognizer.bench.files import find_file
 from recognizer.bench.images import FILTERS
@@ -64,7 +65,7 @@ class TouchRequest(_Request):
     x_mm: float = Field(allow_inf_nan=False)
     y_mm: float = Field(allow_inf_nan=False)
     theta_deg: float = Field(default=0.0, allow_inf_nan=False)
-    force_n: float = Field(default=80.0, allow_inf_nan=False)
+    force_n: float | None = Field(default=None, allow_inf_nan=False)  #: None: as its type takes
 
 
 class LoadRequest(_Request):
@@ -115,6 +116,7 @@ def control_routes(session: Session, ports: Ports) -> APIRouter:
                 "type": sensor.name,
                 "overlay": sensor.overlay.kind,
                 "overlay_mm": sensor.overlay.height_mm,
+                "force_n": usual_force_n(sensor),
             },
             "margin": (reader.settings if reader else DEFAULTS).belief.margin,
         }
@@ -159,8 +161,9 @@ def control_routes(session: Session, ports: Ports) -> APIRouter:
 
     @routes.post("/touch")
     def touch(body: TouchRequest) -> dict[str, Any]:
+        force_n = usual_force_n(session.sensor) if body.force_n is None else body.force_n
         session.simulated().touch(
-            body.object, body.face, body.x_mm, body.y_mm, body.theta_deg, body.force_n
+            body.object, body.face, body.x_mm, body.y_mm, body.theta_deg, force_n
         )
         return {"touched": True}
 

@@ -26,6 +26,8 @@ from probe.sensor_types import (
 )
 from probe.sensor_types.read import parse_sensor_type, sensor_type_named, shipped_names
 from probe.sensor_types.settings import sensor_type_schema
+from probe.simulate.simulated_probe import SimulatedProbe, TouchOptions
+from probe.simulate.source import options_of
 
 LEAST = "name: mine\nrows: 4\ncolumns: 6\npitch: 2 mm\n"
 
@@ -254,3 +256,19 @@ def test_a_type_is_pressed_as_hard_for_its_area_and_a_gel_as_deep():
     assert 80 * force_share(gel) == pytest.approx(0.3 * bed * area)
     soft = replace(gel, overlay=replace(gel.overlay, young_mpa=0.15))
     assert force_share(soft) == pytest.approx(force_share(gel) / 2)
+
+
+@pytest.mark.parametrize(
+    ("name", "newtons"), [("fsr-16", 80.0), ("gel-24x32", 7.75), ("mat-32x32", 508)]
+)
+def test_a_simulated_probe_presses_as_hard_as_its_type_takes(name, newtons):
+    one = next(SimulatedProbe("washer", sensor_type=name).touches())
+    assert one.touch.force_n == pytest.approx(newtons, rel=1e-3)
+    assert options_of({"sensor_type": name}).numbers["force"] == one.touch.force_n
+    told = TouchOptions(touches=20)
+    drawn = [
+        one.touch.force_n for one in SimulatedProbe("washer", told, sensor_type=name).touches()
+    ]
+    assert 0.25 * newtons <= min(drawn) < max(drawn) <= 1.5 * newtons
+    asked = TouchOptions(force_n=3.0)
+    assert next(SimulatedProbe("washer", asked, sensor_type=name).touches()).touch.force_n == 3.0

@@ -13,7 +13,7 @@ const APART_MS = 150;
 export interface Bench {
   shape(): ObjectShape | null;
   touches(): TouchRecord[];
-  press(face: string, x_mm: number, y_mm: number, theta_deg: number, force_n: number): Promise<void>;
+  press(face: string, x_mm: number, y_mm: number, theta_deg: number): Promise<void>;
 }
 
 export class MountingCheck {
@@ -61,7 +61,7 @@ export class MountingCheck {
     if (!face?.centres.length) return;
     this.begin();
     const mean = (k: 0 | 1): number => face.centres.reduce((sum, one) => sum + one[k], 0) / face.centres.length;
-    await this.bench.press(face.name, mean(0), mean(1), 0, 80);
+    await this.bench.press(face.name, mean(0), mean(1), 0);
   }
 
   private async ask(touch: number): Promise<void> {
@@ -130,7 +130,7 @@ export class PrintCheck {
     this.pressing = true;
     for (let k = 0; this.pressing && this.placed().length < ENOUGH && k < 2 * ENOUGH; k++) {
       const [x, y] = face.centres[(k * 17) % face.centres.length]!, before = this.bench.touches().length;
-      await this.bench.press(face.name, x, y, (k * 37) % 360, 80);
+      await this.bench.press(face.name, x, y, (k * 37) % 360);
       for (let i = 0; i < 60 && !(this.bench.touches().length > before && this.bench.touches().at(-1)?.answer); i++) {
         await new Promise((done) => setTimeout(done, APART_MS));
       }

@@ -28,7 +28,7 @@ async function begin(): Promise<void> {
   const { sensor } = info;
   const heat = new Heat(sensor), surface = new Surface(sensor), mosaic = new MosaicPanel(sensor);
   const answers = new AnswerPanel(info.margin), work = new Work(info), guide = new GuideDialog(), replay = new Replay();
-  const touches = new Touches((one, past) => void take(one, past)), form = new PressForm(() => touches.live());
+  const touches = new Touches((one, past) => void take(one, past)), form = new PressForm(sensor.force_n, () => touches.live());
   const part = new Part(sensor, (place) => void form.touch(place).catch(() => undefined));
   const tint = new Tint(part, sensor, () => touches.all);
   const objects = new Objects(heat, form, (shape) => {

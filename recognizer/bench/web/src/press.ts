@@ -10,7 +10,8 @@ export class PressForm {
   private shape: ObjectShape | null = null;
   private clicked: number | null = null;
 
-  constructor(private readonly pressed: () => void) {
+  constructor(private readonly force_n: number, private readonly pressed: () => void) {
+    element<HTMLInputElement>("touch-force").value = force_n.toPrecision(3);
     this.face.addEventListener("change", () => this.middle());
     element("touch").addEventListener("submit", (event) => {
       event.preventDefault();
@@ -46,8 +47,8 @@ export class PressForm {
     await this.press(place.face, place.x_mm, place.y_mm, number("touch-theta"), number("touch-force"));
   }
 
-  /** Let the simulated probe come down on the object that is shown. */
-  async press(face: string, x_mm: number, y_mm: number, theta_deg: number, force_n: number): Promise<void> {
+  /** Let the simulated probe come down on the object that is shown; as hard as its type takes. */
+  async press(face: string, x_mm: number, y_mm: number, theta_deg: number, force_n = this.force_n): Promise<void> {
     this.pressed();
     this.clicked = performance.now();
     await post("touch", { object: this.shape?.name ?? "", face, x_mm, y_mm, theta_deg, force_n });

@@ -2,7 +2,7 @@
 
 export type Matrix = number[][];
 
-export interface Sensor { type: string; rows: number; columns: number; pitch_mm: number; row_pitch_mm: number; overlay: string; overlay_mm: number }
+export interface Sensor { type: string; rows: number; columns: number; pitch_mm: number; row_pitch_mm: number; overlay: string; overlay_mm: number; force_n: number }
 
 export interface BenchInfo {
   ports: { url: string; label: string }[];
