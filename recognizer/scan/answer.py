@@ -21,15 +21,14 @@ from recognizer.scan.path import RegisteredPath
 from recognizer.scan.settings import ScanSettings
 from recognizer.touch.belief import null_log_likelihood, unworn_labels_at, weigh_cells
 from recognizer.touch.chance import expected_matches
-from recognizer.touch.lab import EmbossedArray
-from recognizer.touch.locate import (
+from recognizer.touch.hypothesis import (
     Hypothesis,
     coincide,
-    find_hypotheses,
-    find_rivals,
     log_likelihood,
     under_centre,
 )
+from recognizer.touch.lab import EmbossedArray
+from recognizer.touch.locate import find_hypotheses, find_rivals
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import answer_at
 from recognizer.touch.recognition import (

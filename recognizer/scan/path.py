@@ -26,8 +26,9 @@ from recognizer.scan.mosaic.touch import PlanarBelief
 from recognizer.scan.settings import PATHS, ScanSettings
 from recognizer.scan.steps import log_freedom, step_between
 from recognizer.scan.views import LatticeView, TouchPoses
+from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.lab import EmbossedArray
-from recognizer.touch.locate import Hypothesis, find_hypotheses
+from recognizer.touch.locate import find_hypotheses
 from recognizer.touch.settings import HypothesisSettings
 from recognizer.touch.symbols.fit import Fit
 

@@ -33,8 +33,8 @@ from recognizer.thesis.filters import median, subtract_bias
 from recognizer.thesis.grid import Grid, grid
 from recognizer.thesis.settings import ThesisSettings
 from recognizer.thesis.skeleton.symbols import Symbol, symbols
+from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.lab import EmbossedArray, Lab
-from recognizer.touch.locate import Hypothesis
 from recognizer.touch.pose import face_covariance, face_pose, inside_mm, pose_on_object
 from recognizer.touch.recognition import (
     AMBIGUOUS,

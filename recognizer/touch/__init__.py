@@ -9,6 +9,7 @@
     symbols/     image -> lattices with the likelihood of every symbol in every cell
     lab          database -> the registered cells; windows   index of them by their labels
     prepare      templates and banks of lattices, once for lab and sensor
+    hypothesis   a place of the database, and what cells say of it
     locate       lattice -> hypotheses: places of the database
     verify       the best of them again, with what the database says is there; round   on mantles
     belief       whether the best hypothesis may be believed

@@ -22,8 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.database.registered import Bend
+from recognizer.touch.hypothesis import (
+    Hypothesis,
+    coincide,
+    labels_at,
+    neighbours,
+    under_centre,
+)
 from recognizer.touch.lab import EmbossedArray
-from recognizer.touch.locate import Hypothesis, coincide, labels_at, neighbours, under_centre
 from recognizer.touch.settings import BeliefSettings
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.gain import Image

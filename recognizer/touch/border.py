@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.touch.belief import VerifiedHypothesis
+from recognizer.touch.hypothesis import labels_at
 from recognizer.touch.lab import EncodedFace
-from recognizer.touch.locate import labels_at
 from recognizer.touch.pose import face_pose
 from recognizer.touch.settings import BorderSettings
 from recognizer.touch.symbols.fit import Fit

@@ -39,8 +39,8 @@ from numpy.typing import NDArray
 
 from recognizer.touch.belief import VerifiedHypothesis
 from recognizer.touch.border import points_on_lattice, share_of_borders, surely_pressed
+from recognizer.touch.hypothesis import Hypothesis, bounded_scores, labels_at
 from recognizer.touch.lab import EmbossedArray
-from recognizer.touch.locate import Hypothesis, bounded_scores, labels_at
 from recognizer.touch.place_scores import count_places
 from recognizer.touch.settings import ReaderSettings
 from recognizer.touch.symbols.fit import Fit

@@ -33,8 +33,8 @@ from recognizer.touch.felt_area import (
     plane_points,
     strongest_reading,
 )
+from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.lab import EmbossedArray, EncodedFace
-from recognizer.touch.locate import Hypothesis
 from recognizer.touch.next_limits import next_limits
 from recognizer.touch.pose import face_pose
 from recognizer.touch.prepare import PreparedLab

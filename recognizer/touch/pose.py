@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.touch.as_built import FeltScale
+from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.lab import EmbossedArray, EncodedFace
-from recognizer.touch.locate import Hypothesis
 from recognizer.touch.symbols.fit import Fit
 
 Array = NDArray[np.float64]

@@ -20,8 +20,8 @@ from recognizer.touch.belief import Support, VerifiedHypothesis
 from recognizer.touch.chance import expected_by_border, expected_matches
 from recognizer.touch.diagnose import diagnose
 from recognizer.touch.first_look import may_tell_more, shows_strokes
+from recognizer.touch.hypothesis import Hypothesis, under_centre
 from recognizer.touch.lab import EmbossedArray
-from recognizer.touch.locate import Hypothesis, under_centre
 from recognizer.touch.next_touch import propose_next
 from recognizer.touch.pose import (
     face_covariance,

@@ -18,14 +18,9 @@ import numpy as np
 from generator.database.registered import Bend
 from probe.sensor import SensorType
 from recognizer.touch.belief import VerifiedHypothesis
+from recognizer.touch.hypothesis import Hypothesis, log_likelihood, shown_at
 from recognizer.touch.lab import EmbossedArray
-from recognizer.touch.locate import (
-    Hypothesis,
-    find_hypotheses,
-    find_rivals,
-    log_likelihood,
-    shown_at,
-)
+from recognizer.touch.locate import find_hypotheses, find_rivals
 from recognizer.touch.pose import face_pose
 from recognizer.touch.settings import FitSettings, RoundSettings
 from recognizer.touch.symbols.bends import guess_bends

@@ -12,14 +12,9 @@ from functools import lru_cache
 import numpy as np
 
 from recognizer.touch.belief import VerifiedHypothesis
+from recognizer.touch.hypothesis import Hypothesis, log_likelihoods_at, shown_at
 from recognizer.touch.lab import EmbossedArray
-from recognizer.touch.locate import (
-    Hypothesis,
-    find_hypotheses,
-    find_rivals,
-    log_likelihoods_at,
-    shown_at,
-)
+from recognizer.touch.locate import find_hypotheses, find_rivals
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.round import verify_on_round_faces
 from recognizer.touch.settings import FitSettings

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from recognizer.touch.hypothesis import Hypothesis, labels_at
 from recognizer.touch.lab import EmbossedArray, EncodedFace
-from recognizer.touch.locate import Hypothesis, labels_at
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise_with_hypothesis
 from recognizer.touch.signal import Signal

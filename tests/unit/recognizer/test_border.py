@@ -20,8 +20,8 @@ from recognizer.touch.border import (
     surely_pressed,
     tip_share,
 )
+from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.lab import open_lab
-from recognizer.touch.locate import Hypothesis
 from recognizer.touch.pose import face_pose
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise_with_hypothesis

@@ -16,7 +16,7 @@ from recognizer.touch.belief import (
     unworn_labels_at,
     weigh_cells,
 )
-from recognizer.touch.locate import Hypothesis
+from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.settings import BeliefSettings, ReaderSettings
 
 LIMITS = BeliefSettings()

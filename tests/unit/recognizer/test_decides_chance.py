@@ -10,7 +10,7 @@ import pytest
 
 import recognizer.touch.chance
 from recognizer.touch.chance import chance_of_match, expected_by_border, expected_matches
-from recognizer.touch.locate import Hypothesis, bounded_scores
+from recognizer.touch.hypothesis import Hypothesis, bounded_scores
 from recognizer.touch.settings import BeliefSettings, HypothesisSettings, ReaderSettings
 
 SETTINGS = ReaderSettings()

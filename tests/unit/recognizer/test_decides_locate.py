@@ -6,17 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from recognizer.touch.locate import (
+from recognizer.touch.hypothesis import (
     Hypothesis,
     coincide,
-    find_hypotheses,
-    find_rivals,
     labels_at,
     log_likelihood,
     neighbours,
     shown_at,
     under_centre,
 )
+from recognizer.touch.locate import find_hypotheses, find_rivals
 from recognizer.touch.settings import HypothesisSettings
 
 USUAL = HypothesisSettings()

@@ -10,7 +10,7 @@ import pytest
 import recognizer.touch.recognise
 from probe.sensor import SensorType
 from recognizer.touch.belief import Support
-from recognizer.touch.locate import Hypothesis
+from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.recognise import recognise, recognise_with_hypothesis
 from recognizer.touch.recognition import (
     AMBIGUOUS,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import recognizer.touch.verify
-from recognizer.touch.locate import Hypothesis
+from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.settings import ReaderSettings
 from recognizer.touch.verify import fit_touch, verify_hypotheses
 

@@ -9,8 +9,8 @@ import pytest
 
 from probe.sensor import SensorType
 from recognizer.touch.felt_area import EarlierTouch
+from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.lab import EncodedFace
-from recognizer.touch.locate import Hypothesis
 from recognizer.touch.next_touch import propose_next
 from recognizer.touch.recognition import AMBIGUOUS, NO_CONTACT, TOO_FEW, NextTouch, refusal
 from recognizer.touch.settings import ReaderSettings

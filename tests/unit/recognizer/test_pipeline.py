@@ -17,14 +17,9 @@ from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from recognizer.touch.belief import Support, weigh_cells
 from recognizer.touch.chance import expected_matches
+from recognizer.touch.hypothesis import Hypothesis, labels_at, log_likelihood
 from recognizer.touch.lab import open_lab
-from recognizer.touch.locate import (
-    Hypothesis,
-    find_hypotheses,
-    find_rivals,
-    labels_at,
-    log_likelihood,
-)
+from recognizer.touch.locate import find_hypotheses, find_rivals
 from recognizer.touch.pose import inside_mm
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import _refuse_few, recognise, recognise_with_hypothesis

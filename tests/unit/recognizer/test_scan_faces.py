@@ -8,7 +8,7 @@ import pytest
 from recognizer.scan.answer import LocatedComposite
 from recognizer.scan.faces import TouchedFace, contradict, hypotheses_of, join_faces
 from recognizer.scan.settings import ScanSettings
-from recognizer.touch.locate import Hypothesis
+from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.recognition import AMBIGUOUS, NOT_ENCODED, refusal
 from recognizer.touch.settings import ReaderSettings
 
