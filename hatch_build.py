@@ -1,4 +1,4 @@
-"""Build hook: four C files -> `kernels.so`, by the compiler that `ziglang` brings.
+"""Build hook: the C files of a folder -> its `kernels.so`, by the compiler that `ziglang` brings.
 
 No compiler is needed on the machine. The code is for any processor of its kind, so that a wheel
 may be kept and moved; products and sums are not contracted, so that it rounds as numpy does.
@@ -14,7 +14,7 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-FOLDER = "recognizer/touch"
+FOLDERS = ("probe/surface", "recognizer/touch")
 OPTIONS = ["-O3", "-ffp-contract=off", "-fno-math-errno", "-shared", "-fPIC", "-mcpu=baseline"]
 
 
@@ -22,16 +22,20 @@ class CompiledKernels(BuildHookInterface):  # type: ignore[misc, type-arg]
     """Compiles into the tree, for a wheel as for an editable install."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002
-        """Build the library and name it as a part of the wheel."""
-        folder = Path(self.root) / FOLDER
-        sources = sorted(folder.rglob("*.c"))
-        made, draft = folder / "kernels.so", folder / "kernels.so.draft"
-        compiler = [sys.executable, "-m", "ziglang", "cc"]
-        text = b"".join(source.read_bytes() for source in sources)
-        made_of = f"-DSOURCE_SUM={zlib.crc32(text)}u"
-        arguments = [*OPTIONS, made_of, *map(str, sources), "-lm", "-o", str(draft)]
-        subprocess.run([*compiler, *arguments], check=True)  # noqa: S603
-        draft.replace(made)
-        build_data["artifacts"].append(f"{FOLDER}/kernels.so")
+        """Build the libraries and name them as parts of the wheel."""
+        for name in FOLDERS:
+            compile_folder(Path(self.root) / name)
+            build_data["artifacts"].append(f"{name}/kernels.so")
         build_data["pure_python"] = False
         build_data["infer_tag"] = True
+
+
+def compile_folder(folder: Path) -> None:
+    """Build the library of a folder; it knows which text it was made of."""
+    sources = sorted(folder.rglob("*.c"))
+    made, draft = folder / "kernels.so", folder / "kernels.so.draft"
+    text = b"".join(source.read_bytes() for source in sources)
+    made_of = f"-DSOURCE_SUM={zlib.crc32(text)}u"
+    arguments = [*OPTIONS, made_of, *map(str, sources), "-lm", "-o", str(draft)]
+    subprocess.run([sys.executable, "-m", "ziglang", "cc", *arguments], check=True)  # noqa: S603
+    draft.replace(made)

@@ -18,9 +18,10 @@
     row 1, column 61 (t = 2206)
 
 A name is loaded from its package when it is first used; importing this module loads nothing
-else. Beside the names stand the three things that all packages share: the root of the errors
+else. Beside the names stand the things that all packages share: the root of the errors
 (`encoded_objects.errors`), how a command starts, shows progress and ends
-(`encoded_objects.console`), and files that people write (`encoded_objects.document`).
+(`encoded_objects.console`), files that people write (`encoded_objects.document`), and where
+compiled loops lie (`encoded_objects.compiled`).
 """
 
 from __future__ import annotations

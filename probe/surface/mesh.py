@@ -9,13 +9,16 @@ undersides of a closed mesh.
 
 from __future__ import annotations
 
+import ctypes
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from encoded_objects.compiled import addresses
 from probe.errors import SurfaceError
+from probe.surface.heights import compiled_kernels
 from probe.surface.triangle_bins import TriangleBins, bin_triangles
 from probe.surface.triangle_mesh import triangle_mesh
 
@@ -45,6 +48,9 @@ class MeshSurface:
 
     def heights_mm(self, points_mm: Array) -> Array:
         """Return the height of the highest triangle over points (n, 2); -inf beside all."""
+        library = compiled_kernels()
+        if library is not None:
+            return self._look_up(library, points_mm)
         bins = self._bins
         found = np.full(len(points_mm), -np.inf)
         cell, asked = bins.of(points_mm)
@@ -67,6 +73,20 @@ class MeshSurface:
             first = last
         lowered: Array = np.minimum(found, self.top_mm)  # a mean of equal heights may round up
         return lowered
+
+    def _look_up(self, library: ctypes.CDLL, points_mm: Array) -> Array:
+        """Return the same heights, compiled."""
+        bins, triangles = self._bins, self._triangles
+        points = np.ascontiguousarray(points_mm, np.float64)
+        heights = np.empty(len(points))
+        first, *rest = addresses(
+            points, bins.starts, bins.triangles, bins.level, triangles, heights
+        )
+        library.look_up_heights(
+            len(points), first, *bins.low.tolist(), bins.side_mm, *bins.shape,
+            *rest[:-1], self.top_mm, rest[-1],
+        )  # fmt: skip
+        return heights
 
     def _over(self, triangle: Index, x: Array, y: Array) -> Array:
         """Return the height of triangles over a point each; -inf where it is not under it."""
@@ -93,6 +113,11 @@ class MeshSurface:
         (ax, bx, cx), (ay, by, cy), heights = self.corners.transpose(2, 1, 0)
         edges = [ax, ay, bx, by, bx - ax, by - ay, cx - bx, cy - by, cx - ax, cy - ay]
         return np.stack(edges), np.ascontiguousarray(heights)
+
+    @cached_property
+    def _triangles(self) -> Array:
+        """Corners a and b, the edges and the heights of each, (n, 13)."""
+        return np.ascontiguousarray(np.concatenate(self._columns).T)
 
     @cached_property
     def _bins(self) -> TriangleBins:

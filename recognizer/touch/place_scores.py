@@ -13,8 +13,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.compiled import addresses
 from recognizer.touch.lab import EmbossedArray, cell_keys
-from recognizer.touch.symbols.kernels import addresses, compiled_kernels
+from recognizer.touch.symbols.kernels import compiled_kernels
 
 Ints = NDArray[np.int64]
 Array = NDArray[np.float64]

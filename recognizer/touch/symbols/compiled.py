@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.compiled import addresses
 from recognizer.touch.settings import DEFAULTS
 from recognizer.touch.symbols.gain import Image
-from recognizer.touch.symbols.kernels import addresses
 from recognizer.touch.symbols.template import ResponseTemplate
 
 Array = NDArray[np.float64]

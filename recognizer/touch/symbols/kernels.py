@@ -1,31 +1,20 @@
-"""The inner loops of reading, compiled: built with the project from C.
+"""The inner loops of reading, compiled: `encoded_objects.compiled` says when they are used.
 
 The numpy forms beside their callers are the reference: values to 1e-6 of them, the same answers.
-They are also what reads where the compiled form is missing (a checkout that nobody installed),
-older than its source (install again) or unwanted (`ENCODED_OBJECTS_KERNELS=numpy`);
 `recognize-object --version` and a run's provenance say which of the two it was.
 """
 
 from __future__ import annotations
 
 import ctypes
-import os
-import zlib
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+
+from encoded_objects.compiled import is_wanted, library_made_of, sources_in
 
 FOLDER = Path(__file__).parent.parent
 FILE = FOLDER / "kernels.so"
-SOURCES = tuple(sorted(FOLDER.rglob("*.c")))
-CHOICE = "ENCODED_OBJECTS_KERNELS"  #: variable; "numpy" leaves the compiled form out
-
-
-class _Start(ctypes.Array[ctypes.c_char]):
-    """Where the values of an array begin."""
-
-    _type_ = ctypes.c_char
-    _length_ = 0
+SOURCES = sources_in(FOLDER)
 
 
 def kernels_in_use() -> str:
@@ -35,19 +24,14 @@ def kernels_in_use() -> str:
 
 def compiled_kernels() -> ctypes.CDLL | None:
     """Return the compiled form; None where it is missing or unwanted."""
-    return None if os.environ.get(CHOICE) == "numpy" else load_kernels(FILE)
+    return load_kernels(FILE) if is_wanted() else None
 
 
 @lru_cache(maxsize=2)
 def load_kernels(file: Path) -> ctypes.CDLL | None:
     """Return the library of the kernels; None where there is none, or one of another text."""
-    if not file.is_file():
-        return None
-    library = ctypes.CDLL(str(file))
-    if not hasattr(library, "source_sum"):
-        return None
-    library.source_sum.restype = ctypes.c_uint32
-    if library.source_sum() != zlib.crc32(b"".join(one.read_bytes() for one in SOURCES)):
+    library = library_made_of(SOURCES, file)
+    if library is None:
         return None
     pointer, whole = ctypes.c_void_p, ctypes.c_int64
     library.refine.argtypes = [pointer, whole, whole, *[pointer] * 7]
@@ -74,16 +58,3 @@ def load_kernels(file: Path) -> ctypes.CDLL | None:
     library.count_places.argtypes = [pointer, whole, pointer, pointer, ctypes.c_double]
     library.count_places.restype = whole
     return library
-
-
-def addresses(*arrays: Any) -> list[int | None]:
-    """Return where the values of arrays lie, None of none.
-
-    Thrice as fast as `ctypes.data`, which serves those that may not be written.
-    """
-    return [
-        None if one is None
-        else ctypes.addressof(_Start.from_buffer(one)) if one.flags.writeable
-        else one.ctypes.data
-        for one in arrays
-    ]  # fmt: skip

@@ -16,9 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.compiled import addresses
 from recognizer.touch.settings import SpreadSettings
 from recognizer.touch.symbols.covariance import invert_normal
-from recognizer.touch.symbols.kernels import addresses, compiled_kernels
+from recognizer.touch.symbols.kernels import compiled_kernels
 
 Array = NDArray[np.float64]
 

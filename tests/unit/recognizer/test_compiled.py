@@ -2,18 +2,17 @@
 
 import itertools
 import re
-import shutil
-import subprocess
-import zlib
 from collections import Counter
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from c_library import compile_kernels
 from hypothesis import given as drawn
 from hypothesis import strategies as st
 
+from encoded_objects.compiled import CHOICE
 from generator.alphabet import SymbolStyle, alphabet_named
 from probe.sensor import SensorType
 from recognizer.touch.lab import EmbossedArray, cell_keys
@@ -43,18 +42,11 @@ def library(tmp_path_factory):
     return made
 
 
-def compile_kernels(sources, made):
-    options = ["-O2", "-ffp-contract=off", "-shared", "-fPIC", "-Wall", "-Werror"]
-    made_of = f"-DSOURCE_SUM={zlib.crc32(b''.join(one.read_bytes() for one in sources))}u"
-    command = [shutil.which("cc"), *options, made_of, *sources, "-o", made, "-lm"]
-    subprocess.run(command, check=True)
-
-
 @pytest.fixture
 def use(library, monkeypatch):
     def chosen(kind):
         monkeypatch.setattr(kernels, "FILE", library)
-        monkeypatch.setenv(kernels.CHOICE, kind)
+        monkeypatch.setenv(CHOICE, kind)
         assert kernels.kernels_in_use() == kind
 
     return chosen
@@ -188,7 +180,7 @@ def test_a_symbol_is_shown_where_rounding_could_not_say_so(ahead, label):
 
 
 def test_what_is_missing_is_said(tmp_path, monkeypatch):
-    monkeypatch.delenv(kernels.CHOICE, raising=False)
+    monkeypatch.delenv(CHOICE, raising=False)
     monkeypatch.setattr(kernels, "FILE", tmp_path / "kernels.so")
     assert kernels.compiled_kernels() is None
     assert kernels.kernels_in_use() == "numpy"
@@ -298,7 +290,7 @@ def test_places_score_alike(held, dense, seed, library):
     for kind in ("numpy", "compiled"):
         with pytest.MonkeyPatch.context() as patched:
             patched.setattr(kernels, "FILE", library)
-            patched.setenv(kernels.CHOICE, kind)
+            patched.setenv(CHOICE, kind)
             sums = add_scores(embossed, places, cells, scores, before)
             names = name_places(embossed, which, cells[which % 6])
             count_ = count_places(embossed, borders, prices, 1.2)
@@ -311,7 +303,7 @@ def test_names_are_counted_alike(names, library):
     given_ = np.array(names, np.int64)
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(kernels, "FILE", library)
-        patched.setenv(kernels.CHOICE, "compiled")
+        patched.setenv(CHOICE, "compiled")
         known, votes = count_names(given_)
     assert dict(zip(known.tolist(), votes.tolist(), strict=True)) == Counter(names)
     assert known.tolist() == sorted(set(names))
