@@ -59,7 +59,8 @@ def _packed(template: ResponseTemplate, bank: Bank) -> bytes:
         np.array((template.order, *bank.shape, bank.reach, bank.rim), _NUMBERS),
         template.rimmed.astype("<f4"),
         bank.taps.astype("<i4"),
-        bank.kernels.astype("<f4"),
+        bank.even.astype("<f4"),
+        bank.odd.astype("<f4"),
         bank.lookups.astype("<i4"),
         bank.rotations_rad.astype("<f8"),
         bank.shifts_mm.astype("<f8"),
@@ -89,7 +90,7 @@ def _unpacked(content: bytes) -> tuple[ResponseTemplate, Bank]:
     order, rows, columns, reach, rim = counts
     template = ResponseTemplate(pitch_mm, order, half_mm, read("<f4"), ink, step_mm)
     bank = Bank(
-        (rows, columns), reach, rim, read("<i4"), read("<f4"), read("<i4"), read("<f8"),
-        read("<f8"),
+        (rows, columns), reach, rim, read("<i4"), read("<f4"), read("<f4"), read("<i4"),
+        read("<f8"), read("<f8"),
     )  # fmt: skip
     return template, bank

@@ -91,7 +91,7 @@ class NoiseSettings:
 class SearchSettings:
     """The coarse search; work grows with rotations (phases^2 + shifts^2)."""
 
-    rotations: int = 72  #: over the full turn
+    rotations: int = 72  #: over the full turn, an even number
     phases: int = 2  #: places per tactel along each axis
     shifts: int = 10  #: of the lattice along each axis
     rim: float = 1.0  #: tactels beyond the matrix at which a symbol's centre may lie

@@ -32,26 +32,40 @@ static inline void gather(float *to, const float *from, int64_t n, int64_t size,
         for (int64_t k = 0; k < size; k++) to[x * size + k] = from[x * apart + k];
 }
 
-/* products (height, width, order, turns, phases^2) -> scores (turns, lattices): the sum over the
-   cells of each lattice of what its likeliest symbol, or none, scores where the cell lies; lookups
-   (turns, lattices, cells) are numbers of places (height phases, width phases), the last one none. */
+/* best (2, half): of none and all symbols at a place, of turns and of those half a turn further. */
+static void best_symbols(int64_t order, int64_t half, int64_t each, const float *even,
+                         const float *odd, float *best) {
+    float *opposite = best + half;
+    for (int64_t k = 0; k < 2 * half; k++) best[k] = 0.0f;
+    for (int64_t label = 0; label < order; label++, even += half, odd += half)
+        for (int64_t k = 0; k < half; k++) {
+            float one = even[k] + odd[k], other = even[k] - odd[k];
+            best[k] = one > best[k] ? one : best[k];
+            opposite[k] = other > opposite[k] ? other : opposite[k];
+        }
+    for (int64_t turn = 0; turn < half; turn += each) /* there phases lie the other way round */
+        for (int64_t k = 0; k < each / 2; k++) {
+            float one = opposite[turn + k];
+            opposite[turn + k] = opposite[turn + each - 1 - k];
+            opposite[turn + each - 1 - k] = one;
+        }
+}
+
+/* Products even, odd (height, width, order, turns / 2, phases^2) -> scores (turns, lattices): the
+   sum over the cells of each lattice of what its likeliest symbol, or none, scores where the cell
+   lies; lookups (turns, lattices, cells) are numbers of places (height phases, width phases), the
+   last one none. */
 void sum_lattices(int64_t height, int64_t width, int64_t order, int64_t turns, int64_t phases,
-                  int64_t lattices, int64_t cells, const float *products, const int32_t *lookups,
-                  float *scores) {
+                  int64_t lattices, int64_t cells, const float *even, const float *odd,
+                  const int32_t *lookups, float *scores) {
     int64_t each = phases * phases, count = height * width * each;
-    int64_t all = turns * each;
+    int64_t all = turns * each, half = all / 2;
     float *places = malloc((turns * (count + 1) + width * all) * sizeof(float));
     float *row = places + turns * (count + 1); /* (width, turns, phases^2) of a row of tactels */
     for (int64_t y = 0; y < height; y++) {
         for (int64_t x = 0; x < width; x++) {
-            const float *from = products + (y * width + x) * order * all;
-            float *best = row + x * all;
-            for (int64_t k = 0; k < all; k++) best[k] = from[k] > 0.0f ? from[k] : 0.0f;
-            for (int64_t label = 1; label < order; label++)
-                for (int64_t k = 0; k < all; k++) {
-                    float one = from[label * all + k];
-                    best[k] = one > best[k] ? one : best[k];
-                }
+            int64_t from = (y * width + x) * order * half;
+            best_symbols(order, half, each, even + from, odd + from, row + x * all);
         }
         for (int64_t turn = 0; turn < turns; turn++)
             for (int64_t down = 0; down < phases; down++) {

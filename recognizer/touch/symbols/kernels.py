@@ -44,7 +44,7 @@ def load_kernels(file: Path) -> ctypes.CDLL | None:
         pointer, whole, pointer, pointer, pointer, whole, pointer, pointer, pointer
     ]  # fmt: skip
     library.add_scores.restype = None
-    library.sum_lattices.argtypes = [*[whole] * 7, *[pointer] * 3]
+    library.sum_lattices.argtypes = [*[whole] * 7, *[pointer] * 4]
     library.sum_lattices.restype = None
     library.look_around.argtypes = [*[whole] * 2, *[pointer] * 2]
     library.look_around.restype = None

@@ -1,9 +1,12 @@
 """Coarse search: every rotation and shift of the lattice at once.
 
 The score of a symbol k at a place y of the sensor is sum_t w (2 f T_k - T_k^2) over tactels
-t, two correlations of the image with what the symbol looks like there. All symbols, rotations
-and sub-tactel phases together are one matrix product; the score of a lattice is then the
-sum, over its cells, of the best symbol of each (or none), by a table of look-ups.
+t, two correlations of the image with what the symbol looks like there. What it looks like half a
+turn further is the same, seen through the place: so tactels that lie opposite are taken together,
+and the sums and differences of such pairs, multiplied with the even and the odd part of half the
+turns, give all of them. All symbols, rotations and sub-tactel phases together are these two matrix
+products; the score of a lattice is then the sum, over its cells, of the best symbol of each (or
+none), by a table of look-ups.
 Sensor frame, mm; psi values as in `template`.
 """
 
@@ -31,8 +34,9 @@ class Bank:
     shape: tuple[int, int]  #: rows and columns of the image
     reach: int  #: kernels are (2 reach + 1) tactels wide
     rim: int  #: how many tactels around the matrix are places
-    taps: NDArray[np.int32]  #: (m,) places in (2, K, K), T and T^2, where symbols are felt
-    kernels: Floats  #: (m, order * rotations * phases^2) of them there
+    taps: NDArray[np.int32]  #: (2, m) places in (2, K, K), T and T^2, and those opposite to them
+    even: Floats  #: (m, order * rotations / 2 * phases^2) of the first half turn, over both taps
+    odd: Floats  #: the same, over their difference
     lookups: NDArray[np.int32]  #: (rotations, shifts^2, cells) into places, last one = none
     rotations_rad: NDArray[np.float64]  #: (rotations,)
     shifts_mm: NDArray[np.float64]  #: (shifts^2, 2) of the lattice
@@ -44,7 +48,8 @@ def bank_of(
     """Return the tables of a search."""
     rotations, phases, shifts = settings.rotations, settings.phases, settings.shifts
     across, down = sensor.step_mm
-    turns = np.arange(rotations) * 2 * np.pi / rotations
+    turns = np.arange(rotations) * 2 * np.pi / rotations  # an even number
+    half = rotations // 2
     reach = math.ceil(template.half_mm * settings.reach / min(across, down))
     rim = math.ceil(settings.rim)
     offset = (np.arange(phases) + 0.5) / phases - 0.5  # of a place from its tactel, tactels
@@ -53,27 +58,41 @@ def bank_of(
     dx = (k[None, :, None, None] - offset[None, None, None, :]) * across
     dy = (-k[:, None, None, None] + offset[None, None, :, None]) * down
     dx, dy = np.broadcast_arrays(dx, dy)
-    kernels = np.empty((2, len(k) ** 2, template.order, rotations, phases * phases), np.float32)
-    for i, turn in enumerate(turns):
+    kernels = np.empty((2, len(k) ** 2, template.order, half, phases * phases), np.float32)
+    for i, turn in enumerate(turns[:half]):
         c, s = math.cos(turn), math.sin(turn)
         u = np.stack([c * dx - s * dy, s * dx + c * dy], axis=-1)
         value = template.at(u)[..., 0].reshape(len(k) ** 2, phases * phases, template.order)
         kernels[0, :, :, i] = value.swapaxes(1, 2)
         kernels[1, :, :, i] = kernels[0, :, :, i] ** 2
     lookups, shifts_mm = _lookups(template, sensor, turns, rim, phases, shifts)
-    flat = kernels.reshape(2 * len(k) ** 2, -1)
-    felt = np.abs(flat).max(axis=1) > settings.nothing  # in the corners nothing is
-    taps = np.flatnonzero(felt).astype(np.int32)
+    taps, even, odd = _opposite_pairs(kernels, settings.nothing)
     return Bank(
         (sensor.rows, sensor.columns),
         reach,
         rim,
         taps,
-        flat[taps],
+        even,
+        odd,
         lookups,
         turns,
         shifts_mm,
     )
+
+
+def _opposite_pairs(kernels: Floats, nothing: float) -> tuple[NDArray[np.int32], Floats, Floats]:
+    """Return `taps`, `even` and `odd` of a bank from kernels (2, K^2, ...), symbols at each tap."""
+    flat, opposite = (one.reshape(2 * kernels.shape[1], -1) for one in (kernels, kernels[:, ::-1]))
+    number = np.arange(len(flat), dtype=np.int32)
+    across = number.reshape(2, -1)[:, ::-1].ravel()
+    felt = np.maximum(np.abs(flat), np.abs(opposite)).max(axis=1) > nothing  # not in the corners
+    one = number[felt & (number <= across)]
+    taps = np.stack([one, across[one]])
+    even, odd = (
+        np.float32(0.5) * part for part in (flat[one] + opposite[one], flat[one] - opposite[one])
+    )
+    even[taps[0] == taps[1]] /= 2  # the place itself, which is taken twice
+    return taps, even, odd
 
 
 def _lookups(
@@ -166,13 +185,14 @@ def lattice_scores(bank: Bank, values: Floats, weights: Floats, order: int) -> F
     height, width = rows + 2 * bank.rim, columns + 2 * bank.rim
     padded = np.zeros((2, rows + 2 * pad, columns + 2 * pad), np.float32)
     padded[:, pad : pad + rows, pad : pad + columns] = 2 * weights * values, -weights
-    flat = padded.ravel().take(_tactels_of(bank))
+    one, other = padded.ravel().take(_tactels_of(bank))
     turns = len(bank.rotations_rad)
-    products = flat @ bank.kernels
+    even, odd = (one + other) @ bank.even, (one - other) @ bank.odd
     library = compiled_kernels()
     if library is not None:
-        return _sum_lattices(library, bank, products, (height, width, order))
-    best = products.reshape(height, width, order, turns, -1).max(axis=2)
+        return _sum_lattices(library, bank, even, odd, (height, width, order))
+    even, odd = (part.reshape(height, width, order, turns // 2, -1) for part in (even, odd))
+    best = np.concatenate([even + odd, (even - odd)[..., ::-1]], axis=3).max(axis=2)
     np.maximum(best, 0, out=best)
     phases = round(math.sqrt(best.shape[-1]))
     grid = best.reshape(height, width, turns, phases, phases).transpose(2, 0, 3, 1, 4)
@@ -184,28 +204,28 @@ def lattice_scores(bank: Bank, values: Floats, weights: Floats, order: int) -> F
 
 @lru_cache(maxsize=16)
 def _tactels_of(bank: Bank) -> NDArray[np.intp]:
-    """Return (places, m) which tactel of a padded image lies at each tap about each place."""
+    """Return (2, places, m) which tactels of a padded image lie at each tap about each place."""
     side, around = 2 * bank.reach + 1, 2 * (bank.reach + bank.rim)
     shape = (2, bank.shape[0] + around, bank.shape[1] + around)
-    layer, down, along = np.unravel_index(bank.taps, (2, side, side))
+    layer, down, along = np.unravel_index(bank.taps[:, None], (2, side, side))
     height, width = shape[1] - 2 * bank.reach, shape[2] - 2 * bank.reach
     y, x = (part.reshape(-1, 1) for part in np.indices((height, width)))
     return np.ravel_multi_index((layer + 0 * y, y + down, x + along), shape)
 
 
 def _sum_lattices(
-    library: ctypes.CDLL, bank: Bank, products: Floats, sides: tuple[int, int, int]
+    library: ctypes.CDLL, bank: Bank, even: Floats, odd: Floats, sides: tuple[int, int, int]
 ) -> Floats:
     """Return the scores of lattices from those of symbols at places, compiled."""
     turns, lattices, cells = bank.lookups.shape
     height, width, order = sides
-    phases = math.isqrt(products.shape[1] // (order * turns))
+    phases = math.isqrt(even.shape[1] // (order * turns // 2))
     lookups = np.ascontiguousarray(bank.lookups, np.int32)
-    products = np.ascontiguousarray(products, np.float32)
+    even, odd = (np.ascontiguousarray(part, np.float32) for part in (even, odd))
     scores = np.empty((turns, lattices), np.float32)
     library.sum_lattices(
         height, width, order, turns, phases, lattices, cells,
-        *addresses(products, lookups, scores),
+        *addresses(even, odd, lookups, scores),
     )  # fmt: skip
     return scores
 

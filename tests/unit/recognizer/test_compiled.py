@@ -215,17 +215,42 @@ def test_cells_score_alike(name, use):
 def test_lattices_of_the_coarse_search_are_summed_alike_to_the_bit(cells, use):
     sensor, draw = SensorType(), np.random.default_rng(cells)
     template = template_of(alphabet_named("dense-4"), STYLE, sensor, DEFAULTS.template)
-    few = replace(DEFAULTS.search, rotations=3, shifts=4)
+    few = replace(DEFAULTS.search, rotations=4, shifts=4)
     bank = bank_of(template, sensor, few)
     none = int(bank.lookups.max())
-    bank = replace(bank, lookups=draw.integers(0, none + 1, (3, 16, cells)).astype(np.int32))
+    bank = replace(bank, lookups=draw.integers(0, none + 1, (4, 16, cells)).astype(np.int32))
     values, weights = draw.random((2, 16, 16)).astype(np.float32)
     found = []
     for kind in ("numpy", "compiled"):
         use(kind)
         found.append(lattice_scores(bank, values, weights, template.order))
-    assert found[0].shape == (3, 16)
+    assert found[0].shape == (4, 16)
     assert found[0].tobytes() == found[1].tobytes()
+
+
+@pytest.mark.parametrize("kind", ["numpy", "compiled"])
+def test_lattices_score_what_their_symbols_do_tactel_by_tactel(kind, use):
+    use(kind)
+    sensor, draw = SensorType(), np.random.default_rng(12)
+    template = template_of(alphabet_named("dense-4"), STYLE, sensor, DEFAULTS.template)
+    few = replace(DEFAULTS.search, rotations=4, shifts=3, reach=3.0)
+    bank = bank_of(template, sensor, few)
+    values, weights = draw.random((2, 16, 16))
+    felt, trust = values.ravel()[:, None], weights.ravel()[:, None]
+    side = 2 * (16 + 2 * bank.rim)  # two places each way for every tactel
+    at = (np.arange(side) + 0.5) / 2 - bank.rim - 8
+    places = np.stack(np.meshgrid(at, -at), axis=-1).reshape(-1, 2) * sensor.pitch_mm
+    expected = np.zeros((4, 9))
+    for turn, angle in enumerate(bank.rotations_rad):
+        best = np.zeros(len(places) + 1)
+        for number, place in enumerate(places):
+            x, y = (sensor.centres_mm().reshape(-1, 2) - place).T
+            c, s = np.cos(angle), np.sin(angle)
+            shows = template.at(np.stack([c * x - s * y, s * x + c * y], axis=-1))[..., 0]
+            best[number] = max(0, (trust * (2 * felt * shows - shows**2)).sum(axis=0).max())
+        expected[turn] = best[bank.lookups[turn]].sum(axis=-1)
+    found = lattice_scores(bank, values, weights, template.order)
+    assert found == pytest.approx(expected, rel=1e-4)
 
 
 @pytest.mark.parametrize("shape", [(5, 16), (3, 9), (2, 4), (1, 1)])
