@@ -8,18 +8,21 @@
 Each world is a run of `validate-set` with a share of the touches: 40 objects and 40 small ones,
 own engine and MuJoCo, written files and prints, with what is wrong with sensors, light presses,
 other labs' parts and steps to a next touch. Stopped by Ctrl-C it says so (exit code 130) and goes
-on by the same command; at most a thousand touches are made again. Prints need PrusaSlicer; folders
-of prints that exist are used (--prints, --small-prints). Writes DIR/million.json and a table.
+on by the same command; at most a thousand touches are made again. What became of a world stands in
+DIR/million.json once it is finished, every wrong answer in full: with that file alone another
+machine goes on after it. Prints need PrusaSlicer; folders of prints that exist are used (--prints,
+--small-prints).
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -33,6 +36,11 @@ from recognizer.validation.files import write_json
 from recognizer.validation.statistics import chi2_quantile
 
 SPECS = Path("docs/validation")
+SUMMARY = "million.json"  #: of the worlds that are finished
+COUNTS = ("touches", "on_faces", "right", "wrong")
+#: What is kept of a wrong answer.
+WRONG = ("number", "kind", "level", "object", "face", "x_mm", "y_mm", "theta_deg", "force_n",
+         "tilt_deg", "edge_mm", "answer", "margin")  # fmt: skip
 INSIDE = chi2_quantile(0.95)  #: chi square of three numbers at 95 %
 #: One of its own each; a quarter turn of the mounting is left out, which no touch tells.
 SENSORS = (
@@ -88,12 +96,15 @@ WORLDS = {
 }
 
 
+def touches_of(name: str, asked: argparse.Namespace) -> int:
+    """Return how many touches a world has."""
+    return max(10, round(WORLDS[name].share * asked.touches))
+
+
 def touch(name: str, asked: argparse.Namespace) -> None:
     """Do a world's run, or go on with it."""
     world, folder = WORLDS[name], asked.output / name
-    if (folder / "results.json").exists():
-        return
-    touches = max(10, round(world.share * asked.touches))
+    touches = touches_of(name, asked)
     options = [*world.options]
     if world.makes:
         options = [str(SPECS / f"{world.spec}.yaml"), *options]
@@ -139,6 +150,24 @@ def line_of(rows: pa.Table) -> dict[str, Any]:
         line["rms_mm"] = round(float(np.sqrt(np.mean(mm**2))), 4)
         line["worst_mm"] = round(float(mm.max()), 3)
         line["inside"] = round(float(np.mean(chi2 < INSIDE)), 4)
+    if verdicts["wrong"]:
+        line["wrong_answers"] = [
+            {name: row[name] for name in WRONG}
+            for row in rows.filter(pc.equal(rows["verdict"], "wrong")).to_pylist()
+        ]
+    return line
+
+
+def all_of(lines: Iterable[dict[str, Any]]) -> dict[str, Any]:
+    """Return what became of the touches of all worlds."""
+    lines = list(lines)
+    line = {key: sum(one[key] for one in lines) for key in COUNTS}
+    if line["right"]:
+        share = [one["right"] / line["right"] for one in lines]
+        several = list(zip(share, lines, strict=True))
+        line["rms_mm"] = round(sum(s * one.get("rms_mm", 0) ** 2 for s, one in several) ** 0.5, 4)
+        line["worst_mm"] = max(one.get("worst_mm", 0) for one in lines)
+        line["inside"] = round(sum(s * one.get("inside", 0) for s, one in several), 4)
     return line
 
 
@@ -148,8 +177,24 @@ def table(lines: Mapping[str, dict[str, Any]]) -> None:
     print("| --- " * 7 + "|")
     for name, line in lines.items():
         inside = f"{100 * line['inside']:.0f} %" if "inside" in line else ""
-        counts = " | ".join(f"{line[key]:,}" for key in ("touches", "on_faces", "right", "wrong"))
+        counts = " | ".join(f"{line[key]:,}" for key in COUNTS)
         print(f"| {name} | {counts} | {line.get('rms_mm', '')} | {inside} |")
+
+
+def run(asked: argparse.Namespace, finished: dict[str, dict[str, Any]]) -> None:
+    """Run the worlds that are left, each put down as soon as it is finished."""
+    for number, (name, world) in enumerate(WORLDS.items(), 1):
+        there = finished.get(name, {}).get("touches") == touches_of(name, asked)
+        if there and (not world.makes or (asked.output / name / "lab.db").exists()):
+            continue
+        start = time.monotonic()
+        print(f"run {number} of {len(WORLDS)}: {name}", end="", flush=True, file=sys.stderr)
+        touch(name, asked)
+        rows = rows_of(asked.output / name)
+        assert rows is not None
+        finished[name] = line_of(rows)
+        write_json(asked.output / SUMMARY, finished)
+        print(f", {time.monotonic() - start:.0f} s", flush=True, file=sys.stderr)
 
 
 def main() -> int:
@@ -163,20 +208,20 @@ def main() -> int:
     parser.add_argument("--table", action="store_true", help="of the touches that are there")
     asked = parser.parse_args()
     asked.output = asked.output.absolute()
-    for done, name in enumerate(() if asked.table else WORLDS, 1):
-        start = time.monotonic()
-        print(f"run {done} of {len(WORLDS)}: {name}", end="", flush=True, file=sys.stderr)
+    summary = asked.output / SUMMARY
+    finished = json.loads(summary.read_text()) if summary.exists() else {}
+    if not asked.table:
         try:
-            touch(name, asked)
+            run(asked, finished)
         except KeyboardInterrupt:
             print("\nstopped; the same command goes on", file=sys.stderr)
             return 130
-        print(f", {time.monotonic() - start:.0f} s", flush=True, file=sys.stderr)
-    found = {name: rows for name in WORLDS if (rows := rows_of(asked.output / name)) is not None}
-    lines = {name: line_of(rows) for name, rows in found.items()}
-    lines["all"] = line_of(pa.concat_tables(list(found.values()), promote_options="default"))
-    write_json(asked.output / "million.json", lines)
-    table(lines)
+    lines = {}
+    for name in WORLDS:
+        rows = None if name in finished else rows_of(asked.output / name)
+        if rows is not None or name in finished:
+            lines[name] = finished[name] if rows is None else line_of(rows)
+    table({**lines, "all": all_of(lines.values())})
     return 0
 
 
