@@ -79,6 +79,8 @@ def recognise_with_rivals(
     answer, support = _answer(first, settings, seq)
     judged = _judge(reader, first, answer, support)
     if not may_tell_more(reader, signal, answer, judged, first[0] if first else None, support):
+        if judged and judged.doubt is not None and judged.doubt > settings.belief.looked_at_again:
+            return _look_again(reader, signal, judged, first)
         return judged, first
     # Spend more where it is needed: no answer yet, or one that few cells speak for.
     second = verify_hypotheses(reader, signal, settings.thorough)
@@ -86,6 +88,26 @@ def recognise_with_rivals(
     if answer and final and not first[0].coincides(second[0]):
         return refusal(seq, AMBIGUOUS, margin=0.0, runner_up=answer.runner_up), second
     return _judge(reader, second, final, support), second
+
+
+def _look_again(
+    reader: PreparedLab, signal: Signal, answer: Recognition, first: list[VerifiedHypothesis]
+) -> tuple[Recognition, list[VerifiedHypothesis]]:
+    """Return an answer that chance nearly allows, or the refusal where a wide search takes it back.
+
+    A soft touch may hold the true place too weakly for a first search, and another one whose pose
+    and gain happen to fit.
+    """
+    second = verify_hypotheses(reader, signal, reader.settings.thorough)
+    margin, runner_up = answer.margin, answer.runner_up
+    if not second or not first[0].coincides(second[0]):
+        return refusal(answer.seq, AMBIGUOUS, margin=0.0, runner_up=runner_up), second
+    doubt = _doubt_of(reader, second[0], answer)
+    if doubt > reader.settings.belief.doubt_again:
+        return refusal(
+            answer.seq, BY_CHANCE, margin=margin, runner_up=runner_up, doubt=doubt
+        ), second
+    return answer, first
 
 
 def _answer(
@@ -160,15 +182,21 @@ def _refuse_by_chance(
     """Return an answer with its doubt, or the refusal where that is too large."""
     if not answer:
         return answer
+    doubt = _doubt_of(reader, best, answer)
+    if doubt <= reader.settings.belief.doubt:
+        return replace(answer, doubt=doubt)
+    margin, runner_up = answer.margin, answer.runner_up
+    return refusal(answer.seq, BY_CHANCE, margin=margin, runner_up=runner_up, doubt=doubt)
+
+
+def _doubt_of(reader: PreparedLab, best: VerifiedHypothesis, answer: Recognition) -> float:
+    """Return how many places a foreign surface matches as well, by its border where that counts."""
     settings, arrays = reader.settings, reader.lab.arrays
     doubt = expected_matches(arrays, best.embossed, best.fit, best.hypothesis, settings)
     if doubt > settings.belief.doubt and _is_plain(reader, best, answer):
         tip_mm = reader.sensor.overlay.tab_diameter_mm
         doubt = min(doubt, expected_by_border(arrays, best, tip_mm, settings))
-    if doubt <= settings.belief.doubt:
-        return replace(answer, doubt=doubt)
-    margin, runner_up = answer.margin, answer.runner_up
-    return refusal(answer.seq, BY_CHANCE, margin=margin, runner_up=runner_up, doubt=doubt)
+    return doubt
 
 
 def _is_plain(reader: PreparedLab, best: VerifiedHypothesis, answer: Recognition) -> bool:

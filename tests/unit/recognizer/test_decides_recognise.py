@@ -92,13 +92,14 @@ def reads(small, lab, monkeypatch):
 
     def read(first, second=None, signal=TOUCHED, doubt=1e-5, named=0.5, by_border=math.inf):
         tries = []
+        doubts = doubt if isinstance(doubt, tuple) else (doubt, doubt)  # of the two tries
 
         def matches(arrays, embossed, fit, hypothesis, settings, *, borders=True):
             assert (arrays, settings) == (READER.lab.arrays, READER.settings)
             judged = first if len(tries) == 1 else second
             best = judged[0]
             assert (embossed, fit, hypothesis) == (best.embossed, best.fit, best.hypothesis)
-            return doubt if borders else named
+            return doubts[len(tries) - 1] if borders else named
 
         def matches_by_border(arrays, best, tip_mm, settings):
             assert (arrays, settings) == (READER.lab.arrays, READER.settings)
@@ -318,7 +319,38 @@ def test_what_many_places_match_by_chance_is_refused(reads, doubt, reason, inlie
     assert (answer.reason, answer.doubt, bool(answer)) == (reason, doubt, not reason)
     assert (answer.margin, answer.runner_up.face) == (40.0, "F2")
     assert judged is found[0]
-    assert tries == (1 if inliers == 16 else 2)
+    assert tries == (1 if inliers == 16 and doubt != 1e-4 else 2)
+
+
+@pytest.mark.parametrize(("first", "tries"), [(1e-5, 1), (1.01e-5, 2), (1e-4, 2)])
+def test_what_chance_nearly_allows_is_looked_at_again(reads, first, tries):
+    found, again = [reads.one(), reads.one("rival", -40.0)], [reads.one(x_mm=17.5)]
+    answer, judged, tried = reads.read(found, again, doubt=(first, 1e-3))
+    assert (tried, judged is found[0]) == (tries, True)
+    assert (answer.reason, answer.doubt, answer.margin) == ("", first, 40.0)
+    assert answer.x_mm == pytest.approx(17.0)  # as the first try has it
+
+
+@pytest.mark.parametrize(
+    ("again", "reason", "margin", "doubt"),
+    [
+        ({}, BY_CHANCE, 40.0, 1.01e-3),
+        ({"place": "there"}, AMBIGUOUS, 0.0, None),
+        (None, AMBIGUOUS, 0.0, None),
+    ],
+)
+def test_a_wide_search_may_take_it_back(reads, again, reason, margin, doubt):
+    first = [reads.one(), reads.one("rival", -40.0, face=1, index=(9, 12))]
+    second = [] if again is None else [reads.one(**again)]
+    answer, judged, _ = reads.read(first, second, doubt=(1e-4, 1.01e-3))
+    assert (answer.reason, answer.margin, answer.doubt) == (reason, margin, doubt)
+    assert answer.runner_up.face == "F2"
+    assert judged is (second[0] if second else None)
+
+
+def test_a_border_counts_there_too(reads):
+    found = [reads.one()]
+    assert reads.read(found, found, doubt=0.3, by_border=1e-4)[0]
 
 
 @pytest.mark.parametrize(
