@@ -22,7 +22,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -158,9 +158,8 @@ def line_of(rows: pa.Table) -> dict[str, Any]:
     return line
 
 
-def all_of(lines: Iterable[dict[str, Any]]) -> dict[str, Any]:
+def all_of(lines: Collection[dict[str, Any]]) -> dict[str, Any]:
     """Return what became of the touches of all worlds."""
-    lines = list(lines)
     line = {key: sum(one[key] for one in lines) for key in COUNTS}
     if line["right"]:
         share = [one["right"] / line["right"] for one in lines]
@@ -218,9 +217,10 @@ def main() -> int:
             return 130
     lines = {}
     for name in WORLDS:
-        rows = None if name in finished else rows_of(asked.output / name)
-        if rows is not None or name in finished:
-            lines[name] = finished[name] if rows is None else line_of(rows)
+        if name in finished:
+            lines[name] = finished[name]
+        elif (rows := rows_of(asked.output / name)) is not None:
+            lines[name] = line_of(rows)
     table({**lines, "all": all_of(lines.values())})
     return 0
 
