@@ -32,10 +32,11 @@ class CompiledKernels(BuildHookInterface):  # type: ignore[misc, type-arg]
 
 def compile_folder(folder: Path) -> None:
     """Build the library of a folder; it knows which text it was made of."""
-    sources = sorted(folder.rglob("*.c"))
+    sources = sorted(folder.rglob("*.[ch]"))
     made, draft = folder / "kernels.so", folder / "kernels.so.draft"
     text = b"".join(source.read_bytes() for source in sources)
     made_of = f"-DSOURCE_SUM={zlib.crc32(text)}u"
-    arguments = [*OPTIONS, made_of, *map(str, sources), "-lm", "-o", str(draft)]
+    compiled = [str(source) for source in sources if source.suffix == ".c"]
+    arguments = [*OPTIONS, made_of, *compiled, "-lm", "-o", str(draft)]
     subprocess.run([sys.executable, "-m", "ziglang", "cc", *arguments], check=True)  # noqa: S603
     draft.replace(made)

@@ -31,8 +31,8 @@ def is_wanted() -> bool:
 
 
 def sources_in(folder: Path) -> tuple[Path, ...]:
-    """Return the C files of which a folder's library is made."""
-    return tuple(sorted(folder.rglob("*.c")))
+    """Return the C files and headers of which a folder's library is made."""
+    return tuple(sorted(folder.rglob("*.[ch]")))
 
 
 def library_made_of(sources: Sequence[Path], file: Path) -> ctypes.CDLL | None:

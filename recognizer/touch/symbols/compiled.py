@@ -1,4 +1,4 @@
-"""The compiled loops over an image (`kernels`): refinement, linearization, scores of cells.
+"""The compiled loops over an image (`kernels`): refinement, last fit, scores of cells.
 
 The numpy forms in `refine`, `posterior` and `fit` are the reference.
 """
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.compiled import addresses
-from recognizer.touch.settings import DEFAULTS
+from recognizer.touch.settings import DEFAULTS, SpreadSettings
 from recognizer.touch.symbols.gain import Image
 from recognizer.touch.symbols.template import ResponseTemplate
 
@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 UNKNOWNS = len(DEFAULTS.refine.least)  #: pose (7,) and gain (4,)
+ALL = UNKNOWNS + len(DEFAULTS.posterior.least)  #: and offset, blur across rows and columns
 
 _WHOLE = ("b", "n", "q", "size", "hardens", "falls", "high", "wide")
 _REAL = (
@@ -42,7 +43,7 @@ _ARRAYS = {
 
 
 class _Scene(ctypes.Structure):
-    """`Scene` of evaluate.c."""
+    """`Scene` of scene.h."""
 
     held: tuple[NDArray[Any], ...]  # what it points to
 
@@ -52,6 +53,18 @@ class _Scene(ctypes.Structure):
         *((name, ctypes.c_double * size) for name, size in _ROWS.items()),
         ("usual_scale", ctypes.c_double),
         *((name, ctypes.c_void_p) for name in _ARRAYS),
+    ]
+
+
+class _Steps(ctypes.Structure):
+    """`Steps` of posterior.c."""
+
+    _fields_ = [
+        *((name, ctypes.c_int64) for name in ("rows", "columns", "steps", "rounds")),
+        *((name, ctypes.c_double) for name in ("freedom", "touches", "unseen")),
+        ("usual", ctypes.c_double * 2),
+        *((name, ctypes.c_double * ALL) for name in ("least", "most", "known")),
+        ("aside", ctypes.c_void_p),
     ]
 
 
@@ -97,35 +110,48 @@ def refine_compiled(
     return pose, gain, value, normal, right
 
 
-def linearizer_compiled(
+@dataclass(frozen=True, slots=True, eq=False)
+class LastSteps:
+    """What `posterior.fit_posterior` weighs and bounds; pose, gain and what a sensor adds (14,)."""
+
+    steps: int
+    spread: SpreadSettings
+    least: Array  #: (14,) what the diagonal gains
+    most: Array  #: (14,) the largest step
+    known: Array  #: (14,) what is known of each unknown beforehand, one over its variance
+
+
+def fit_posterior_compiled(
     library: ctypes.CDLL,
     image: Image,
     template: ResponseTemplate,
     pose: Array,
-    steps: int,
+    gain: Array,
     shown: Callable[[Ints], Ints],
-) -> Callable[[Array, Array], tuple[Array, Array, Array, Array]]:
-    """Return what linearizes an image about a lattice whose symbols are known.
+    how: LastSteps,
+) -> tuple[Array, Array, Array, Array, Array] | None:
+    """Return where a lattice of known symbols lies; None where the image shows too little.
 
-    Of a pose (7,), no more than `steps` from the one that is given, and a gain (4,): psi and slopes
-    (n, 6) of what is shown, forces (n,), derivatives (n, 11) by pose and gain, and (n,) by how much
-    forces change with psi, over `NormalizedImage.press`.
+    Pose (7,), gain (4,), offset and blurs (3,), variances (2,) of a covered tactel's psi and of a
+    tip's place, and the normal matrix (14, 14).
     """
-    tactels, fields = len(image.forces), template.rimmed.shape[-1]
-    labels, corner = _label_tables(image, template, pose[None], steps, shown)
+    labels, corner = _label_tables(image, template, pose[None], how.steps, shown)
     scene = _scene_of(image, template).of_lattices(1, labels)
-
-    def linearize(pose: Array, gain: Array) -> tuple[Array, Array, Array, Array]:
-        pose, gain = np.ascontiguousarray(pose), np.ascontiguousarray(gain)
-        values, jacobian = np.empty((tactels, fields)), np.empty((tactels, UNKNOWNS))
-        forces, unit = np.empty(tactels), np.empty(tactels)
-        library.linearize(
-            ctypes.addressof(scene),
-            *addresses(labels, corner, pose, gain, values, forces, jacobian, unit),
-        )
-        return values, forces, jacobian, unit
-
-    return linearize
+    aside = np.ascontiguousarray(np.broadcast_to(image.aside, len(image.forces)), np.float64)
+    spread, unknowns = how.spread, len(how.known)
+    steps = _Steps(
+        rows=image.shape[0], columns=image.shape[1], steps=how.steps, rounds=spread.rounds,
+        freedom=spread.freedom, touches=spread.touches, unseen=spread.unseen,
+        usual=(spread.felt**2, spread.aside_mm**2), least=tuple(how.least.tolist()),
+        most=tuple(how.most.tolist()), known=tuple(how.known.tolist()), aside=aside.ctypes.data,
+    )  # fmt: skip
+    pose, gain = np.array(pose, np.float64), np.array(gain, np.float64)
+    more, now, normal = np.empty(3), np.empty(2), np.empty((unknowns, unknowns))
+    seen = library.fit_posterior(
+        ctypes.addressof(scene), ctypes.addressof(steps),
+        *addresses(labels, corner, pose, gain, more, now, normal),
+    )  # fmt: skip
+    return (pose, gain, more, now, normal) if seen else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,28 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { UNKNOWNS = 11, FIELDS = 6 };
-
-typedef struct {
-    int64_t b, n, q, size;      /* candidates, tactels, symbols, grid points along a side */
-    int64_t hardens, falls;     /* of the overlay; rows of `falls`, 0 for a flat face */
-    int64_t high, wide;         /* of the tables of labels */
-    double symbol, deepest;     /* Pressing */
-    double pitch, half, step;   /* ResponseTemplate, mm */
-    double noise;               /* of the readings */
-    double least_gain, full_press, least_press, steepest;       /* GainSettings */
-    double quiet, displaced, loud, most, first, far, grazed, tie;   /* NoiseSettings */
-    double damping, easier, harder, settled, shallower, deepest_gain; /* RefineSettings */
-    double least[UNKNOWNS], largest[UNKNOWNS], limits[4];
-    double precision[UNKNOWNS], usual_scale;    /* what is known beforehand; log of the scale */
-    const double *points, *forces, *trust, *plane;  /* Image: (n, 2), (n,), (n,), (n, 3) */
-    const uint8_t *loaded;      /* (n,) */
-    const double *drop;         /* (falls, n), or NULL */
-    const float *rimmed;        /* ResponseTemplate, (size + 2, size + 2, q, 6) */
-} Scene;
-
-static inline double larger(double a, double b) { return a > b ? a : b; }
-static inline double smaller(double a, double b) { return a < b ? a : b; }
+#include "scene.h"
 
 static const double LOG4 = 1.3862943611198906; /* log(1 + 3) */
 
@@ -101,7 +80,6 @@ typedef struct {
 } Work;
 
 enum { ROWS = 12 };
-typedef double Four __attribute__((vector_size(32), aligned(8), may_alias));
 
 static int64_t whole_fours(int64_t n) { return (n + 3) / 4 * 4; }
 
@@ -473,12 +451,10 @@ static void linear_system(const Scene *s, Work *w, const double *pose, const dou
     }
 }
 
-/* The image about one lattice whose cells show what is given: psi and slopes (n, 6), forces (n,),
-   their derivatives (n, 11), and (n,) by how much forces change with psi, where all press fully. */
 void linearize(const Scene *s, const int8_t *given, const int64_t *corner, const double *pose,
-               const double *gain, double *values, double *forces, double *jacobian,
-               double *unit) {
+               const double *gain, int64_t wide, Linearized at) {
     Work w = new_work(s);
+    const int64_t n = s->n, row = n * sizeof(double);
     look_at_gains(s, &w, gain);
     normalize(s, &w, 0, gain);
     w.known = 1;
@@ -487,43 +463,12 @@ void linearize(const Scene *s, const int8_t *given, const int64_t *corner, const
     look_up(s, &w, pose);
     value_shown(s, &w);
     press_shown(s, &w, pose, gain);
-    for (int64_t t = 0; t < s->n; t++) {
-        for (int f = 0; f < FIELDS; f++) values[FIELDS * t + f] = w.shown[f * s->n + t];
-        for (int k = 0; k < UNKNOWNS; k++)
-            jacobian[UNKNOWNS * t + k] = w.rows[k * whole_fours(s->n) + t];
-        forces[t] = w.force[t];
-        unit[t] = w.by_psi[t] / w.press[t];
-    }
+    for (int f = 0; f < 3; f++) memcpy(at.values + f * wide, w.shown + f * n, row);
+    for (int k = 0; k < UNKNOWNS; k++)
+        memcpy(at.jacobian + k * wide, w.rows + k * whole_fours(n), row);
+    memcpy(at.forces, w.force, row);
+    for (int64_t t = 0; t < n; t++) at.unit[t] = w.by_psi[t] / w.press[t];
     free_work(&w);
-}
-
-/* Solve A x = b by elimination with row pivots; both are overwritten. */
-static void solve(double A[UNKNOWNS][UNKNOWNS], double b[UNKNOWNS]) {
-    for (int k = 0; k < UNKNOWNS; k++) {
-        int pivot = k;
-        for (int i = k + 1; i < UNKNOWNS; i++) if (fabs(A[i][k]) > fabs(A[pivot][k])) pivot = i;
-        for (int j = 0; j < UNKNOWNS && pivot != k; j++) {
-            double held = A[k][j];
-            A[k][j] = A[pivot][j];
-            A[pivot][j] = held;
-        }
-        double held = b[k];
-        b[k] = b[pivot];
-        b[pivot] = held;
-        for (int i = k + 1; i < UNKNOWNS; i++) {
-            double share = A[i][k] / A[k][k];
-            for (int j = k + 1; j < UNKNOWNS; j++) A[i][j] -= share * A[k][j];
-            b[i] -= share * b[k];
-        }
-    }
-    for (int k = UNKNOWNS - 1; k >= 0; k--) {
-        for (int j = k + 1; j < UNKNOWNS; j++) b[k] -= A[k][j] * b[j];
-        b[k] /= A[k][k];
-    }
-}
-
-static double bounded(double value, double least, double most) {
-    return smaller(larger(value, least), most);
 }
 
 /* The lattice a damped step further. */
@@ -533,18 +478,9 @@ static void move(const Scene *s, const double *normal, const double *right, doub
     memcpy(A, normal, sizeof A);
     memcpy(step, right, sizeof step);
     for (int k = 0; k < UNKNOWNS; k++) A[k][k] += A[k][k] * damping + s->least[k];
-    solve(A, step);
+    solve(UNKNOWNS, A, step);
     for (int k = 0; k < UNKNOWNS; k++) step[k] = bounded(step[k], -s->largest[k], s->largest[k]);
-    for (int k = 0; k < 7; k++) to_pose[k] = pose[k] + step[k];
-    for (int k = 0; k < 4; k++) {
-        to_pose[3 + k] = bounded(to_pose[3 + k], -s->limits[k], s->limits[k]);
-        to_gain[k] = gain[k] + step[7 + k];
-    }
-    to_gain[1] = bounded(to_gain[1], s->shallower * gain[1], s->deepest_gain);
-    double slope = fabs(to_gain[2]) + fabs(to_gain[3]), limit = s->steepest * to_gain[1];
-    double factor = slope > limit ? limit / larger(slope, 1e-300) : 1.0;
-    to_gain[2] *= factor;
-    to_gain[3] *= factor;
+    take_step(s, step, pose, gain, to_pose, to_gain);
 }
 
 /* Move candidates by damped steps, `steps` at most; pose and gain (b, 7), (b, 4) are where they begin

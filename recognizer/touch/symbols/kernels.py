@@ -36,8 +36,8 @@ def load_kernels(file: Path) -> ctypes.CDLL | None:
     pointer, whole = ctypes.c_void_p, ctypes.c_int64
     library.refine.argtypes = [pointer, whole, whole, *[pointer] * 7]
     library.refine.restype = None
-    library.linearize.argtypes = [pointer] * 9
-    library.linearize.restype = None
+    library.fit_posterior.argtypes = [pointer] * 9
+    library.fit_posterior.restype = ctypes.c_int
     library.score_cells.argtypes = [pointer, whole, ctypes.c_double, *[pointer] * 8]
     library.score_cells.restype = ctypes.c_double
     library.add_scores.argtypes = [
@@ -48,9 +48,6 @@ def load_kernels(file: Path) -> ctypes.CDLL | None:
     library.sum_lattices.restype = None
     library.look_around.argtypes = [*[whole] * 2, *[pointer] * 2]
     library.look_around.restype = None
-    real = ctypes.c_double
-    library.fit_spread.argtypes = [*[whole] * 3, *[real] * 3, *[pointer] * 7]
-    library.fit_spread.restype = ctypes.c_int
     library.name_places.argtypes = [pointer, whole, pointer, pointer, whole, pointer]
     library.name_places.restype = None
     library.count_names.argtypes = [whole, pointer, pointer, pointer]

@@ -10,15 +10,13 @@ makes slopes less steep than the template's. Damped least squares; lattice and s
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.touch.settings import PosteriorSettings
 from recognizer.touch.symbols.blur import second_differences
-from recognizer.touch.symbols.compiled import linearizer_compiled
+from recognizer.touch.symbols.compiled import LastSteps, fit_posterior_compiled
 from recognizer.touch.symbols.covariance import invert_normal
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.gain import Image, bounded_gain
@@ -39,9 +37,6 @@ from recognizer.touch.symbols.spread import TactelScatter, fit_spread, usual_spr
 from recognizer.touch.symbols.template import ResponseTemplate
 
 Array = NDArray[np.float64]
-
-#: Pose (7,) and gain (4,) -> what `compiled.linearizer_compiled` says.
-Linearizer = Callable[[Array, Array], tuple[Array, Array, Array, Array]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,22 +90,39 @@ def fit_posterior(
     shown
         What the cells show.
     """
-    settings, spreads = image.settings.posterior, image.settings.spread
-    known = np.diag(_precision(image, settings))
-    trust, freedom = image.trust, spreads.freedom
-    linearizer = _linearizer(image, template, pose, settings.steps, shown)
-    bounds = _step_bounds(image)
-    at = _linearize(image, linearizer, pose, gain, np.zeros(3))
-    spread, damping = usual_spread(spreads), image.settings.refine.damping
-    for step in range(settings.steps + 1):
-        spread = fit_spread(spread, at.left, at.parts, at.jacobian, known, trust, spreads)
+    least, most = _step_bounds(image)
+    how = LastSteps(
+        image.settings.posterior.steps, image.settings.spread, least, most, _precision(image)
+    )
+    library = compiled_kernels()
+    found = None
+    if library is not None:
+        found = fit_posterior_compiled(library, image, template, pose, gain, shown, how)
+    pose, gain, more, now, normal = found or _fit(image, template, pose, gain, shown, how)
+    told = invert_normal(normal, image.settings.covariance.unseen)
+    rows = [0, 1, 2, POSE - 1]
+    covariance = _size(image, pose, more) * told[rows][:, rows]
+    spread = TactelScatter(math.sqrt(now[0]), math.sqrt(now[1]))
+    return PosePosterior(pose, gain, covariance, spread, (float(more[1]), float(more[2])))
+
+
+def _fit(
+    image: Image, template: ResponseTemplate, pose: Array, gain: Array, shown: Shown, how: LastSteps
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Return what `compiled.fit_posterior_compiled` says."""
+    known, trust, freedom = np.diag(how.known), image.trust, how.spread.freedom
+    at = _linearize(image, template, pose, gain, np.zeros(3), shown)
+    spread, damping = usual_spread(how.spread), image.settings.refine.damping
+    for step in range(how.steps + 1):
+        spread = fit_spread(spread, at.left, at.parts, at.jacobian, known, trust, how.spread)
         weights = spread.weights(at.left, at.parts, trust, freedom)
         weighted = (at.jacobian * weights[:, None]).T
         normal = weighted @ at.jacobian + known
-        if step == settings.steps:
+        if step == how.steps:
             break
         right = weighted @ at.left - known @ at.departure
-        tried = _move(image, linearizer, at, normal, right, damping, bounds)
+        moved = _move(image, at, normal, right, damping, how)
+        tried = _linearize(image, template, *moved, shown)
         before, after = (
             spread.log_likelihood(one.left, one.parts, trust, freedom)
             - 0.5 * float(one.departure @ known @ one.departure)
@@ -120,23 +132,23 @@ def fit_posterior(
             at, damping = tried, damping / image.settings.refine.easier
         else:
             damping *= image.settings.refine.harder
-    told = invert_normal(normal, image.settings.covariance.unseen)
-    rows = [0, 1, 2, POSE - 1]
-    covariance = _size(image, at) * told[rows][:, rows]
-    blur = float(at.more[1]), float(at.more[2])
-    return PosePosterior(at.pose, at.gain, covariance, spread, blur)
+    return at.pose, at.gain, at.more, np.square([spread.felt, spread.aside_mm]), normal
 
 
 def _linearize(
-    image: Image, linearizer: Linearizer, pose: Array, gain: Array, more: Array
+    image: Image, template: ResponseTemplate, pose: Array, gain: Array, more: Array, shown: Shown
 ) -> _Linearized:
     noise = image.settings.noise
-    value, force, jacobian, unit = linearizer(pose, gain)
+    felt, _, values = project_symbols(image, template, pose[None], gain[None], shown)
+    jacobian, force = (
+        one[0] for one in force_jacobian(image, pose[None], gain[None], values, felt)
+    )
+    value, plateau, press = values[0], felt.plateau[0], felt.press[0]
+    unit = response_by_psi(response_of(value[:, 0])) * plateau / press
     columns = np.ones((len(force), 3))
     columns[:, 1:2], columns[:, 2:] = second_differences(force[:, None], image.shape)
-    if more[1:].any():
-        rows, across = second_differences(jacobian, image.shape)
-        jacobian = jacobian + (more[1] * rows + more[2] * across)
+    rows, across = second_differences(jacobian, image.shape)
+    jacobian = jacobian + (more[1] * rows + more[2] * across)
     parts = np.empty((2, len(force)))
     parts[0] = noise.quiet**2 + value[:, 0] ** 2
     parts[1] = image.aside * (value[:, 1] ** 2 + value[:, 2] ** 2)
@@ -147,60 +159,43 @@ def _linearize(
     return _Linearized(pose, gain, more, left, parts, jacobian, departure)
 
 
-def _linearizer(
-    image: Image, template: ResponseTemplate, pose: Array, steps: int, shown: Shown
-) -> Linearizer:
-    library = compiled_kernels()
-    if library is not None:
-        return linearizer_compiled(library, image, template, pose, steps, shown)
-
-    def linearize(pose: Array, gain: Array) -> tuple[Array, Array, Array, Array]:
-        felt, _, values = project_symbols(image, template, pose[None], gain[None], shown)
-        jacobian, force = force_jacobian(image, pose[None], gain[None], values, felt)
-        plateau, press = felt.plateau[0], felt.press[0]
-        unit = response_by_psi(response_of(values[0, :, 0])) * plateau / press
-        return values[0], force[0], jacobian[0], unit
-
-    return linearize
-
-
 def _move(
-    image: Image, linearizer: Linearizer, at: _Linearized, normal: Array, right: Array,
-    damping: float, bounds: tuple[Array, Array, Array],
-) -> _Linearized:  # fmt: skip
-    """Return the image about the lattice a damped step further."""
-    refine, (least, most, limits) = image.settings.refine, bounds
-    lattice = len(at.pose) + len(at.gain)
+    image: Image, at: _Linearized, normal: Array, right: Array, damping: float, how: LastSteps
+) -> tuple[Array, Array, Array]:
+    """Return pose, gain and the sensor's unknowns a damped step further."""
+    refine = image.settings.refine
+    lattice, limits = len(at.pose) + len(at.gain), np.array(refine.limits)
     system = normal.copy()
-    system.flat[:: len(system) + 1] += np.diagonal(normal) * damping + least
-    step = _clip(np.asarray(np.linalg.solve(system, right)), most)
+    system.flat[:: len(system) + 1] += np.diagonal(normal) * damping + how.least
+    step = _clip(np.asarray(np.linalg.solve(system, right)), how.most)
     pose, gain = at.pose + step[:POSE], at.gain + step[POSE:lattice]
     pose[3:] = _clip(pose[3:], limits)
     gain[1] = min(max(gain[1], refine.shallower * at.gain[1]), refine.deepest)
     gain = bounded_gain(gain[None], image.settings.gain.steepest)[0]
-    return _linearize(image, linearizer, pose, gain, at.more + step[lattice:])
+    return pose, gain, at.more + step[lattice:]
 
 
-def _step_bounds(image: Image) -> tuple[Array, Array, Array]:
-    """Return what the diagonal gains (14,), the largest step (14,) and the limits of form (4,)."""
+def _step_bounds(image: Image) -> tuple[Array, Array]:
+    """Return what the diagonal gains (14,), and the largest step (14,)."""
     refine, settings = image.settings.refine, image.settings.posterior
     most = np.array([*refine.step, *settings.step])
     most[len(refine.step)] *= float(image.forces.max())
-    return np.array([*refine.least, *settings.least]), most, np.array(refine.limits)
+    return np.array([*refine.least, *settings.least]), most
 
 
 def _clip(values: Array, most: Array) -> Array:
     return np.asarray(np.minimum(np.maximum(values, -most), most))
 
 
-def _precision(image: Image, settings: PosteriorSettings) -> Array:
+def _precision(image: Image) -> Array:
     """Return what is known of each unknown beforehand, one over its variance (14,)."""
+    settings = image.settings.posterior
     offset = settings.offset * max(float(image.forces.max()), 1e-12)
     more = 1.0 / np.square([offset, settings.blur, settings.blur])
     return np.concatenate([prior_precision(image), more])
 
 
-def _size(image: Image, at: _Linearized) -> float:
+def _size(image: Image, pose: Array, more: Array) -> float:
     """Return by how much the covariance is wider than least squares say.
 
     Readings that hold much of each other do so in a way that no second difference tells. And where
@@ -209,9 +204,9 @@ def _size(image: Image, at: _Linearized) -> float:
     over (`docs/recognizer.md`, "How sure it is").
     """
     settings, refine = image.settings.covariance, image.settings.refine
-    heard = image.settings.template.cross_talk * (1 + float(at.pose[4]))
-    heard += 2 * float(at.more[1:].sum())
+    heard = image.settings.template.cross_talk * (1 + float(pose[4]))
+    heard += 2 * float(more[1:].sum())
     blurred = settings.blurred * max(0.0, heard - settings.usual_blur)
-    away = at.pose[3 : POSE - 1] / np.array(refine.prior[3 : POSE - 1])
+    away = pose[3 : POSE - 1] / np.array(refine.prior[3 : POSE - 1])
     strange = max(0.0, float(away @ away) - settings.usual_form)
     return (settings.size + blurred) * (1 + settings.form * strange)

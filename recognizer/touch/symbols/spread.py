@@ -16,10 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.compiled import addresses
 from recognizer.touch.settings import SpreadSettings
 from recognizer.touch.symbols.covariance import invert_normal
-from recognizer.touch.symbols.kernels import compiled_kernels
 
 Array = NDArray[np.float64]
 
@@ -75,9 +73,6 @@ def fit_spread(
     freedom = settings.freedom
     usual = np.square([settings.felt, settings.aside_mm])
     now = np.square([before.felt, before.aside_mm])
-    found = _fit_compiled(usual, now, left, parts, jacobian, known, trust, settings)
-    if found is not None:
-        return found
     for _ in range(settings.rounds):
         spread = TactelScatter(math.sqrt(now[0]), math.sqrt(now[1]))
         weights = spread.weights(left, parts, trust, freedom)
@@ -88,20 +83,3 @@ def fit_spread(
         asked = share @ (weights * left * left + taken) + settings.touches * usual / now
         now = now * np.sqrt(asked / (share.sum(axis=1) + settings.touches))
     return TactelScatter(math.sqrt(now[0]), math.sqrt(now[1]))
-
-
-def _fit_compiled(
-    usual: Array, now: Array, left: Array, parts: Array, jacobian: Array, known: Array,
-    trust: Array, settings: SpreadSettings,
-) -> TactelScatter | None:  # fmt: skip
-    """Return the same by the compiled kernel; None without it, or where little is seen."""
-    library = compiled_kernels()
-    if library is None:
-        return None
-    now = now.copy()
-    given = [np.ascontiguousarray(one) for one in (usual, left, parts, jacobian, known, trust)]
-    seen = library.fit_spread(
-        *jacobian.shape, settings.rounds, settings.freedom, settings.touches, settings.unseen,
-        *addresses(*given, now),
-    )  # fmt: skip
-    return TactelScatter(math.sqrt(now[0]), math.sqrt(now[1])) if seen else None

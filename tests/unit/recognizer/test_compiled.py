@@ -27,7 +27,6 @@ from recognizer.touch.symbols.posterior import fit_posterior
 from recognizer.touch.symbols.projection import likeliest_labels, project_template
 from recognizer.touch.symbols.refine import refine_lattices
 from recognizer.touch.symbols.search import bank_of, best_around, lattice_scores
-from recognizer.touch.symbols.spread import fit_spread, usual_spread
 from recognizer.touch.symbols.template import template_of
 
 STYLE = SymbolStyle(pitch_mm=5.0)
@@ -187,9 +186,10 @@ def test_what_is_missing_is_said(tmp_path, monkeypatch):
 
 
 def test_what_was_made_of_another_text_is_left_out(tmp_path):
-    changed = tmp_path / "scatter.c"
-    changed.write_text(kernels.SOURCES[-1].read_text() + "\n")
-    compile_kernels((*kernels.SOURCES[:-1], changed), tmp_path / "kernels.so")
+    places, *others = kernels.SOURCES
+    changed = tmp_path / places.name
+    changed.write_text(places.read_text() + "\n")
+    compile_kernels((changed, *others), tmp_path / "kernels.so")
     assert kernels.load_kernels(tmp_path / "kernels.so") is None
 
 
@@ -276,22 +276,24 @@ def test_the_last_fit_is_the_same(name, use):
     assert np.abs(one.pose[:3] - other.pose[:3]).max() < 1e-6
     assert one.gain == pytest.approx(other.gain, abs=1e-6)
     assert one.covariance == pytest.approx(other.covariance, rel=1e-5, abs=1e-9)
+    assert one.blur == pytest.approx(other.blur, abs=1e-7)
+    assert one.spread.felt == pytest.approx(other.spread.felt, rel=1e-6)
+    assert one.spread.aside_mm == pytest.approx(other.spread.aside_mm, rel=1e-6)
 
 
-@pytest.mark.parametrize("shown", [1.0, 1e-3, 0.0])  # at last: an unknown of which nothing is seen
-def test_scatter_is_fitted_alike(shown, use):
-    draw = np.random.default_rng(2)
-    left, parts = draw.normal(0, 0.1, 256), draw.random((2, 256)) + 0.1
-    jacobian = draw.normal(0, 1.0, (256, 14)) * np.array([1.0] * 13 + [shown])
-    known, trust = np.diag([0.0] * 10 + [2.0] * 3 + [0.0]), (draw.random(256) > 0.1).astype(float)
+def test_where_too_little_is_seen_the_last_fit_is_that_of_numpy(use):
+    image, template, gain = SCENES["flat"]()
     found = []
     for kind in ("numpy", "compiled"):
         use(kind)
-        spread = usual_spread(DEFAULTS.spread)
-        spread = fit_spread(spread, left, parts, jacobian, known, trust, DEFAULTS.spread)
-        found.append((spread.felt, spread.aside_mm))
-    assert found[0] == pytest.approx(found[1], rel=1e-12)
-    assert found[0] != pytest.approx((DEFAULTS.spread.felt, DEFAULTS.spread.aside_mm), rel=0.1)
+        found.append(fit_posterior(image, template, TRUE[0], gain[0], nothing))
+    one, other = found
+    assert (one.pose == other.pose).all()
+    assert (one.covariance == other.covariance).all()
+
+
+def nothing(cells):
+    return np.full(cells.shape[:-1], -1)
 
 
 HELD = st.lists(
@@ -366,8 +368,13 @@ def embossed_of(held, *, dense, columns=9):
     )  # fmt: skip
 
 
-def test_scene_is_as_long_as_in_c():
-    text = (kernels.FOLDER / "symbols/evaluate.c").read_text()
-    fields = text[text.index("typedef struct {") : text.index("} Scene;")]
+@pytest.mark.parametrize(
+    ("file", "name", "known"),
+    [("scene.h", "Scene", compiled._Scene), ("posterior.c", "Steps", compiled._Steps)],
+)
+def test_what_c_is_given_is_as_long_there(file, name, known):
+    text = (kernels.FOLDER / "symbols" / file).read_text()
+    end = text.index(f"}} {name};")
+    fields = text[text.rindex("typedef struct {", 0, end) : end]
     names = re.findall(r"\*?(\w+)(?:\[\w+\])?[,;]", re.sub(r"/\*.*?\*/", "", fields, flags=re.S))
-    assert names == [name for name, _ in compiled._Scene._fields_]
+    assert names == [field for field, *_ in known._fields_]
