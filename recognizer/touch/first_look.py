@@ -6,8 +6,10 @@ that within a pitch of the strongest readings lie weak ones. A blank plate press
 Signal and what the first try found -> whether a wider search can change the answer. It hardly can
 where the first try is sure; where symbols explain the image and are so few that they stand
 elsewhere as well; where fewer tactels are pressed than the symbols would press that it takes to
-name a place; where the image speaks for symbols of no registered place; and where symbols of a
-place are plainly there and most of the image is something else. Thesis 6.3.
+name a place; where hardly a symbol agrees with the best place; where the image speaks for symbols
+of no registered place; and where symbols of a place are plainly there and most of the image is
+something else. Nor is an answer that few places match by chance looked at again where the image
+speaks plainly for its symbols. Thesis 6.3.
 """
 
 from __future__ import annotations
@@ -86,6 +88,14 @@ def may_tell_more(
     return _is_unexplained(reader, signal, support)
 
 
+def may_be_chance(reader: PreparedLab, judged: Recognition, support: Support) -> bool:
+    """Return whether a wide search had better look at an answer again."""
+    settings = reader.settings
+    if judged.doubt is None or judged.doubt <= settings.belief.looked_at_again:
+        return False
+    return support.surprise < settings.first_look.plain
+
+
 def _is_nearly_sure(judged: Recognition, settings: FirstLookSettings) -> bool:
     """Return whether little is missing to the answer that few symbols give."""
     if judged.reason == BY_CHANCE:
@@ -98,8 +108,10 @@ def _is_nearly_sure(judged: Recognition, settings: FirstLookSettings) -> bool:
 def _is_unexplained(reader: PreparedLab, signal: Signal, support: Support) -> bool:
     """Return whether symbols are pressed that are those of a place, or may be under another fit."""
     settings = reader.settings.first_look
+    if support.inliers < settings.agreed or support.surprise < settings.foreign:
+        return False
     least = min(_tactels_to_name(reader, each, settings) for each in reader.lab.arrays)
-    if pressed_tactels(signal, settings) < least or support.surprise < settings.foreign:
+    if pressed_tactels(signal, settings) < least:
         return False
     return support.surprise < settings.plain or support.explained >= settings.explained
 

@@ -19,7 +19,7 @@ from dataclasses import replace
 from recognizer.touch.belief import Support, VerifiedHypothesis
 from recognizer.touch.chance import expected_by_border, expected_matches
 from recognizer.touch.diagnose import diagnose
-from recognizer.touch.first_look import may_tell_more, shows_strokes
+from recognizer.touch.first_look import may_be_chance, may_tell_more, shows_strokes
 from recognizer.touch.hypothesis import Hypothesis, under_centre
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.next_touch import propose_next
@@ -79,7 +79,7 @@ def recognise_with_rivals(
     answer, support = _answer(first, settings, seq)
     judged = _judge(reader, first, answer, support)
     if not may_tell_more(reader, signal, answer, judged, first[0] if first else None, support):
-        if judged and judged.doubt is not None and judged.doubt > settings.belief.looked_at_again:
+        if judged and support is not None and may_be_chance(reader, judged, support):
             return _look_again(reader, signal, judged, first)
         return judged, first
     # Spend more where it is needed: no answer yet, or one that few cells speak for.

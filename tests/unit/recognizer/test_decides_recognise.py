@@ -26,7 +26,7 @@ TOUCHED = SimpleNamespace(contact=True)
 READER = SimpleNamespace(
     sensor=SensorType(), settings=ReaderSettings(), lab=SimpleNamespace(arrays=("one", "two"))
 )
-SURE = Support(surprise=20.0, explained=0.95, inliers=16, clear=0, plain=0, wider=0.0)
+SURE = Support(surprise=19.9, explained=0.95, inliers=16, clear=0, plain=0, wider=0.0)
 T_OBJECT_FACE = np.array([[0.0, 0, 1, 5], [1, 0, 0, 6], [0, 1, 0, 7], [0, 0, 0, 1]])
 
 
@@ -329,6 +329,12 @@ def test_what_chance_nearly_allows_is_looked_at_again(reads, first, tries):
     assert (tried, judged is found[0]) == (tries, True)
     assert (answer.reason, answer.doubt, answer.margin) == ("", first, 40.0)
     assert answer.x_mm == pytest.approx(17.0)  # as the first try has it
+
+
+def test_what_speaks_plainly_for_a_place_is_not_looked_at_again(reads):
+    found = [reads.one(surprise=20.0), reads.one("rival", -40.0)]
+    answer, judged, tried = reads.read(found, [], doubt=1e-4)
+    assert (tried, judged is found[0], bool(answer)) == (1, True, True)
 
 
 @pytest.mark.parametrize(

@@ -96,6 +96,12 @@ def test_symbols_of_no_registered_place_are_not_sought_further(asked):
     assert not asked(surprise=2.9)
 
 
+def test_where_hardly_a_symbol_agrees_no_place_is_found(asked):
+    assert asked(inliers=3)
+    assert not asked(inliers=2)
+    assert asked(inliers=0, lab={"kind": "pad"})
+
+
 def test_plain_symbols_that_explain_little_stand_beside_something_else(asked):
     assert asked(surprise=19.9, explained=0.1)
     assert not asked(surprise=20.0, explained=0.59)
