@@ -42,10 +42,10 @@ from recognizer.touch.recognition import (
 )
 from recognizer.touch.round import bend_at
 from recognizer.touch.settings import HypothesisSettings
+from recognizer.touch.symbols.explained import explained_share
 from recognizer.touch.symbols.fit import Fit, score_cells
 from recognizer.touch.symbols.gain import Image, bend_image
 from recognizer.touch.symbols.posterior import refit_pose
-from recognizer.touch.symbols.projection import explained_share
 from recognizer.touch.symbols.refine import refine_lattices
 from recognizer.touch.symbols.template import ResponseTemplate
 

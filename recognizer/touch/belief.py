@@ -31,10 +31,10 @@ from recognizer.touch.hypothesis import (
 )
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.settings import BeliefSettings
+from recognizer.touch.symbols.explained import explained_share
 from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.gain import Image
 from recognizer.touch.symbols.posterior import refit_pose
-from recognizer.touch.symbols.projection import explained_share
 from recognizer.touch.symbols.template import ResponseTemplate
 
 Ints = NDArray[np.int64]

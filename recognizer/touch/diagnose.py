@@ -21,7 +21,8 @@ from recognizer.touch.cause import Cause
 from recognizer.touch.first_look import shows_strokes
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.signal import Signal
-from recognizer.touch.symbols.projection import explained_share, project_symbols
+from recognizer.touch.symbols.explained import explained_share
+from recognizer.touch.symbols.projection import project_symbols
 from recognizer.touch.verify import fit_touch
 
 Array = NDArray[np.float64]

@@ -1,6 +1,6 @@
-"""The compiled loops over an image (`kernels`): refinement, last fit, scores of cells.
+"""The compiled loops over an image (`kernels`): refinement, scores of cells, last fit.
 
-The numpy forms in `refine`, `posterior` and `fit` are the reference.
+The numpy forms in `refine`, `fit`, `explained` and `posterior` are the reference.
 """
 
 from __future__ import annotations
@@ -152,6 +152,24 @@ def fit_posterior_compiled(
         *addresses(labels, corner, pose, gain, more, now, normal),
     )  # fmt: skip
     return (pose, gain, more, now, normal) if seen else None
+
+
+def explained_share_compiled(
+    library: ctypes.CDLL,
+    image: Image,
+    template: ResponseTemplate,
+    pose: Array,
+    gain: Array,
+    shown: Callable[[Ints], Ints],
+) -> float:
+    """Return what `explained.explained_share` says of a pose (7,) and a gain (4,)."""
+    labels, corner = _label_tables(image, template, pose[None], 0, shown)
+    scene, noise = _scene_of(image, template).of_lattices(1, labels), image.settings.noise
+    pose, gain = np.array(pose, np.float64), np.array(gain, np.float64)
+    share: float = library.explained_share(
+        ctypes.addressof(scene), *addresses(labels, corner, pose, gain), noise.hidden, noise.above
+    )
+    return share
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -471,6 +471,37 @@ void linearize(const Scene *s, const int8_t *given, const int64_t *corner, const
     free_work(&w);
 }
 
+/* The share of the variance of psi that labels (high, wide) from `corner` on explain where they
+   stand: what `explained.explained_share` says. */
+double explained_share(const Scene *s, const int8_t *given, const int64_t *corner,
+                       const double *pose, const double *gain, double hidden, double above) {
+    Work w = new_work(s);
+    double weight = 0.0, sum = 0.0, whole = 0.0, left = 0.0, alone = 0.0;
+    look_at_gains(s, &w, gain);
+    normalize(s, &w, 0, gain);
+    w.known = 1;
+    find_cells(s, &w, pose);
+    read_labels(s, &w, given, corner);
+    look_up(s, &w, pose);
+    for (int64_t t = 0; t < s->n; t++) { /* no symbol explains the noise of readings */
+        double noise = 3.0 / LOG4 * exp(-LOG4 * w.value[t]) * (s->noise / w.plateau[t]);
+        double share = noise / (s->quiet * s->first);
+        double trust = w.labels[t] < 0 ? 0.0 : s->trust[t] * (s->falls ? w.contact[t] : 1.0);
+        w.unit[t] = trust / (1.0 + share * share);
+        weight += w.unit[t];
+        sum += w.unit[t] * w.psi[t];
+        alone += w.unit[t] * (w.value[t] > s->grazed ? 1.0 : above) * noise * noise;
+    }
+    for (int64_t t = 0; t < s->n; t++) {
+        double away = w.psi[t] - sum / larger(weight, 1e-12), off = w.psi[t] - w.value[t];
+        whole += w.unit[t] * away * away;
+        left += w.unit[t] * off * off;
+    }
+    free_work(&w);
+    alone = smaller(smaller(alone, hidden * whole), left);
+    return 1.0 - (left - alone) / larger(whole - alone, 1e-12);
+}
+
 /* The lattice a damped step further. */
 static void move(const Scene *s, const double *normal, const double *right, double damping,
                  const double *pose, const double *gain, double *to_pose, double *to_gain) {

@@ -38,6 +38,8 @@ def load_kernels(file: Path) -> ctypes.CDLL | None:
     library.refine.restype = None
     library.fit_posterior.argtypes = [pointer] * 9
     library.fit_posterior.restype = ctypes.c_int
+    library.explained_share.argtypes = [*[pointer] * 5, *[ctypes.c_double] * 2]
+    library.explained_share.restype = ctypes.c_double
     library.score_cells.argtypes = [pointer, whole, ctypes.c_double, *[pointer] * 8]
     library.score_cells.restype = ctypes.c_double
     library.add_scores.argtypes = [

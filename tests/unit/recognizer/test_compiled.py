@@ -21,6 +21,7 @@ from recognizer.touch.place_scores import add_scores, count_names, count_places,
 from recognizer.touch.settings import DEFAULTS
 from recognizer.touch.signal import Signal
 from recognizer.touch.symbols import compiled, kernels
+from recognizer.touch.symbols.explained import explained_share
 from recognizer.touch.symbols.fit import score_cells
 from recognizer.touch.symbols.gain import image_of_signal, normalize_image
 from recognizer.touch.symbols.posterior import fit_posterior
@@ -101,6 +102,10 @@ def starts(gain, count=6):
 
 def given(cells):
     return np.where((cells[..., 0] + cells[..., 1]) % 5 == 0, -1, cells[..., 0] % 4)
+
+
+def nothing(cells):
+    return np.full(cells.shape[:-1], -1)
 
 
 @pytest.mark.parametrize("shown", [None, given], ids=["chosen", "given"])
@@ -265,6 +270,18 @@ def test_the_best_beside_a_score_goes_round_all_three_ways(kind, shape, use):
     assert best_around(scores).tolist() == expected.reshape(shape).tolist()
 
 
+@pytest.mark.parametrize("shown", [given, nothing])
+@pytest.mark.parametrize("name", [name for name in SCENES if not name.endswith("each gain")])
+def test_symbols_explain_the_same_share(name, shown, use):
+    image, template, gain = SCENES[name]()
+    found = []
+    for kind in ("numpy", "compiled"):
+        use(kind)
+        found.append(explained_share(image, template, TRUE[0], gain[0], shown))
+    assert found[0] == pytest.approx(found[1], abs=1e-6)
+    assert found[0] <= 1
+
+
 @pytest.mark.parametrize("name", [name for name in SCENES if not name.endswith("each gain")])
 def test_the_last_fit_is_the_same(name, use):
     image, template, gain = SCENES[name]()
@@ -290,10 +307,6 @@ def test_where_too_little_is_seen_the_last_fit_is_that_of_numpy(use):
     one, other = found
     assert (one.pose == other.pose).all()
     assert (one.covariance == other.covariance).all()
-
-
-def nothing(cells):
-    return np.full(cells.shape[:-1], -1)
 
 
 HELD = st.lists(

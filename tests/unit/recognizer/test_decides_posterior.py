@@ -11,9 +11,10 @@ from probe.sensor import SensorType
 from recognizer.touch.settings import DEFAULTS
 from recognizer.touch.signal import Signal
 from recognizer.touch.symbols.blur import second_differences
+from recognizer.touch.symbols.explained import explained_share
 from recognizer.touch.symbols.gain import image_of_signal
 from recognizer.touch.symbols.posterior import fit_posterior
-from recognizer.touch.symbols.projection import explained_share, project_template, values_of
+from recognizer.touch.symbols.projection import project_template, values_of
 from recognizer.touch.symbols.refine import force_jacobian
 from recognizer.touch.symbols.template import template_of
 
