@@ -48,7 +48,7 @@ def share_of_borders(found: VerifiedHypothesis, tip_mm: float, settings: BorderS
     if face.round is not None or tip_mm <= 0.0:
         return 1.0
     pressed, top, bare = _free_tactels(found, settings)
-    points = _points_on_face(found, face)
+    points = points_on_face(found, face)
     readings = psi(found.image.forces / np.maximum(top, 1e-300))
     pitch, unit = found.embossed.style.pitch_mm, max(settings.noise, found.fit.noise)
     shares: list[tuple[float, float]] = []
@@ -109,7 +109,7 @@ def _free_tactels(
     return ~on_symbol & _plain(image, bare, settings.pressed, settings), top, bare
 
 
-def _points_on_face(found: VerifiedHypothesis, face: EncodedFace) -> Array:
+def points_on_face(found: VerifiedHypothesis, face: EncodedFace) -> Array:
     """Return the tactels (n, 2) in the face frame, in lengths as they were designed."""
     T = face_pose(found.embossed, face, found.hypothesis, found.fit)
     points = found.image.points_mm * (1.0 + float(found.fit.nuisance[3]))

@@ -24,7 +24,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import SensorType
-from probe.surface.polygon import FaceRegion, polygon
 from recognizer.touch.felt_area import (
     EarlierTouch,
     FeltArea,
@@ -34,9 +33,9 @@ from recognizer.touch.felt_area import (
     strongest_reading,
 )
 from recognizer.touch.hypothesis import Hypothesis
-from recognizer.touch.lab import EmbossedArray, EncodedFace
+from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.next_limits import next_limits
-from recognizer.touch.pose import face_pose
+from recognizer.touch.pose import face_pose, outline_of
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, NextTouch, Recognition
 from recognizer.touch.settings import NextSettings
@@ -194,14 +193,9 @@ def _symbols_by_face(
     new = ~area.seen(plane_points(area.sensor, own))
     worth = (seen * (1 + settings.novelty * new)).sum(axis=1)
     places = steps[:, :2] @ R.T + at
-    region = _outline_of(face)
+    region = outline_of(face)
     within = region.contains(places) & (region.distance_mm(places) > settings.clear_mm)
     return worth.astype(np.float64), within.astype(np.float64)
-
-
-@lru_cache(maxsize=64)
-def _outline_of(face: EncodedFace) -> FaceRegion:
-    return polygon(list(face.polygon_mm))
 
 
 def _why(

@@ -19,6 +19,7 @@ from dataclasses import replace
 from recognizer.touch.belief import Support, VerifiedHypothesis
 from recognizer.touch.chance import expected_by_border, expected_matches
 from recognizer.touch.diagnose import diagnose
+from recognizer.touch.exchanged import exchange_halves, leaves_much
 from recognizer.touch.first_look import may_be_chance, may_tell_more, shows_strokes
 from recognizer.touch.hypothesis import Hypothesis, under_centre
 from recognizer.touch.lab import EmbossedArray
@@ -66,10 +67,17 @@ def recognise_with_hypothesis(
 def recognise_with_rivals(
     reader: PreparedLab, signal: Signal, seq: int = 0
 ) -> tuple[Recognition, list[VerifiedHypothesis]]:
-    """Return what the first try says, or the second where that is not enough; and all hypotheses.
+    """Return what a touch says, and all hypotheses, first of them the one that was judged."""
+    answer, found = _try_twice(reader, signal, seq)
+    if answer and _is_exchanged(reader, signal, answer, found[0]):
+        return refusal(seq, AMBIGUOUS, margin=0.0, runner_up=answer.runner_up), found
+    return answer, found
 
-    The first of them is the one that was judged.
-    """
+
+def _try_twice(
+    reader: PreparedLab, signal: Signal, seq: int
+) -> tuple[Recognition, list[VerifiedHypothesis]]:
+    """Return what the first try says, or the second where that is not enough."""
     if not signal.contact:
         return refusal(seq, NO_CONTACT), []
     if not shows_strokes(reader, signal):
@@ -108,6 +116,26 @@ def _look_again(
             answer.seq, BY_CHANCE, margin=margin, runner_up=runner_up, doubt=doubt
         ), second
     return answer, first
+
+
+def _is_exchanged(
+    reader: PreparedLab, signal: Signal, answer: Recognition, best: VerifiedHypothesis
+) -> bool:
+    """Return whether a touch is read better with halves of the sensor exchanged.
+
+    Asked where its answer leaves much of it over; not of a sensor that was learned, which tells.
+    """
+    settings = reader.settings
+    if reader.sensor.overlay.kind != "tab" or signal.state is not None:
+        return False
+    if not leaves_much(best, settings.exchanged):
+        return False
+    for axis in (0, 1):
+        found = verify_hypotheses(reader, exchange_halves(signal, axis), settings.first)
+        other, support = _answer(found, settings, answer.seq)
+        if _judge(reader, found, other, support) and found[0].score > best.score:
+            return True
+    return False
 
 
 def _answer(

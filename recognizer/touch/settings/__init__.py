@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from recognizer.touch.settings.answer import (
     BeliefSettings,
     BorderSettings,
+    ExchangedSettings,
     FirstLookSettings,
     HypothesisSettings,
     NextSettings,
@@ -46,6 +47,7 @@ __all__ = [
     "BorderSettings",
     "ContactSettings",
     "CovarianceSettings",
+    "ExchangedSettings",
     "FirstLookSettings",
     "FitSettings",
     "GainSettings",
@@ -102,6 +104,7 @@ class ReaderSettings:
     bends: BendSettings = field(default_factory=BendSettings)
     round: RoundSettings = field(default_factory=RoundSettings)
     printed: PrintedSettings = field(default_factory=PrintedSettings)
+    exchanged: ExchangedSettings = field(default_factory=ExchangedSettings)
     first_look: FirstLookSettings = field(default_factory=FirstLookSettings)
     next: NextSettings = field(default_factory=NextSettings)
 

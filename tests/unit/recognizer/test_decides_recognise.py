@@ -22,7 +22,7 @@ from recognizer.touch.recognition import (
 )
 from recognizer.touch.settings import ReaderSettings
 
-TOUCHED = SimpleNamespace(contact=True)
+TOUCHED = SimpleNamespace(contact=True, state=None)
 READER = SimpleNamespace(
     sensor=SensorType(), settings=ReaderSettings(), lab=SimpleNamespace(arrays=("one", "two"))
 )
@@ -120,6 +120,7 @@ def reads(small, lab, monkeypatch):
         monkeypatch.setattr(recognizer.touch.recognise, "diagnose", lambda *_: None)
         monkeypatch.setattr(recognizer.touch.recognise, "shows_strokes", lambda *_: True)
         monkeypatch.setattr(recognizer.touch.recognise, "may_tell_more", wide_unless_sure)
+        monkeypatch.setattr(recognizer.touch.recognise, "leaves_much", lambda *_: False)
         answer, judged = recognise_with_hypothesis(READER, signal, 7)
         assert answer.seq == 7
         assert tries == [READER.settings.first, READER.settings.thorough][: len(tries)]
@@ -352,6 +353,57 @@ def test_a_wide_search_may_take_it_back(reads, again, reason, margin, doubt):
     assert (answer.reason, answer.margin, answer.doubt) == (reason, margin, doubt)
     assert answer.runner_up.face == "F2"
     assert judged is (second[0] if second else None)
+
+
+@pytest.fixture
+def exchanged(reads, monkeypatch):
+    """Read a touch that leaves much over; by axis, what is found with halves exchanged."""
+
+    def read(by_axis, state=None, leaves=True):
+        asked = []
+        best = reads.one(score=-100.0)
+
+        def verified(reader, given, effort):
+            if isinstance(given, int):
+                assert effort is READER.settings.first
+                asked.append(given)
+                return by_axis[given]
+            return [best]
+
+        def leaves_much(found, settings):
+            assert (found, settings) == (best, READER.settings.exchanged)
+            return leaves
+
+        for name, value in (
+            ("verify_hypotheses", verified), ("leaves_much", leaves_much),
+            ("exchange_halves", lambda _, axis: axis), ("expected_matches", lambda *_, **__: 1e-9),
+            ("shows_strokes", lambda *_: True), ("may_tell_more", lambda *_: False),
+        ):  # fmt: skip
+            monkeypatch.setattr(recognizer.touch.recognise, name, value)
+        touch = SimpleNamespace(contact=True, state=state)
+        answer, judged = recognise_with_hypothesis(READER, touch, 7)
+        assert judged is best
+        assert (answer.reason, answer.margin) in (("", math.inf), (AMBIGUOUS, 0.0))
+        return bool(answer), asked
+
+    return read
+
+
+def test_what_is_read_better_with_halves_exchanged_is_no_answer(reads, exchanged):
+    better, worse = [reads.one("there", -99.9)], [reads.one("there", -100.0)]
+    few = [reads.one("there", -50.0, inliers=2)]
+    assert exchanged(([], better)) == (False, [0, 1])
+    assert exchanged((better, [])) == (False, [0])
+    assert exchanged((worse, worse)) == (True, [0, 1])
+    assert exchanged((few, few)) == (True, [0, 1])
+
+
+def test_halves_are_exchanged_only_where_that_may_be(reads, exchanged, monkeypatch):
+    better = [reads.one("there", -99.9)]
+    assert exchanged((better, better), leaves=False) == (True, [])
+    assert exchanged((better, better), state="learned") == (True, [])
+    monkeypatch.setattr(READER, "sensor", SensorType().with_overlay("pad"))
+    assert exchanged((better, better)) == (True, [])
 
 
 def test_a_border_counts_there_too(reads):

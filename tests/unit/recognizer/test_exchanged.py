@@ -1,0 +1,87 @@
+"""Which answers leave much of a touch over, and what exchanging halves does."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from recognizer.touch.belief import Support
+from recognizer.touch.exchanged import exchange_halves, leaves_much
+from recognizer.touch.settings import DEFAULTS
+from recognizer.touch.signal import Signal
+
+SETTINGS = DEFAULTS.exchanged
+PLAIN = Support(surprise=40.0, explained=0.95, inliers=16, clear=0, plain=0, wider=0.0)
+SQUARE = (np.array([(0, 0), (40, 0), (40, 40), (0, 40)], float),)
+
+
+class Face:
+    polygon_mm = SQUARE
+
+    def __init__(self, round_):
+        self.round = round_
+
+
+@pytest.fixture
+def leaves(small, monkeypatch):
+    """Ask of a touch with so many of 100 pressed tactels so far beyond the face."""
+
+    def ask(*, beyond=0, mm=3.0, forces=1.0, round_=None, noise=0.0, **speaks):
+        points = np.full((120, 2), 20.0)
+        points[:beyond, 0] = 40.0 + mm
+        points[100:] = 60.0  # not pressed: never counted
+        monkeypatch.setattr("recognizer.touch.exchanged.points_on_face", lambda *_: points)
+        felt = np.where(np.arange(120) < 100, forces, 0.1)
+        image = SimpleNamespace(forces=felt, trust=np.ones(120), noise=noise)
+        face = Face(round_)
+        found = SimpleNamespace(
+            image=image, embossed=SimpleNamespace(face=lambda _: face),
+            hypothesis=SimpleNamespace(face=0), support=lambda: replace(PLAIN, **speaks),
+        )  # fmt: skip
+        return leaves_much(found, SETTINGS)
+
+    return ask
+
+
+def test_what_lies_on_the_face_leaves_nothing(leaves):
+    assert not leaves()
+
+
+def test_pressed_tactels_beyond_the_face_are_left_over(leaves):
+    assert leaves(beyond=15)
+    assert not leaves(beyond=14)
+    assert leaves(beyond=15, mm=1.51)
+    assert not leaves(beyond=15, mm=1.49)
+    assert not leaves(beyond=15, round_="a cylinder")
+
+
+def test_what_reads_little_is_not_pressed(leaves):
+    forces = np.where(np.arange(120) < 15, 0.19, 1.0)
+    assert not leaves(beyond=15, forces=forces)
+    assert leaves(beyond=15, forces=np.where(np.arange(120) < 15, 0.21, 1.0))
+
+
+def test_symbols_that_explain_little_leave_much(leaves):
+    assert leaves(surprise=24.9, explained=0.859)
+    assert not leaves(surprise=25.0, explained=0.859)
+    assert not leaves(surprise=24.9, explained=0.86)
+
+
+def test_soft_symbols_explain_little_for_noise(leaves):
+    assert leaves(surprise=24.9, explained=0.85, noise=0.0333)
+    assert not leaves(surprise=24.9, explained=0.85, noise=0.0334)
+    assert leaves(beyond=15, noise=0.0334)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_exchanged_twice_nothing_is_changed(axis):
+    forces = np.arange(256.0).reshape(16, 16)
+    trust = (forces % 7 > 0).astype(float)
+    signal = Signal(forces, trust, contact=True, newtons=False)
+    other = exchange_halves(signal, axis)
+    first = (slice(8, None), slice(None)) if axis == 0 else (slice(None), slice(8, None))
+    assert other.forces[0, 0] == forces[first][0, 0]
+    assert (exchange_halves(other, axis).forces == forces).all()
+    assert (exchange_halves(other, axis).trust == trust).all()
+    assert (other.trust == (other.forces % 7 > 0)).all()
