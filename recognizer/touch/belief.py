@@ -51,7 +51,7 @@ class Support:
     clear: int  #: cells that speak clearly for another symbol
     plain: int  #: and plainly
     wider: float  #: tenths of a mm by which strokes would be wider than asked
-    worn: int = 0  #: cells that are seen, with a registered symbol that is not felt
+    worn: int  #: cells that are seen, with a registered symbol that is not felt
 
     def holds(self, limits: BeliefSettings) -> bool:
         """Return whether an encoded surface is believed."""

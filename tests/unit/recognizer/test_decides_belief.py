@@ -17,10 +17,22 @@ from recognizer.touch.belief import (
     weigh_cells,
 )
 from recognizer.touch.hypothesis import Hypothesis
+from recognizer.touch.prepare import settings_for
 from recognizer.touch.settings import BeliefSettings, ReaderSettings
 
 LIMITS = BeliefSettings()
-GOOD = Support(surprise=20.0, explained=0.9, inliers=12, clear=0, plain=0, wider=0.0)
+GOOD = Support(surprise=20.0, explained=0.9, inliers=12, clear=0, plain=0, wider=0.0, worn=0)
+
+
+@pytest.mark.parametrize(("tactels", "share"), [(3.0, 1.0), (math.sqrt(8.0), 1.0), (2.0, 0.25)])
+def test_few_tactels_on_a_symbol_count_whole(tactels, share):
+    sensor = SimpleNamespace(pitch_mm=2.0)
+    styles = [SimpleNamespace(style=SimpleNamespace(pitch_mm=2 * t)) for t in (tactels, 9.0)]
+    found = settings_for(SimpleNamespace(arrays=styles), sensor, ReaderSettings())
+    usual = ReaderSettings()
+    assert found.belief.whole == pytest.approx(share * usual.belief.whole)
+    assert found.hypotheses.corner == pytest.approx(share * usual.hypotheses.corner)
+    assert found.hypotheses.heavy == pytest.approx(share * usual.hypotheses.heavy)
 
 
 @pytest.mark.parametrize(
@@ -75,6 +87,7 @@ def one_cell(small, scores, seen=20.0, held=2, order=4):
         ([-1000, -1000, 0, -1000, 0], 20, 2, (False, True, False, 0.0)),  # as likely as all else
         # but not where rounding alone tells the two apart
         ([-9, -9, 0, -9, 0.9e-4], 20, 2, (False, True, False, 0.0)),
+        ([-9, -9, 0, -9, 1e-4], 20, 2, (False, True, False, 0.0)),
         ([-9, -9, 0, -9, 1.1e-4], 20, 2, (True, True, False, 0.0)),
         # another symbol is likelier
         ([0, -9, -4.5, -9, -9], 20, 2, (False, True, False, 4.5)),

@@ -11,7 +11,11 @@ import recognizer.touch.recognise
 from probe.sensor import SensorType
 from recognizer.touch.belief import Support
 from recognizer.touch.hypothesis import Hypothesis
-from recognizer.touch.recognise import recognise, recognise_with_hypothesis
+from recognizer.touch.recognise import (
+    recognise,
+    recognise_with_hypothesis,
+    recognise_with_rivals,
+)
 from recognizer.touch.recognition import (
     AMBIGUOUS,
     BY_CHANCE,
@@ -26,7 +30,9 @@ TOUCHED = SimpleNamespace(contact=True, state=None)
 READER = SimpleNamespace(
     sensor=SensorType(), settings=ReaderSettings(), lab=SimpleNamespace(arrays=("one", "two"))
 )
-SURE = Support(surprise=19.9, explained=0.95, inliers=16, clear=0, plain=0, wider=0.0)
+#: Limits of margins, nats: 10 and 14 but for rounding.
+TEN, FOURTEEN = READER.settings.belief.margin, READER.settings.belief.margin_by_few
+SURE = Support(surprise=19.9, explained=0.95, inliers=16, clear=0, plain=0, wider=0.0, worn=0)
 T_OBJECT_FACE = np.array([[0.0, 0, 1, 5], [1, 0, 0, 6], [0, 1, 0, 7], [0, 0, 0, 1]])
 
 
@@ -75,6 +81,10 @@ def lab(small):
     return made
 
 
+def test_limits_of_margins_are_reached_but_for_rounding():
+    assert (TEN, FOURTEEN) == (10.0 - 1e-4, 14.0 - 1e-4)
+
+
 def wide_unless_sure(reader, signal, answer, judged, best, support):
     """Ask for the second try as under a pad: `test_first_look` has when it is asked for."""
     assert (reader is READER, bool(best), bool(support)) in ((True,) * 3, (True, False, False))
@@ -107,6 +117,10 @@ def reads(small, lab, monkeypatch):
             assert tip_mm == READER.sensor.overlay.tab_diameter_mm
             return by_border
 
+        def tells_more(reader, given, answer, judged, best, support):
+            assert best is (first[0] if first else None)
+            return wide_unless_sure(reader, given, answer, judged, best, support)
+
         def found(reader, given, effort):
             assert reader is READER
             assert given is signal
@@ -119,7 +133,7 @@ def reads(small, lab, monkeypatch):
         monkeypatch.setattr(recognizer.touch.recognise, "propose_next", lambda *_: None)
         monkeypatch.setattr(recognizer.touch.recognise, "diagnose", lambda *_: None)
         monkeypatch.setattr(recognizer.touch.recognise, "shows_strokes", lambda *_: True)
-        monkeypatch.setattr(recognizer.touch.recognise, "may_tell_more", wide_unless_sure)
+        monkeypatch.setattr(recognizer.touch.recognise, "may_tell_more", tells_more)
         monkeypatch.setattr(recognizer.touch.recognise, "leaves_much", lambda *_: False)
         answer, judged = recognise_with_hypothesis(READER, signal, 7)
         assert answer.seq == 7
@@ -147,11 +161,12 @@ def test_a_touch_that_is_not_numbered_is_the_first(reads):
     nothing = SimpleNamespace(contact=False)
     assert recognise(READER, nothing).seq == 0
     assert recognise_with_hypothesis(READER, nothing)[0].seq == 0
+    assert recognise_with_rivals(READER, nothing)[0].seq == 0
 
 
 @pytest.mark.parametrize(
     ("behind", "reason", "margin"),
-    [(3.0, AMBIGUOUS, 3.0), (9.9, AMBIGUOUS, 9.9), (13.9, "", 13.9), (14.0, "", math.inf)],
+    [(3.0, AMBIGUOUS, 3.0), (9.9, AMBIGUOUS, 9.9), (13.9, "", 13.9), (FOURTEEN, "", math.inf)],
 )
 def test_a_place_one_pitch_beside_is_a_rival_where_it_comes_near(reads, behind, reason, margin):
     best, beside = reads.one(inliers=16), replace(reads.one(score=-behind), shift=1)
@@ -212,7 +227,7 @@ def test_what_the_first_try_refuses_the_second_may_answer(reads):
 
 
 def test_where_many_cells_speak_at_the_second_try_ten_nats_are_enough(reads):
-    second = [reads.one("there", inliers=11), reads.one("rival", -10.0)]
+    second = [reads.one("there", inliers=11), reads.one("rival", -TEN)]
     answer, _, _ = reads.read([reads.one(explained=0.1)], second)
     assert answer
 
@@ -225,7 +240,7 @@ def test_what_the_second_try_refuses_is_refused(reads):
     assert (answer.reason, judged) == (TOO_FEW, None)
 
 
-@pytest.mark.parametrize(("margin", "reason"), [(10.0, ""), (9.99, AMBIGUOUS)])
+@pytest.mark.parametrize(("margin", "reason"), [(TEN, ""), (9.99, AMBIGUOUS)])
 def test_the_best_is_ten_nats_before_the_best_other_place(reads, margin, reason):
     found = [
         reads.one(),
@@ -244,10 +259,10 @@ def test_the_best_is_ten_nats_before_the_best_other_place(reads, margin, reason)
 @pytest.mark.parametrize(
     ("inliers", "margin", "reason"),
     [
-        (10, 14.0, ""),
+        (10, FOURTEEN, ""),
         (10, 13.99, AMBIGUOUS),
         (11, 13.99, ""),
-        (11, 10.0, ""),
+        (11, TEN, ""),
     ],
 )
 def test_where_fewer_than_eleven_cells_speak_it_is_fourteen(reads, inliers, margin, reason):
@@ -368,7 +383,7 @@ def exchanged(reads, monkeypatch):
                 assert effort is READER.settings.first
                 asked.append(given)
                 return by_axis[given]
-            return [best]
+            return [best, reads.one("rival", -200.0)]
 
         def leaves_much(found, settings):
             assert (found, settings) == (best, READER.settings.exchanged)
@@ -383,14 +398,15 @@ def exchanged(reads, monkeypatch):
         touch = SimpleNamespace(contact=True, state=state)
         answer, judged = recognise_with_hypothesis(READER, touch, 7)
         assert judged is best
-        assert (answer.reason, answer.margin) in (("", math.inf), (AMBIGUOUS, 0.0))
+        assert (answer.reason, answer.margin) in (("", 100.0), (AMBIGUOUS, 0.0))
         return bool(answer), asked
 
     return read
 
 
 def test_what_is_read_better_with_halves_exchanged_is_no_answer(reads, exchanged):
-    better, worse = [reads.one("there", -99.9)], [reads.one("there", -100.0)]
+    better = [reads.one("there", -99.9), reads.one("rival", -150.0)]
+    worse = [reads.one("there", -100.0), reads.one("rival", -150.0)]
     few = [reads.one("there", -50.0, inliers=2)]
     assert exchanged(([], better)) == (False, [0, 1])
     assert exchanged((better, [])) == (False, [0])
@@ -404,6 +420,49 @@ def test_halves_are_exchanged_only_where_that_may_be(reads, exchanged, monkeypat
     assert exchanged((better, better), state="learned") == (True, [])
     monkeypatch.setattr(READER, "sensor", SensorType().with_overlay("pad"))
     assert exchanged((better, better)) == (True, [])
+
+
+def test_what_symbols_allow_needs_no_border(reads):
+    found = [reads.one()]
+    assert reads.read(found, found, doubt=1e-4, by_border=1e-6)[0].doubt == 1e-4
+
+
+def test_only_what_is_refused_has_a_cause(reads, monkeypatch):
+    few = [reads.one(inliers=2)]
+    for found, cause in (([reads.one()], None), (few, "its cause")):
+        reads.read(found, found, doubt=0.0)
+        monkeypatch.setattr(recognizer.touch.recognise, "diagnose", lambda *_: "its cause")
+        monkeypatch.setattr(
+            recognizer.touch.recognise, "verify_hypotheses", lambda *_, found=found: found
+        )
+        monkeypatch.setattr(recognizer.touch.recognise, "expected_matches", lambda *_, **__: 0.0)
+        assert recognise(READER, TOUCHED, 7).cause == cause
+
+
+def test_a_print_is_posed_by_the_scale_that_is_felt(reads, monkeypatch):
+    class Print:
+        @staticmethod
+        def pose(pose, covariance, felt):
+            assert felt == ("felt", READER.settings.refine.prior[6])
+            return 2 * pose, 3 * covariance
+
+    found = reads.one()
+    plain, _, _ = reads.read([found])
+    monkeypatch.setattr(
+        recognizer.touch.recognise, "felt_scale", lambda face, fit, prior: ("felt", prior)
+    )
+    reads.lab.known[0].printed = Print
+    answer, _, _ = reads.read([found])
+    assert (answer.T_face_probe == 2 * plain.T_face_probe).all()
+    assert (answer.covariance == 3 * plain.covariance).all()
+
+
+def test_only_flat_faces_say_how_far_inside_a_touch_lies(reads, monkeypatch):
+    found = reads.one()
+    assert reads.read([found])[0].inside_mm == pytest.approx(10.0)
+    reads.lab.known[0].round = "a cylinder"
+    monkeypatch.setattr(recognizer.touch.recognise, "pose_on_object", lambda *_: np.eye(4))
+    assert reads.read([found])[0].inside_mm is None
 
 
 def test_a_border_counts_there_too(reads):
@@ -420,7 +479,7 @@ def test_a_border_counts_there_too(reads):
         ({"worn": 1}, -40.0, 1e-5, 1e-5),
         ({"worn": 2}, -40.0, 1e-5, 0.3),
         ({"clear": 1}, -40.0, 1e-5, 0.3),
-        ({}, -14.0, 1e-5, 1e-5),
+        ({}, -FOURTEEN, 1e-5, 1e-5),
         ({}, -13.9, 1e-5, 0.3),
     ],
 )

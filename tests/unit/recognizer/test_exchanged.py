@@ -12,7 +12,7 @@ from recognizer.touch.settings import DEFAULTS
 from recognizer.touch.signal import Signal
 
 SETTINGS = DEFAULTS.exchanged
-PLAIN = Support(surprise=40.0, explained=0.95, inliers=16, clear=0, plain=0, wider=0.0)
+PLAIN = Support(surprise=40.0, explained=0.95, inliers=16, clear=0, plain=0, wider=0.0, worn=0)
 SQUARE = (np.array([(0, 0), (40, 0), (40, 40), (0, 40)], float),)
 
 
@@ -27,13 +27,13 @@ class Face:
 def leaves(small, monkeypatch):
     """Ask of a touch with so many of 100 pressed tactels so far beyond the face."""
 
-    def ask(*, beyond=0, mm=3.0, forces=1.0, round_=None, noise=0.0, **speaks):
+    def ask(*, beyond=0, mm=3.0, forces=1.0, round_=None, noise=0.0, trust=1.0, **speaks):
         points = np.full((120, 2), 20.0)
         points[:beyond, 0] = 40.0 + mm
         points[100:] = 60.0  # not pressed: never counted
         monkeypatch.setattr("recognizer.touch.exchanged.points_on_face", lambda *_: points)
         felt = np.where(np.arange(120) < 100, forces, 0.1)
-        image = SimpleNamespace(forces=felt, trust=np.ones(120), noise=noise)
+        image = SimpleNamespace(forces=felt, trust=np.full(120, trust), noise=noise)
         face = Face(round_)
         found = SimpleNamespace(
             image=image, embossed=SimpleNamespace(face=lambda _: face),
@@ -52,14 +52,22 @@ def test_pressed_tactels_beyond_the_face_are_left_over(leaves):
     assert leaves(beyond=15)
     assert not leaves(beyond=14)
     assert leaves(beyond=15, mm=1.51)
-    assert not leaves(beyond=15, mm=1.49)
+    assert not leaves(beyond=15, mm=1.5)
     assert not leaves(beyond=15, round_="a cylinder")
 
 
 def test_what_reads_little_is_not_pressed(leaves):
     forces = np.where(np.arange(120) < 15, 0.19, 1.0)
     assert not leaves(beyond=15, forces=forces)
+    assert not leaves(beyond=15, forces=np.where(np.arange(120) < 15, 0.2, 1.0))
     assert leaves(beyond=15, forces=np.where(np.arange(120) < 15, 0.21, 1.0))
+
+
+def test_what_is_half_trusted_is_pressed_half(leaves):
+    assert not leaves(beyond=15, trust=np.where(np.arange(120) < 15, 0.19, 1.0))
+    assert leaves(beyond=15, trust=np.where(np.arange(120) < 15, 0.21, 1.0))
+    weak = np.where(np.arange(120) < 12, 0.25, 0.3)
+    assert leaves(beyond=15, forces=np.where(np.arange(120) < 12, 2.0, 1.0), trust=weak)
 
 
 def test_symbols_that_explain_little_leave_much(leaves):
@@ -69,8 +77,8 @@ def test_symbols_that_explain_little_leave_much(leaves):
 
 
 def test_soft_symbols_explain_little_for_noise(leaves):
-    assert leaves(surprise=24.9, explained=0.85, noise=0.0333)
-    assert not leaves(surprise=24.9, explained=0.85, noise=0.0334)
+    assert leaves(surprise=24.9, explained=0.85, forces=30.0, noise=1.0)
+    assert not leaves(surprise=24.9, explained=0.85, forces=29.9, noise=1.0)
     assert leaves(beyond=15, noise=0.0334)
 
 

@@ -71,7 +71,7 @@ def asked(small):
         answer = refusal(0, reason)
         if not reason:
             answer = replace(answer, object="Thing")
-        support = replace(Support(5.0, 0.9, 5, clear=0, plain=0, wider=0.0), **speaks)
+        support = replace(Support(5.0, 0.9, 5, clear=0, plain=0, wider=0.0, worn=0), **speaks)
         given = answer if judged is None else judged
         return may_tell_more(
             reader(small, **(lab or {})), touch_of(tactels), answer, given, best, support

@@ -216,7 +216,7 @@ def test_the_reading_behind_an_answer(url, reader):
      {"wider": 1.1, "explained": 0.75}],
 )  # fmt: skip
 def test_what_is_not_believed(change):
-    good = Support(surprise=12.0, explained=0.8, inliers=12, clear=0, plain=0, wider=0.3)
+    good = Support(surprise=12.0, explained=0.8, inliers=12, clear=0, plain=0, wider=0.3, worn=0)
     assert good.holds(BeliefSettings())
     assert not replace(good, **change).holds(BeliefSettings())
 
