@@ -17,6 +17,7 @@ MOVING = "moving"
 EDGE = "edge"
 ONE_ROW = "one_row"
 DEAD_TACTELS = "dead_tactels"
+EXCHANGED = "halves_exchanged"
 NOT_REGISTERED = "not_registered"
 OTHER_PATTERN = "other_pattern"
 PLAIN = "not_encoded"
@@ -104,6 +105,10 @@ _WORDS: dict[str, Callable[[Numbers], str]] = {
     EDGE: _edge,
     ONE_ROW: lambda n: f"one row of symbols: what is loaded is {n['width_mm']:.0f} mm wide",
     DEAD_TACTELS: _dead,
+    EXCHANGED: lambda n: (
+        "all of the touch lies on one face if the halves of the sensor's "
+        f"{'columns' if n['columns'] else 'rows'} are exchanged"
+    ),
     NOT_REGISTERED: _not_registered,
     OTHER_PATTERN: _other_pattern,
     PLAIN: lambda n: (
@@ -123,6 +128,7 @@ _WAYS_OUT = {
     EDGE: "move towards the loaded part",
     ONE_ROW: "one row tells no place: touch another face, or several places as one (--scan)",
     DEAD_TACTELS: "learn the sensor: recognize-object --learn FILE, from 25 touches or more",
+    EXCHANGED: "is the sensor wired as drawn? recognize-object check tells",
     NOT_REGISTERED: "is the object in this database, or of another lab?",
     OTHER_PATTERN: "another profile, another overlay (--overlay), or an object of no lab?",
     PLAIN: "is the object in this database?",

@@ -17,6 +17,7 @@ import math
 from dataclasses import replace
 
 from recognizer.touch.belief import Support, VerifiedHypothesis
+from recognizer.touch.cause import EXCHANGED, Cause
 from recognizer.touch.chance import expected_by_border, expected_matches
 from recognizer.touch.diagnose import diagnose
 from recognizer.touch.exchanged import exchange_halves, leaves_much
@@ -52,7 +53,7 @@ from recognizer.touch.verify import verify_hypotheses
 def recognise(reader: PreparedLab, signal: Signal, seq: int = 0) -> Recognition:
     """Return what one touch says, and where to touch next if that is not enough."""
     answer, found = recognise_with_rivals(reader, signal, seq)
-    cause = None if answer else diagnose(reader, signal, found)
+    cause = answer.cause if answer or answer.cause else diagnose(reader, signal, found)
     return replace(answer, next=propose_next(reader, signal, answer, found), cause=cause)
 
 
@@ -69,8 +70,9 @@ def recognise_with_rivals(
 ) -> tuple[Recognition, list[VerifiedHypothesis]]:
     """Return what a touch says, and all hypotheses, first of them the one that was judged."""
     answer, found = _try_twice(reader, signal, seq)
-    if answer and _is_exchanged(reader, signal, answer, found[0]):
-        return refusal(seq, AMBIGUOUS, margin=0.0, runner_up=answer.runner_up), found
+    exchanged = _read_exchanged(reader, signal, found[0]) if answer else None
+    if exchanged is not None:
+        return replace(refusal(seq, AMBIGUOUS, margin=0.0), cause=exchanged), found
     return answer, found
 
 
@@ -118,24 +120,22 @@ def _look_again(
     return answer, first
 
 
-def _is_exchanged(
-    reader: PreparedLab, signal: Signal, answer: Recognition, best: VerifiedHypothesis
-) -> bool:
-    """Return whether a touch is read better with halves of the sensor exchanged.
+def _read_exchanged(reader: PreparedLab, signal: Signal, best: VerifiedHypothesis) -> Cause | None:
+    """Return which halves of the sensor seem exchanged, as a touch is read better so; None if none.
 
     Asked where its answer leaves much of it over; not of a sensor that was learned, which tells.
     """
     settings = reader.settings
     if reader.sensor.overlay.kind != "tab" or signal.state is not None:
-        return False
+        return None
     if not leaves_much(best, settings.exchanged):
-        return False
+        return None
     for axis in (0, 1):
         found = verify_hypotheses(reader, exchange_halves(signal, axis), settings.first)
-        other, support = _answer(found, settings, answer.seq)
-        if _judge(reader, found, other, support) and found[0].score > best.score:
-            return True
-    return False
+        answer, support = _answer(found, settings, 0)
+        if _judge(reader, found, answer, support) and found[0].score > best.score:
+            return Cause(EXCHANGED, {"columns": float(axis)})
+    return None
 
 
 def _answer(

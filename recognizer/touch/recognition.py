@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.touch.cause import Cause
+from recognizer.touch.cause import EXCHANGED, Cause
 
 NO_CONTACT = "no contact"
 TOO_FEW = "too few symbols"
@@ -151,7 +151,9 @@ class Recognition:
     @property
     def way_out(self) -> str:
         """What a person does about the reason; empty where it answers."""
-        if self.cause is not None and self.reason in (TOO_FEW, NOT_ENCODED):
+        if self.cause is not None and (
+            self.reason in (TOO_FEW, NOT_ENCODED) or self.cause.code == EXCHANGED
+        ):
             return self.cause.way_out
         return WAYS_OUT.get(self.reason, "")
 

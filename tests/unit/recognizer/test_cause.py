@@ -158,13 +158,16 @@ def test_a_cause_is_said_beside_the_reason_it_led_to():
     assert both.startswith("not recognised: ambiguous: at an edge: 50 %")
     assert both.endswith("touch again a few mm beside")
     assert refusal(1, NOT_ENCODED).reason_code == "not_an_encoded_surface"
+    halves = Cause(cause.EXCHANGED, {"columns": 0.0})
+    assert "halves of the sensor's rows are exchanged" in str(halves)
+    assert "is the sensor wired as drawn?" in str(replace(refusal(1, AMBIGUOUS), cause=halves))
     numbers = dict.fromkeys(
         ("plateau", "signal_to_noise", "newtons", "loaded", "symbols", "direction_deg",
          "sharpness", "silent", "explained", "explained_anywhere",
-         "symbols_anywhere", "slope", "width_mm", "variation"), 0.5
+         "symbols_anywhere", "slope", "width_mm", "variation", "columns"), 0.5
     )  # fmt: skip
     codes = [value for name, value in vars(cause).items() if name.isupper() and name[0] != "_"]
-    assert len(codes) == 11
+    assert len(codes) == 12
     for code in codes:
         one = Cause(code, numbers)
         assert str(one)

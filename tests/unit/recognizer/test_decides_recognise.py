@@ -10,6 +10,7 @@ import pytest
 import recognizer.touch.recognise
 from probe.sensor import SensorType
 from recognizer.touch.belief import Support
+from recognizer.touch.cause import EXCHANGED, Cause
 from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.recognise import (
     recognise,
@@ -396,10 +397,21 @@ def exchanged(reads, monkeypatch):
         ):  # fmt: skip
             monkeypatch.setattr(recognizer.touch.recognise, name, value)
         touch = SimpleNamespace(contact=True, state=state)
+        for name in ("propose_next", "diagnose"):
+            monkeypatch.setattr(recognizer.touch.recognise, name, lambda *_: None)
         answer, judged = recognise_with_hypothesis(READER, touch, 7)
         assert judged is best
-        assert (answer.reason, answer.margin) in (("", 100.0), (AMBIGUOUS, 0.0))
-        return bool(answer), asked
+        assert (answer.seq, answer.reason, answer.margin) in (
+            (7, "", 100.0), (7, AMBIGUOUS, 0.0),
+        )  # fmt: skip
+        found = recognise(READER, touch, 7)
+        assert found.cause == answer.cause
+        if answer:
+            assert answer.cause is None
+            return True, asked[: len(asked) // 2]
+        assert answer.cause == Cause(EXCHANGED, {"columns": float(asked[-1])})
+        assert answer.way_out == answer.cause.way_out
+        return False, asked[: len(asked) // 2]
 
     return read
 
