@@ -75,8 +75,8 @@ class ReaderSettings:
 
     Examples
     --------
-    >>> ReaderSettings().belief.margin
-    10.0
+    >>> ReaderSettings().belief.least_inliers
+    4
     >>> ReaderSettings(belief=BeliefSettings(margin=20.0)).belief.surprise
     3.0
     """
