@@ -20,6 +20,7 @@ from probe.frame import Frame
 from recognizer.errors import WiringError
 from recognizer.sensor.settings import LEARNING, LearningSettings
 from recognizer.touch.contacts import TouchImage
+from recognizer.touch.exchanged import exchange_image
 from recognizer.touch.reader import Reader
 from recognizer.touch.sensor_state import invert_floating
 
@@ -32,8 +33,8 @@ CHANGES: dict[str, Change] = {
     "columns": lambda image, _: image[:, ::-1],
     "rows": lambda image, _: image[::-1],
     "transpose": lambda image, _: image.T,
-    "column-halves": lambda image, _: np.roll(image, image.shape[1] // 2, axis=1),
-    "row-halves": lambda image, _: np.roll(image, image.shape[0] // 2, axis=0),
+    "column-halves": lambda image, _: exchange_image(image, 1),
+    "row-halves": lambda image, _: exchange_image(image, 0),
     "values": lambda image, full: full - np.minimum(image, full),
     "quarter": lambda image, _: np.rot90(image),
 }

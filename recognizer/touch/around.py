@@ -54,3 +54,8 @@ def quantile(ordered: NDArray[np.float64], share: float) -> NDArray[np.float64]:
     part = at - low
     between = other - one
     return np.asarray(one + between * part if part < 0.5 else other - between * (1 - part))
+
+
+def mean_of_strongest(forces: NDArray[np.float64], count: int) -> float:
+    """Return the mean of so many of the highest readings."""
+    return float(np.sort(forces, axis=None)[-count:].mean())

@@ -23,6 +23,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from recognizer.touch.around import mean_of_strongest
 from recognizer.touch.belief import VerifiedHypothesis
 from recognizer.touch.hypothesis import labels_at
 from recognizer.touch.lab import EncodedFace
@@ -80,7 +81,7 @@ def surely_pressed(image: Image, gain: Array, share: float, settings: BorderSett
 
 
 def _plain(image: Image, force: Array, share: float, settings: BorderSettings) -> Flags:
-    strongest = float(np.sort(image.forces * image.trust)[-settings.strongest :].mean())
+    strongest = mean_of_strongest(image.forces * image.trust, settings.strongest)
     least = max(share * strongest, settings.sigmas * image.noise)
     return np.asarray((image.trust > 0) & (force > least))
 

@@ -10,20 +10,25 @@ frame, mm.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
+from recognizer.touch.around import mean_of_strongest
 from recognizer.touch.belief import VerifiedHypothesis
 from recognizer.touch.border import points_on_face
 from recognizer.touch.pose import outline_of
 from recognizer.touch.settings import ExchangedSettings
 from recognizer.touch.signal import Signal
 
+Scalar = TypeVar("Scalar", bound=np.generic)
+
 
 def leaves_much(found: VerifiedHypothesis, settings: ExchangedSettings) -> bool:
     """Return whether a good part of a touch is left over by a hypothesis, and not for noise."""
     support, image = found.support(), found.image
-    strongest = np.sort(image.forces * image.trust)[-settings.strongest :].mean()
+    strongest = mean_of_strongest(image.forces * image.trust, settings.strongest)
     poorly = support.surprise < settings.surprise and support.explained < settings.explained
     if poorly and strongest >= settings.soft * image.noise:
         return True
@@ -32,9 +37,16 @@ def leaves_much(found: VerifiedHypothesis, settings: ExchangedSettings) -> bool:
 
 def exchange_halves(signal: Signal, axis: int) -> Signal:
     """Return a signal with the halves of its rows (axis 0) or of its columns (1) exchanged."""
-    shift = signal.forces.shape[axis] // 2
-    forces, trust = (np.roll(each, shift, axis) for each in (signal.forces, signal.trust))
-    return replace(signal, forces=forces, trust=trust)
+    return replace(
+        signal,
+        forces=exchange_image(signal.forces, axis),
+        trust=exchange_image(signal.trust, axis),
+    )
+
+
+def exchange_image(image: NDArray[Scalar], axis: int) -> NDArray[Scalar]:
+    """Return an image (rows, columns) likewise."""
+    return np.roll(image, image.shape[axis] // 2, axis)
 
 
 def _lies_beside(found: VerifiedHypothesis, pressed: float, settings: ExchangedSettings) -> bool:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import SensorType
-from recognizer.touch.around import combine_around
+from recognizer.touch.around import combine_around, mean_of_strongest
 from recognizer.touch.settings import NextSettings
 from recognizer.touch.signal import Signal
 
@@ -113,8 +113,7 @@ def loaded_tactels(signal: Signal, settings: NextSettings) -> Flags:
 
 def strongest_reading(signal: Signal, settings: NextSettings) -> float:
     """Return the mean of the strongest readings."""
-    forces = np.sort(signal.forces * signal.trust, axis=None)
-    return float(forces[-settings.strongest :].mean())
+    return mean_of_strongest(signal.forces * signal.trust, settings.strongest)
 
 
 def _tactels(sensor: SensorType, points_mm: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.touch.around import quantile
+from recognizer.touch.around import mean_of_strongest, quantile
 from recognizer.touch.belief import Support, VerifiedHypothesis, symbols_to_name
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.prepare import PreparedLab
@@ -122,8 +122,7 @@ def pressed_tactels(signal: Signal, settings: FirstLookSettings) -> int:
 
 
 def _pressed_from(signal: Signal, settings: FirstLookSettings) -> float:
-    strongest = np.sort(signal.forces * signal.trust, axis=None)[-settings.strongest :]
-    return settings.pressed * float(strongest.mean())
+    return settings.pressed * mean_of_strongest(signal.forces * signal.trust, settings.strongest)
 
 
 def _tactels_to_name(

@@ -400,7 +400,7 @@ static double explain(const Scene *s, Work *w, Shown shown, int64_t i, const dou
         if (w->press[t] != 1.0 && s->trust[t] != 0.0) level += s->trust[t] * log(w->press[t]);
     }
     for (int k = 3; k < 8; k++) {
-        double away = k < 7 ? pose[k] : gain[0] - s->usual_scale;
+        double away = departure(s, k, pose, gain);
         sum -= 0.5 * away * away * s->precision[k];
     }
     return sum + w->measure + level;
@@ -438,29 +438,36 @@ static void linear_system(const Scene *s, Work *w, const double *pose, const dou
                 sums[3] += at * *(const Four *)(e + t);
             }
             for (int j = 0; j < 4; j++) {
-                double sum = (sums[j][0] + sums[j][1]) + (sums[j][2] + sums[j][3]);
+                double sum = total(sums[j]);
                 if (m + j == UNKNOWNS) right[k] = sum;
                 else normal[k * UNKNOWNS + m + j] = normal[(m + j) * UNKNOWNS + k] = sum;
             }
         }
     }
     for (int k = 0; k < UNKNOWNS; k++) {
-        double away = k < 3 || k > 7 ? 0.0 : k < 7 ? pose[k] : gain[0] - s->usual_scale;
+        double away = departure(s, k, pose, gain);
         normal[k * UNKNOWNS + k] += s->precision[k];
         right[k] -= away * s->precision[k];
     }
 }
 
-void linearize(const Scene *s, const int8_t *given, const int64_t *corner, const double *pose,
-               const double *gain, int64_t wide, Linearized at) {
+/* See the image as the one lattice does whose cells show what is given. */
+static Work see_given(const Scene *s, const int8_t *given, const int64_t *corner,
+                      const double *pose, const double *gain) {
     Work w = new_work(s);
-    const int64_t n = s->n, row = n * sizeof(double);
     look_at_gains(s, &w, gain);
     normalize(s, &w, 0, gain);
     w.known = 1;
     find_cells(s, &w, pose);
     read_labels(s, &w, given, corner);
     look_up(s, &w, pose);
+    return w;
+}
+
+void linearize(const Scene *s, const int8_t *given, const int64_t *corner, const double *pose,
+               const double *gain, int64_t wide, Linearized at) {
+    Work w = see_given(s, given, corner, pose, gain);
+    const int64_t n = s->n, row = n * sizeof(double);
     value_shown(s, &w);
     press_shown(s, &w, pose, gain);
     for (int f = 0; f < 3; f++) memcpy(at.values + f * wide, w.shown + f * n, row);
@@ -475,14 +482,8 @@ void linearize(const Scene *s, const int8_t *given, const int64_t *corner, const
    stand: what `explained.explained_share` says. */
 double explained_share(const Scene *s, const int8_t *given, const int64_t *corner,
                        const double *pose, const double *gain, double hidden, double above) {
-    Work w = new_work(s);
+    Work w = see_given(s, given, corner, pose, gain);
     double weight = 0.0, sum = 0.0, whole = 0.0, left = 0.0, alone = 0.0;
-    look_at_gains(s, &w, gain);
-    normalize(s, &w, 0, gain);
-    w.known = 1;
-    find_cells(s, &w, pose);
-    read_labels(s, &w, given, corner);
-    look_up(s, &w, pose);
     for (int64_t t = 0; t < s->n; t++) { /* no symbol explains the noise of readings */
         double noise = 3.0 / LOG4 * exp(-LOG4 * w.value[t]) * (s->noise / w.plateau[t]);
         double share = noise / (s->quiet * s->first);

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.sensor import SensorType
-from recognizer.touch.around import combine_around
+from recognizer.touch.around import combine_around, mean_of_strongest
 from recognizer.touch.settings import DEFAULTS, LoadedAreaSettings
 from recognizer.touch.signal import Signal
 
@@ -31,7 +31,7 @@ def find_loaded_area(
     if sensor.overlay.kind != "tab":
         return everywhere
     forces = np.where(signal.trust > 0, signal.forces, 0.0)
-    strongest = float(np.sort(forces, axis=None)[-settings.strongest :].mean())
+    strongest = mean_of_strongest(forces, settings.strongest)
     noise = min(signal.noise, settings.quiet * strongest)
     reach = settings.around // 2
     high = combine_around(forces, reach, np.maximum)

@@ -27,8 +27,6 @@ typedef struct {
     double *left, *parts, *jacobian;    /* (wide,); (2, wide) of the spread; (14, wide) */
 } Image;
 
-static inline double total(Four sum) { return (sum[0] + sum[1]) + (sum[2] + sum[3]); }
-
 /* Those of one image, across rows and across columns; beyond the rim nothing is felt. */
 static void second_differences(int64_t rows, int64_t columns, const double *image, double *up,
                                double *along) {
@@ -66,8 +64,7 @@ static void look(const Scene *s, const Steps *how, const int8_t *given, const in
         at->parts[wide + t] = how->aside[t] * (x * x + y * y) * square;
         at->left[t] = s->forces[t] - forces[t] - (more[0] + blurred);
     }
-    for (int k = 0; k < UNKNOWNS; k++)
-        at->away[k] = k < 3 || k > 7 ? 0.0 : k < 7 ? at->pose[k] : at->gain[0] - s->usual_scale;
+    for (int k = 0; k < UNKNOWNS; k++) at->away[k] = departure(s, k, at->pose, at->gain);
     memcpy(at->away + OFFSET, more, sizeof at->more);
 }
 

@@ -30,11 +30,17 @@ typedef struct {
 
 typedef double Four __attribute__((vector_size(32), aligned(8), may_alias));
 
+static inline double total(Four sum) { return (sum[0] + sum[1]) + (sum[2] + sum[3]); }
 static inline double larger(double a, double b) { return a > b ? a : b; }
 static inline double smaller(double a, double b) { return a < b ? a : b; }
 
 static inline double bounded(double value, double least, double most) {
     return smaller(larger(value, least), most);
+}
+
+/* How far unknown k of a lattice lies from what is known of it beforehand. */
+static inline double departure(const Scene *s, int k, const double *pose, const double *gain) {
+    return k < 3 || k > 7 ? 0.0 : k < 7 ? pose[k] : gain[0] - s->usual_scale;
 }
 
 /* Solve A x = b of k unknowns by elimination with row pivots; both are overwritten. */
