@@ -89,7 +89,7 @@ def test_decode_windows(tmp_path):
 def test_own_sensor_data(tmp_path):
     said = said_by("own_sensor_data.py", tmp_path).splitlines()
     assert said[0].startswith("mine.h5: 2 frames")
-    assert ["Cube/F4" in line for line in said[1:]] == [True, True]
+    assert ["Cube/F4" in line for line in said[1:]] == [True, True], said
 
 
 def test_report(tmp_path):
