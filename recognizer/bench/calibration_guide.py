@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from probe.calibration import Calibration, Condition, calibration_from, even_load
 from probe.calibration.load_words import describe_load
+from probe.calibration.settings import AVERAGE
 from probe.circuit import Electronics
 from probe.frame import Frame
 from recognizer.bench.errors import BenchError, BusyError
@@ -37,6 +38,7 @@ class CalibrationGuide:
     felt: list[str] = field(default_factory=list)
     _frames: list[Counts] | None = None  #: while a step is read
     _began_ns: int = 0
+    _news: int = 0  #: frames of them that differ from the one before
 
     @property
     def steps(self) -> int:
@@ -69,14 +71,20 @@ class CalibrationGuide:
             self.felt.pop()
 
     def take(self, frame: Frame) -> None:
-        """Take a frame; a step ends when its time is over."""
+        """Take a frame; a step ends when its time is over, and enough was read for an average.
+
+        A frame that repeats the one before, as from a board that converts seldom, tells nothing
+        new; of a board that only repeats itself, more is not waited for than a few times longer.
+        """
         if self._frames is None:
             return
-        if not self._frames:
-            self._began_ns = frame.t_ns
+        if not self._frames or frame.t_ns < self._began_ns:  # the board started again
+            self._frames, self._began_ns, self._news = [], frame.t_ns, 0
+        self._news += not self._frames or not np.array_equal(frame.counts, self._frames[-1])
         self._frames.append(frame.counts)
         passed_s = (frame.t_ns - self._began_ns) * 1e-9
-        if not 0 <= passed_s < self.seconds or len(self._frames) >= GUIDE.most_frames:
+        told = self._news >= AVERAGE.frames or passed_s >= GUIDE.longest * self.seconds
+        if (told and passed_s >= self.seconds) or len(self._frames) >= GUIDE.most_frames:
             counts, self._frames = np.stack(self._frames), None
             self.taken.append(counts)
             self.felt.append(describe_load(counts, self.taken[0] if self.step else None))

@@ -45,7 +45,8 @@ class PressSequence:
         self.sensor, self.manner = sensor, manner
         self._readout = readout_of(sensor, quiet=manner.noise == "quiet", frame_s=1 / manner.rate)
         self._rest = np.zeros(sensor.shape)
-        self._turn = threading.Lock()
+        self._turn = threading.Condition()
+        self._felt = 0  #: beats so far
         self._coming: list[tuple[int, Array]] = []  #: beats to stay at these forces
         self._now = self._rest
 
@@ -72,6 +73,8 @@ class PressSequence:
     def load(self, newtons: float) -> None:
         """Put an even load on, in newtons; 0 takes it off. It stays.
 
+        Returns when it was felt for `PRESS.loaded_s`, or nobody reads the sensor.
+
         Raises
         ------
         BenchError
@@ -82,6 +85,9 @@ class PressSequence:
                 f"a load of {newtons:g} N", fix=f"give 0 to {10 * PRESS.largest_n:g} N"
             )
         self._play([(1, np.full(self._rest.shape, newtons / self._rest.size))])
+        with self._turn:
+            then = self._felt + self._beats(PRESS.loaded_s)
+            self._turn.wait_for(lambda: self._felt >= then, PRESS.unread_s)
 
     def lift(self) -> None:
         """Lift at once."""
@@ -111,4 +117,6 @@ class PressSequence:
                 self._coming[0] = (left - 1, self._now)
                 if left <= 1:
                     self._coming.pop(0)
+            self._felt += 1
+            self._turn.notify_all()
             return self._now

@@ -71,6 +71,7 @@ class GuideSettings:
 
     most_loads: int = 12
     most_frames: int = 20_000  #: of a load
+    longest: float = 8.0  #: times what was asked for, that frames which repeat themselves are read
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +91,8 @@ class PressSettings:
 
     steps: tuple[float, ...] = (0.5,)  #: shares of the force on the way down, a frame each
     apart_s: float = 0.08  #: between two touches
+    loaded_s: float = 0.1  #: that a load is on before it counts as put on
+    unread_s: float = 5.0  #: the longest that is waited for it
     largest_n: float = 400.0  #: of a touch; a load may be ten times as large
     scenes: int = 32  #: surfaces that are kept
     unplugged_s: float = 60.0  #: at most

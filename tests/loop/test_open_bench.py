@@ -203,6 +203,23 @@ def test_calibrate_step_by_step(page, lab):
     assert list((lab / "recordings").glob("calibration-*.json"))
 
 
+def test_loads_that_tell_too_little_are_refused_where_it_is_asked(page):
+    page.get_by_test_id("calibrate").click()
+    page.get_by_test_id("guide-loads").fill("80")
+    page.get_by_test_id("guide-seconds").fill("0.5")
+    page.get_by_test_id("guide-start").click()
+    for step in range(2):
+        expect(page.get_by_test_id("guide-ask")).to_contain_text(f"{step + 1} of 2")
+        page.get_by_test_id("guide-load").click()
+        page.get_by_test_id("guide-read").click()
+        expect(page.locator("#guide-felt li")).to_have_count(step + 1)
+    page.get_by_test_id("guide-finish").click()
+    refused = page.locator("#guide").get_by_test_id("error")  # all else is behind the dialog
+    expect(refused).to_contain_text("a law needs 3")
+    expect(refused).to_be_in_viewport()
+    page.locator("#guide-close").click()
+
+
 def test_files_and_pictures_can_be_had(page, lab):
     page.locator("summary").click()
     with page.expect_download() as download:

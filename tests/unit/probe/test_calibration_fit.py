@@ -161,7 +161,7 @@ def refused(match, fsr=None, levels=LEVELS, board=STILL, **more):
 
 
 def test_loads_that_do_not_determine_the_laws_are_named():
-    refused(r"felt only 2 different loads clearly, a law needs 3; add 1 on them", levels=(0.3, 1.0))
+    refused(r"felt 2 different loads clearly, a law needs 3; add 1 on them", levels=(0.3, 1.0))
     refused(r"felt loads of 0.5 ... 0.6 N only.*add a load of 1.5 N", levels=(0.5, 0.55, 0.6))
     refused(r"carried less than 0.2 N", levels=(0.02, 0.05, 0.1))
     refused(r"256 tactels \[\(0, 0\), \(0, 1\)", levels=(0.5, 0.5, 0.5))

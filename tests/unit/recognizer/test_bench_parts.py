@@ -36,7 +36,7 @@ from recognizer.bench.images import FILTERS, filter_image
 from recognizer.bench.message import FrameMessage, mosaic_message
 from recognizer.bench.read_trigger import ReadTrigger
 from recognizer.bench.replay import ReplayFeed
-from recognizer.bench.settings import TRIGGER, TouchLogSettings, UploadSettings
+from recognizer.bench.settings import GUIDE, TRIGGER, TouchLogSettings, UploadSettings
 from recognizer.bench.simulated import parse_simulation
 from recognizer.bench.touch_log import TouchLog
 from recognizer.bench.uploads import Uploads, folder_bytes
@@ -443,6 +443,36 @@ def test_a_guide_leads_to_a_calibration():
     fed(guide, 600, rng, state)
     with pytest.raises(BusyError):
         guide.read()
+
+
+def begun(seconds):
+    guide = CalibrationGuide("bench/0", forces_given([80]), seconds, None, "2026-01-01")
+    guide.read()
+    return guide
+
+
+def read_for(guide, images, step_ns=10_000_000):
+    """Return how many of the images a step took."""
+    for taken, value in enumerate(images):
+        if not guide.as_json()["reading"]:
+            return taken
+        guide.take(frame_from(np.full((16, 16), value), t_ns=taken * step_ns, seq=taken))
+    return len(images)
+
+
+def test_a_load_is_read_until_enough_was_told():
+    assert read_for(begun(0.5), range(1000)) == 51
+    assert read_for(begun(0.5), np.arange(1000) // 5) == 19 * 5 + 1  # each is sent five times
+    assert read_for(begun(0.5), [7] * 1000) == round(0.5 * GUIDE.longest * 100) + 1
+    assert read_for(begun(0.5), range(9), step_ns=100_000_000) == 9  # slow, and not done yet
+
+
+def test_a_load_is_read_anew_where_the_board_starts_again():
+    guide = begun(0.3)
+    for t_ms in (*range(5000, 5200, 10), *range(0, 310, 10)):
+        assert guide.as_json()["reading"]
+        guide.take(frame_from(np.full((16, 16), t_ms), t_ns=t_ms * 1_000_000, seq=0))
+    assert guide.felt[0].startswith("31 frames")
 
 
 def test_loads_that_tell_nothing_are_refused_with_what_is_missing():

@@ -66,7 +66,7 @@ export class AnswerPanel {
     const next = answer.runner_up
       ? `runner-up: ${answer.runner_up.object} ${answer.runner_up.face}, row ${answer.runner_up.index[0]}, column ${answer.runner_up.index[1]}`
       : "no other place comes into question";
-    const size = answer.alone ? "" : `margin ${answer.margin!.toFixed(1)} nats, ${this.threshold} are needed; `;
+    const size = answer.alone ? "" : `margin ${answer.margin!.toFixed(1)} nats, ${Number(this.threshold.toFixed(1))} are needed; `;
     say(element("margin-text"), size + next);
   }
 

@@ -58,8 +58,10 @@ export function isDark(): boolean {
 
 let errorTimer = 0;
 
+/** Show what went wrong; in the open dialog if there is one, as all else can neither be seen nor heard then. */
 export function showError(text: string): void {
   const box = element("error");
+  (document.querySelector("dialog[open]") ?? document.body).append(box);
   box.textContent = text;
   box.hidden = false;
   clearTimeout(errorTimer);

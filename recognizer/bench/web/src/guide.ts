@@ -9,6 +9,7 @@ interface Result { name: string; bad: number; tactels: number; scatter: number }
 export class GuideDialog {
   private readonly dialog = element<HTMLDialogElement>("guide");
   private status: Status | null = null;
+  private loading = false;
 
   constructor() {
     element("calibrate").addEventListener("click", () => {
@@ -18,7 +19,7 @@ export class GuideDialog {
     element("guide-start").addEventListener("click", () => void this.begin().catch(() => undefined));
     element("guide-read").addEventListener("click", () => void post("calibration", { do: "read" }).catch(() => undefined));
     element("guide-again").addEventListener("click", () => void post("calibration", { do: "again" }).catch(() => undefined));
-    element("guide-load").addEventListener("click", () => void post("load", { newtons: this.status?.guide?.newtons ?? 0 }).catch(() => undefined));
+    element("guide-load").addEventListener("click", () => void this.load().catch(() => undefined));
     element("guide-finish").addEventListener("click", () => void this.finish().catch(() => undefined));
     this.dialog.addEventListener("close", () => void this.close().catch(() => undefined));
   }
@@ -32,7 +33,7 @@ export class GuideDialog {
     if (!guide) return;
     const ask = guide.reading ? "Reading… keep it still." : guide.done ? guide.ask : `${guide.step + 1} of ${guide.steps}: ${guide.ask}`;
     say(element("guide-ask"), ask);
-    element<HTMLButtonElement>("guide-read").disabled = guide.reading || guide.done;
+    this.allowReading();
     element<HTMLButtonElement>("guide-again").disabled = guide.reading || guide.step === 0;
     element("guide-finish").hidden = !guide.done;
     element("guide-load").hidden = !status.simulated || guide.done;
@@ -53,6 +54,23 @@ export class GuideDialog {
       do: "begin", newtons, seconds: Number(element<HTMLInputElement>("guide-seconds").value),
       simulated_board: this.status?.simulated ?? false,
     });
+  }
+
+  /** Put the simulated load on; nothing is read before it is on. */
+  private async load(): Promise<void> {
+    this.loading = true;
+    this.allowReading();
+    try {
+      await post("load", { newtons: this.status?.guide?.newtons ?? 0 });
+    } finally {
+      this.loading = false;
+      this.allowReading();
+    }
+  }
+
+  private allowReading(): void {
+    const guide = this.status?.guide;
+    element<HTMLButtonElement>("guide-read").disabled = this.loading || !guide || guide.reading || guide.done;
   }
 
   private async finish(): Promise<void> {
