@@ -158,8 +158,8 @@ def demand_loads(
     if few.any():
         most = int(levels[few].min())
         raise CalibrationError(
-            f"{tactel_words(few)} felt {most} different load{'s' * (most != 1)} clearly, a law needs "
-            f"{t.levels}",
+            f"{tactel_words(few)} felt {most} different load{'s' * (most != 1)} clearly, "
+            f"a law needs {t.levels}",
             fix=f"add {t.levels - most} on them, {t.felt_n:g} N or more, over a ratio of "
             f"{t.ratio:g}, or record more frames of each",
         )
