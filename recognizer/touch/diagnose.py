@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from probe.sensor import SensorType
 from recognizer.touch import cause
 from recognizer.touch.around import combine_around, quantile
-from recognizer.touch.belief import VerifiedHypothesis, unworn_labels_at, weigh_cells
+from recognizer.touch.belief import Support, VerifiedHypothesis, unworn_labels_at, weigh_cells
 from recognizer.touch.cause import Cause
 from recognizer.touch.first_look import shows_strokes
 from recognizer.touch.prepare import PreparedLab
@@ -54,6 +54,7 @@ class CauseSettings:
     dead: float = 0.1  #: share of the pressed tactels that read nothing, of a faulty sensor
     ghosts: float = 0.08  #: share of the free ones that read a symbol, of another pattern
     known: float = -2.0  #: nats over symbols of no registered place, least where one is right
+    there: float = 20.0  #: likewise, from which its symbols are plainly there; a plain face has 11
     explained: float = 0.8  #: share of the image that symbols of this size explain, wherever
     clear: float = 6.0  #: nats by which a symbol is read
     pattern: float = 0.35  #: share below which they are other ones
@@ -126,6 +127,11 @@ def _is_plain(image: ImageFeatures, signal: Signal, settings: CauseSettings) -> 
     return filled > settings.filled and bool(forces.std() < settings.plain * forces.mean())
 
 
+def _is_there(support: Support | None, settings: CauseSettings) -> bool:
+    """Whether the symbols of a place are plainly there: hard pressed ones, not a plain face."""
+    return support is not None and support.surprise >= settings.there
+
+
 def diagnose(
     reader: PreparedLab,
     signal: Signal,
@@ -143,15 +149,15 @@ def diagnose(
         return Cause(cause.NO_LOAD, {})
     pitch = min(each.style.pitch_mm for each in reader.lab.arrays)
     image = image_features(reader.sensor, signal, pitch, settings)
-    seen = _by_image(image, signal, settings)
-    if seen is not None:
-        return seen
     support = found[0].support() if found else None
+    seen = _by_image(image, signal, settings)
+    if seen is not None and not (seen.code == cause.PLAIN and _is_there(support, settings)):
+        return seen
     symbols = 0 if support is None else support.inliers
     if image.width_mm < settings.narrow_mm and image.length_mm > settings.longer * image.width_mm:
         return Cause(cause.ONE_ROW, {"width_mm": image.width_mm, "symbols": float(symbols)})
-    bare = support is None and not shows_strokes(reader, signal)  # no symbols were looked for
-    if bare or _is_plain(image, signal, settings):
+    bare = not shows_strokes(reader, signal) or _is_plain(image, signal, settings)
+    if bare and not _is_there(support, settings):
         return Cause(cause.PLAIN, {"variation": image.variation, "plateau": image.plateau})
     if support is None:
         code = cause.EDGE if image.loaded < settings.loaded else cause.UNCLEAR

@@ -1,15 +1,16 @@
-"""What a touch can show at all, told before symbols are searched for, or searched for widely.
+"""What a touch can show at all, told before symbols are searched for widely.
 
-Signal -> whether there are strokes under the sensor: beside them it hangs over the bare face, so
-that within a pitch of the strongest readings lie weak ones. A blank plate presses evenly.
+Signal -> whether strokes show: beside them the sensor hangs over the bare face, so that within a
+pitch of the strongest readings lie weak ones. A blank plate presses evenly; so may symbols that
+stand along the tactels' rows and are pressed hard, so nothing is refused for it before a search.
 
 Signal and what the first try found -> whether a wider search can change the answer. It hardly can
 where the first try is sure; where symbols explain the image and are so few that they stand
 elsewhere as well; where fewer tactels are pressed than the symbols would press that it takes to
-name a place; where hardly a symbol agrees with the best place; where the image speaks for symbols
-of no registered place; and where symbols of a place are plainly there and most of the image is
-something else. Nor is an answer that few places match by chance looked at again where the image
-speaks plainly for its symbols. Thesis 6.3.
+name a place; where hardly a symbol agrees with the best place, or no strokes show; where the image
+speaks for symbols of no registered place; and where symbols of a place are plainly there and most
+of the image is something else. Nor is an answer that few places match by chance looked at again
+where the image speaks plainly for its symbols. Thesis 6.3.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ Array = NDArray[np.float64]
 
 
 def shows_strokes(reader: PreparedLab, signal: Signal) -> bool:
-    """Return whether a touch may be of symbols; true wherever that is not known to be told."""
+    """Return whether strokes show; true wherever that is not known to be told."""
     settings, sensor = reader.settings.first_look, reader.sensor
     if sensor.overlay.kind != "tab":
         return True  # a pad smears what lies between strokes
@@ -109,6 +110,8 @@ def _is_unexplained(reader: PreparedLab, signal: Signal, support: Support) -> bo
     """Return whether symbols are pressed that are those of a place, or may be under another fit."""
     settings = reader.settings.first_look
     if support.inliers < settings.agreed or support.surprise < settings.foreign:
+        return False
+    if not shows_strokes(reader, signal):
         return False
     least = min(_tactels_to_name(reader, each, settings) for each in reader.lab.arrays)
     if pressed_tactels(signal, settings) < least:

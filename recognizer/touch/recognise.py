@@ -21,7 +21,7 @@ from recognizer.touch.cause import EXCHANGED, Cause
 from recognizer.touch.chance import expected_by_border, expected_matches
 from recognizer.touch.diagnose import diagnose
 from recognizer.touch.exchanged import exchange_halves, leaves_much
-from recognizer.touch.first_look import may_be_chance, may_tell_more, shows_strokes
+from recognizer.touch.first_look import may_be_chance, may_tell_more
 from recognizer.touch.hypothesis import Hypothesis, under_centre
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.next_touch import propose_next
@@ -82,8 +82,6 @@ def _try_twice(
     """Return what the first try says, or the second where that is not enough."""
     if not signal.contact:
         return refusal(seq, NO_CONTACT), []
-    if not shows_strokes(reader, signal):
-        return refusal(seq, NOT_ENCODED), []
     settings = reader.settings
     first = verify_hypotheses(reader, signal, settings.first)
     answer, support = _answer(first, settings, seq)

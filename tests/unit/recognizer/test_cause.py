@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from encoded_objects import simulate
 from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.contact.contract import Touch
@@ -14,6 +15,7 @@ from probe.simulate.registered import registered_surface
 from recognizer.touch import cause
 from recognizer.touch.cause import Cause
 from recognizer.touch.diagnose import CauseSettings, diagnose, image_features
+from recognizer.touch.first_look import gap_share
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import AMBIGUOUS, NOT_ENCODED, TOO_FEW, refusal
@@ -144,6 +146,35 @@ def test_dead_tactels_are_counted(lab, reader):
     one = found[codes.index(cause.DEAD_TACTELS)]
     assert "recognize-object --learn" in str(one)
     assert 0.1 < one.cause.evidence["silent"] < 0.5
+
+
+@pytest.fixture(scope="module")
+def keyed(tmp_path_factory):
+    """A lab whose symbols are known, so that places can be named where the readings are even."""
+    folder = tmp_path_factory.mktemp("keyed")
+    (folder / "cube.yaml").write_text("{name: Cube, shape: {cube: 40 mm}}")
+    encode(read_specs([folder / "cube.yaml"]), folder=folder, formats=("stl",),
+           database=f"sqlite:///{folder}/lab.db", lab_key="0123-4567-89AB-CDER")  # fmt: skip
+    return f"{folder}/lab.db"
+
+
+def test_symbols_along_the_rows_are_read_however_few_gaps_they_show(keyed):
+    reader, at = Reader(open_lab(keyed)), Touch(18.4, 18.4, np.pi / 2, 300.0)
+    surface = registered_surface(keyed, "Cube", "F5").surface
+    counts = np.rint(100 * press(surface, SENSOR, at).forces_n)
+    settings = reader.settings.first_look
+    assert gap_share(signal_of(counts), settings) < settings.gaps  # as of a plain plate
+    answer = reader.read(counts)
+    assert (answer.face, answer.x_mm, answer.y_mm) == (
+        "F5", pytest.approx(18.4, abs=0.2), pytest.approx(18.4, abs=0.2),
+    )  # fmt: skip
+
+
+def test_symbols_that_are_plainly_there_are_no_plain_face(keyed):
+    touch = simulate(f"{keyed}#Cube/F4", x=17.5, y=16.5, theta=90, force=350)
+    refused = Reader(open_lab(keyed)).read(touch.counts)
+    assert refused.reason_code == cause.UNCLEAR
+    assert refused.cause.evidence["surprise"] > 20
 
 
 def test_a_cause_is_said_beside_the_reason_it_led_to():

@@ -133,7 +133,6 @@ def reads(small, lab, monkeypatch):
         monkeypatch.setattr(recognizer.touch.recognise, "expected_by_border", matches_by_border)
         monkeypatch.setattr(recognizer.touch.recognise, "propose_next", lambda *_: None)
         monkeypatch.setattr(recognizer.touch.recognise, "diagnose", lambda *_: None)
-        monkeypatch.setattr(recognizer.touch.recognise, "shows_strokes", lambda *_: True)
         monkeypatch.setattr(recognizer.touch.recognise, "may_tell_more", tells_more)
         monkeypatch.setattr(recognizer.touch.recognise, "leaves_much", lambda *_: False)
         answer, judged = recognise_with_hypothesis(READER, signal, 7)
@@ -393,7 +392,7 @@ def exchanged(reads, monkeypatch):
         for name, value in (
             ("verify_hypotheses", verified), ("leaves_much", leaves_much),
             ("exchange_halves", lambda _, axis: axis), ("expected_matches", lambda *_, **__: 1e-9),
-            ("shows_strokes", lambda *_: True), ("may_tell_more", lambda *_: False),
+            ("may_tell_more", lambda *_: False),
         ):  # fmt: skip
             monkeypatch.setattr(recognizer.touch.recognise, name, value)
         touch = SimpleNamespace(contact=True, state=state)

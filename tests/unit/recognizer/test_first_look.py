@@ -67,7 +67,7 @@ def asked(small):
     """Ask for a wide search after a first try; four symbols and 48 cells: three name one."""
     best = SimpleNamespace(embossed=small.two_faces().embossed)
 
-    def ask(*, tactels=200, reason=NOT_ENCODED, judged=None, lab=None, **speaks):
+    def ask(*, tactels=160, reason=NOT_ENCODED, judged=None, lab=None, **speaks):
         answer = refusal(0, reason)
         if not reason:
             answer = replace(answer, object="Thing")
@@ -94,6 +94,12 @@ def test_few_pressed_tactels_can_name_no_place(asked):
 def test_symbols_of_no_registered_place_are_not_sought_further(asked):
     assert asked(surprise=3.0)
     assert not asked(surprise=2.9)
+
+
+def test_where_no_stroke_shows_none_are_sought_further(asked):
+    assert asked(tactels=160)
+    assert not asked(tactels=256)
+    assert asked(tactels=256, lab={"kind": "pad"})
 
 
 def test_where_hardly_a_symbol_agrees_no_place_is_found(asked):
