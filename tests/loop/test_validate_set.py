@@ -201,7 +201,6 @@ def test_a_report_of_what_no_database_knows_shows_no_errors_of_right_answers(ref
     page = (tmp_path / "blank" / "report.html").read_text()
     assert "When it answers" in page
     assert "How far off" not in page
-    assert "How sure" not in page
     assert "How far off" in (reference[0] / "report.html").read_text()
 
 
