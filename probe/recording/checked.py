@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.errors import RecordingError
-from probe.recording.heap import strings_end
+from probe.recording.guard import MOST_TACTELS
 from probe.recording.layout import (
     DATASETS,
     FORMAT,
@@ -65,8 +65,6 @@ def check_recording(path: Path, *, live: bool = False) -> CheckedFile:
 def check_open_file(file: h5py.File, path: Path) -> CheckedFile:
     """Check that an open file is a recording; see `check_recording`."""
     with explain_errors(path, "read"):
-        if not strings_end(path):
-            raise ValueError("a collection of strings without end")
         attributes = {name: _attribute_value(value) for name, value in file.attrs.items()}
         names = [name for name in DATASETS if name in file]
         others = ", ".join(sorted(file)) or "nothing"
@@ -83,6 +81,13 @@ def check_open_file(file: h5py.File, path: Path) -> CheckedFile:
             f"it has no dataset /frames, but {others}", fix=_IMPORT, place=str(path)
         )
     shapes = {name: _shape_of(file, path, name) for name in names}
+    rows, columns = shapes["frames"][1:]
+    if rows * columns > MOST_TACTELS:
+        raise RecordingError(
+            f"its images are of {rows} x {columns}, at most {MOST_TACTELS:,} values are read",
+            fix="import a part of each image",
+            place=str(path),
+        )
     lengths = [shape[0] for shape in shapes.values()]
     ours = {name: attributes.pop(name, None) for name in _OURS} if own else {}
     origin = RecordingOrigin(
@@ -98,7 +103,7 @@ def check_open_file(file: h5py.File, path: Path) -> CheckedFile:
         tool_version=str(ours.get("tool_version", "")),
         piece=int(ours.get("piece") or 1),
         frames=min(lengths),
-        shape=(shapes["frames"][1], shapes["frames"][2]),
+        shape=(rows, columns),
         even=len(set(lengths)) == 1,
         poses="pose" in names,
     )

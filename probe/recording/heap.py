@@ -15,7 +15,7 @@ from pathlib import Path
 _SIGNATURE, _VERSION = b"GCOL", 1
 _HEAD = 16  #: bytes before the objects, and before the data of each
 _ALIGNED = 8  #: bytes, to which an object's length is rounded up
-_SEARCHED = 1 << 20  #: bytes from the beginning; attributes are written before frames
+_SEARCHED = 1 << 26  #: bytes from the beginning; attributes are written before frames
 
 
 def strings_end(path: Path) -> bool:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from probe.errors import RecordingError
+from probe.recording.guard import check_file
 from probe.recording.lock import is_locked
 from probe.recording.names import final_of, is_part, part_of
 from probe.recording.padded import PaddedFile
@@ -37,7 +38,7 @@ def open_recording(path: Path, *, live: bool = False) -> Iterator[h5py.File]:
     Raises
     ------
     RecordingError
-        No such file, no HDF5 file, truncated, not closed, damaged.
+        No such file, no HDF5 file, truncated, not closed, damaged; or what `guard` refuses.
     """
     head = _head_of(path)
     if head.truncated and not (live and head.writing):
@@ -59,7 +60,7 @@ def open_anyhow(path: Path) -> Iterator[tuple[h5py.File, Superblock]]:
     Raises
     ------
     RecordingError
-        No such file, no HDF5 file, or its beginning is lost.
+        No such file, no HDF5 file, its beginning is lost; or what `guard` refuses.
     """
     import h5py
 
@@ -70,6 +71,8 @@ def open_anyhow(path: Path) -> Iterator[tuple[h5py.File, Superblock]]:
         with explain_errors(path, "open"):
             source = path if head.whole else PaddedFile(stream, head)
             file = stack.enter_context(h5py.File(source, "r"))
+        with explain_errors(path, "read"):
+            _held = check_file(file, path)
         yield file, head
 
 
@@ -96,6 +99,8 @@ def _open_file(path: Path, head: Superblock) -> Iterator[h5py.File]:
                 raise
             file = h5py.File(path, "r")  # closed meanwhile
     try:
+        with explain_errors(path, "read"):
+            _held = check_file(file, path)
         yield file
     finally:
         file.close()

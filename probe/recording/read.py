@@ -23,6 +23,7 @@ from probe.sensor import SensorType
 from probe.sensor_types import choose_sensor_type
 
 _AT_ONCE: Final = 256  #: frames read at a time
+_VALUES_AT_ONCE: Final = 1 << 24  #: of larger images fewer: 256 of 256 x 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +114,7 @@ class Recording:
             A value that is no count, a pose that is none, a damaged part of the file.
         """
         stop = len(self) if stop is None else min(stop, len(self))
+        size = max(1, min(size, _VALUES_AT_ONCE // (self.shape[0] * self.shape[1])))
         for file in self.files:
             if start < min(stop, file.frames):
                 with open_recording(file.path, live=self.live) as source:

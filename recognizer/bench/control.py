@@ -93,7 +93,7 @@ class CalibrationRequest(_Request):
 def control_routes(session: Session, ports: Ports) -> APIRouter:
     """Return the routes."""
     routes = APIRouter(prefix="/api")
-    uploads = Uploads(session.folder)
+    uploads = Uploads(session.folder, lambda: session.ending)
 
     def port_list() -> list[dict[str, Any]]:
         there = [(entry.url, f"{entry.device} {entry.vendor} {entry.product}".strip())

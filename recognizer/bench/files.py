@@ -7,6 +7,7 @@ only where they lie in its folder.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 from generator.database.registered import RegisteredPart
@@ -14,6 +15,7 @@ from generator.database.url import normal_url, part_path
 from probe.errors import RecordingError
 from probe.recording.read import Recording
 from recognizer.bench.errors import UnknownError
+from recognizer.bench.replay import playable_blocks
 from recognizer.bench.settings import PAGE
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}")
@@ -64,17 +66,21 @@ def list_files(folder: Path, suffix: str) -> list[str]:
     return [name for _, name in dated[: PAGE.listed]]
 
 
-def keep_recording(draft: Path, path: Path) -> int:
+def keep_recording(draft: Path, path: Path, ending: Callable[[], bool]) -> int:
     """Give a file that was sent in its name, if it is a recording; returns its frames.
 
     Raises
     ------
     RecordingError
         It is none.
+    BenchError
+        It is too long to be played.
+    BusyError
+        `ending` says that the server ends.
     """
     try:
         recording = Recording(draft)
-        for _ in recording.blocks():  # every value is looked at
+        for _ in playable_blocks(recording, ending):  # every value is looked at
             pass
     except RecordingError as error:
         raise RecordingError(error.cause, fix=error.fix, place=path.name) from error

@@ -8,32 +8,42 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import islice
+from math import prod
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from probe.frame import Frame
+from probe.recording.layout import FrameBlock
 from probe.recording.read import Recording
-from recognizer.bench.errors import BenchError
+from recognizer.bench.errors import BenchError, BusyError
 from recognizer.bench.settings import REPLAY
 
 
 class ReplayFeed:
-    """A recording with a time line; it begins to play at once."""
+    """A recording with a time line; it begins to play at once.
 
-    def __init__(self, url: str, recording: Recording) -> None:
+    Parameters
+    ----------
+    url
+        Its port.
+    recording
+        Read once as a whole, for the time line.
+    ending
+        Whether the server ends; reading then ends, too.
+    """
+
+    def __init__(
+        self, url: str, recording: Recording, ending: Callable[[], bool] = lambda: False
+    ) -> None:
         self.url = url
         self.recording = recording
-        if len(recording) > REPLAY.most_frames:
-            raise BenchError(
-                f"a recording of {len(recording):,} frames, {REPLAY.most_frames:,} can be played",
-                fix="play a part of it",
-            )
         self._turn = threading.Lock()
-        t_ns, self.strength = _times_and_strengths(recording)
+        t_ns, self.strength = _times_and_strengths(playable_blocks(recording, ending))
         pauses = np.clip(np.diff(t_ns, prepend=t_ns[:1]) * 1e-9, 0.0, REPLAY.jump_s)
         self._at_s = np.cumsum(pauses)
         self.began_ns = int(t_ns[0]) if len(t_ns) else 0  #: time of the first frame
@@ -139,10 +149,37 @@ class ReplayFeed:
         return list(islice(self._frames, last - first))
 
 
-def _times_and_strengths(recording: Recording) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return times (ns) and strengths of all frames, a block at a time."""
-    times, strengths = [np.zeros(0, np.int64)], [np.zeros(0)]
+def playable_blocks(recording: Recording, ending: Callable[[], bool]) -> Iterator[FrameBlock]:
+    """Yield all blocks of a recording that is short enough to be played.
+
+    Raises
+    ------
+    BenchError
+        It is too long; nothing was read.
+    BusyError
+        `ending` says that the server ends.
+    """
+    frames = len(recording)
+    if frames > REPLAY.most_frames or frames * prod(recording.shape) > REPLAY.most_values:
+        rows, columns = recording.shape
+        raise BenchError(
+            f"a recording of {frames:,} frames of {rows} x {columns}; {REPLAY.most_frames:,} "
+            f"frames or {REPLAY.most_values:,} values can be played",
+            fix="play a part of it",
+            place=Path(recording.path).name,
+        )
     for block in recording.blocks():
+        if ending():
+            raise BusyError("open-bench ends", fix="start it again")
+        yield block
+
+
+def _times_and_strengths(
+    blocks: Iterator[FrameBlock],
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return times (ns) and strengths of all frames."""
+    times, strengths = [np.zeros(0, np.int64)], [np.zeros(0)]
+    for block in blocks:
         times.append(block.t_ns)
         over = block.counts.reshape(len(block), -1).astype(np.float64)
         strengths.append(over.sum(axis=1) - over.shape[1] * np.quantile(over, 0.05, axis=1))

@@ -9,6 +9,7 @@ import secrets
 import signal
 import socket
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -80,10 +81,11 @@ def serve(options: BenchOptions) -> int:
             RequestGuard(app_for(bench), access_rules(options.host, token)),
             log_level="warning", access_log=False, server_header=False,
             ws_max_size=4096, ws_per_message_deflate=False, ws_ping_interval=20.0,
-            timeout_graceful_shutdown=2, limit_concurrency=PAGE.connections,
+            timeout_graceful_shutdown=1, limit_concurrency=PAGE.connections,
             http=PatientProtocol,
         )  # fmt: skip
         server = uvicorn.Server(config)
+        server.handle_exit = _ending_first(session, server.handle_exit)
         sys.stdout.write(_address(options.host, line.getsockname()[1], token) + "\n")
         sys.stdout.flush()
         server.run(sockets=[line])
@@ -99,6 +101,18 @@ def serve(options: BenchOptions) -> int:
 def _end(_number: int, _frame: FrameType | None) -> None:
     """Take a request to end like that of the operator, so that what is open is closed."""
     raise KeyboardInterrupt
+
+
+def _ending_first(
+    session: Session, end: Callable[[int, FrameType | None], None]
+) -> Callable[[int, FrameType | None], None]:
+    """Return a signal handler that ends what reads a recording, which `end` would wait for."""
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        session.ending = True
+        end(number, frame)
+
+    return handle
 
 
 def _begin(session: Session, port: str) -> None:

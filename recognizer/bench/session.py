@@ -66,6 +66,7 @@ class Session:
         self._noted = 0
         self._started_ms = time.time() * 1e3
         self.calibrations, self.desk = CalibrationDesk(self), SensorDesk(self)
+        self.ending = False  #: set by a signal: what reads a whole recording ends
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="bench", daemon=True)
         self._thread.start()
@@ -97,7 +98,7 @@ class Session:
                 target = address_of(url).target
                 recording = Recording(target)
                 recording.sensor_type(self.sensor)  # of another shape: refused
-                self.feed = feed = ReplayFeed(url, recording)
+                self.feed = feed = ReplayFeed(url, recording, lambda: self.ending)
                 self.frames.replayed = (Path(target).name, feed.began_ns)
             elif url:
                 address_of(url)

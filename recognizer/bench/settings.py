@@ -80,7 +80,8 @@ class ReplaySettings:
 
     at_once: int = 512  #: frames taken at a time
     points: int = 800  #: of the time line's picture
-    most_frames: int = 2_000_000  #: of a recording that is played
+    most_frames: int = 2_000_000  #: of a recording that is played, or sent in
+    most_values: int = 1 << 30  #: of its images: twice as many as 2,000,000 of 16 x 16 have
     faint: float = 2048.0  #: counts of all tactels; a recording of noise alone looks like one
     jump_s: float = 0.5  #: longer pauses in a recording are shortened to it
 

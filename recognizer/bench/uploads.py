@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import tempfile
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
 from fastapi.concurrency import run_in_threadpool
@@ -20,8 +20,8 @@ from recognizer.bench.settings import UPLOAD
 class Uploads:
     """What comes in; on the server's loop."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self, folder: Path, ending: Callable[[], bool] = lambda: False) -> None:
+        self._folder, self._ending = folder, ending
         self._coming = 0
 
     async def take(self, name: str, chunks: AsyncIterator[bytes]) -> int:
@@ -30,9 +30,10 @@ class Uploads:
         Raises
         ------
         BenchError, UnknownError
-            There is one of this name, or the name is none; no room is left, or nothing comes.
+            There is one of this name, or the name is none; no room is left, nothing comes, or
+            it is too long to be played.
         BusyError
-            Others are being sent in.
+            Others are being sent in, or the server ends.
         RecordingError
             It is no recording; nothing is kept.
         """
@@ -47,7 +48,7 @@ class Uploads:
             with tempfile.TemporaryDirectory(prefix=".coming-", dir=self._folder) as place:
                 draft = Path(place) / path.name
                 await self._write(draft, chunks)
-                return await run_in_threadpool(keep_recording, draft, path)
+                return await run_in_threadpool(keep_recording, draft, path, self._ending)
         finally:
             self._coming -= 1
 
