@@ -26,6 +26,7 @@ _FREE: Final = 8 << 20  #: bytes of values that any file may hold: 16,384 images
 _PACKED: Final = 1100  #: bytes of values in a byte of the file; our recordings reach 185
 _PIECE: Final = 512  #: bytes of values that a chunk costs at least, to find and to unpack
 _MOST_CHUNK: Final = 64 << 20  #: bytes of a chunk, which is unpacked as a whole
+_LARGE_CHUNK: Final = 256 << 10  #: bytes; it is kept from one block to the next
 _MOST_LINKS: Final = 10_000  #: of all groups; checking as many datasets takes 1 to 2 s
 _MOST_DEPTH: Final = 64  #: groups in one another; libhdf5 visits them by recursion
 
@@ -35,8 +36,8 @@ def check_file(file: h5py.File, path: Path) -> list[h5py.h5d.DatasetID]:
 
     Returns
     -------
-    Datasets to be kept open as long as the file: their chunks are larger than the library's
-    cache, and would be unpacked again for every block.
+    Datasets to be kept open as long as the file, so that their large chunks are not unpacked
+    again for every block.
 
     Raises
     ------
@@ -123,7 +124,7 @@ def _resolves(group: h5py.h5g.GroupID, name: bytes) -> bool:
 def _checked_cache(
     dataset: h5py.h5d.DatasetID, path: Path, place: str, most: int
 ) -> h5py.h5p.PropDAID | None:
-    """Check a dataset by its header; return the cache that it needs if the usual one is small.
+    """Check a dataset by its header; return a cache for its chunks if they are large.
 
     The layout comes first: asked for its shape, a virtual dataset opens its sources.
     """
@@ -154,9 +155,9 @@ def _checked_cache(
         )
     access = dataset.get_access_plist()
     slots, usual, weight = access.get_chunk_cache()
-    if not chunked or piece <= usual:
+    if not chunked or piece <= _LARGE_CHUNK:
         return None
-    access.set_chunk_cache(slots, piece, weight)
+    access.set_chunk_cache(slots, max(piece, usual), weight)
     return access
 
 

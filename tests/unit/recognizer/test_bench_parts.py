@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import json
+import re
 import struct
 import time
 from dataclasses import replace
@@ -13,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hostile_recordings import HOSTILE, write_hostile, write_zeros
 
 from generator.database.registered import RegisteredPart
 from probe.circuit import Electronics, fsr_of, read_counts
@@ -119,6 +121,38 @@ def test_a_recording_that_is_sent_in_is_kept_only_if_it_is_one(tmp_path):
             taken_in(uploads, "b.h5", bad)
     assert [path.name for path in (tmp_path / "kept").iterdir()] == ["a.h5"]
     assert (tmp_path / "kept" / "a.h5").read_bytes() == content
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_recordings_that_mean_harm_are_not_kept(tmp_path, kind):
+    content = write_hostile(kind, tmp_path / "mine.h5").read_bytes()
+    with pytest.raises(RecordingError, match=re.escape(HOSTILE[kind][1])) as caught:
+        taken_in(Uploads(tmp_path / "kept"), "a.h5", content)
+    assert caught.value.place == "a.h5"
+    assert list((tmp_path / "kept").iterdir()) == []
+
+
+def test_recordings_that_cannot_be_played_are_not_read(tmp_path, monkeypatch):
+    path = write_zeros(tmp_path / "a.h5", 2_000_001)
+    monkeypatch.setattr(Recording, "blocks", None)
+    for attempt in (
+        lambda: ReplayFeed("file:x", Recording(path)),
+        lambda: taken_in(Uploads(tmp_path / "kept"), "a.h5", path.read_bytes()),
+    ):
+        with pytest.raises(BenchError, match=r"a.h5: a recording of 2,000,001 frames of 16 x 16"):
+            attempt()
+    assert list((tmp_path / "kept").iterdir()) == []
+
+
+def test_recordings_are_no_longer_read_when_the_server_ends(tmp_path):
+    path = write_zeros(tmp_path / "a.h5", 10_000)
+    looks = iter([False, False, True])
+    with pytest.raises(BusyError, match="open-bench ends"):
+        ReplayFeed("file:x", Recording(path), lambda: next(looks))
+    uploads = Uploads(tmp_path / "kept", lambda: True)
+    with pytest.raises(BusyError, match="open-bench ends"):
+        taken_in(uploads, "a.h5", path.read_bytes())
+    assert list((tmp_path / "kept").iterdir()) == []
 
 
 def test_recordings_that_are_sent_in_have_a_quota_a_number_and_a_time(tmp_path, monkeypatch):

@@ -1,0 +1,128 @@
+"""Recordings that mean harm, sent to a real server or on its disk; and how fast it ends."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager
+
+import httpx
+import pytest
+from hostile_recordings import HOSTILE, SECRET, write_hostile, write_zeros
+
+from recognizer.command import run as recognize_object
+
+PATIENCE_S = 30.0
+SOON_S = 2.0
+LONG = 1_900_000  #: frames, which take 20 s to read
+
+
+@contextmanager
+def started(folder):
+    """Start a server on an empty folder; gives the process and its client."""
+    command = (sys.executable, "-m", "recognizer.bench.command", "--folder", "recordings",
+               "--web-port", "0", "--port", "sim:")  # fmt: skip
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL, "text": True}
+    with subprocess.Popen(command, cwd=folder, **pipes) as process:
+        try:
+            address = process.stdout.readline().split()[-1]
+            with httpx.Client(base_url=address, timeout=PATIENCE_S) as client:
+                yield process, client
+        finally:
+            process.kill()
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / SECRET).write_bytes(b"kept to itself " * 80)
+    (tmp_path / "recordings").mkdir()
+    return tmp_path
+
+
+def send(client, path):
+    """Send a recording in; return the answer."""
+    return client.post("/api/recordings", params={"name": "sent.h5"}, content=path.read_bytes())
+
+
+def refused(answer, kind):
+    assert answer.status_code == 400, answer.text
+    error = answer.json()["error"]
+    assert HOSTILE[kind][1] in error["cause"]
+    assert error["fix"]
+    return error["place"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_what_means_harm_is_refused_and_the_server_ends(folder, number):
+    kept = folder / "recordings"
+    with started(folder) as (process, client):
+        for kind in HOSTILE:
+            path = write_hostile(kind, folder / "mine.h5")
+            assert refused(send(client, path), kind) == "sent.h5"
+            assert list(kept.iterdir()) == []
+            path.rename(kept / "mine.h5")  # by another way, or from an earlier version
+            assert refused(client.post("/api/replay", json={"name": "mine.h5"}), kind)
+            assert client.post("/api/port", json={"url": "sim:"}).status_code == 200
+            (kept / "mine.h5").unlink()
+        seconds, code = ended(process, number)
+    assert code == 0
+    assert seconds < SOON_S
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("work", ["two sent in", "one played"])
+def test_the_server_ends_while_it_reads_long_recordings(folder, work, number):
+    path = write_zeros(folder / "long.h5", LONG)
+    (folder / "recordings" / "long.h5").write_bytes(path.read_bytes())
+    with started(folder) as (process, client):
+        base = client.base_url
+
+        def ask(name):
+            with httpx.Client(base_url=base, timeout=PATIENCE_S) as other:
+                try:
+                    if work == "one played":
+                        answers.append(other.post("/api/replay", json={"name": "long.h5"}))
+                    else:
+                        given, content = {"name": name}, path.read_bytes()
+                        answers.append(other.post("/api/recordings", params=given, content=content))
+                except httpx.HTTPError as error:  # the line was closed
+                    answers.append(error)
+
+        answers = []
+        names = ("a.h5", "b.h5") if work == "two sent in" else ("",)
+        asking = [threading.Thread(target=ask, args=(name,), daemon=True) for name in names]
+        for thread in asking:
+            thread.start()
+        time.sleep(3.0)
+        assert answers == []  # it reads
+        seconds, code = ended(process, number)
+        for thread in asking:
+            thread.join(PATIENCE_S)
+    assert code == 0
+    assert seconds < SOON_S
+    for answer in answers:
+        assert isinstance(answer, httpx.HTTPError) or answer.status_code == 409, answer
+    assert [path.name for path in (folder / "recordings").iterdir()] == ["long.h5"]
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_recognize_object_refuses_it(folder, kind, lab, capsys, monkeypatch):
+    monkeypatch.chdir(folder / "recordings")
+    write_hostile(kind, folder / "recordings" / "a.h5")
+    for words in (("a.h5",), ("check", "a.h5", "--at", "Cube/F1"), ("--port", "file:a.h5")):
+        assert recognize_object([*words, "--database", str(lab / "lab.db")]) == 2, words
+        err = capsys.readouterr().err
+        assert HOSTILE[kind][1] in err
+        assert "a.h5" in err
+        assert "fix: " in err
+
+
+def ended(process, number):
+    """Send a signal; return after how many seconds the process ended, and its exit code."""
+    began_s = time.monotonic()
+    process.send_signal(number)
+    code = process.wait(PATIENCE_S)
+    return time.monotonic() - began_s, code

@@ -1,0 +1,133 @@
+"""Recordings that lead to other files or claim more than they hold, and those that may be large."""
+
+from __future__ import annotations
+
+import h5py
+import numpy as np
+import pytest
+from hostile_recordings import HOSTILE, IMAGES, SECRET, write_hostile
+
+from probe.command import run
+from probe.errors import RecordingError
+from probe.recording.imported import import_array
+from probe.recording.layout import FrameBlock, RecordingOrigin
+from probe.recording.read import Recording, read_frames
+from probe.recording.repair import repair
+from probe.recording.write import FileWriter
+
+TEN_MINUTES = 126_600  #: frames, at 211 a second
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder, with a secret in the one above."""
+    (tmp_path / SECRET).write_bytes(b"kept to itself " * 80)
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    return folder
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_it_is_refused_before_a_value_is_read(folder, kind, monkeypatch):
+    path = write_hostile(kind, folder / "a.h5")
+
+    def value(*_):
+        raise AssertionError("a value was asked for")
+
+    monkeypatch.setattr(h5py.Dataset, "__getitem__", value)
+    for attempt in (
+        lambda: list(read_frames(path)),
+        lambda: Recording(path, live=True),
+        lambda: repair(path),
+        lambda: import_array(path, folder / "b.h5", dataset="frames"),
+    ):
+        with pytest.raises(RecordingError) as caught:
+            attempt()
+        assert HOSTILE[kind][1] in caught.value.cause
+        assert caught.value.fix
+        assert caught.value.place == str(path)
+    assert [file.name for file in folder.iterdir()] == ["a.h5"]
+
+
+def test_the_link_of_an_unknown_kind_is_one(folder):
+    kinds = []
+    with h5py.File(write_hostile("link of an unknown kind", folder / "a.h5")) as file:
+        group = file["/"].id
+        group.links.iterate(lambda _, link: kinds.append(link.type), info=True)
+    assert sorted(kinds) == [h5py.h5l.TYPE_HARD, 77]
+
+
+@pytest.mark.parametrize("kind", ["external storage", "virtual dataset", "10^9 images"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("info", "a.h5"), ("replay", "a.h5"), ("repair", "a.h5"),
+        ("info", "file:a.h5"), ("record", "file:a.h5", "-o", "out.h5"),
+        ("calibrate", "bias", "a.h5"),
+        ("calibrate", "loads", "a.h5=0", "a.h5=9", "-o", "c.json"),
+        ("import", "a.h5", "-o", "out.h5"),
+        *(("export", "a.h5", f"--{kind}", f"out.{kind}") for kind in ("csv", "npy", "png", "mcap")),
+    ],
+    ids=" ".join,
+)  # fmt: skip
+def test_commands_refuse_it(folder, kind, words, capsys, monkeypatch):
+    monkeypatch.chdir(folder)
+    write_hostile(kind, folder / "a.h5")
+    assert run(list(words)) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert HOSTILE[kind][1] in err
+    assert "a.h5" in err
+    assert "fix: " in err
+    assert [file.name for file in folder.iterdir()] == ["a.h5"]
+
+
+@pytest.mark.parametrize("live", [False, True])
+def test_ten_minutes_of_nothing_are_a_recording(tmp_path, live):
+    path, number = tmp_path / "a.h5", np.zeros(TEN_MINUTES, np.int64)
+    images = np.zeros((TEN_MINUTES, 16, 16), np.uint16)
+    wrist = np.zeros((TEN_MINUTES, 4), np.uint16)
+    with FileWriter(path, RecordingOrigin()) as writer:
+        writer.write(FrameBlock(images, number, number, wrist, None))
+    recording = Recording(path, live=live)
+    assert len(recording) == TEN_MINUTES
+    assert sum(len(block) for block in recording.blocks(100_000)) == TEN_MINUTES - 100_000
+    assert repair(path).changed is False
+
+
+@pytest.mark.parametrize("chunk", [64, 2048, TEN_MINUTES, None])
+def test_ten_minutes_of_others_are_a_recording_however_they_are_stored(tmp_path, chunk):
+    packed = {} if chunk is None else {"chunks": (chunk, 16, 16), "compression": 9}
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        images = np.zeros((TEN_MINUTES, 16, 16), np.uint16)
+        images[:, 3, 4] = np.arange(TEN_MINUTES) % 1024
+        file.create_dataset("frames", data=images, **packed)
+    first = [block.counts[0, 3, 4] for block in Recording(tmp_path / "a.h5").blocks()]
+    assert first == [number % 1024 for number in range(0, TEN_MINUTES, 256)]
+
+
+def test_links_within_a_file_are_followed(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["held/images"] = IMAGES + 3
+        file["frames"] = h5py.SoftLink("/held/images")
+        file["held/above"] = file["/"]  # a group within itself
+        file["again"] = file["held"]
+    assert (Recording(tmp_path / "a.h5").block().counts == 3).all()
+
+
+def test_a_few_images_that_were_never_written_are_zeros(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_dataset("frames", (16_000, 16, 16), np.uint16, chunks=(64, 16, 16))
+    assert sum(len(block) for block in Recording(tmp_path / "a.h5").blocks()) == 16_000
+
+
+@pytest.mark.parametrize("side", [1024, 1025])
+def test_images_are_of_bounded_size(tmp_path, side):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["frames"] = np.zeros((20, side, side), np.uint8)
+    if side == 1024:
+        sizes = [len(block) for block in Recording(tmp_path / "a.h5").blocks()]
+        assert sizes == [16, 4]  # not all of them at once
+        return
+    with pytest.raises(RecordingError, match="images are of 1025 x 1025, at most 1,048,576"):
+        Recording(tmp_path / "a.h5")
