@@ -10,12 +10,15 @@ HDF5 File Format Specification 3.0, III.E: disk format level 1E, the global heap
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
-_SIGNATURE, _VERSION = b"GCOL", 1
+_HEAP = b"GCOL\x01"  #: signature and version
 _HEAD = 16  #: bytes before the objects, and before the data of each
 _ALIGNED = 8  #: bytes, to which an object's length is rounded up
 _SEARCHED = 1 << 26  #: bytes from the beginning; attributes are written before frames
+_AT_ONCE = 1 << 20  #: bytes
 
 
 def strings_end(path: Path) -> bool:
@@ -26,21 +29,39 @@ def strings_end(path: Path) -> bool:
     OSError
         The file cannot be read.
     """
+    room = 2 * path.stat().st_size  # collections lie apart; those that were freed may overlap
     with open(path, "rb") as file:
-        data = file.read(_SEARCHED)
-    at = data.find(_SIGNATURE)
-    while at >= 0:
-        if at + _HEAD <= len(data) and data[at + 4] == _VERSION and not _ends(data, at):
-            return False
-        at = data.find(_SIGNATURE, at + 1)
+        for start in _heaps(file):
+            data = _objects(file, start)
+            room -= len(data)
+            if room < 0 or not _ends(data):
+                return False
     return True
 
 
-def _ends(data: bytes, start: int) -> bool:
-    """Tell whether the objects of a collection lead to its end, or beyond what was read."""
-    end = min(start + _number(data, start + 8), len(data))
-    at = start + _HEAD
-    while at + _HEAD <= end:
+def _heaps(file: BinaryIO) -> Iterator[int]:
+    """Yield where collections begin."""
+    for first in range(0, _SEARCHED, _AT_ONCE):
+        file.seek(first)
+        data = file.read(_AT_ONCE + len(_HEAP) - 1)
+        at = data.find(_HEAP)
+        while at >= 0:
+            yield first + at
+            at = data.find(_HEAP, at + 1)
+        if len(data) < _AT_ONCE:
+            return
+
+
+def _objects(file: BinaryIO, start: int) -> bytes:
+    """Return the objects of a collection, as far as the file has them."""
+    file.seek(start + 8)
+    return file.read(max(0, min(_number(file.read(8), 0), _SEARCHED) - _HEAD))
+
+
+def _ends(data: bytes) -> bool:
+    """Tell whether the objects of a collection lead to its end, or beyond the end of the file."""
+    at = 0
+    while at + _HEAD <= len(data):
         length = _number(data, at + 8)
         if int.from_bytes(data[at : at + 2], "little"):
             at += _HEAD + -(-length // _ALIGNED) * _ALIGNED

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import h5py
 import numpy as np
 import pytest
 
 from probe.errors import RecordingError
 from probe.frame import frame_from
 from probe.recording.heap import strings_end
-from probe.recording.read import read_frames
+from probe.recording.read import Recording, read_frames
 from probe.recording.record import Recorder
 from probe.recording.repair import repair
 
@@ -36,6 +37,25 @@ def test_strings_without_end_are_damage(recording, attempt):
     assert not strings_end(recording)
     with pytest.raises(RecordingError, match="it is damaged: cannot read it"):
         attempt(recording)
+
+
+def test_strings_behind_the_images_are_looked_at_too(tmp_path):
+    with h5py.File(tmp_path / "touch.h5", "w") as file:
+        file["frames"] = np.zeros((8000, 16, 16), np.uint16)
+        file.attrs["sensor"] = "mat 3"
+    content = bytearray((tmp_path / "touch.h5").read_bytes())
+    at = content.index(b"GCOL")
+    assert at > 4_000_000
+    content[at + 16 : at + 528] = bytes(512)
+    (tmp_path / "touch.h5").write_bytes(content)
+    with pytest.raises(RecordingError, match="it is damaged: cannot read it"):
+        Recording(tmp_path / "touch.h5")
+
+
+def test_collections_in_one_another_are_damage(tmp_path):
+    head = b"GCOL\x01\0\0\0" + (1 << 20).to_bytes(8, "little")
+    (tmp_path / "touch.h5").write_bytes(head * (1 << 16))
+    assert not strings_end(tmp_path / "touch.h5")  # which would be looked at 65,536 times
 
 
 @pytest.mark.parametrize("length", range(0, 20, 4))
