@@ -23,8 +23,7 @@ from types import ModuleType
 from typing import Any
 
 #: Modules of this folder, one corpus each.
-CORPORA: tuple[str, ...] = (
-)  # fmt: skip
+CORPORA = ("answers",)
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
@@ -46,6 +45,7 @@ ENVIRONMENT = {
 }
 UNSET = ("ENCODED_OBJECTS_KERNELS", "FORCE_COLOR")
 RELATIVE, ABSOLUTE = 1e-9, 1e-12  #: by which numbers that are not whole may differ
+DIGITS = 12  #: of a number that is stored
 COMPRESSED_FROM = 1_000_000  #: bytes of a stored corpus
 SHOWN = 8  #: entries of each kind, and values of an entry, that are printed
 
@@ -77,8 +77,17 @@ def collect(wanted: str) -> Entries:
         for entry, value in found.items() if isinstance(found, Mapping) else found:
             if entry in entries or not entry.startswith(name + "/" * bool(name)):
                 raise ValueError(f"{corpus}: entry {entry} stands twice, or not in part {name}")
-            entries[entry] = json.loads(json.dumps(value, allow_nan=False))
+            entries[entry] = rounded(json.loads(json.dumps(value, allow_nan=False)))
     return entries
+
+
+def rounded(value: Any) -> Any:
+    """Return a JSON value with its numbers to `DIGITS` places."""
+    if isinstance(value, dict):
+        return {key: rounded(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [rounded(one) for one in value]
+    return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
 
 
 def stored(corpus: str) -> Entries:
