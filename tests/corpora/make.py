@@ -23,7 +23,10 @@ from types import ModuleType
 from typing import Any
 
 #: Modules of this folder, one corpus each.
-CORPORA = ("answers",)
+CORPORA = (
+    "answers",
+    "counts",
+)
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
