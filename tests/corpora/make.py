@@ -24,7 +24,11 @@ from typing import Any
 
 #: Modules of this folder, one corpus each.
 CORPORA: tuple[str, ...] = (
-)  # fmt: skip
+    "bytes",
+    "databases",
+    "recordings",
+    "texts",
+)
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent

@@ -12,6 +12,7 @@ import json
 import shlex
 import shutil
 import tempfile
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -480,10 +481,13 @@ def collect(part: str) -> Iterator[tuple[str, Any]]:
         work.mkdir()
         with Commands(folder) as commands:
             _provide(work, commands)
-            for number, line in enumerate(_lines(part, work)):
+            times: Counter[str] = Counter()
+            for line in _lines(part, work):
                 words = shlex.split(line)
                 outcome = commands.run(*words, cwd=work)
-                yield f"{part}/{number:03d} {line}", _said(outcome, words, work)
+                times[line] += 1
+                again = f" #{times[line]}" if times[line] > 1 else ""
+                yield f"{part}/{line}{again}", _said(outcome, words, work)
 
 
 def _lines(part: str, folder: Path) -> list[str]:
