@@ -47,6 +47,14 @@ SENSOR_TYPES = (
 MOST = ALL.replace("stpz,", "")  # gzipped STEP costs more than all else together
 PARTS = ("specs", "shapes", "options", "kit")
 
+_RING = (
+    "shape: {polyhedron: {vertices: [[0, 0, 0], [60, 0, 0], [60, 60, 0], [0, 60, 0], "
+    "[0, 0, 30], [60, 0, 30], [60, 60, 30], [0, 60, 30], [20, 20, 0], [40, 20, 0], "
+    "[40, 40, 0], [20, 40, 0], [20, 20, 30], [40, 20, 30], [40, 40, 30], [20, 40, 30]], "
+    "faces: [[[0, 3, 2, 1], [8, 9, 10, 11]], [[4, 5, 6, 7], [12, 15, 14, 13]], "
+    "[0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7], "
+    "[8, 12, 13, 9], [9, 13, 14, 10], [10, 14, 15, 11], [11, 15, 12, 8]]}}"
+)
 # Name of the case, what is written of it, and a spec; SHAPES stands for the fixtures' folder.
 SHAPES: tuple[tuple[str, str, str], ...] = (
     ("step-hole", MOST, "shape: {file: SHAPES/cube_with_hole.step}"),
@@ -67,19 +75,20 @@ SHAPES: tuple[tuple[str, str, str], ...] = (
     (
         "face-with-hole",
         "step,stl,3mf,glb",
-        "shape: {polyhedron: {vertices: [[0, 0, 0], [60, 0, 0], [60, 60, 0], [0, 60, 0], "
-        "[0, 0, 30], [60, 0, 30], [60, 60, 30], [0, 60, 30], [20, 20, 0], [40, 20, 0], "
-        "[40, 40, 0], [20, 40, 0], [20, 20, 30], [40, 20, 30], [40, 40, 30], [20, 40, 30]], "
-        "faces: [[[0, 3, 2, 1], [8, 9, 10, 11]], [[4, 5, 6, 7], [12, 15, 14, 13]], "
-        "[0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7], "
-        "[8, 12, 13, 9], [9, 13, 14, 10], [10, 14, 15, 11], [11, 15, 12, 8]]}}",
+        _RING,
     ),
 )
+_ROD = "shape: {cylinder: {diameter: 40 mm, height: 36 mm}}\n"
 _SMALL = "shape: {cube: 36 mm}\n"
+_SHELF = (
+    "name: Shelf\nprofile: one-touch\nobjects:\n"
+    "  - {name: Cube, shape: {cube: 30 mm}, copies: 2}\n"
+    "  - {name: Rod, shape: {cylinder: {diameter: 30 mm, height: 60 mm}}}\n"
+    "  - {name: Block, shape: {box: [40, 30, 20]}, print: {parts: whole, printer: resin}}\n"
+)
 OPTIONS: tuple[tuple[str, str, str], ...] = (
     ("whole", ALL, _SMALL + "print: {parts: whole}"),
-    ("whole-cylinder", "step,3mf", "shape: {cylinder: {diameter: 40 mm, height: 36 mm}}\n"
-     "print: {parts: whole}"),
+    ("whole-cylinder", "step,3mf", _ROD + "print: {parts: whole}"),
     ("whole-bracket", "step,stl", "shape: {file: SHAPES/l_bracket.stl}\nprint: {parts: whole}"),
     ("two-colours", "3mf,glb,step", _SMALL + "print: {colours: 2}"),
     ("collision-symbols", "mjcf,urdf,sdf,usd", _SMALL + "robot: {collision: symbols}"),
@@ -101,10 +110,7 @@ OPTIONS: tuple[tuple[str, str, str], ...] = (
     ("prmvs", "stl", _SMALL + "encoding: {family: prba, order: 2, degree: 12, "
      "rows: 63, columns: 65, window: 6x2}\nsymbols: {pitch: 7 mm}"),
     ("name", "stl,step,urdf,usd", "name: Würfel 1 & 2\nshape: {cube: 32 mm}"),
-    ("set", "step,stl,3mf,glb", "name: Shelf\nprofile: one-touch\nobjects:\n"
-     "  - {name: Cube, shape: {cube: 30 mm}, copies: 2}\n"
-     "  - {name: Rod, shape: {cylinder: {diameter: 30 mm, height: 60 mm}}}\n"
-     "  - {name: Block, shape: {box: [40, 30, 20]}, print: {parts: whole, printer: resin}}\n"),
+    ("set", "step,stl,3mf,glb", _SHELF),
 )  # fmt: skip
 
 GEOMETRY = {"step", "stl", "glb", "obj", "xml", "urdf", "sdf", "usda", "mtl"}

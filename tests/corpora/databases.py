@@ -102,7 +102,8 @@ def _postgresql(commands: Commands, work: Path) -> Iterator[tuple[str, Any]]:
     pipe = subprocess.PIPE
     script = [sys.executable, ROOT / "tests/postgres.py"]
     with subprocess.Popen(script, stdin=pipe, stdout=pipe, text=True) as server:
-        assert server.stdin is not None and server.stdout is not None
+        assert server.stdin is not None
+        assert server.stdout is not None
         try:
             address = server.stdout.readline().strip()
             if not address:

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
 from corpora.commands import DATA, FIXTURES, Commands, normal_text, normal_value
 
 NAME = "recordings"
@@ -71,8 +70,9 @@ def _read(commands: Commands, work: Path) -> Iterator[tuple[str, Any]]:
         words = ("--csv", "out.csv", "--npy", "out.npy", "--replace", "--json")
         yield f"export/{name}", _said(commands, work, "probe-sensor", "export", name, *words)
         yield from _written(work, f"export/{name}", "out.csv", "out.npy")
-    yield "calibration", _said(
-        commands, work, "probe-sensor", "info", "old-calibration.json", "--json"
+    yield (
+        "calibration",
+        _said(commands, work, "probe-sensor", "info", "old-calibration.json", "--json"),
     )
     for name in ("scan", "old-touch"):
         words = (f"{name}.h5", "--mcap", "out.mcap", "--replace")

@@ -82,6 +82,7 @@ encode-object schema
 encode-object printers [twice]
 encode-object --version [twice]
 encode-object cube.yaml --dry-run --lab-key F1XT-VRES-0000-000Q [twice]
+encode-object cube.yaml --database dry.db --dry-run --lab-key F1XT-VRES-0000-000Q [twice]
 encode-object cube.yaml --database new.db --lab-key F1XT-VRES-0000-000Q --format stl [twice]
 encode-object lab --database new.db [twice]
 encode-object cube.yaml --database new.db --format stl --replace --json
@@ -549,7 +550,7 @@ def _provide(folder: Path, commands: Commands) -> None:
         connection.execute("CREATE TABLE songs (name TEXT)")
     connection.close()
     whole = (folder / "lab.db").read_bytes()
-    (folder / "damaged.db").write_bytes(whole[:4096] + b"\xff" * 8192 + whole[12288:])
+    (folder / "damaged.db").write_bytes(whole[: len(whole) // 3])
     (folder / "text.db").write_text("not a database, but long enough to be read as one\n" * 40)
 
     for path in (DATA / "recordings").iterdir():
