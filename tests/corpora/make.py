@@ -23,10 +23,7 @@ from types import ModuleType
 from typing import Any
 
 #: Modules of this folder, one corpus each.
-CORPORA = (
-    "answers",
-    "counts",
-)
+CORPORA: tuple[str, ...] = ("answers", "bytes", "counts", "databases", "recordings", "texts")
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent

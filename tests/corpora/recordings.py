@@ -1,0 +1,180 @@
+"""Recordings of every format that is read, and of every kind that is refused or repaired.
+
+File -> frames as SHA-256 of each array, attributes, and what the commands say: `info`, a table
+(CSV) and an array, `repair`, `import`, and the answers to its touches. The files of
+`data/recordings` were written by the code of November 2026 (README.md there) and are never made
+again.
+"""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from corpora.commands import DATA, FIXTURES, Commands, normal_text, normal_value
+
+NAME = "recordings"
+TOUCHES = ("touch", "touches", "scan", "gel", "small", "plain", "all-attributes")
+IMPORTED = {
+    "array.npy": (),
+    "arrays.npz": (),
+    "two.npz": ("--dataset", "right", "--rate", "50", "--sensor", "right"),
+    "matlab.mat": (),
+    "table.csv": (),
+    "short.csv": (),
+    "pictures": ("--sensor-type", "fsr-16"),
+    "scan.mcap": (),
+    "damaged.mcap": (),
+    "plain-12x32.h5": ("--sensor-type", "flexitac-12x32"),
+    "plain-negative.h5": (),
+    "plain-flat.h5": (),
+    "fractions.h5": (),
+}  #: file: options of `probe-sensor import`
+
+
+def collect() -> Iterator[tuple[str, Any]]:
+    """Yield the entries."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name).resolve()
+        work = folder / "work"
+        shutil.copytree(DATA / "recordings", work)
+        for packed in work.glob("*.gz"):
+            (work / packed.stem).write_bytes(gzip.decompress(packed.read_bytes()))
+            packed.unlink()
+        for old in ("touch.h5", "scan.h5", "calibration.json"):
+            shutil.copy(FIXTURES / "recordings" / old, work / f"old-{old}")
+        shutil.copy(FIXTURES / "database/v2.db", work / "old.db")
+        packed = DATA / "databases/v3.db.gz"
+        (work / "lab.db").write_bytes(gzip.decompress(packed.read_bytes()))
+        with Commands(folder) as commands:
+            yield from _read(commands, work)
+            yield from _recognised(commands, work)
+            yield from _imported(commands, work)
+            yield from _repaired(commands, work)
+
+
+def _read(commands: Commands, work: Path) -> Iterator[tuple[str, Any]]:
+    """Yield what is read of every file as it is, and how it is refused."""
+    for path in [*sorted(work.glob("*.h5")), work / "series.h5"]:
+        name = path.name
+        yield f"frames/{name}", _frames(path, work)
+        yield f"info/{name}", _said(commands, work, "probe-sensor", "info", name, "--json")
+        if name.endswith(".part.h5"):
+            yield f"live/{name}", _frames(path, work, live=True)
+        words = ("--csv", "out.csv", "--npy", "out.npy", "--replace", "--json")
+        yield f"export/{name}", _said(commands, work, "probe-sensor", "export", name, *words)
+        yield from _written(work, f"export/{name}", "out.csv", "out.npy")
+    yield (
+        "calibration",
+        _said(commands, work, "probe-sensor", "info", "old-calibration.json", "--json"),
+    )
+    for name in ("scan", "old-touch"):
+        words = (f"{name}.h5", "--mcap", "out.mcap", "--replace")
+        _said(commands, work, "probe-sensor", "export", *words)
+        back = ("import", "out.mcap", "-o", "back.h5", "--replace", "--json")
+        yield f"mcap/{name}", _said(commands, work, "probe-sensor", *back)
+        yield f"mcap/{name}/frames", _frames(work / "back.h5", work)
+
+
+def _recognised(commands: Commands, work: Path) -> Iterator[tuple[str, Any]]:
+    for name in TOUCHES:
+        words = (f"{name}.h5", "--json")
+        yield f"recognised/{name}", _said(commands, work, "recognize-object", *words)
+    for name, more in (("old-touch", ()), ("old-scan", ("--scan",))):
+        words = (f"{name}.h5", "--database", "old.db", *more, "--json")
+        yield f"recognised/{name}", _said(commands, work, "recognize-object", *words)
+
+
+def _imported(commands: Commands, work: Path) -> Iterator[tuple[str, Any]]:
+    for name, more in IMPORTED.items():
+        words = ("import", name, "-o", "imported.h5", "--replace", *more, "--json")
+        said = _said(commands, work, "probe-sensor", *words)
+        yield f"import/{name}", said
+        if not said["code"]:
+            yield f"import/{name}/frames", _frames(work / "imported.h5", work)
+
+
+def _repaired(commands: Commands, work: Path) -> Iterator[tuple[str, Any]]:
+    """Yield what repair says of every file, and what is there afterwards; changes the files."""
+    for path in sorted(work.glob("*.h5")):
+        before = {one.name for one in work.iterdir()}
+        said = _said(commands, work, "probe-sensor", "repair", path.name, "--json")
+        new = sorted({one.name for one in work.iterdir()} - before)
+        gone = sorted(before - {one.name for one in work.iterdir()})
+        yield f"repair/{path.name}", said | {"new files": new, "files gone": gone}
+        for name in [*([path.name] if path.exists() else []), *new]:
+            yield f"repair/{path.name}/frames of {name}", _frames(work / name, work)
+
+
+def _frames(path: Path, work: Path, *, live: bool = False) -> dict[str, Any]:
+    """Return what `Recording` reads of a file, or why not."""
+    from encoded_objects import EncodedObjectsError, Recording
+
+    try:
+        recording = Recording(path, live=live)
+        frames = list(recording.frames())
+    except EncodedObjectsError as error:
+        return {"error": normal_text(str(error), work), "exit code": error.exit_code}
+    arrays = {
+        "counts": [np.asarray(frame.counts, "<i8") for frame in frames],
+        "t_ns": [np.asarray(frame.t_ns, "<i8") for frame in frames],
+        "seq": [np.asarray(frame.seq, "<i8") for frame in frames],
+        "wrist": [np.asarray(frame.wrist, "<i8") for frame in frames],
+        "pose": [np.asarray(frame.pose, "<f8") for frame in frames if frame.pose is not None],
+    }
+    origin = recording.origin
+    try:
+        sensor_type = repr(recording.sensor_type().shape)
+    except EncodedObjectsError as error:
+        sensor_type = normal_text(str(error), work)
+    return {
+        "says": str(recording),
+        "frames": len(recording),
+        "shape": list(recording.shape),
+        "sha256": {name: _sha256(values) for name, values in arrays.items() if values},
+        "sensor": origin.sensor,
+        "calibration": origin.calibration,
+        "units": origin.units,
+        "sensor type": origin.sensor_type,
+        "sensor type read": sensor_type,
+        "more": {name: normal_text(str(value), work) for name, value in origin.more.items()},
+    }
+
+
+def _written(work: Path, entry: str, *names: str) -> Iterator[tuple[str, Any]]:
+    """Yield hashes of files that may have been written, and take them away."""
+    for name in names:
+        path = work / name
+        if not path.exists():
+            continue
+        if path.suffix == ".npy":
+            value = np.load(path)
+            yield f"{entry}/npy", [str(value.dtype), list(value.shape), _sha256([value])]
+        else:
+            text = path.read_text()
+            digest = hashlib.sha256(text.encode()).hexdigest()
+            yield f"{entry}/csv", [text.partition("\n")[0][:80], text.count("\n"), digest]
+        path.unlink()
+
+
+def _sha256(arrays: list[Any]) -> str:
+    return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
+
+
+def _said(commands: Commands, work: Path, *words: str) -> dict[str, Any]:
+    outcome = commands.run(*words, cwd=work)
+    try:
+        stdout = normal_value(outcome.value(), work)
+    except ValueError:
+        stdout = normal_text(outcome.stdout, work)
+    return {
+        "code": outcome.code,
+        "stdout": stdout,
+        "stderr": normal_text(outcome.stderr, work),
+    }

@@ -1,0 +1,578 @@
+"""Every page of help, what every command says as text and as JSON, and every sort of error.
+
+Command -> exit code, stdout (as JSON where it is), stderr. Commands run in one folder after
+another, so that later ones meet the files of earlier ones. Folders, times of day, versions and
+durations are replaced by words; numbers in JSON are compared as numbers.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+import shlex
+import shutil
+import tempfile
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from corpora.commands import DATA, FIXTURES, Commands, Outcome, normal_text, normal_value
+
+NAME = "texts"
+PARTS = ("help", "making", "decoding", "probing", "reading", "validating", "misuse", "specs")
+
+HELP = """
+encode-object
+encode-object init
+encode-object schema
+encode-object printers
+encode-object lab
+encode-object list
+encode-object show
+encode-object retire
+encode-object export
+encode-object import
+decode-window
+probe-sensor
+probe-sensor list
+probe-sensor info
+probe-sensor types
+probe-sensor live
+probe-sensor record
+probe-sensor replay
+probe-sensor export
+probe-sensor import
+probe-sensor repair
+probe-sensor simulate
+probe-sensor calibrate
+probe-sensor calibrate bias
+probe-sensor calibrate loads
+probe-sensor calibrate port
+probe-kit
+recognize-object
+recognize-object as-built
+recognize-object check
+validate-set
+validate-set compare
+validate-set worlds
+validate-set repeat
+validate-set report
+open-bench
+"""
+
+# Lines are commands, in their order; those that end in [twice] also run with --json.
+MAKING = """
+encode-object init --json
+encode-object init cube
+encode-object init box
+encode-object init triangular_prism
+encode-object init tetrahedron
+encode-object init octahedron
+encode-object init dodecahedron
+encode-object init prism
+encode-object init pyramid
+encode-object init cylinder
+encode-object init cone
+encode-object init polyhedron
+encode-object init file
+encode-object init box -o box.yaml [twice]
+encode-object init box -o box.yaml --force
+encode-object schema
+encode-object printers [twice]
+encode-object --version [twice]
+encode-object cube.yaml --dry-run --lab-key F1XT-VRES-0000-000Q [twice]
+encode-object cube.yaml --database dry.db --dry-run --lab-key F1XT-VRES-0000-000Q [twice]
+encode-object cube.yaml --database new.db --lab-key F1XT-VRES-0000-000Q --format stl [twice]
+encode-object lab --database new.db [twice]
+encode-object cube.yaml --database new.db --format stl --replace --json
+encode-object changed.yaml --database new.db --format stl [twice]
+encode-object changed.yaml --database new.db --format stl --replace
+encode-object set.yaml --database set.db --lab-key F1XT-VRES-0000-000Q --format stl,3mf [twice]
+encode-object set.yaml --database set2.db --lab-key F1XT-VRES-0000-000Q --format stl -j 2 --json
+encode-object blank.yaml --database new.db --format stl [twice]
+encode-object cube.yaml --database other.db --lab-key 0000-0000-0000-0000 --format stl
+encode-object cube.yaml --database verified.db --lab-key F1XT-VRES-0000-000Q --format 3mf --verify
+encode-object lab [twice]
+encode-object list [twice]
+encode-object show Cube [twice]
+encode-object show Rod [twice]
+encode-object show Guest --json
+encode-object show "Small box-2" [twice]
+encode-object show Prism --sensor-type gel-24x32
+encode-object show Nobody [twice]
+encode-object retire Prism
+encode-object retire Prism [twice]
+encode-object retire Prism --undo --json
+encode-object retire "Small box-1" --free
+encode-object retire "Small box-1" --free --yes
+encode-object list --json
+encode-object export out.db --object Cube --object Rod
+encode-object export out.db --json
+encode-object export out.db --force --json
+encode-object import out.db --database into.db --dry-run
+encode-object import out.db --database into.db --json
+encode-object import out.db --database into.db
+encode-object import guest.db --database into.db --rename Guest=Visitor [twice]
+encode-object import out.db --database new.db [twice]
+encode-object import out.db --database new.db --skip-refused
+encode-object list --database into.db --json
+encode-object lab --database into.db
+encode-object list --database old.db --json
+encode-object lab --database old.db [twice]
+encode-object list --database newer.db [twice]
+encode-object list --database foreign.db [twice]
+encode-object list --database damaged.db [twice]
+encode-object list --database gone.db [twice]
+encode-object show Cube --database text.db [twice]
+encode-object list --database gone/lab.db
+encode-object list --database postgresql://nobody@127.0.0.1:1/none [twice]
+encode-object list --database mysql://host/name
+encode-object cube.yaml --database newer.db [twice]
+encode-object import newer.db
+encode-object import text.db
+probe-kit gel-24x32 -o kit
+"""
+
+DECODING = """
+decode-window "01 11 01 01 00 01" --profile thesis [twice]
+decode-window "01 11 01 01 00 01" --profile thesis --method table [twice]
+decode-window "01 11 01 01 00 01" --profile thesis --method serial [twice]
+decode-window "01 11 01 01 00 01" --profile thesis --method milestones [twice]
+decode-window "01 11 01 01 00 01" --profile thesis --method logarithm [twice]
+decode-window "01 11 01 01 00 01" --profile thesis --method likelihood [twice]
+decode-window "01 1? 01 01 00 01" --profile thesis --method likelihood --json
+decode-window "0123 1032 2310" --json
+decode-window "012 103 231" --method likelihood --rotations 0,1,2,3 --json
+decode-window "012 103 231" --method likelihood --top 3 [twice]
+decode-window "012 1?3 2?1" [twice]
+decode-window 012 103 231 --method milestones --json
+decode-window "0?2 1?3 2?1" --method likelihood --lab-key F1XT-VRES-0000-000Q --json
+decode-window "012 103 231" --profile large --json
+decode-window "012 103 231 130" --profile fine --json
+decode-window "0123 1032 2310" --database lab.db --json
+decode-window "1203 0132 2301" --database lab.db --method likelihood [twice]
+decode-window "01 11 01 01" --profile product --json
+decode-window "01 11" --profile thesis [twice]
+decode-window "05 11" [twice]
+decode-window "01 1" [twice]
+decode-window "01 xy" [twice]
+decode-window "01" --nothing
+decode-window "01" --profile none [twice]
+decode-window "01" --method none [twice]
+decode-window "01" --array "{" [twice]
+decode-window "01" --array "[1]"
+decode-window "01" --array "{}" --profile thesis
+decode-window "01" --array gone.json
+decode-window "01 11 01 01 00 01" --profile thesis --method likelihood --error 2
+decode-window "01 11 01 01 00 01" --profile thesis --method likelihood --rotations x
+decode-window "01" --database gone.db [twice]
+decode-window "01" --lab-key hello
+decode-window --version [twice]
+decode-window
+"""
+
+PROBING = """
+probe-sensor --version [twice]
+probe-sensor types [twice]
+probe-sensor types fsr-16 [twice]
+probe-sensor types gel-24x32 [twice]
+probe-sensor types mat-32x32
+probe-sensor types flexitac-12x32
+probe-sensor types flexitac-16x32
+probe-sensor types fsr-8x8
+probe-sensor types --schema
+probe-sensor types fsr16 [twice]
+probe-sensor types own-type.yaml [twice]
+probe-sensor types bad-type.yaml [twice]
+probe-sensor types gone.yaml
+probe-sensor info touch.h5 [twice]
+probe-sensor info touches.h5 [twice]
+probe-sensor info scan.h5 [twice]
+probe-sensor info calibration.json [twice]
+probe-sensor info gone.h5 [twice]
+probe-sensor info gone.json [twice]
+probe-sensor info text.h5 [twice]
+probe-sensor info newer.h5 [twice]
+probe-sensor info damaged.h5 [twice]
+probe-sensor info truncated.h5 [twice]
+probe-sensor info bad-calibration.json [twice]
+probe-sensor info newer-calibration.json [twice]
+probe-sensor info /dev/ttyGONE [twice]
+probe-sensor info serial:///dev/ttyGONE [twice]
+probe-sensor info sim:?speed=2 [twice]
+probe-sensor info sim:?firmware=z80
+probe-sensor info smoke:thing [twice]
+probe-sensor info sim: --sensor 8
+probe-sensor live sim:nothing
+probe-sensor live sim:gone.db#Cube/F1
+probe-sensor record file:gone.h5 -o a.h5
+probe-sensor record sim: -o a.csv [twice]
+probe-sensor record sim: -o gone/a.h5 --frames 1
+probe-sensor record sim: -o a.h5 --calibration gone.json
+probe-sensor record sim:
+probe-sensor record file:touch.h5 -o copy.h5 --frames 4
+probe-sensor replay touch.h5 --speed 0
+probe-sensor replay scan.h5 --speed 0 --json
+probe-sensor replay gone.h5
+probe-sensor replay touch.h5 --speed fast
+probe-sensor replay touch.h5 --speed nan
+probe-sensor export touch.h5 --csv touch.csv --npy touch.npy [twice]
+probe-sensor export scan.h5 --csv scan.csv
+probe-sensor export scan.h5 --mcap scan.mcap [twice]
+probe-sensor export touch.h5 --png touch.png --frame 99
+probe-sensor export touch.h5 --csv touch.csv [twice]
+probe-sensor export gone.h5 --npy a.txt
+probe-sensor export gone.h5 --png gone/a.png
+probe-sensor export touch.h5
+probe-sensor import arrays.npz -o imported.h5 [twice]
+probe-sensor import two.npz -o two.h5 [twice]
+probe-sensor import two.npz -o two.h5 --dataset left --rate 100 --sensor left
+probe-sensor import short.csv -o short.h5 [twice]
+probe-sensor import gone.npy -o a.h5
+probe-sensor import touch.npy -o touch.h5
+probe-sensor import touch.npy -o rate.h5 --rate -1
+probe-sensor repair touch.h5 [twice]
+probe-sensor repair truncated.h5 [twice]
+probe-sensor repair beheaded.h5 [twice]
+probe-sensor repair gone.h5
+probe-sensor calibrate bias blank0.h5 [twice]
+probe-sensor calibrate bias gone.h5
+probe-sensor calibrate loads blank0.h5=0 load20.h5=20 load60.h5=60 -o made.json
+probe-sensor calibrate loads blank0.h5=0 load20.h5=20 load60.h5=60 -o made.json [twice]
+probe-sensor calibrate loads gone.h5 -o a.json
+probe-sensor calibrate loads gone.h5=0 -o a.txt
+probe-sensor calibrate port sim: -o a.json --newtons 1,b
+probe-sensor calibrate
+probe-sensor simulate lab.db#Cube/F1 --seed 1 [twice]
+probe-sensor simulate lab.db#Cube/F1 --x 14 --y 20 --theta 30 --force 80 --seed 3 --json
+probe-sensor simulate lab.db#Rod/F1 --seed 1 --json
+probe-sensor simulate washer --x 1 --accuracy layer
+probe-sensor simulate washer --seed 2 --truth truth.json --touches 2 --noise quiet --json
+probe-sensor simulate lab.db#Cube/F1 --scan raster --touches 3 --seed 1 --json
+probe-sensor simulate lab.db#Cube/F1 --scan kinesthetic --touches 2 --seed 1 -o way.h5 --json
+probe-sensor simulate lab.db#Cube/F9 [twice]
+probe-sensor simulate lab.db#Nobody/F1 [twice]
+probe-sensor simulate lab.db#Cube
+probe-sensor simulate gone.stl
+probe-sensor simulate cube
+probe-sensor simulate gone.db#Cube/F1 [twice]
+probe-sensor simulate washer --x 99 -o a.h5
+probe-sensor simulate washer --accuracy 1e-9
+probe-sensor simulate washer --theta inf
+probe-sensor simulate washer --truth a.txt
+probe-sensor simulate washer --force -1 [twice]
+probe-sensor simulate washer --nope
+probe-sensor simulate washer --overlay wool [twice]
+probe-sensor simulate washer --noise loud
+probe-sensor simulate
+probe-sensor fly
+probe-sensor
+"""
+
+READING = """
+recognize-object touch.h5 [twice]
+recognize-object touches.h5 [twice]
+recognize-object touches.h5 --every --json
+recognize-object touches.h5 --scan [twice]
+recognize-object scan.h5 --scan --json
+recognize-object scan.h5 --scan --method thesis --json
+recognize-object gel.h5 [twice]
+recognize-object small.h5 [twice]
+recognize-object plain.h5 --json
+recognize-object touch.h5 --flip columns [twice]
+recognize-object touch.h5 --flip sideways
+recognize-object touch.h5 --joints 10,20,-30,5,0 [twice]
+recognize-object touch.h5 --touches 1 --overlay pad --json
+recognize-object touch.h5 --sensor-type gel-24x32 [twice]
+recognize-object touch.h5 --mcap answers.mcap --json
+recognize-object old.h5 --database old.db [twice]
+recognize-object blank0.h5 [twice]
+recognize-object load20.h5 [twice]
+recognize-object built.h5 --learn state.json --json
+recognize-object touch.h5 --sensor-state state.json --json
+recognize-object as-built built.h5 [twice]
+recognize-object as-built built.h5 --store --material PETG
+recognize-object as-built touch.h5 [twice]
+recognize-object check touch.h5 --at Cube/F1 [twice]
+recognize-object check touches.h5 --at Cube/F3 --every [twice]
+recognize-object check touch.h5 --at Cube/F9
+recognize-object check touch.h5
+recognize-object gone.h5 [twice]
+recognize-object text.h5 [twice]
+recognize-object newer.h5 [twice]
+recognize-object damaged.h5 [twice]
+recognize-object bad-type.h5 [twice]
+recognize-object other-shape.h5 [twice]
+recognize-object touch.h5 --database gone.db [twice]
+recognize-object touch.h5 --database text.h5 [twice]
+recognize-object touch.h5 --database newer.db [twice]
+recognize-object touch.h5 --plot a.pdf
+recognize-object touch.h5 --calibration gone.json [twice]
+recognize-object touch.h5 --sensor-state gone.json [twice]
+recognize-object touch.h5 --sensor-state calibration.json
+recognize-object --port serial:///dev/nowhere [twice]
+recognize-object --port smoke:
+recognize-object --port sim:lab.db#Cube/F1?overlay=wool
+recognize-object --json
+recognize-object a.h5 --port sim:
+recognize-object a.h5 --follow
+recognize-object a.h5 --overlay wool [twice]
+recognize-object a.h5 --joints 1,2
+recognize-object a.h5 --joints 1,2,3,4,nan
+recognize-object a.h5 --touches 0 [twice]
+recognize-object a.h5 --nope [twice]
+recognize-object touch.h5 --publish ftp://nowhere/x
+recognize-object --version [twice]
+recognize-object
+"""
+
+VALIDATING = """
+validate-set cube.yaml --touches 12 --study 0 --seed 3 -o run --json
+validate-set cube.yaml --touches 12 --study 0 --seed 3 -o run
+validate-set cube.yaml --touches 12 --study 0 --seed 4 --noise hard --policy next -o other --json
+validate-set --database lab.db --surfaces database --touches 8 --study 0 -o registered --json
+validate-set run --resume
+validate-set compare run other --json
+validate-set worlds run other --json
+validate-set repeat run 3 --json
+validate-set repeat run 99
+validate-set repeat gone 1
+validate-set report gone
+validate-set compare run gone
+validate-set gone.yaml --touches 4 -o new [twice]
+validate-set cube.yaml --touches 0 -o new
+validate-set cube.yaml --touches 4 --kinds face,moon -o new [twice]
+validate-set cube.yaml --touches 4 --noise loud -o new [twice]
+validate-set cube.yaml --touches 4 --surfaces clouds -o new
+validate-set cube.yaml --touches 4 --engine bullet -o new
+validate-set cube.yaml --touches 4 --policy best -o new
+validate-set --database gone.db --touches 4 -o new [twice]
+validate-set --version [twice]
+validate-set
+"""
+
+MISUSE = """
+encode-object
+encode-object --dry-runn c.yaml [twice]
+encode-object list --data x [twice]
+encode-object --json-lines
+encode-object --dry-run [twice]
+encode-object cube.yaml --format stepp [twice]
+encode-object cube.yaml --database mysql://h/n [twice]
+encode-object cube.yaml --lab-key hello [twice]
+encode-object cube.yaml --lab-key 0123-4567-89AB-CDEQ
+encode-object cube.yaml --sensor-type nose [twice]
+encode-object cube.yaml --sensor-type bad-type.yaml [twice]
+encode-object cube.yaml --jobs 0
+encode-object cube.yaml --print-profile none --printed-check
+encode-object cube.yaml --printed-check --print-faults broken
+encode-object cube.yaml -o text.h5/under --database a.db --lab-key F1XT-VRES-0000-000Q [twice]
+encode-object gone.yaml [twice]
+encode-object folder
+encode-object init prisma [twice]
+encode-object init cube -o cube.yaml [twice]
+encode-object init cube -o gone/cube.yaml [twice]
+encode-object show
+encode-object retire
+encode-object export
+encode-object import gone.db [twice]
+encode-object import lab.db --rename Cube
+encode-object import lab.db --rename Nobody=Somebody
+encode-object export lab.db
+encode-object export out.db --object Nobody
+encode-object fly
+probe-kit nose -o kit [twice]
+probe-kit bad-type.yaml -o kit [twice]
+probe-kit
+probe-kit fsr-16 -o text.h5/kit
+probe-kit --version [twice]
+open-bench --port smoke: --database lab.db
+open-bench --database gone.db
+open-bench --database newer.db
+open-bench --web-port 70000
+open-bench --overlay wool --database lab.db
+open-bench --nope
+"""
+
+# One spec for every sort of mistake; each is read with --dry-run, every fourth as JSON too.
+SPECS = {
+    "empty": "",
+    "not-yaml": "name: Cube\nshape: {cube: 60 mm\n",
+    "tab": "name: Cube\nshape:\n\tcube: 60 mm\n",
+    "list": "- Cube\n- Box\n",
+    "two-documents": "name: A\n---\nname: B\n",
+    "twice": "name: Cube\nname: Box\nshape: {cube: 60 mm}\n",
+    "alias": "name: &a Cube\nshape: {cube: 60 mm}\noutput: {folder: *b}\n",
+    "unknown-key": "name: Cube\nshape: {cube: 60 mm}\nlayuot: net\n",
+    "unknown-nested": "name: Cube\nshape: {cube: 60 mm}\nsymbols: {pich: 7 mm}\n",
+    "misplaced": "name: Cube\nshape: {cube: 60 mm}\npitch: 7 mm\n",
+    "no-name": "shape: {cube: 60 mm}\n",
+    "no-shape": "name: Cube\n",
+    "two-shapes": "name: Cube\nshape: {cube: 60 mm, tetrahedron: 50 mm}\n",
+    "unknown-shape": "name: Cube\nshape: {sphere: 60 mm}\n",
+    "other-name": "name: Cube\nshape: {brick: [4, 5, 6]}\n",
+    "bad-unit": "name: Cube\nshape: {cube: 60 furlongs}\n",
+    "no-number": "name: Cube\nshape: {cube: large}\n",
+    "negative": "name: Cube\nshape: {cube: -60 mm}\n",
+    "nan": "name: Cube\nshape: {cube: .nan}\n",
+    "huge": "name: Cube\nshape: {cube: 9 km}\n",
+    "two-sides": "name: Box\nshape: {box: [80 mm, 80 mm]}\n",
+    "sides": "name: P\nshape: {prism: {sides: 2, side: 40 mm, height: 80 mm}}\n",
+    "side-and-radius": "name: P\nshape: {prism: {sides: 6, side: 4 cm, radius: 4 cm, "
+    "height: 8 cm}}\n",
+    "flat": "name: P\nshape:\n  polyhedron:\n    vertices: [[0,0,0],[9,0,0],[0,9,0],[9,9,0]]\n"
+    "    faces: [[0,1,2],[1,3,2],[0,2,1],[1,2,3]]\n",
+    "open": "name: P\nshape:\n  polyhedron:\n    vertices: [[0,0,0],[60,0,0],[0,60,0],[0,0,60]]\n"
+    "    faces: [[0,2,1],[0,1,3],[1,2,3],[0,1,2]]\n",
+    "bent": "name: P\nshape:\n  polyhedron:\n"
+    "    vertices: [[0,0,0],[60,0,0],[60,60,0],[0,60,9],[30,30,60]]\n"
+    "    faces: [[0,3,2,1],[0,1,4],[1,2,4],[2,3,4],[3,0,4]]\n",
+    "no-vertex": "name: P\nshape:\n  polyhedron:\n"
+    "    vertices: [[0,0,0],[60,0,0],[0,60,0],[0,0,60]]\n"
+    "    faces: [[0,2,1],[0,1,3],[1,2,3],[0,3,7]]\n",
+    "missing-file": "name: M\nshape: {file: gone.stl}\n",
+    "other-file": "name: M\nshape: {file: notes.txt}\n",
+    "damaged-file": "name: M\nshape: {file: broken.stl}\n",
+    "missing-scale": "name: M\nshape: {file: gone.stl, scale: 0}\n",
+    "unknown-profile": "name: Cube\nshape: {cube: 60 mm}\nprofile: one-tuch\n",
+    "profile-and-encoding": "name: Cube\nshape: {cube: 60 mm}\nprofile: thesis\n"
+    "encoding: {family: prba, order: 2, degree: 12, rows: 63, columns: 65, window: 6x2}\n",
+    "not-primitive": "name: Cube\nshape: {cube: 60 mm}\nencoding: {family: prmva, order: 2, "
+    "degree: 4, polynomial: x^4+x^2+1, rows: 3, columns: 5, window: 2x2}\n",
+    "wrong-size": "name: Cube\nshape: {cube: 60 mm}\nencoding: {family: prba, order: 2, "
+    "degree: 12, rows: 64, columns: 65, window: 6x2}\n",
+    "unknown-alphabet": "name: Cube\nshape: {cube: 60 mm}\nsymbols: {alphabet: runes}\n",
+    "small-alphabet": "name: Cube\nshape: {cube: 60 mm}\nprofile: product\n"
+    "symbols: {alphabet: thesis-2}\n",
+    "narrow-stroke": "name: Cube\nshape: {cube: 60 mm}\nsymbols: {stroke: 0.1 mm}\n",
+    "wide-stroke": "name: Cube\nshape: {cube: 60 mm}\nsymbols: {pitch: 5 mm, stroke: 4 mm}\n",
+    "small-pitch": "name: Cube\nshape: {cube: 60 mm}\nsymbols: {pitch: 0.5 mm}\n",
+    "steep": "name: Cube\nshape: {cube: 60 mm}\nsymbols: {draft: 80 deg}\n",
+    "thin-wall": "name: Cube\nshape: {cube: 60 mm}\nprint: {wall: 0.1 mm}\n",
+    "thick-wall": "name: Cube\nshape: {cube: 30 mm}\nprint: {wall: 29 mm}\n",
+    "unknown-printer": "name: Cube\nshape: {cube: 60 mm}\nprint: {printer: prusa-mk9}\n",
+    "own-printer": "name: Cube\nshape: {cube: 60 mm}\nprint: {printer: {nozle: 0.4 mm}}\n",
+    "too-large": "name: Cube\nshape: {cube: 600 mm}\nprint: {parts: whole}\n",
+    "too-small": "name: Cube\nshape: {cube: 4 mm}\n",
+    "no-room": "name: Cube\nshape: {cube: 400 mm}\nprofile: product\n",
+    "copies": "name: Cube\nshape: {cube: 60 mm}\ncopies: 0\n",
+    "formats": "name: Cube\nshape: {cube: 60 mm}\noutput: {formats: [step, dwg]}\n",
+    "lab-key": "name: Cube\nshape: {cube: 60 mm}\noutput: {lab_key: 12}\n",
+    "database": "name: Cube\nshape: {cube: 60 mm}\noutput: {database: 'redis://x'}\n",
+    "version": "version: 7\nname: Cube\nshape: {cube: 60 mm}\n",
+    "sensor-type": "name: Cube\nshape: {cube: 60 mm}\nsensor_type: nose\n",
+    "density": "name: Cube\nshape: {cube: 60 mm}\nrobot: {density: 3 mm}\n",
+    "name-of-path": "name: ../Cube\nshape: {cube: 60 mm}\n",
+    "same-names": "name: Set\nobjects:\n  - {name: A, shape: {cube: 30 mm}}\n"
+    "  - {name: A, shape: {cube: 40 mm}}\n",
+    "no-objects": "name: Set\nobjects: []\n",
+    "set-member": "name: Set\nobjects:\n  - gone.yaml\n",
+    "set-mistake": "name: Set\nobjects:\n  - {name: A, shape: {cube: 30 mm}, pitch: 3}\n"
+    "  - {name: B, shape: {cub: 40 mm}}\n",
+    "many-mistakes": "nam: Cube\nshape: {cube: 60}\ncopies: many\nlayout: nett\n",
+}  # fmt: skip
+
+
+def collect(part: str) -> Iterator[tuple[str, Any]]:
+    """Yield the entries of a part."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name).resolve()
+        work = folder / "work"
+        work.mkdir()
+        with Commands(folder) as commands:
+            _provide(work, commands)
+            times: Counter[str] = Counter()
+            for line in _lines(part, work):
+                words = shlex.split(line)
+                outcome = commands.run(*words, cwd=work)
+                times[line] += 1
+                again = f" #{times[line]}" if times[line] > 1 else ""
+                yield f"{part}/{line}{again}", _said(outcome, words, work)
+
+
+def _lines(part: str, folder: Path) -> list[str]:
+    """Return the commands of a part, and write the specs that they name."""
+    if part == "help":
+        return [f"{line} --help" for line in HELP.split("\n") if line]
+    if part == "specs":
+        for name, text in SPECS.items():
+            (folder / f"{name}.yaml").write_text(text)
+        ending = "--dry-run --lab-key F1XT-VRES-0000-000Q"
+        lines = [f"encode-object {name}.yaml {ending}" for name in SPECS]
+        return [*lines, *(f"{line} --json" for line in lines[::4])]
+    text = {
+        "making": MAKING,
+        "decoding": DECODING,
+        "probing": PROBING,
+        "reading": READING,
+        "validating": VALIDATING,
+        "misuse": MISUSE,
+    }[part]
+    lines = []
+    for line in filter(None, text.split("\n")):
+        lines.append(line.removesuffix(" [twice]"))
+        if line.endswith("[twice]"):
+            lines.append(lines[-1] + " --json")
+    return lines
+
+
+def _said(outcome: Outcome, words: list[str], folder: Path) -> dict[str, Any]:
+    stdout: Any = normal_text(outcome.stdout, folder)
+    if "--json" in words or "schema" in words or "--schema" in words:
+        try:
+            stdout = normal_value(outcome.value(), folder)
+        except ValueError:  # several objects, each on a line, or a text after all
+            lines = outcome.stdout.splitlines()
+            if lines and all(line.startswith(("{", "[")) for line in lines):
+                stdout = [normal_value(json.loads(line), folder) for line in lines]
+    return {
+        "code": outcome.code,
+        "stdout": stdout,
+        "stderr": normal_text(outcome.stderr, folder),
+    }
+
+
+def _provide(folder: Path, commands: Commands) -> None:
+    """Put what commands read into the folder."""
+    import sqlite3
+
+    for name in ("v3", "guest"):
+        packed = DATA / "databases" / f"{name}.db.gz"
+        target = folder / ("lab.db" if name == "v3" else f"{name}.db")
+        target.write_bytes(gzip.decompress(packed.read_bytes()))
+    shutil.copy(FIXTURES / "database/v2.db", folder / "old.db")
+    shutil.copy(folder / "lab.db", folder / "newer.db")
+    with sqlite3.connect(folder / "newer.db") as connection:
+        connection.execute("UPDATE meta SET value = '9' WHERE key = 'schema_version'")
+    connection.close()
+    with sqlite3.connect(folder / "foreign.db") as connection:
+        connection.execute("CREATE TABLE songs (name TEXT)")
+    connection.close()
+    whole = (folder / "lab.db").read_bytes()
+    (folder / "damaged.db").write_bytes(whole[: len(whole) // 3])
+    (folder / "text.db").write_text("not a database, but long enough to be read as one\n" * 40)
+
+    for path in (DATA / "recordings").iterdir():
+        if path.suffix in {".h5", ".npz", ".csv"}:
+            shutil.copy(path, folder / path.name)
+    shutil.copy(FIXTURES / "recordings/touch.h5", folder / "old.h5")
+    calibration = (FIXTURES / "recordings/calibration.json").read_text()
+    (folder / "calibration.json").write_text(calibration)
+    (folder / "bad-calibration.json").write_text(calibration[:-200])
+    changed = json.loads(calibration) | {"version": 99, "format_version": 99}
+    (folder / "newer-calibration.json").write_text(json.dumps(changed))
+
+    (folder / "folder").mkdir()
+    (folder / "notes.txt").write_text("no model\n")
+    (folder / "broken.stl").write_bytes(b"solid broken\nfacet normal 0 0\n")
+    own = commands.done("probe-sensor", "types", "gel-24x32", cwd=folder).stdout
+    (folder / "own-type.yaml").write_text(own)
+    (folder / "bad-type.yaml").write_text(own.replace("rows:", "rowes:"))
+    (folder / "cube.yaml").write_text("name: Cube\nshape: {cube: 40 mm}\n")
+    (folder / "changed.yaml").write_text("name: Cube\nshape: {cube: 44 mm}\n")
+    (folder / "blank.yaml").write_text("name: Slab\nshape: {box: [50, 40, 5]}\n")
+    (folder / "set.yaml").write_text(
+        "name: Pair\nobjects:\n  - {name: A, shape: {cube: 36 mm}, copies: 2}\n"
+        "  - {name: B, shape: {cone: {diameter: 50 mm, height: 40 mm}}}\n"
+    )
