@@ -3,8 +3,8 @@
 The part is sliced as its file has it, the flat back on the bed; its box is put on the middle
 of a bed that is large enough, which gives T_part_gcode, and what was printed is compared with
 the part's box, so that a slicer that turned, scaled or moved it does not pass. PrusaSlicer
-2.5 gives other G-code each run unless its memory lies where it lay and one processor works.
-mm.
+2.5 gives other G-code each run unless its memory lies where it lay and one processor works; so
+its environment and the names of its files have a fixed length, too. mm.
 """
 
 from __future__ import annotations
@@ -37,6 +37,8 @@ _TURNS = count()  # of the slicers that this process has begun
 _BED_MARGIN_MM = 20.0  # around the part: skirt, brim, purge line
 _AGREE_MM = 0.25  # by which plastic may reach beyond the part's box: half a bead, and seams
 _POINTED_WIDTHS = 3.0  # by which it may fall short: beads are round in corners of 20 degrees
+#: Of the slicer: a variable more or less moves its memory.
+_ENVIRONMENT = {"PATH": "/usr/local/bin:/usr/bin:/bin", "HOME": ".", "LC_ALL": "C"}
 _KINDS = (".stl", ".3mf", ".obj", ".amf")
 
 # The machine's own business: nothing of it is on the part.
@@ -171,14 +173,14 @@ def _run(file: Path, settings: str, middle: str, gcode: Path) -> None:
         shutil.copyfile(file, part)
         written = Path(folder) / "part.gcode"
         command = [
-            *_repeatable_command(), find_slicer(), "--export-gcode",
-            "--load", f"{folder}/settings.ini",
-            "--center", middle, "-o", str(written), str(part),
+            *_repeatable_command(), find_slicer(), "--export-gcode", "--datadir", ".",
+            "--load", "settings.ini", "--center", middle, "-o", written.name, part.name,
         ]  # fmt: skip
         try:
             done = subprocess.run(  # noqa: S603
-                command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False
-            )
+                command, cwd=folder, env=_ENVIRONMENT, capture_output=True, text=True,
+                timeout=TIMEOUT_S, check=False,
+            )  # fmt: skip
         except subprocess.TimeoutExpired:
             raise PrintError(
                 f"PrusaSlicer did not end within {TIMEOUT_S} s",
