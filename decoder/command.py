@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from encoded_objects import console
-from encoded_objects.console import output
+from encoded_objects.base import console
+from encoded_objects.base.console import output
 
 if TYPE_CHECKING:
     from decoder.decoded import Candidate, Decoded

@@ -12,7 +12,7 @@ A window that cannot be decoded is no error: it is a `Decoded` with a reason.
 
 from __future__ import annotations
 
-from encoded_objects.errors import EncodedObjectsError
+from encoded_objects.base.errors import EncodedObjectsError
 
 
 class DecoderError(EncodedObjectsError):

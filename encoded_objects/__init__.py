@@ -18,10 +18,7 @@
     row 1, column 61 (t = 2206)
 
 A name is loaded from its package when it is first used; importing this module loads nothing
-else. Beside the names stand the things that all packages share: the root of the errors
-(`encoded_objects.errors`), how a command starts, shows progress and ends
-(`encoded_objects.console`), files that people write (`encoded_objects.document`), and where
-compiled loops lie (`encoded_objects.compiled`).
+else. What all packages stand on lies in `encoded_objects.base`.
 """
 
 from __future__ import annotations
@@ -30,7 +27,7 @@ __version__ = "0.2.0"
 
 #: name: the module that holds it; `__init__.pyi` says the same to type checkers
 HOMES = {
-    "EncodedObjectsError": "encoded_objects.errors",
+    "EncodedObjectsError": "encoded_objects.base.errors",
     "Frame": "probe.frame",
     "Reader": "recognizer.touch.reader",
     "Recognition": "recognizer.touch.recognition",

@@ -1,7 +1,7 @@
 """What `encoded_objects` loads when it is first used, for type checkers and editors."""
 
 from decoder.any_method import decode as decode
-from encoded_objects.errors import EncodedObjectsError as EncodedObjectsError
+from encoded_objects.base.errors import EncodedObjectsError as EncodedObjectsError
 from generator.cad.encode import encode as encode
 from probe.frame import Frame as Frame
 from probe.recording.read import Recording as Recording

@@ -20,7 +20,7 @@ Every error says what was given, what is allowed, and the way out (`fix`).
 
 from __future__ import annotations
 
-from encoded_objects.errors import EncodedObjectsError
+from encoded_objects.base.errors import EncodedObjectsError
 
 
 class GeneratorError(EncodedObjectsError):

@@ -15,7 +15,7 @@ A touch that is not recognised is no error but a value with a reason (`recogniti
 
 from __future__ import annotations
 
-from encoded_objects.errors import EncodedObjectsError
+from encoded_objects.base.errors import EncodedObjectsError
 
 
 class RecognizerError(EncodedObjectsError):

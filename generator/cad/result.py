@@ -11,7 +11,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from encoded_objects.errors import require
+from encoded_objects.base.errors import require
 from generator.cad.encode import EncodedSolid
 from generator.errors import SolidError
 from generator.export.step import step_chunks

@@ -10,7 +10,7 @@
     object_report.py   what is registered, as text and as JSON
     lab_report.py      the lab's key, and how full its arrays are
 
-Results go to stdout, progress and messages to stderr (`encoded_objects.console`). Exit codes:
+Results go to stdout, progress and messages to stderr (`encoded_objects.base.console`). Exit codes:
 0 done, 1 could not be written, 2 bad input, 4 database, 130 interrupted. Nothing heavy is
 imported before it is needed: `encode-object --help` loads no array, no geometry, no database.
 """
@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NoReturn
 
-from encoded_objects import console
+from encoded_objects.base import console
 
 if TYPE_CHECKING:
     from typer import Typer

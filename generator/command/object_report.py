@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
 
-from encoded_objects.console import output
+from encoded_objects.base.console import output
 from generator.command.lab_report import fullness_text, fullness_values
 from generator.database.read import surfaces_of
 from generator.database.url import without_password
 
 if TYPE_CHECKING:
-    from encoded_objects.sensor_type import SensorSize
+    from encoded_objects.base.sensor_size import SensorSize
     from generator.database.carry import CopyReport
     from generator.database.fullness import Fullness
     from generator.database.part_state import PartState

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from encoded_objects import console
-from encoded_objects.console import Action
+from encoded_objects.base import console
+from encoded_objects.base.console import Action
 
 if TYPE_CHECKING:
     from sqlalchemy import Engine
@@ -86,7 +86,7 @@ def show(
     """Print all about one object: faces, cells, origin, files and whether they are unchanged."""
 
     def action() -> int:
-        from encoded_objects.sensor_type import USUAL_SENSOR, sensor_size
+        from encoded_objects.base.sensor_size import USUAL_SENSOR, sensor_size
         from generator.command import object_report
         from generator.database.open import open_database
         from generator.database.part_state import part_state

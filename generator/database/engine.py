@@ -16,7 +16,7 @@ from urllib.parse import quote
 
 from sqlalchemy import URL, Engine, NullPool, create_engine, event
 
-from encoded_objects.errors import install_line
+from encoded_objects.base.errors import install_line
 from generator.database.transaction import begin_sqlite, place_of
 from generator.errors import DatabaseError
 

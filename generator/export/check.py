@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from encoded_objects.errors import require
+from encoded_objects.base.errors import require
 from generator.errors import GeneratorError, SolidError
 from generator.export.exact_crossing import cut_triangles, perhaps_folded
 from generator.export.settings import READ_BACK

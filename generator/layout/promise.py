@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from encoded_objects.sensor_type import USUAL_SENSOR, SensorSize
+from encoded_objects.base.sensor_size import USUAL_SENSOR, SensorSize
 from generator.layout.footprint import Points
 from generator.layout.views import FaceViews
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.sensor_type import USUAL_SENSOR, SensorSize
+from encoded_objects.base.sensor_size import USUAL_SENSOR, SensorSize
 from generator.layout.footprint import Points
 from generator.layout.placement import FaceLayout
 from generator.plane.polygon import points_inside, signed_area

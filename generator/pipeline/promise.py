@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from encoded_objects.sensor_type import SensorSize
+from encoded_objects.base.sensor_size import SensorSize
 from generator.alphabet.outline import SymbolStyle, footprint_half_mm
 from generator.alphabet.printable import check_printable
 from generator.array.touches import touches_needed

@@ -7,7 +7,7 @@ and of arrays that are read by a scan.
 
 from __future__ import annotations
 
-from encoded_objects.sensor_type import USUAL_SENSOR, SensorSize
+from encoded_objects.base.sensor_size import USUAL_SENSOR, SensorSize
 from generator.array.touches import touches_needed
 from generator.database.registered import RegisteredObject
 from generator.layout.views import face_views, sensor_view

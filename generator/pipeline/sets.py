@@ -15,7 +15,7 @@ from pathlib import Path
 
 from sqlalchemy import Connection, Engine
 
-from encoded_objects.errors import install_line
+from encoded_objects.base.errors import install_line
 from generator.database.entries import find_object, natural_key
 from generator.database.part_state import part_state
 from generator.database.read import read_layout, read_parts

@@ -12,12 +12,12 @@
 
     SpecError     problem.py: every problem with place, line, caret and fix
 
-How files become values that remember line and column: `encoded_objects.document`.
+How files become values that remember line and column: `encoded_objects.base.document`.
 """
 
 from __future__ import annotations
 
-from encoded_objects.document.problem import Problem
+from encoded_objects.base.document.problem import Problem
 from generator.spec.located import LocatedSpec, error_at, locate
 from generator.spec.problem import SpecError
 from generator.spec.read import read_specs

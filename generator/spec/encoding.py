@@ -13,8 +13,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from encoded_objects.document.block import Block, whole_number
-from encoded_objects.document.quantity import refuse
+from encoded_objects.base.document.block import Block, whole_number
+from encoded_objects.base.document.quantity import refuse
 
 Family = Literal["prbs", "prmvs", "prba", "prmva", "prpa", "prmvpa"]
 CELLS_MAX = 2**64

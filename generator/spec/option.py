@@ -7,8 +7,8 @@ from typing import get_args
 
 from pydantic_core import PydanticCustomError
 
-from encoded_objects.document.problem import Problem, did_you_mean
-from encoded_objects.sensor_type import SENSOR_FILES, sensor_size
+from encoded_objects.base.document.problem import Problem, did_you_mean
+from encoded_objects.base.sensor_size import SENSOR_FILES, sensor_size
 from generator.spec.problem import SpecError
 from generator.spec.settings import Format, database_url
 

@@ -11,10 +11,10 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, ValidationError
 
-from encoded_objects.document.block import Block, PathText
-from encoded_objects.document.problem import did_you_mean
-from encoded_objects.document.quantity import Angle, Length, refuse
-from encoded_objects.document.tree import Tree, read_tree
+from encoded_objects.base.document.block import Block, PathText
+from encoded_objects.base.document.problem import did_you_mean
+from encoded_objects.base.document.quantity import Angle, Length, refuse
+from encoded_objects.base.document.tree import Tree, read_tree
 from generator.errors import GeneratorError
 from generator.printers import MACHINES, PRINTERS, Printer, printer_named, printer_of_nozzle
 from generator.spec.name import ObjectName

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from encoded_objects.sensor_type import USUAL_SENSOR, SensorSize
+from encoded_objects.base.sensor_size import USUAL_SENSOR, SensorSize
 from generator.alphabet.outline import SymbolStyle
 from generator.errors import GeneratorError
 from generator.printers import Printer, printer_named

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from encoded_objects.console import application
+from encoded_objects.base.console import application
 from probe.command import calibrate, devices, files, live, record, replay, simulate, types
 from probe.command.options import Json
 
@@ -35,7 +35,7 @@ def _head(
     version: bool = typer.Option(False, "--version", help="Say which version this is."),
     as_json: Json = False,
 ) -> None:
-    from encoded_objects.console import output
+    from encoded_objects.base.console import output
     from probe.command import NAME
 
     if version:

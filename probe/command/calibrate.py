@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from encoded_objects.console import Action, application
+from encoded_objects.base.console import Action, application
 from probe.command.options import (
     URLS,
     Calibrated,

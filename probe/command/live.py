@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from encoded_objects.console import Action
+from encoded_objects.base.console import Action
 from probe.command.options import Calibrated, SelectedSensor, Typed, Url
 
 EPILOG = """Keys: q quit, space pause, 0 ... 7 sensor, b bias on and off, m median filter, s save \

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from encoded_objects.console import Action
+from encoded_objects.base.console import Action
 from probe.command.options import (
     Bits,
     Calibrated,

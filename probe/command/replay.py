@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from encoded_objects.console import Action
+from encoded_objects.base.console import Action
 from probe.command.options import Calibrated, Recording, Typed
 
 if TYPE_CHECKING:
@@ -51,8 +51,8 @@ def _pipe(url: str, *, as_json: bool) -> int:
     """Write every frame when its time has come."""
     import sys
 
-    from encoded_objects.console import INTERRUPTED
-    from encoded_objects.console.interruption import interruption
+    from encoded_objects.base.console import INTERRUPTED
+    from encoded_objects.base.console.interruption import interruption
     from probe.client.stream import Stream
 
     with interruption() as interrupted, Stream(url) as stream:

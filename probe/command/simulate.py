@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from encoded_objects.console import Action
+from encoded_objects.base.console import Action
 from probe.command.options import Json, Replace, Typed
 
 if TYPE_CHECKING:

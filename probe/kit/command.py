@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from encoded_objects import console
-from encoded_objects.console import Action
-from encoded_objects.console.progress import progress_bar
+from encoded_objects.base import console
+from encoded_objects.base.console import Action
+from encoded_objects.base.console.progress import progress_bar
 
 if TYPE_CHECKING:
     from probe.kit.make import Kit
@@ -62,7 +62,7 @@ def kit(
     """Make the kit."""
 
     def action() -> int:
-        from encoded_objects.console import output
+        from encoded_objects.base.console import output
 
         if version:
             output.version(NAME, as_json=as_json)

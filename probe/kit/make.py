@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from encoded_objects.errors import require
+from encoded_objects.base.errors import require
 from generator.export.atomic import Staging
 from generator.export.slicer_settings import slicer_settings
 from generator.export.step import step_chunks

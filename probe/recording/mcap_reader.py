@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.errors import require
+from encoded_objects.base.errors import require
 from probe.errors import FrameError, RecordingError
 from probe.frame import Frame, frame_from
 from probe.recording.layout import RecordingOrigin

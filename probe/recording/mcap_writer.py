@@ -19,7 +19,7 @@ from typing import IO, Any, Final
 
 import numpy as np
 
-from encoded_objects.errors import require
+from encoded_objects.base.errors import require
 from probe.closing import Closing
 from probe.frame import Frame
 from probe.recording.layout import RecordingOrigin

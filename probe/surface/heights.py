@@ -1,4 +1,4 @@
-"""The look-up of heights, compiled: `encoded_objects.compiled` says when it is used."""
+"""The look-up of heights, compiled: `encoded_objects.base.compiled` says when it is used."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import ctypes
 from functools import lru_cache
 from pathlib import Path
 
-from encoded_objects.compiled import is_wanted, library_made_of, sources_in
+from encoded_objects.base.compiled import is_wanted, library_made_of, sources_in
 
 FOLDER = Path(__file__).parent
 FILE = FOLDER / "kernels.so"

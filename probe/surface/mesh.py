@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from encoded_objects.compiled import addresses
+from encoded_objects.base.compiled import addresses
 from probe.errors import SurfaceError
 from probe.surface.heights import compiled_kernels
 from probe.surface.triangle_bins import TriangleBins, bin_triangles

@@ -32,7 +32,7 @@ from fastapi.responses import FileResponse, JSONResponse
 from fastapi.staticfiles import StaticFiles
 from starlette.middleware.gzip import GZipMiddleware
 
-from encoded_objects.errors import EncodedObjectsError
+from encoded_objects.base.errors import EncodedObjectsError
 from recognizer.bench.broker import Broker, Subscriber
 from recognizer.bench.checks import check_routes
 from recognizer.bench.control import control_routes

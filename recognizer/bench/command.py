@@ -12,9 +12,9 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from encoded_objects import console
-from encoded_objects.console import Action
-from encoded_objects.errors import require
+from encoded_objects.base import console
+from encoded_objects.base.console import Action
+from encoded_objects.base.errors import require
 
 HELP = """See the part, the touch and the answer in a web page.
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import threading
 from typing import Any
 
-from encoded_objects.errors import EncodedObjectsError
+from encoded_objects.base.errors import EncodedObjectsError
 from probe.recording.names import next_free
 from recognizer.bench.desk import DeskSession
 from recognizer.bench.errors import BusyError

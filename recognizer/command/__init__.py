@@ -25,7 +25,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NoReturn
 
-from encoded_objects import console
+from encoded_objects.base import console
 
 if TYPE_CHECKING:
     from typer import Typer

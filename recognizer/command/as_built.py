@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from encoded_objects import console
-from encoded_objects.console import Action
+from encoded_objects.base import console
+from encoded_objects.base.console import Action
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from encoded_objects.console.progress import ProgressBar
+    from encoded_objects.base.console.progress import ProgressBar
     from recognizer.as_built.estimate import FeltPrint
     from recognizer.touch.contacts import TouchImage
 
@@ -69,7 +69,7 @@ def as_built(
         raise typer.BadParameter(f"--overlay {overlay}: give tab or pad")
 
     def action() -> int:
-        from encoded_objects.console.output import message, write, write_json
+        from encoded_objects.base.console.output import message, write, write_json
         from recognizer.as_built.parts import estimate_parts
         from recognizer.as_built.words import (
             as_built_entry,
@@ -107,8 +107,8 @@ def _feel(
     recording: Path, database: str, sensor_type: str, overlay: str, calibration: Path | None
 ) -> tuple[FeltPrint, ...]:
     """Return how the touches of a recording felt the print."""
-    from encoded_objects.console.output import warning
-    from encoded_objects.console.progress import progress_bar
+    from encoded_objects.base.console.output import warning
+    from encoded_objects.base.console.progress import progress_bar
     from probe.recording.read import Recording
     from recognizer.as_built.settings import settings_for_prints
     from recognizer.as_built.touches import feel_prints

@@ -8,10 +8,10 @@ from contextlib import ExitStack
 from threading import Event
 from typing import Any
 
-from encoded_objects.console import FAILED, INTERRUPTED
-from encoded_objects.console.interruption import interruption
-from encoded_objects.console.output import message, warning, write_json
-from encoded_objects.console.progress import ProgressBar, progress_bar
+from encoded_objects.base.console import FAILED, INTERRUPTED
+from encoded_objects.base.console.interruption import interruption
+from encoded_objects.base.console.output import message, warning, write_json
+from encoded_objects.base.console.progress import ProgressBar, progress_bar
 from probe.frame import Frame
 from probe.recording.layout import RecordingOrigin
 from probe.recording.read import Recording

@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.compiled import addresses
+from encoded_objects.base.compiled import addresses
 from recognizer.touch.lab import EmbossedArray, cell_keys
 from recognizer.touch.symbols.kernels import compiled_kernels
 

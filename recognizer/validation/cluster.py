@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
-from encoded_objects.errors import require
+from encoded_objects.base.errors import require
 from recognizer.validation.campaign import Batch
 from recognizer.validation.errors import WorkersError
 from recognizer.validation.settings import SHARING

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from encoded_objects.console import DATABASE, FAILED
+from encoded_objects.base.console import DATABASE, FAILED
 from recognizer.errors import RecognizerError
 
 

@@ -11,7 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from encoded_objects.errors import require
+from encoded_objects.base.errors import require
 from recognizer.validation import pictures
 from recognizer.validation.bounds import FAILS, HOLDS, UNTOLD
 from recognizer.validation.precision_pictures import work_precision

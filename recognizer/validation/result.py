@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from encoded_objects.console import DONE, FAILED
+from encoded_objects.base.console import DONE, FAILED
 from recognizer.validation.bounds import HOLDS
 
 

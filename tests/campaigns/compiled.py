@@ -24,7 +24,7 @@ for library in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 import numpy as np  # noqa: E402
 
-from encoded_objects.compiled import CHOICE  # noqa: E402
+from encoded_objects.base.compiled import CHOICE  # noqa: E402
 from recognizer.touch.lab import open_lab  # noqa: E402
 from recognizer.touch.reader import Reader  # noqa: E402
 from recognizer.touch.symbols.kernels import kernels_in_use  # noqa: E402

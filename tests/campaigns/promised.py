@@ -35,7 +35,7 @@ import numpy as np  # noqa: E402
 from numpy.typing import ArrayLike, NDArray  # noqa: E402
 
 from encoded_objects import encode  # noqa: E402
-from encoded_objects.sensor_type import USUAL_SENSOR, SensorSize, sensor_size  # noqa: E402
+from encoded_objects.base.sensor_size import USUAL_SENSOR, SensorSize, sensor_size  # noqa: E402
 from generator.database.entries import object_names  # noqa: E402
 from generator.database.open import open_if_there  # noqa: E402
 from generator.database.read import read_object  # noqa: E402

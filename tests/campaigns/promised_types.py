@@ -25,7 +25,7 @@ import pyarrow.parquet as pq
 from promised import LEVELS
 from scipy.optimize import minimize
 
-from encoded_objects.sensor_type import USUAL_SENSOR, SensorSize, sensor_size
+from encoded_objects.base.sensor_size import USUAL_SENSOR, SensorSize, sensor_size
 from generator.database.open import open_if_there
 from generator.database.read import read_object
 from generator.database.transaction import read_transaction

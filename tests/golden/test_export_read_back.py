@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from encoded_objects.errors import MissingExtraError
+from encoded_objects.base.errors import MissingExtraError
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
 from generator.array.profiles import profile

@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.errors import require
+from encoded_objects.base.errors import require
 from generator.errors import SolidError
 from generator.export.robot.model import RobotModel
 from generator.export.robot.usd import prim_name

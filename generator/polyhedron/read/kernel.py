@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from encoded_objects.errors import install_line
+from encoded_objects.base.errors import install_line
 from generator.errors import ShapeError
 from generator.polyhedron.read.settings import MODEL
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from encoded_objects.errors import install_line
+from encoded_objects.base.errors import install_line
 from generator.errors import ShapeError
 from generator.polyhedron.read.facets import polyhedron_of_facets
 from generator.polyhedron.read.merge import merge_triangles

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.errors import require
+from encoded_objects.base.errors import require
 from probe.contact.contract import Contact, Touch
 from probe.contact.engines import Engine
 from probe.contact.engines.under_sensor import UNDER, Mesh, mesh_under

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.errors import require
+from encoded_objects.base.errors import require
 from generator.alphabet import Glyph
 from recognizer.thesis.settings import ROUNDING, CountingSettings
 from recognizer.thesis.skeleton.graph import Path, graph

@@ -18,7 +18,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.errors import require
+from encoded_objects.base.errors import require
 from generator.alphabet import Alphabet, Glyph, SymbolStyle
 from recognizer.thesis.filters import magnify_image
 from recognizer.thesis.settings import SkeletonSettings

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.compiled import addresses
+from encoded_objects.base.compiled import addresses
 from recognizer.touch.settings import DEFAULTS, SpreadSettings
 from recognizer.touch.symbols.gain import Image
 from recognizer.touch.symbols.template import ResponseTemplate

@@ -1,4 +1,4 @@
-"""The inner loops of reading, compiled: `encoded_objects.compiled` says when they are used.
+"""The inner loops of reading, compiled: `encoded_objects.base.compiled` says when they are used.
 
 The numpy forms beside their callers are the reference: values to 1e-6 of them, the same answers.
 `recognize-object --version` and a run's provenance say which of the two it was.
@@ -10,7 +10,7 @@ import ctypes
 from functools import lru_cache
 from pathlib import Path
 
-from encoded_objects.compiled import is_wanted, library_made_of, sources_in
+from encoded_objects.base.compiled import is_wanted, library_made_of, sources_in
 
 FOLDER = Path(__file__).parent.parent
 FILE = FOLDER / "kernels.so"

@@ -20,7 +20,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.compiled import addresses
+from encoded_objects.base.compiled import addresses
 from probe.sensor import SensorType
 from recognizer.touch.settings import DEFAULTS, SearchSettings
 from recognizer.touch.symbols.kernels import compiled_kernels, kernels_in_use

@@ -6,7 +6,7 @@ import sys
 
 PROGRAM = """
 import gc, json, os, sys
-from encoded_objects import console
+from encoded_objects.base import console
 
 class Cycle:
     def __init__(self): self.own = self

@@ -6,7 +6,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from encoded_objects.console import application, help_page, run
+from encoded_objects.base.console import application, help_page, run
 
 app = application()
 part = application()

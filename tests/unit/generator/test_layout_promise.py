@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from encoded_objects.sensor_type import SensorSize, sensor_size
+from encoded_objects.base.sensor_size import SensorSize, sensor_size
 from generator.array import profile
 from generator.layout.layout import lay_out
 from generator.layout.placement import FaceLayout, Placement

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from encoded_objects.sensor_type import sensor_size
+from encoded_objects.base.sensor_size import sensor_size
 from generator.database.open import open_database
 from generator.database.read import read_object
 from generator.database.transaction import read_transaction

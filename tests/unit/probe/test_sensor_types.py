@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from encoded_objects.sensor_type import SensorSize, sensor_size
+from encoded_objects.base.sensor_size import SensorSize, sensor_size
 from probe.command import run
 from probe.errors import ContactError
 from probe.frame import frame_from

@@ -5,7 +5,7 @@ import pytest
 import shapely
 from c_library import compile_kernels
 
-from encoded_objects.compiled import CHOICE
+from encoded_objects.base.compiled import CHOICE
 from probe.errors import SurfaceError
 from probe.surface import heights
 from probe.surface.face import FaceSurface

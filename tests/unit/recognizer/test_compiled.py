@@ -12,7 +12,7 @@ from c_library import compile_kernels
 from hypothesis import given as drawn
 from hypothesis import strategies as st
 
-from encoded_objects.compiled import CHOICE
+from encoded_objects.base.compiled import CHOICE
 from generator.alphabet import SymbolStyle, alphabet_named
 from probe.sensor import SensorType
 from recognizer.touch.lab import EmbossedArray, cell_keys

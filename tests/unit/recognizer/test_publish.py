@@ -14,7 +14,7 @@ import pytest
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.typesys import Stores, get_typestore
 
-from encoded_objects.errors import EncodedObjectsError
+from encoded_objects.base.errors import EncodedObjectsError
 from probe.frame import frame_from
 from probe.recording.cdr import cdr_bytes
 from probe.recording.ros import DEFINITIONS, IMAGE, POSE_WITH_COVARIANCE, image_message

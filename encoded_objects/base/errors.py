@@ -99,7 +99,7 @@ def require(*modules: str, extra: str, purpose: str) -> None:
     --------
     >>> require("no_such_module", extra="report", purpose="validate-set")
     Traceback (most recent call last):
-    encoded_objects.errors.MissingExtraError: validate-set needs no_such_module, which is not \
+    encoded_objects.base.errors.MissingExtraError: validate-set needs no_such_module, which is not \
 installed; pip install 'encoded-objects[report]'
     """
     for module in modules:

@@ -10,8 +10,8 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from encoded_objects.document.problem import Problem, SourceMark, did_you_mean
-from encoded_objects.document.tree import Place, Tree
+from encoded_objects.base.document.problem import Problem, SourceMark, did_you_mean
+from encoded_objects.base.document.tree import Place, Tree
 
 Error = Mapping[str, Any]
 

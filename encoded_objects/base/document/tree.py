@@ -16,9 +16,9 @@ from typing import Any
 
 import yaml
 
-from encoded_objects.document.problem import DocumentKind, Problem, SourceMark, TextSource
-from encoded_objects.document.syntax import explain_syntax
-from encoded_objects.document.text import read_text
+from encoded_objects.base.document.problem import DocumentKind, Problem, SourceMark, TextSource
+from encoded_objects.base.document.syntax import explain_syntax
+from encoded_objects.base.document.text import read_text
 
 DEPTH_MAX = 16
 

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
-from encoded_objects.document.problem import did_you_mean
+from encoded_objects.base.document.problem import did_you_mean
 
 LENGTH_MAX_MM = 10_000.0
 MILLIMETRES = {

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Any
 
-from encoded_objects.errors import EncodedObjectsError, printable
+from encoded_objects.base.errors import EncodedObjectsError, printable
 
 _LINE_END = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
 LINE_SHOWN = 100  # characters of a source line that are printed

@@ -5,7 +5,7 @@ from __future__ import annotations
 from difflib import get_close_matches
 from pathlib import Path
 
-from encoded_objects.document.problem import DocumentKind, Problem, SourceMark, TextSource
+from encoded_objects.base.document.problem import DocumentKind, Problem, SourceMark, TextSource
 
 BYTES_MAX = 256 * 1024
 

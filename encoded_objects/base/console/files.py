@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from encoded_objects.errors import EncodedObjectsError
+from encoded_objects.base.errors import EncodedObjectsError
 
 
 def refuse_taken(out: Path, suffix: str, *, replace: bool) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from encoded_objects.errors import EncodedObjectsError
+    from encoded_objects.base.errors import EncodedObjectsError
 
 WIDTH = 120  #: characters of a table that is written to a file
 

@@ -101,8 +101,8 @@ def run(
     """Run one command; returns its exit code. Errors are reported, not raised."""
     from typer import BadParameter, Exit
 
-    from encoded_objects.console import help_page, output
-    from encoded_objects.errors import EncodedObjectsError
+    from encoded_objects.base.console import help_page, output
+    from encoded_objects.base.errors import EncodedObjectsError
 
     usage_error: type[Exception] = BadParameter.__mro__[1]  # of every misused option
     as_json = "--json" in arguments

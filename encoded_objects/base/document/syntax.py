@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import yaml
 
-from encoded_objects.document.problem import DocumentKind, Problem, SourceMark, TextSource
+from encoded_objects.base.document.problem import DocumentKind, Problem, SourceMark, TextSource
 
 _SYNTAX = (
     (r"'\t'", "a tab cannot be used here", "use spaces"),

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, model_validator
 
-from encoded_objects.document.quantity import refuse
+from encoded_objects.base.document.quantity import refuse
 
 
 class Block(BaseModel):
