@@ -36,9 +36,8 @@ from numpy.typing import ArrayLike, NDArray  # noqa: E402
 
 from encoded_objects import encode  # noqa: E402
 from encoded_objects.base.sensor_size import USUAL_SENSOR, SensorSize, sensor_size  # noqa: E402
-from generator.database.entries import object_names  # noqa: E402
 from generator.database.open import open_if_there  # noqa: E402
-from generator.database.read import read_object  # noqa: E402
+from generator.database.read import object_names, read_object  # noqa: E402
 from generator.database.transaction import read_transaction  # noqa: E402
 from generator.layout.placement import FaceLayout  # noqa: E402
 from generator.layout.promise import (  # noqa: E402
