@@ -125,7 +125,7 @@ def retire(
 
     def action() -> int:
         from generator.command import object_report
-        from generator.database import retire as change
+        from generator.database import register as change
         from generator.database.open import existing_database
         from generator.database.transaction import retry_on_conflict
         from generator.spec.option import database_option

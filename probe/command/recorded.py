@@ -8,10 +8,15 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from encoded_objects.base.console import INTERRUPTED
-from encoded_objects.base.console.interruption import interruption
-from encoded_objects.base.console.output import count_of, message, write, write_json
-from encoded_objects.base.console.progress import ProgressBar, progress_bar
+from encoded_objects.base.console import INTERRUPTED, interruption
+from encoded_objects.base.output import (
+    ProgressBar,
+    count_of,
+    message,
+    progress_bar,
+    write,
+    write_json,
+)
 from probe.calibration import Calibration, calibration_hash, read_calibration
 from probe.client.stream import Stream, name_of
 from probe.command.settings import COMMAND

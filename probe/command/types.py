@@ -26,7 +26,7 @@ def types(
     """List the sensor types, show one as YAML to start from, or check a file."""
 
     def action() -> int:
-        from encoded_objects.base.console import output
+        from encoded_objects.base import output
         from probe.sensor_types import sensor_type_text
         from probe.sensor_types.read import sensor_type_named, shipped_names, shipped_text
         from probe.sensor_types.settings import sensor_type_schema

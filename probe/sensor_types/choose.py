@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from encoded_objects.base.document.problem import Problem
+from encoded_objects.base.document import Problem
 from probe.sensor import SensorType
 from probe.sensor_types.errors import SensorTypeError
 from probe.sensor_types.text import sensor_type_text

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from encoded_objects.base.document.problem import DocumentError
+from encoded_objects.base.document import DocumentError
 from probe.errors import ProbeError
 
 

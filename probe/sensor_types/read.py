@@ -12,9 +12,9 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from encoded_objects.base.document.explain import SettingWords, explain_settings
-from encoded_objects.base.document.problem import DocumentKind, Problem, did_you_mean
-from encoded_objects.base.document.tree import Tree, read_tree, tree_of
+from encoded_objects.base.document import DocumentKind, Problem, did_you_mean
+from encoded_objects.base.settings import SettingWords, explain_settings
+from encoded_objects.base.yaml_tree import Tree, read_tree, tree_of
 from probe.sensor import SensorType
 from probe.sensor_types.errors import SensorTypeError
 from probe.sensor_types.settings import SensorTypeSettings

@@ -10,8 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from encoded_objects.base.document.block import Block, whole_number
-from encoded_objects.base.document.quantity import Length, LengthOrZero, refuse
+from encoded_objects.base.settings import Block, Length, LengthOrZero, refuse, whole_number
 from probe.sensor import Overlay, OverlayKind, SensorType, Value, Wiring
 
 LINES_MAX = 255  #: rows or columns: a packet tells them by a byte each
@@ -195,7 +194,7 @@ class SensorTypeSettings(Block):
 
 def sensor_type_schema() -> dict[str, Any]:
     """Return the JSON schema (draft 2020-12) of a file of a sensor type."""
-    from encoded_objects.base.document.json_schema import DescribedSchema
+    from encoded_objects.base.json_schema import DescribedSchema
 
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -19,7 +19,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.base.console.files import staged_file
+from encoded_objects.base.files import staged_file
 from probe.contact.contract import Contact, Touch
 from probe.contact.press import accuracy_of, level_for, press
 from probe.errors import SurfaceError

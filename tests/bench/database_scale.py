@@ -12,8 +12,9 @@ object of a mixture (cubes, boxes, prisms, tetrahedra) found its place by the la
 before it. The same objects are registered on each engine, 100 in a transaction.
 
 At each number of objects it prints medians: one more cube placed and registered by
-`retry_on_conflict` (open, taken cells, layout, rows, commit), wall time and CPU time of this process (a server's is
-its own), reading the taken cells alone, and the object and face of a 3 x 4 window of cells, on an
+`retry_on_conflict` (open, taken cells, layout, rows, commit), wall time and CPU time of this
+process (a server's is its own), reading the taken cells alone, and the object and face of a 3 x 4
+window of cells, on an
 open connection and with opening it. `opened` is used cells by those of the corner that placing
 has opened (`generator.layout.board.board_size`: it grows when nothing fits into it any more),
 `array` by those of the array.
