@@ -13,15 +13,13 @@ what became of it. With `--save` each type's share of the usual sensor's answers
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
+import runner
 from promised import LEVELS
 from scipy.optimize import minimize
 
@@ -42,10 +40,9 @@ SHIPPED = Path(__file__).parents[2] / "generator" / "layout" / "answers_of_types
 
 def touches_of(folder: Path, sensor: SensorSize) -> Array:
     """Return (N, 3) of a type's touches: the usual sensor's probability, loaded share, right."""
-    files = sorted(folder.glob("own-*/shards/touches/*.parquet"))
-    if not files:
+    rows = [row for one in sorted(folder.glob("own-*")) for row in runner.rows_of(one)]
+    if not rows:
         return np.empty((0, 3))
-    rows = pa.concat_tables([pq.read_table(file) for file in files]).to_pylist()
     engine = open_if_there(f"sqlite:///{folder / 'lab.db'}", writable=False)
     assert engine is not None, f"{folder}: touches of a lab that is not there"
     with read_transaction(engine) as connection:
@@ -94,17 +91,16 @@ def compare(name: str, touches: Array, sensor: SensorSize) -> None:
         if some.any():
             p, q = promised[some], right[some]
             chance = np.sqrt((p * (1 - p)).sum()) / len(p)
-            print(f"| {name} | {low:g} to {min(high, 1):g} | {len(p)} | {usual[some].mean():.2f} "
-                  f"| {p.mean():.2f} +- {chance:.2f} | {q.mean():.2f} |")  # fmt: skip
+            runner.row(name, f"{low:g} to {min(high, 1):g}", len(p), f"{usual[some].mean():.2f}",
+                       f"{p.mean():.2f} +- {chance:.2f}", f"{q.mean():.2f}")  # fmt: skip
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = runner.arguments(__doc__)
     parser.add_argument("folder", type=Path, help="-o of sensor_types.py")
     parser.add_argument("--save", action="store_true", help="what ships")
-    asked = parser.parse_args()
-    print("| type | loaded | touches | usual sensor's | promised | answered |")
-    print("| --- " * 6 + "|")
+    asked = runner.parse(parser)
+    runner.table(("type", "loaded", "touches", "usual sensor's", "promised", "answered"))
     kept = {}
     for name in shipped_names():
         sensor = sensor_size(name)
