@@ -6,5 +6,6 @@
     document     files that people write: YAML with marks, quantities, located problems
     console      how a command starts, shows progress, writes files and ends
     compiled     loops compiled from C: where their library lies, and whether it may be used
-    sensor_size  rows, columns and pitch of a sensor type, by name
+    sensor_type       matrix, overlay and values of a sensor, and which type images are of
+    sensor_type_file  types by name and as YAML; `sensor_types` holds the shipped ones
 """

@@ -8,6 +8,6 @@
     problem    what is wrong, printed as `file:line:column: error: cause`, the line, a caret, a fix
     explain    errors of pydantic at their places
 
-Specs (`generator.spec`) and sensor types (`probe.sensor_type`) are read by it. A `DocumentKind`
+Specs (`generator.spec`) and sensor types (`base.sensor_type_file`) are read by it. A `DocumentKind`
 holds the words of their messages, and the error that their packages raise.
 """
