@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.base.document.problem import DocumentError, Problem
+from encoded_objects.base.document import DocumentError, Problem
 
 SENSOR_FILES = (".yaml", ".yml")  #: suffixes of files of types; other words are names
 USUAL_FORCE_N = 80.0  #: on `fsr-16`, as the thesis pressed its washer

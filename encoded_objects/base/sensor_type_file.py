@@ -15,11 +15,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, ValidationError
 
-from encoded_objects.base.document.block import Block, whole_number
-from encoded_objects.base.document.explain import SettingWords, explain_settings
-from encoded_objects.base.document.problem import DocumentKind, Problem, did_you_mean
-from encoded_objects.base.document.quantity import Length, LengthOrZero, refuse
-from encoded_objects.base.document.tree import Tree, read_tree, tree_of
+from encoded_objects.base.document import DocumentKind, Problem, did_you_mean
 from encoded_objects.base.sensor_type import (
     SENSOR_FILES,
     Overlay,
@@ -29,6 +25,16 @@ from encoded_objects.base.sensor_type import (
     Value,
     Wiring,
 )
+from encoded_objects.base.settings import (
+    Block,
+    Length,
+    LengthOrZero,
+    SettingWords,
+    explain_settings,
+    refuse,
+    whole_number,
+)
+from encoded_objects.base.yaml_tree import Tree, read_tree, tree_of
 
 LINES_MAX = 255  #: rows or columns: a packet holds each in a byte
 _NAME = re.compile(r"[a-z0-9][a-z0-9._-]{0,59}\Z")
@@ -296,7 +302,7 @@ def _sensor_type(tree: Tree) -> SensorType:
 
 def sensor_type_schema() -> dict[str, Any]:
     """Return the JSON schema (draft 2020-12) of a file of a sensor type."""
-    from encoded_objects.base.document.json_schema import DescribedSchema
+    from encoded_objects.base.json_schema import DescribedSchema
 
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

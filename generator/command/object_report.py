@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
 
-from encoded_objects.base.console import output
+from encoded_objects.base import output
 from generator.command.lab_report import fullness_text, fullness_values
 from generator.database.read import surfaces_of
 from generator.database.url import without_password

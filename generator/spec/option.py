@@ -7,7 +7,7 @@ from typing import get_args
 
 from pydantic_core import PydanticCustomError
 
-from encoded_objects.base.document.problem import Problem, did_you_mean
+from encoded_objects.base.document import Problem, did_you_mean
 from encoded_objects.base.sensor_type import SENSOR_FILES
 from generator.spec.problem import SpecError
 from generator.spec.settings import Format, database_url

@@ -11,9 +11,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from encoded_objects.base.document.problem import DocumentError, Problem
-from encoded_objects.base.document.tree import Tree
+from encoded_objects.base.document import DocumentError, Problem
 from encoded_objects.base.sensor_type import SENSOR_FILES, USUAL_SENSOR, SensorType
+from encoded_objects.base.yaml_tree import Tree
 from generator.alphabet.known import ALPHABETS, Alphabet
 from generator.alphabet.outline import SymbolStyle
 from generator.alphabet.printable import check_printable

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from encoded_objects.base.console.files import refuse_taken
-from encoded_objects.base.console.output import message
+from encoded_objects.base.files import refuse_taken
+from encoded_objects.base.output import message
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
 from probe.calibration.load_words import describe_load
 from probe.circuit import Electronics

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.base.console.interruption import interruption
-from encoded_objects.base.console.output import message
+from encoded_objects.base.console import interruption
+from encoded_objects.base.output import message
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
 from probe.client.stream import Stream, name_of
 from probe.errors import PortError

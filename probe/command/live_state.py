@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.base.console.files import staged_file
 from encoded_objects.base.errors import MissingExtraError, require
+from encoded_objects.base.files import staged_file
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
 from probe.calibration import Calibration, calibrate_image, calibration_hash, drift_of
 from probe.calibration.settings import AVERAGE

@@ -8,11 +8,16 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from encoded_objects.base.console import INTERRUPTED
-from encoded_objects.base.console.interruption import interruption
-from encoded_objects.base.console.output import count_of, message, write, write_json
-from encoded_objects.base.console.progress import ProgressBar, progress_bar
+from encoded_objects.base.console import INTERRUPTED, interruption
 from encoded_objects.base.errors import EncodedObjectsError
+from encoded_objects.base.output import (
+    ProgressBar,
+    count_of,
+    message,
+    progress_bar,
+    write,
+    write_json,
+)
 from encoded_objects.base.sensor_type import choose_sensor_type
 from probe.calibration import Calibration, calibration_hash, read_calibration
 from probe.client.stream import Stream, name_of

@@ -26,7 +26,7 @@ def types(
     """List the sensor types, show one as YAML to start from, or check a file."""
 
     def action() -> int:
-        from encoded_objects.base.console import output
+        from encoded_objects.base import output
         from encoded_objects.base.sensor_type import sensor_type_text
         from encoded_objects.base.sensor_type_file import (
             sensor_type_named,

@@ -14,7 +14,7 @@ import typer
 
 from encoded_objects.base import console
 from encoded_objects.base.console import Action
-from encoded_objects.base.console.progress import progress_bar
+from encoded_objects.base.output import progress_bar
 
 if TYPE_CHECKING:
     from probe.kit.make import Kit
@@ -62,7 +62,7 @@ def kit(
     """Make the kit."""
 
     def action() -> int:
-        from encoded_objects.base.console import output
+        from encoded_objects.base import output
 
         if version:
             output.version(NAME, as_json=as_json)

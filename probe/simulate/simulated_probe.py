@@ -19,7 +19,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.base.console.files import staged_file
+from encoded_objects.base.files import staged_file
 from encoded_objects.base.sensor_type import (
     SensorType,
     choose_sensor_type,

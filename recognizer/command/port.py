@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from threading import Event
 
-from encoded_objects.base.console.output import message
+from encoded_objects.base.output import message
 from encoded_objects.base.sensor_type import SensorType
 from probe.frame import Frame
 from probe.port.typed import typed_port
