@@ -17,7 +17,7 @@ from collections import Counter
 import numpy as np
 import runner
 
-from probe.sensor_types.read import sensor_type_named
+from encoded_objects.base.sensor_type_file import sensor_type_named
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import NextTouch, Recognition

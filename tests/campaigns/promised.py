@@ -31,7 +31,8 @@ import runner
 from numpy.typing import ArrayLike, NDArray
 
 from encoded_objects import encode
-from encoded_objects.base.sensor_size import USUAL_SENSOR, SensorSize, sensor_size
+from encoded_objects.base.sensor_type import USUAL_SENSOR, SensorType
+from encoded_objects.base.sensor_type_file import sensor_type_named
 from generator.database.entries import object_names
 from generator.database.open import open_if_there
 from generator.database.read import read_object
@@ -43,7 +44,6 @@ from generator.layout.promise import (
     measured_answers,
 )
 from generator.layout.views import SensorView, sensor_view, views_at
-from probe.sensor_types.read import sensor_type_named
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.validation.policy import NEXT, touch_until_answered
@@ -152,10 +152,10 @@ def main() -> None:
     parser.add_argument("--sensor-type", default=USUAL_SENSOR.name, metavar="T")
     parser.add_argument("--save", action="store_true", help="the table, as the one that ships")
     asked = runner.parse(parser)
-    sensor = sensor_size(asked.sensor_type)
+    sensor = sensor_type_named(asked.sensor_type)
     touches = list(map(_touched, touch_faces(asked.output, asked.rounds, asked.seed, sensor)))
     if sensor.name != USUAL_SENSOR.name:
-        print(f"{sensor.name}, {sensor.pitch_mm:g} mm")
+        print(f"{sensor.name}, {sensor.symbol_pitch_mm:g} mm")
         compare(touches, measured_answers(), sensor)
         return
     table = measured_table([one for one in touches if one.group == "learn"])
@@ -172,7 +172,7 @@ def _touched(values: dict[str, Any]) -> Touched:
     return Touched(**(values | lists))
 
 
-def touch_faces(folder: Path, rounds: int, seed: int, sensor: SensorSize) -> list[runner.Row]:
+def touch_faces(folder: Path, rounds: int, seed: int, sensor: SensorType) -> list[runner.Row]:
     """Touch every face once a round, the rounds that are not there yet."""
     folder.mkdir(parents=True, exist_ok=True)
     readers, faces = {}, []
@@ -187,7 +187,7 @@ def touch_faces(folder: Path, rounds: int, seed: int, sensor: SensorSize) -> lis
             for k, solid in enumerate(solids):  # one by one: each has the pitch that suits it
                 spec = {"name": f"{group} {k + 1}", "output": {"lab_key": LAB_KEY}} | solid
                 spec |= {} if usual else {"sensor_type": sensor.name}
-                spec |= {"print": {"printer": "resin"}} if sensor.pitch_mm < RESIN_MM else {}
+                spec |= {"print": {"printer": "resin"}} if sensor.symbol_pitch_mm < RESIN_MM else {}
                 encode(spec, database=str(unfinished), formats=())
             unfinished.rename(lab)
         readers[group] = Reader(open_lab(lab), reading)
@@ -201,7 +201,7 @@ def touch_faces(folder: Path, rounds: int, seed: int, sensor: SensorSize) -> lis
     return runner.resume(folder / "touches.jsonl", range(rounds * len(faces)), touch)
 
 
-def faces_of(lab: Path, group: str, sensor: SensorSize) -> Iterator[Face]:
+def faces_of(lab: Path, group: str, sensor: SensorType) -> Iterator[Face]:
     """Yield the faces of a set that bear symbols, one of those that are equal."""
     engine = open_if_there(f"sqlite:///{lab}", writable=False)
     assert engine is not None
@@ -241,7 +241,7 @@ def touch_face(face: Face, lab: str, number: int, most: int, reader: Reader, see
     )  # fmt: skip
 
 
-def compare(touches: list[Touched], table: AnswerTable, sensor: SensorSize = USUAL_SENSOR) -> None:
+def compare(touches: list[Touched], table: AnswerTable, sensor: SensorType = USUAL_SENSOR) -> None:
     """Print promise and reading by size and face, and how far they lie apart."""
     for title, within in (("at once", False), ("within three", True)):
         some = [one for one in touches if one.most > 1] if within else touches
@@ -266,7 +266,7 @@ def compare(touches: list[Touched], table: AnswerTable, sensor: SensorSize = USU
 
 
 def _shares(
-    touches: Sequence[Touched], table: AnswerTable, within: bool, sensor: SensorSize
+    touches: Sequence[Touched], table: AnswerTable, within: bool, sensor: SensorType
 ) -> tuple[float, float, float]:
     """Return what is promised and answered, and the standard error of the second."""
     p = np.array([

@@ -21,8 +21,7 @@ from pathlib import Path
 import numpy as np
 import runner
 
-from probe.sensor_types import proposed_pitch_mm
-from probe.sensor_types.read import sensor_type_named, shipped_names
+from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_names
 
 SHAPES = {
     "Cube": "{cube: 80 mm}",
@@ -47,7 +46,7 @@ class World:
         """Whether a type can touch here: MuJoCo has tabs, filament no fine symbols."""
         sensor = sensor_type_named(name)
         if self.shapes:
-            return proposed_pitch_mm(sensor) >= FINE_MM
+            return sensor.symbol_pitch_mm >= FINE_MM
         return not self.options or sensor.overlay.kind == "tab"
 
 
@@ -65,7 +64,7 @@ def make_lab(place: Path, name: str, shapes: Mapping[str, str]) -> Path:
     database = place / "lab.db"
     if not (place / "made").exists():
         place.mkdir(parents=True, exist_ok=True)
-        pitch = proposed_pitch_mm(sensor_type_named(name))
+        pitch = sensor_type_named(name).symbol_pitch_mm
         printer = "resin" if pitch < FINE_MM else "fdm-0.4"
         objects = [f"  - {{name: {key}, shape: {shape}}}" for key, shape in shapes.items()]
         lines = [f"sensor_type: {name}", f"print: {{printer: {printer}}}", "objects:"]
