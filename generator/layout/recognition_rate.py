@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from encoded_objects.base.sensor_size import USUAL_SENSOR, SensorSize
+from encoded_objects.base.sensor_type import USUAL_SENSOR, SensorType
 from generator.array.touches import touches_needed
 from generator.layout.footprint import Points
 from generator.layout.placement import FaceLayout
@@ -123,8 +123,8 @@ class AnsweredShare:
     them.
     """
 
-    across_mm: float  #: of the type, as `SensorSize.across_mm`
-    pitch_mm: float  #: of the symbols that it was measured on
+    across_mm: float  #: of the type, as `SensorType.across_mm`
+    symbol_pitch_mm: float  #: that it was measured on
     constant: float
     by_loaded: float
 
@@ -139,7 +139,7 @@ def face_rates(
     cells: int,
     pitch_mm: float,
     symbol_half_mm: float,
-    sensor: SensorSize = USUAL_SENSOR,
+    sensor: SensorType = USUAL_SENSOR,
 ) -> dict[int, RecognitionRate]:
     """Return the rate of each face by its number; equal faces share the work.
 
@@ -173,7 +173,7 @@ def face_rate(
     face: FaceLayout,
     pitch_mm: float,
     symbol_half_mm: float,
-    sensor: SensorSize,
+    sensor: SensorType,
     poses: int = POSES,
 ) -> RecognitionRate:
     """Return the rate of one face, to three places; parameters as for `face_rates`."""
@@ -196,7 +196,7 @@ def _face_key(loops: Loops, face: FaceLayout) -> bytes:
     return (np.round(np.concatenate(numbers), 6) + 0.0).tobytes()
 
 
-def sensor_view(sensor: SensorSize, symbol_half_mm: float) -> SensorView:
+def sensor_view(sensor: SensorType, symbol_half_mm: float) -> SensorView:
     """Return what a sensor type can see; a larger one steps farther, too."""
     around = AROUND_MM * sensor.across_mm / USUAL_SENSOR.across_mm
     return SensorView(sensor.half_mm, symbol_half_mm, around)
@@ -256,7 +256,7 @@ def views_at(
 
 
 def answered_shares(
-    views: FaceViews, table: AnswerTable, pitch_mm: float, sensor: SensorSize = USUAL_SENSOR
+    views: FaceViews, table: AnswerTable, pitch_mm: float, sensor: SensorType = USUAL_SENSOR
 ) -> tuple[float, float | None]:
     """Return the shares of touches of a face that will be answered at once, and within three.
 
@@ -270,7 +270,7 @@ def answered_shares(
     return float(once.mean()), float(within.mean())
 
 
-def answered_share(sensor: SensorSize) -> AnsweredShare | None:
+def answered_share(sensor: SensorType) -> AnsweredShare | None:
     """Return what a sensor type answers of what the usual one would; None of the usual one.
 
     Of a type that was not measured it is that of the one most like it in size and pitch.
@@ -282,8 +282,9 @@ def answered_share(sensor: SensorSize) -> AnsweredShare | None:
     return nearest if _unlike(nearest, sensor) < _unlike(USUAL_SENSOR, sensor) else None
 
 
-def _unlike(one: AnsweredShare | SensorSize, sensor: SensorSize) -> float:
-    size, pitch = one.across_mm / sensor.across_mm, one.pitch_mm / sensor.pitch_mm
+def _unlike(one: AnsweredShare | SensorType, sensor: SensorType) -> float:
+    size = one.across_mm / sensor.across_mm
+    pitch = one.symbol_pitch_mm / sensor.symbol_pitch_mm
     return math.hypot(math.log(size), math.log(pitch))
 
 
@@ -292,7 +293,7 @@ def answered_at_once(
     pitch_mm: float,
     seen: NDArray[np.int64],
     loaded: Points,
-    sensor: SensorSize = USUAL_SENSOR,
+    sensor: SensorType = USUAL_SENSOR,
 ) -> Points:
     """Return the probability that a sensor's touch is answered at once at each pose, (P,).
 
