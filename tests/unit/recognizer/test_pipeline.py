@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
-from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from recognizer.touch.belief import weigh_cells
 from recognizer.touch.chance import expected_matches
@@ -205,7 +205,7 @@ def test_the_reading_behind_an_answer(url, reader):
     assert is_encoded(speaks)
     assert speaks.explained > 0.85
     assert speaks.inliers >= 9
-    assert speaks.clear == speaks.plain == 0
+    assert speaks.contradictions == speaks.strong_contradictions == 0
     scores = [r.score for r in verify_hypotheses(reader, signal, reader.settings.first)]
     assert scores == sorted(scores, reverse=True)
 
