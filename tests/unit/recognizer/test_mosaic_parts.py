@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.scan.places import surface_to_sensor
-from probe.sensor import SensorType
 from recognizer.errors import MosaicError
 from recognizer.scan.mosaic.canvas import (
     CanvasEntry,
