@@ -148,7 +148,7 @@ def stage(
             twin = staging.write(f"{spec.name}{suffix}-prusaslicer.3mf", plate.prusaslicer)
             cost = None
             if slice_plates:
-                from generator.printed.sliced_plate import slice_plate
+                from generator.printed.slicer import slice_plate
 
                 progress(f"slicing plate {number}", 0.7)
                 cost = slice_plate(twin.staged)

@@ -23,10 +23,10 @@ from generator.solid import (
     top_insets_mm,
 )
 from generator.solid.emboss import turn
-from generator.solid.frame import in_frame
 from generator.solid.inset import inset, regular, shared_insets
 from generator.solid.mitre import mitre
-from generator.solid.polygon import triangulate_rings
+from generator.solid.part import in_frame
+from generator.solid.triangulate import triangulate_rings
 
 FDM = PRINTERS["fdm-0.4"]
 EMPTY = Layout("faces", 7.0, ())
