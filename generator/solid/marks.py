@@ -23,8 +23,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from generator.alphabet.figures import BAR, FIGURES, figures_of, needs_bar
 from generator.alphabet.outline import Tiers, engrave
-from generator.alphabet.strokes import BAR, FIGURES, figures_of, needs_bar
 from generator.plane.rings import boxes_inside
 from generator.printers import Printer
 from generator.solid.emboss import turn

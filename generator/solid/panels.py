@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from generator.alphabet.figures import in_figures
 from generator.alphabet.outline import Tiers
-from generator.alphabet.strokes import in_figures
 from generator.errors import SolidError
 from generator.layout.placement import FaceLayout, Layout
 from generator.plane.polygon import face_vector

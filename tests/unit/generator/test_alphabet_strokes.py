@@ -5,9 +5,10 @@ import json
 import pytest
 
 from generator.alphabet import ALPHABETS, Counts, Glyph, alphabet_from, alphabet_named, counts
+from generator.alphabet.figures import FIGURES, figures_of, in_figures
 from generator.alphabet.known import line
 from generator.alphabet.outline import engrave
-from generator.alphabet.strokes import FIGURES, figures_of, in_figures, same_shape, turn_glyph
+from generator.alphabet.strokes import same_shape, turn_glyph
 from generator.errors import AlphabetError
 from generator.solid.settings import EMBOSS
 
