@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
 
-from encoded_objects.base.console import output
+from encoded_objects.base import output
 from generator.command.lab_report import fullness_text, fullness_values
 from generator.database.read import surfaces_of
 from generator.database.url import without_password
 
 if TYPE_CHECKING:
-    from encoded_objects.base.sensor_size import SensorSize
+    from encoded_objects.base.sensor_type import SensorType
     from generator.database.carry import CopyReport
     from generator.database.fullness import Fullness
     from generator.database.part_state import PartState
@@ -54,7 +54,7 @@ def print_object(
     held: RegisteredObject,
     files: Sequence[PartState],
     url: str,
-    sensor: SensorSize,
+    sensor: SensorType,
     *,
     as_json: bool,
 ) -> None:
@@ -175,7 +175,7 @@ class _Face:
     promise: FacePromise | None = None  #: None: nothing was measured
 
 
-def _faces(held: RegisteredObject, sensor: SensorSize) -> list[_Face]:
+def _faces(held: RegisteredObject, sensor: SensorType) -> list[_Face]:
     """Return the faces of an object with their symbols; layouts may be in another order."""
     from generator.pipeline.registered_promise import registered_promises
 

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from encoded_objects.base.sensor_size import USUAL_SENSOR, SensorSize
+from encoded_objects.base.sensor_type import USUAL_SENSOR, SensorType
 from generator.layout.footprint import Points
 from generator.layout.views import FaceViews
 
@@ -89,8 +89,8 @@ class AnsweredShare:
     them.
     """
 
-    across_mm: float  #: of the type, as `SensorSize.across_mm`
-    pitch_mm: float  #: of the symbols that it was measured on
+    across_mm: float  #: of the type, as `SensorType.across_mm`
+    symbol_pitch_mm: float  #: that it was measured on
     constant: float
     by_loaded: float
 
@@ -107,7 +107,7 @@ def _between(value: Any, steps: Sequence[float]) -> tuple[Any, Any, Any]:
 
 
 def promised_shares(
-    views: FaceViews, table: AnswerTable, pitch_mm: float, sensor: SensorSize = USUAL_SENSOR
+    views: FaceViews, table: AnswerTable, pitch_mm: float, sensor: SensorType = USUAL_SENSOR
 ) -> tuple[float, float | None]:
     """Return the shares of touches of a face that will be answered at once, and within three.
 
@@ -131,7 +131,7 @@ def promised_shares(
     return float(once.mean()), float(within.mean())
 
 
-def answered_share(sensor: SensorSize) -> AnsweredShare | None:
+def answered_share(sensor: SensorType) -> AnsweredShare | None:
     """Return what a sensor type answers of what the usual one would; None of the usual one.
 
     Of a type that was not measured it is that of the one most like it in size and pitch.
@@ -143,8 +143,9 @@ def answered_share(sensor: SensorSize) -> AnsweredShare | None:
     return nearest if _unlike(nearest, sensor) < _unlike(USUAL_SENSOR, sensor) else None
 
 
-def _unlike(one: AnsweredShare | SensorSize, sensor: SensorSize) -> float:
-    size, pitch = one.across_mm / sensor.across_mm, one.pitch_mm / sensor.pitch_mm
+def _unlike(one: AnsweredShare | SensorType, sensor: SensorType) -> float:
+    size = one.across_mm / sensor.across_mm
+    pitch = one.symbol_pitch_mm / sensor.symbol_pitch_mm
     return math.hypot(math.log(size), math.log(pitch))
 
 
@@ -153,7 +154,7 @@ def answered_at_once(
     pitch_mm: float,
     seen: NDArray[np.int64],
     loaded: Points,
-    sensor: SensorSize = USUAL_SENSOR,
+    sensor: SensorType = USUAL_SENSOR,
 ) -> Points:
     """Return the probability that a sensor's touch is answered at once at each pose, (P,).
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from encoded_objects.base.sensor_size import USUAL_SENSOR, SensorSize
+from encoded_objects.base.sensor_type import USUAL_SENSOR, SensorType
 from generator.layout.footprint import Points
 from generator.layout.placement import FaceLayout
 from generator.plane.polygon import points_inside, signed_area
@@ -53,7 +53,7 @@ class SensorView:
     around_mm: float = AROUND_MM  #: from its centre to what another touch beside may show
 
 
-def sensor_view(sensor: SensorSize, symbol_half_mm: float) -> SensorView:
+def sensor_view(sensor: SensorType, symbol_half_mm: float) -> SensorView:
     """Return what a sensor type can see; a larger one steps farther, too."""
     around = AROUND_MM * sensor.across_mm / USUAL_SENSOR.across_mm
     return SensorView(sensor.half_mm, symbol_half_mm, around)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from encoded_objects.base.sensor_size import SensorSize
+from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet.outline import SymbolStyle, footprint_half_mm
 from generator.alphabet.printable import check_printable
 from generator.array.touches import touches_needed
@@ -97,7 +97,7 @@ def _promise(
     return dataclasses.replace(promise, one_row=one_row)
 
 
-def promise_of(views: FaceViews, pitch_mm: float, sensor: SensorSize) -> FacePromise:
+def promise_of(views: FaceViews, pitch_mm: float, sensor: SensorType) -> FacePromise:
     """Return the shares that a face promises to a sensor, to three places.
 
     Parameters

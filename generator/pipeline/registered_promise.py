@@ -7,7 +7,7 @@ and of arrays that are read by a scan.
 
 from __future__ import annotations
 
-from encoded_objects.base.sensor_size import USUAL_SENSOR, SensorSize
+from encoded_objects.base.sensor_type import USUAL_SENSOR, SensorType
 from generator.array.touches import touches_needed
 from generator.database.registered import RegisteredObject
 from generator.layout.views import face_views, sensor_view
@@ -15,7 +15,7 @@ from generator.pipeline.promise import FacePromise, face_key, promise_of
 
 
 def registered_promises(
-    held: RegisteredObject, sensor: SensorSize = USUAL_SENSOR
+    held: RegisteredObject, sensor: SensorType = USUAL_SENSOR
 ) -> dict[int, FacePromise]:
     """Return the promise of each flat face with symbols; equal faces share the work.
 

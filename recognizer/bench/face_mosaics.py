@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.bench.broker import Broker
 from recognizer.bench.message import MosaicMessage, mosaic_message
 from recognizer.bench.settings import RECOGNITION

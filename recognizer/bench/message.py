@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.bench.images import FILTERS, filter_image
 from recognizer.bench.settings import PAGE
 from recognizer.scan.mosaic.image import GlobalImage

@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.arm.carried import SensorPose
-from probe.sensor import SensorType
 from recognizer.scan.belief import ScanBelief, begin_scan
 from recognizer.scan.faces import TouchedFace, contradict, join_faces
 from recognizer.scan.grow import extend_scan

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.touch import cause
 from recognizer.touch.around import combine_around, quantile
 from recognizer.touch.belief import Support, VerifiedHypothesis, unworn_labels_at, weigh_cells

@@ -28,6 +28,7 @@ from pathlib import Path
 
 import numpy as np
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.arm.links import Arm
@@ -37,7 +38,6 @@ from probe.contact.press import press
 from probe.scan.kinesthetic import ArmPath, JointErrors, follow_poses
 from probe.scan.places import surface_to_sensor
 from probe.scan.raster import raster
-from probe.sensor import SensorType
 from probe.simulate.registered import registered_object, registered_surface
 from recognizer.scan.mosaic.grow import add_touch, settle_mosaic
 from recognizer.scan.mosaic.mosaic import Mosaic, MosaicSettings, no_touches, outliers

@@ -28,13 +28,13 @@ from pathlib import Path
 
 import numpy as np
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.arm.links import Arm
 from probe.contact.contract import Touch
 from probe.errors import ContactError
 from probe.scan.kinesthetic import JointErrors, follow_poses
 from probe.scan.places import surface_to_sensor
 from probe.scan.raster import raster
-from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from probe.simulate.world.levels import LEVELS
 from probe.simulate.world.reading import READOUT, read_sensor

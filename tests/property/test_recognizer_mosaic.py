@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.scan.mosaic.canvas import CanvasEntry, empty_canvas, lay_touch
 from recognizer.scan.mosaic.correlation import cross_correlate
 from recognizer.scan.mosaic.graph import PLANE, Constraint, covariances, solve_pose_graph

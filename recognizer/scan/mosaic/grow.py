@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.scan.mosaic.canvas import Canvas, CanvasEntry, empty_canvas, lay_touch
 from recognizer.scan.mosaic.errors import MosaicError
 from recognizer.scan.mosaic.graph import (

@@ -17,7 +17,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.scan.mosaic.patch import TouchPatch
 from recognizer.scan.mosaic.settings import TEXTURE
 

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from encoded_objects.base.sensor_size import SensorSize, sensor_size
+from encoded_objects.base.sensor_type import SensorType
+from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_names
 from generator.array import profile
 from generator.layout.layout import lay_out
 from generator.layout.placement import FaceLayout, Placement
@@ -19,7 +20,6 @@ from generator.layout.promise import (
 )
 from generator.layout.views import SensorView, ViewSettings, face_views, sensor_view
 from generator.polyhedron import face_polygon, shapes
-from probe.sensor_types.read import shipped_names
 
 NONE = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
 VIEW = SensorView((12.7, 9.0), 2.52)
@@ -165,8 +165,8 @@ def test_other_sensors_answer_a_share_of_what_the_usual_one_does():
     usual = answered_at_once(table, 5.0, seen, loaded)
     assert usual == pytest.approx(table.at(5.0, seen, loaded))
     for name in shipped_names():
-        sensor = sensor_size(name)
-        here = answered_at_once(table, sensor.pitch_mm, seen, loaded, sensor)
+        sensor = sensor_type_named(name)
+        here = answered_at_once(table, sensor.symbol_pitch_mm, seen, loaded, sensor)
         if name == "fsr-16":
             assert answered_share(sensor) is None
             assert here == pytest.approx(usual)
@@ -179,9 +179,9 @@ def test_other_sensors_answer_a_share_of_what_the_usual_one_does():
 
 
 def test_a_larger_sensor_steps_farther_and_within_three_is_said_of_the_usual_one_alone():
-    mat = sensor_size("mat-32x32")
+    mat = sensor_type_named("mat-32x32")
     assert sensor_view(mat, 2.0).around_mm == pytest.approx(20 * 64 / 25.4)
-    assert sensor_view(SensorSize(), 2.0) == SensorView((12.7, 12.7), 2.0)
+    assert sensor_view(SensorType(), 2.0) == SensorView((12.7, 12.7), 2.0)
     views = face_views((SQUARE,), lattice(SQUARE), 7.0, VIEW)
     once, within = promised_shares(views, measured_answers(), 6.0, mat)
     assert 0 < once < 1
@@ -190,9 +190,9 @@ def test_a_larger_sensor_steps_farther_and_within_three_is_said_of_the_usual_one
 
 
 def test_a_type_of_your_own_is_taken_for_the_one_most_like_it():
-    mine = SensorSize("mine", (31.0, 33.0), 6.0)  # 62 x 66 mm: the mat is 64 x 64
+    mine = SensorType(33, 31, 2.0, name="mine")  # 62 x 66 mm: the mat is 64 x 64
     assert answered_share(mine) is measured_types()["mat-32x32"]
-    fine = SensorSize("fine", (8.0, 8.0), 3.0)
+    fine = SensorType(pitch_mm=1.0, name="fine")
     assert answered_share(fine) is measured_types()["gel-24x32"]
-    same = SensorSize("same", (12.7, 12.7), 5.0)
+    same = SensorType(name="same")
     assert answered_share(same) is None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from encoded_objects.base.sensor_size import sensor_size
+from encoded_objects.base.sensor_type_file import sensor_type_named
 from generator.database.open import open_database
 from generator.database.read import read_object
 from generator.database.transaction import read_transaction
@@ -58,8 +58,9 @@ def test_another_sensor_is_promised_what_it_would_have_been_promised_when_made(m
         database=f"{tmp_path}/lab.db",
     )  # fmt: skip
     told = [face.promise.at_once for face in report.objects[0].face_reports if face.symbols]
-    found = [one.at_once for one in registered_promises(held, sensor_size("mat-32x32")).values()]
+    mat = sensor_type_named("mat-32x32")
+    found = [one.at_once for one in registered_promises(held, mat).values()]
     assert sorted(found) == sorted(told)
     usual = {one.at_once for one in registered_promises(held).values()}
     assert usual.isdisjoint(found)
-    assert registered_promises(held, sensor_size("gel-24x32")) == {}  # sees too few at once
+    assert registered_promises(held, sensor_type_named("gel-24x32")) == {}  # sees too few at once

@@ -16,13 +16,13 @@ import numpy as np
 import pytest
 from hostile_recordings import HOSTILE, write_hostile, write_zeros
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.database.registered import RegisteredPart
 from probe.circuit import Electronics, fsr_of, read_counts
 from probe.errors import CalibrationError, RecordingError
 from probe.frame import frame_from
 from probe.recording.read import Recording
 from probe.recording.record import Recorder
-from probe.sensor import SensorType
 from recognizer.bench.answers import answer_json
 from recognizer.bench.broker import Broker, Subscriber
 from recognizer.bench.calibration_guide import CalibrationGuide, forces_given

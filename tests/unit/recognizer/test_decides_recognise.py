@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import recognizer.touch.recognise
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.touch.belief import Support
 from recognizer.touch.cause import EXCHANGED, Cause
 from recognizer.touch.hypothesis import Hypothesis

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from probe.sensor import Overlay, SensorType
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from recognizer.touch.belief import Support
 from recognizer.touch.first_look import gap_share, may_tell_more, pressed_tactels, shows_strokes
 from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, NOT_ENCODED, TOO_FEW, refusal

@@ -8,9 +8,9 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
-from probe.sensor import SensorType
 from probe.surface.face import endless_face
 from recognizer.scan.mosaic.errors import MosaicError
 from recognizer.scan.mosaic.grow import add_touch, mosaic_of, settle_mosaic

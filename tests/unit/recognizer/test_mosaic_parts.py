@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.scan.places import surface_to_sensor
-from probe.sensor import SensorType
 from recognizer.scan.mosaic.canvas import CanvasEntry, empty_canvas, lay_touch, reference
 from recognizer.scan.mosaic.correlation import cross_correlate, peaks
 from recognizer.scan.mosaic.errors import MosaicError

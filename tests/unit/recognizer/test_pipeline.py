@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
-from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from recognizer.touch.belief import Support, weigh_cells
 from recognizer.touch.chance import expected_matches
