@@ -19,8 +19,7 @@ from generator.export.atomic import Staging
 from generator.export.formats import EXPORTERS, ExportedObject, stage_formats
 from generator.export.preview import preview_png
 from generator.export.slicer_settings import SlicerSettings, slicer_settings
-from generator.layout.object_code import object_code
-from generator.layout.placement import Layout
+from generator.layout.placement import Layout, object_code
 from generator.pipeline.blame import errors_at
 from generator.pipeline.faces import FaceReport, face_reports
 from generator.pipeline.plan import ObjectPlan

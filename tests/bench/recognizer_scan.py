@@ -40,8 +40,14 @@ from probe.simulate.world.levels import LEVELS
 from probe.simulate.world.reading import READOUT, read_sensor
 from probe.simulate.world.worn import wear_face
 from recognizer.scan.grow import begin_scan, extend_scan
-from recognizer.scan.mosaic.planar import inverse, planar_covariance, planar_pose, transform_points
-from recognizer.scan.mosaic.touch import PlacedTouch, planar_belief
+from recognizer.scan.mosaic.planar import (
+    PlacedTouch,
+    inverse,
+    planar_belief,
+    planar_covariance,
+    planar_pose,
+    transform_points,
+)
 from recognizer.thesis.scan import read_scan as read_classically
 from recognizer.thesis.settings import MergingSettings
 from recognizer.touch.lab import open_lab

@@ -26,9 +26,9 @@ from probe.errors import ContactError
 from probe.surface.face import endless_face
 from probe.surface.indenters import FlatPlate, HalfPlane, RaisedStrip
 from probe.surface.polygon import polygon
-from recognizer.scan.mosaic.pair import register_patches
 from recognizer.scan.mosaic.patch import patch_of
 from recognizer.scan.mosaic.planar import compose_poses
+from recognizer.scan.mosaic.register import register_patches
 from recognizer.touch.settings import SignalSettings
 from recognizer.touch.signal import signal_of
 

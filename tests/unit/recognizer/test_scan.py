@@ -15,7 +15,7 @@ from probe.simulate.registered import registered_surface
 from probe.simulate.world.levels import MISMATCH, TYPICAL
 from probe.simulate.world.reading import read_sensor
 from recognizer.scan.grow import begin_scan, extend_scan, read_scan
-from recognizer.scan.mosaic.touch import PlacedTouch, planar_belief
+from recognizer.scan.mosaic.planar import PlacedTouch, planar_belief
 from recognizer.scan.session import Scan, TouchPlaces
 from recognizer.scan.settings import ScanSettings
 from recognizer.touch.lab import open_lab
