@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.frame import Frame
-from probe.recording.names import check_name
+from probe.recording.files import check_name
 from probe.sensor import SensorType
 from probe.simulate.scan import ScanKind
 from probe.simulate.simulated_probe import SimulatedProbe, SimulatedTouch, TouchOptions

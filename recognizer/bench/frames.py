@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from probe.calibration import calibration_hash, write_calibration
 from probe.errors import ProbeError
 from probe.frame import Frame
-from probe.recording.names import next_free
+from probe.recording.files import next_free
 from probe.recording.record import Recorder
 from probe.sensor import SensorType
 from recognizer.bench.broker import Broker

@@ -21,8 +21,7 @@ from typing import Any
 import numpy as np
 from rosbags.highlevel import AnyReader
 
-from probe.recording.mcap_reader import import_mcap
-from probe.recording.mcap_writer import export_mcap
+from probe.recording.mcap import export_mcap, import_mcap
 from probe.recording.read import Recording
 from probe.recording.record import Recorder
 from probe.sensor_types.read import shipped_names
