@@ -2,20 +2,18 @@
 
 Windows (N, rows, columns) -> `Decodings`, one `Decoded` each: place, margin, reason::
 
-    window, decoded                   what goes in, what comes out
-    view                              rank and minimum distance of any set of visible cells
-    exact, convert, product           windows without errors, by one of the four methods:
-      table, serial, milestones         the thesis's, parallel, serial and serial-parallel
-      logarithm                         closed form, any size
-    likelihood                        wrong and missing symbols, soft scores, prior, rotations:
-      ranking: transform, ordered,      small arrays, large ones,
-      joint, places                     product arrays, a prior
-    good_tuple                        the thesis's way with wrong symbols, the baseline
-    element, register, scattered, keys,
-                                      field elements, linear maps, look-up, character sums,
-      spectrum, dual, score, ranked     elimination, log-likelihoods, ranking
-    any_method, registered            one window by any method, on a lab's array too
-    command, plot                     decode-window
+    window, decoded        labels and log-likelihoods in, places out
+    view                   rank and minimum distance of any set of visible cells
+    exact                  windows without errors, by one of four methods:
+      milestones             the thesis's: parallel (table), serial, serial-parallel
+      logarithm              closed form, any size
+    likelihood             wrong and missing symbols, soft scores, prior, rotations:
+      ranking                all places, those of a prior, or of a product array
+      transform, ordered     folded arrays: small ones exactly, large ones nearly
+    good_tuple             the thesis's way with wrong symbols, the baseline
+    element, register      field elements; symbols seen as linear equations of them
+    any_method, registered one window by any method, on a lab's array too
+    command, plot          decode-window
 """
 
 from __future__ import annotations

@@ -15,9 +15,8 @@ from numpy.typing import ArrayLike
 from decoder.decoded import Decoded
 from decoder.errors import DecoderError, MethodError
 from decoder.exact import decode_exact
-from decoder.likelihood import decode_likelihood
-from decoder.settings import LIKELIHOOD
-from decoder.window import parse_window
+from decoder.likelihood import BLANK, DOUBT, decode_likelihood
+from decoder.window import SYMBOL_ERROR, parse_window
 from generator.array import DEFAULT_PROFILE, FoldedArray, ProductArray, array_from
 from generator.array import profile as profile_named
 from generator.array.lab_key import read_lab_key
@@ -36,9 +35,9 @@ def decode(
     database: str = "",
     lab_key: str = "",
     method: str = "logarithm",
-    error: float = LIKELIHOOD.symbol_error,
-    doubt: float = LIKELIHOOD.doubt,
-    blank: float = LIKELIHOOD.blank,
+    error: float = SYMBOL_ERROR,
+    doubt: float = DOUBT,
+    blank: float = BLANK,
     rotations: Sequence[int] = (0,),
     top: int = 0,
 ) -> Decoded:

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from encoded_objects.base import console
-from encoded_objects.base.console import output
+from encoded_objects.base import console, output
 
 if TYPE_CHECKING:
     from decoder.decoded import Candidate, Decoded

@@ -17,9 +17,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from decoder.convert import conversion
 from decoder.decoded import Decodings, Reason
 from decoder.errors import MethodError
+from decoder.exact import conversion
 from decoder.register import Register
 from decoder.window import checked_labels
 from generator.array.fold import FoldedArray

@@ -15,15 +15,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from decoder.decoded import Candidate, Decodings, Reason
 from decoder.errors import WindowError
-from decoder.places import Places
-from decoder.ranked import Ranked, best_of_all
-from decoder.ranking import Ranking, ranking_of
-from decoder.score import Scores, hard_scores, unrelated_score
-from decoder.settings import LIKELIHOOD
-from decoder.window import checked_labels, checked_scores
+from decoder.ranking import Places, Ranked, Ranking, best_of_all, ranking_of
+from decoder.window import (
+    SYMBOL_ERROR,
+    Scores,
+    checked_labels,
+    checked_scores,
+    hard_scores,
+    unrelated_score,
+)
 from generator.array.fold import FoldedArray
 from generator.array.product import ProductArray
 
+DOUBT = 5e-4  #: largest probability of a wrong answer that is still given
+BLANK = 0.01  #: probability that a window shows no code at all
+_LISTED = 16  #: candidates listed where nothing is answered
+_FAR = 7.0  #: nats below the best: no candidate (odds of 1 to 1,100)
 _VALUES = 1 << 18  #: log-likelihoods held at a time
 _WINDOWS = 1 << 10  #: windows weighed at a time
 
@@ -62,9 +69,9 @@ class Likelihood:
         *,
         prior: ArrayLike | None = None,
         rotations: Sequence[int] = (0,),
-        error: float = LIKELIHOOD.symbol_error,
-        doubt: float = LIKELIHOOD.doubt,
-        blank: float = LIKELIHOOD.blank,
+        error: float = SYMBOL_ERROR,
+        doubt: float = DOUBT,
+        blank: float = BLANK,
     ) -> None:
         self.array = array
         self.rotations = tuple(rotations)
@@ -129,9 +136,9 @@ def decode_likelihood(
     *,
     prior: ArrayLike | None = None,
     rotations: Sequence[int] = (0,),
-    error: float = LIKELIHOOD.symbol_error,
-    doubt: float = LIKELIHOOD.doubt,
-    blank: float = LIKELIHOOD.blank,
+    error: float = SYMBOL_ERROR,
+    doubt: float = DOUBT,
+    blank: float = BLANK,
     top: int = 0,
 ) -> Decodings:
     """Decode windows by maximum likelihood, once; see `Likelihood`."""
@@ -183,10 +190,10 @@ def _answers(decoder: Likelihood, scores: Scores, weighed: _Weighed, top: int) -
     if refused.size:
         reasons[refused] = _why(decoder, scores[refused], weighed, refused)
         if not top:
-            more = _weigh(decoder, scores[refused], LIKELIHOOD.listed)
+            more = _weigh(decoder, scores[refused], _LISTED)
             for place, i in enumerate(refused.tolist()):
                 if reasons[i] != Reason.NOT_ENCODED:
-                    listed[i] = _candidates(more[0], more[1], place, LIKELIHOOD.far)
+                    listed[i] = _candidates(more[0], more[1], place, _FAR)
     single = best.rows.shape[1] < 2
     margins = np.full(len(scores), np.inf) if single else best.values[:, 0] - best.values[:, 1]
     second = min(1, best.rows.shape[1] - 1)

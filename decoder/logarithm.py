@@ -23,8 +23,7 @@ from math import isqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from decoder.element import Element, Map, Shifts, elements_of, frobenius
-from decoder.keys import Keys
+from decoder.element import Element, Keys, Map, Shifts, elements_of, frobenius
 from generator.array.sequence import Sequence
 
 Indices = NDArray[np.uint64]

@@ -1,6 +1,8 @@
-"""Serial-parallel code conversion, and what it costs. Thesis 5.1, 5.4.3, figures 5.2 and 5.4.
+"""Code conversion the thesis's ways: parallel, serial, and serial-parallel with milestones.
 
-Every t-th place of the sequence is a milestone; the register is shifted back until it holds
+Thesis 5.1, 5.4.3, figures 5.2 and 5.4. Parallel: one look into a table of all windows. Serial:
+back shifts to the start of the sequence, counted; one milestone, at zero. Serial-parallel:
+every t-th place of the sequence is a milestone; the register is shifted back until it holds
 one. Position = milestone position + number of back shifts. All shifts of a block are made
 at once, for all windows.
 
@@ -16,10 +18,49 @@ from math import isqrt, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from decoder.element import Element, Shifts, elements_of
+from decoder.element import Element, Keys, Shifts, elements_of
 from decoder.errors import MethodError
-from decoder.keys import Keys
 from generator.array.sequence import Sequence
+
+MOST_ENTRIES = 1 << 24  #: 64 MB
+
+
+class Table:
+    """The index of every window, by the key of its field element.
+
+    Raises
+    ------
+    MethodError
+        If the sequence has more than 2^24 terms.
+    """
+
+    def __init__(self, sequence: Sequence) -> None:
+        if sequence.period > MOST_ENTRIES:
+            raise MethodError(
+                f"a table of {sequence.period} windows is too large: at most {MOST_ENTRIES}",
+                fix="take method milestones or logarithm",
+            )
+        self.elements = elements_of(sequence.ring)
+        self.index = np.zeros(sequence.period + 1, dtype=np.int32)  #: by key
+        forward = Shifts(self.elements, sequence.ring.powers_of_x[1])
+        block = min(sequence.period, 1 << 16)
+        run = forward.run(self.elements.one[0], block)
+        for start in range(0, sequence.period, block):
+            keys = self.elements.keys(run)[: sequence.period - start]
+            self.index[keys.astype(np.intp)] = np.arange(start, start + keys.size)
+            if start + block < sequence.period:
+                run = self.elements.apply(forward.map(16), run)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the table, bytes."""
+        return self.index.nbytes
+
+    def convert(self, states: Element) -> NDArray[np.uint64]:
+        """Return the index of each element (none of them 0); (N,)."""
+        places = self.elements.keys(states).astype(np.intp)
+        return self.index.take(places).astype(np.uint64)
+
 
 MOST_MILESTONES = 1 << 22  #: 50 MB
 MOST_SHIFTS = 1 << 24  #: a single window then takes about 0.1 s
@@ -121,3 +162,20 @@ class Milestones:
 
 def _block(windows: int, shifts: int) -> int:
     return max(1, min(shifts, _BLOCK // windows))
+
+
+def serial(sequence: Sequence) -> Milestones:
+    """Return the serial conversion of a sequence.
+
+    Raises
+    ------
+    MethodError
+        If the sequence has more than 2^24 terms.
+    """
+    if sequence.period > MOST_SHIFTS:
+        raise MethodError(
+            f"serial conversion of {sequence.period} terms would take up to as many back shifts; "
+            f"at most {MOST_SHIFTS}",
+            fix="take method milestones or logarithm",
+        )
+    return Milestones(sequence, sequence.period)

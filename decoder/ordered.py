@@ -19,13 +19,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from decoder.dual import binary_dual, odd_dual
 from decoder.element import elements_of
-from decoder.score import Scores
-from decoder.settings import LIKELIHOOD
-from decoder.spectrum import Coefficients, Spectrum
+from decoder.register import binary_dual, odd_dual
+from decoder.transform import Coefficients, Spectrum
+from decoder.window import Scores
 from generator.array.residue import pack_words
 from generator.array.sequence import Sequence
+
+TRIES = 4  #: orders of reliability that are decoded
+_KEPT = 6  #: best places of each try that are weighed against each other
+_JITTER = 0.6  #: spread of the shuffles between tries, as a share of the reliability
 
 Keys = NDArray[np.uint64]
 
@@ -33,9 +36,7 @@ Keys = NDArray[np.uint64]
 class Ordered:
     """Near maximum likelihood for symbols seen at given offsets of one sequence."""
 
-    def __init__(
-        self, sequence: Sequence, offsets: list[int], tries: int = LIKELIHOOD.tries
-    ) -> None:
+    def __init__(self, sequence: Sequence, offsets: list[int], tries: int = TRIES) -> None:
         self.spectrum = Spectrum(sequence, offsets)
         self._sequence = sequence
         self._tries = tries
@@ -56,7 +57,7 @@ class Ordered:
             reliability = np.abs(weights)
             if attempt:
                 noise = shuffle.random(weights.shape[1], dtype=np.float32)
-                reliability *= 1 - LIKELIHOOD.jitter * noise
+                reliability *= 1 - _JITTER * noise
             order = np.argsort(-reliability, axis=1, kind="stable")
             found = self._weighed(weights, order)
             keys.append(found[0])
@@ -114,7 +115,7 @@ def _best_flips(
     a, b = np.triu_indices(signs.shape[1], 1)  # one flip (a = 0) or two
     a, b = np.append(0, a), np.append(0, b)
     scores = whole.reshape(len(whole), -1)[:, a * signs.shape[1] + b]
-    kept = np.argpartition(-scores, LIKELIHOOD.kept, axis=1)[:, : LIKELIHOOD.kept]
+    kept = np.argpartition(-scores, _KEPT, axis=1)[:, :_KEPT]
     return a[kept], b[kept], np.take_along_axis(scores, kept, axis=1)
 
 

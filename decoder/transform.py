@@ -18,9 +18,58 @@ import numpy as np
 from numpy.typing import NDArray
 
 from decoder.element import Shifts, elements_of
-from decoder.score import Scores
-from decoder.spectrum import Spectrum
+from decoder.window import Scores
 from generator.array.sequence import Sequence
+
+Coefficients = NDArray[np.float32] | NDArray[np.complex64]
+
+
+class Spectrum:
+    """Frequencies of the symbols seen at given offsets of one sequence.
+
+    Parameters
+    ----------
+    sequence
+        The m-sequence.
+    offsets
+        (k,) relative indices of the cells.
+    """
+
+    def __init__(self, sequence: Sequence, offsets: list[int]) -> None:
+        field, prime = sequence.field, sequence.ring.prime
+        self.prime = prime
+        halves = _halves(field.digits, prime)  # (u, m)
+        maps = sequence.functionals(sequence.element(offsets))  # (k, m, D)
+        every = np.einsum("um,kmd->kud", halves, maps) % prime
+        #: (U, D) digits of every frequency, each once
+        self.frequencies, place = np.unique(
+            every.reshape(-1, sequence.ring.degree), axis=0, return_inverse=True
+        )
+        self._merge = None
+        if len(self.frequencies) < place.size:  # cells in the same GF(q) line share them
+            self._merge = np.zeros((place.size, len(self.frequencies)), dtype=np.float32)
+            self._merge[np.arange(place.size), place.ravel()] = 1.0
+        self._place = np.argsort(place.ravel())
+        angles = 2 * np.pi / prime * (field.digits @ halves.T)  # (q, u)
+        scale = (1 if prime == 2 else 2) / field.order
+        characters = scale * np.exp(-1j * angles)
+        real = characters.real.astype(np.float32)
+        self._characters: Coefficients = real if prime == 2 else characters.astype(np.complex64)
+
+    def of(self, scores: Scores) -> tuple[NDArray[np.float64], Coefficients]:
+        """Return c_0 (N,) and the coefficients (N, U) of scores (N, k, q)."""
+        constant = scores.mean(axis=2, dtype=np.float64).sum(axis=1)
+        every = (scores @ self._characters).reshape(len(scores), -1)
+        merged = every[:, self._place] if self._merge is None else every @ self._merge
+        return constant, np.asarray(merged)
+
+
+def _halves(digits: NDArray[np.int64], prime: int) -> NDArray[np.int64]:
+    """Return one of each pair u, -u of the nonzero vectors of GF(p)^m."""
+    first = (digits != 0).argmax(axis=1)
+    leading = digits[np.arange(len(digits)), first]
+    return np.asarray(digits[(leading > 0) & (leading <= max(1, (prime - 1) // 2))])
+
 
 LARGEST_TRANSFORM = 1 << 18  #: places; a window then takes 1 MB
 

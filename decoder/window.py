@@ -7,6 +7,7 @@ Text: rows apart by spaces, `?` for an erased symbol: "01 11 0? 01 00 01".
 
 from __future__ import annotations
 
+from math import log
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from decoder.errors import WindowError
 from generator.array.contract import Labels
 
 ERASED = -1  #: label of a symbol that is not seen
+SYMBOL_ERROR = 0.05  #: probability that a symbol is read wrong, where no scores say so
 LARGEST_SCORE = 1e6  #: nats; beyond it single precision loses single cells
 
 
@@ -90,3 +92,43 @@ def checked_scores(scores: ArrayLike, order: int) -> NDArray[np.float32]:
             fix="write a symbol that cannot be as -50, and a cell that is not seen as zeros",
         )
     return np.asarray(given - given.max(axis=-1, keepdims=True), dtype=np.float32)
+
+
+Scores = NDArray[np.float32]
+
+
+def hard_scores(labels: Labels, order: int, error: float = SYMBOL_ERROR) -> Scores:
+    """Return the scores of labels that are wrong with probability `error`.
+
+    Parameters
+    ----------
+    labels
+        (...) symbols, -1 where none is seen.
+    order
+        q; every wrong symbol is equally likely.
+    error
+        Above 0 and below 1 - 1/q, where a symbol says nothing.
+
+    Examples
+    --------
+    >>> hard_scores(np.array([0, -1]), 2, 0.2).tolist()
+    [[0.0, -1.3862943649291992], [0.0, 0.0]]
+    """
+    if not 0 < error < 1 - 1 / order:
+        raise WindowError(
+            f"a symbol error rate of {error} was given; it lies above 0 and below "
+            f"{1 - 1 / order:g}, where a symbol of {order} says nothing",
+            fix="give 0.01 for reliable symbols",
+        )
+    table = np.full((order + 1, order), -log((1 - error) * (order - 1) / error), dtype=np.float32)
+    np.fill_diagonal(table, 0.0)
+    table[-1] = 0.0  # label -1
+    return table[labels]
+
+
+def unrelated_score(scores: Scores) -> NDArray[np.float64]:
+    """Return the log-likelihood of each window (N, k, q) if its symbols are unrelated.
+
+    It is the share of a surface without code, and the expected share of one wrong place.
+    """
+    return np.asarray(np.log(np.exp(scores, dtype=np.float64).mean(axis=2)).sum(axis=1))

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, overload
 
-from encoded_objects.base.document.tree import Tree, tree_of
+from encoded_objects.base.yaml_tree import Tree, tree_of
 from generator.cad.read import polyhedron_from
 from generator.layout.placement import Layout
 from generator.pipeline.choose import Choice

@@ -10,7 +10,7 @@
     object_report.py   what is registered, as text and as JSON
     lab_report.py      the lab's key, and how full its arrays are
 
-Results go to stdout, progress and messages to stderr (`encoded_objects.base.console`). Exit codes:
+Results go to stdout, progress and messages to stderr (`encoded_objects.base.output`). Exit codes:
 0 done, 1 could not be written, 2 bad input, 4 database, 130 interrupted. Nothing heavy is
 imported before it is needed: `encode-object --help` loads no array, no geometry, no database.
 """

@@ -112,7 +112,7 @@ def encode(
     """Read the options of `encode-object SPEC.yaml...`; `HELP` is what people see."""
 
     def action() -> int:
-        from encoded_objects.base.console import output
+        from encoded_objects.base import output
         from generator.command import NAME
 
         if version:
@@ -150,7 +150,7 @@ def _make(
     as_json: bool,
 ) -> None:
     """Make the objects and report them."""
-    from encoded_objects.base.console.progress import progress_bar
+    from encoded_objects.base.output import progress_bar
     from generator.command.made_report import print_made
     from generator.spec.option import database_option, format_option, sensor_type_option
     from generator.spec.read import read_specs
@@ -190,7 +190,7 @@ def _check_printed(
     as_json: bool,
 ) -> None:
     """Print the objects in simulation and say what became of their symbols."""
-    from encoded_objects.base.console.progress import progress_bar
+    from encoded_objects.base.output import progress_bar
     from generator.command.printed_report import print_printed
     from generator.pipeline.printed_check import check_printed
     from generator.printed.faults import print_faults

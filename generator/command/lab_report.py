@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
 
-from encoded_objects.base.console import output
+from encoded_objects.base import output
 from generator.database.url import without_password
 
 if TYPE_CHECKING:

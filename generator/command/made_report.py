@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from encoded_objects.base.console import output
+from encoded_objects.base import output
 from generator.command.next_step import next_step
 from generator.command.promise_report import face_values, promise_lines
 from generator.database.url import without_password

@@ -86,7 +86,8 @@ def show(
     """Print all about one object: faces, cells, origin, files and whether they are unchanged."""
 
     def action() -> int:
-        from encoded_objects.base.sensor_size import USUAL_SENSOR, sensor_size
+        from encoded_objects.base.sensor_type import USUAL_SENSOR
+        from encoded_objects.base.sensor_type_file import sensor_type_named
         from generator.command import object_report
         from generator.database.open import open_database
         from generator.database.part_state import part_state
@@ -95,7 +96,7 @@ def show(
         from generator.spec.option import database_option
 
         url = database_option(database)
-        sensor = sensor_size(sensor_type) if sensor_type else USUAL_SENSOR
+        sensor = sensor_type_named(sensor_type) if sensor_type else USUAL_SENSOR
         engine = open_database(url, writable=False)
         with read_transaction(engine) as connection:
             held = read_object(connection, name)

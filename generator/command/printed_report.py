@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from encoded_objects.base.console import output
+from encoded_objects.base import output
 from generator.pipeline.printed_check import PrintedObject
 from generator.printed.survey import DOUBTFUL, LOST, SURVIVES, SymbolCheck
 

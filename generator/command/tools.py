@@ -37,7 +37,7 @@ def init(
     """Write a commented spec to begin with; it can be made as it is."""
 
     def action() -> int:
-        from encoded_objects.base.console import output
+        from encoded_objects.base import output
         from generator.spec.starter import starter_named
 
         kind, text = starter_named(shape, file.name if file else "")
@@ -63,7 +63,7 @@ def schema(
     """Print the JSON schema of specs, so that an editor completes and checks them."""
 
     def action() -> int:
-        from encoded_objects.base.console import output
+        from encoded_objects.base import output
         from generator.spec.schema import spec_schema
 
         output.write_json(spec_schema())
@@ -77,7 +77,7 @@ def printers(as_json: Json = False) -> Action:
     """Print the printers that specs can name, with their limits."""
 
     def action() -> int:
-        from encoded_objects.base.console import output
+        from encoded_objects.base import output
         from generator.printers import NOZZLES_MM, known_printers
 
         rows = [_printer_values(printer) for printer in known_printers()]
@@ -117,7 +117,7 @@ def _printer_values(printer: Printer) -> dict[str, Any]:
 
 def _write_new(path: Path, text: str, force: bool) -> None:
     """Write a file whole or not at all; one that is there only with `force`."""
-    from encoded_objects.base.document.problem import Problem
+    from encoded_objects.base.document import Problem
     from generator.spec.problem import SpecError
 
     if path.exists() and not force:

@@ -216,7 +216,7 @@ def _with_array(
 
 def _share_mm(share: float, located: LocatedSpec) -> float:
     """Return a share of the pitch that the sensor of an object proposes, mm."""
-    return round(share * located.spec.sensor.pitch_mm, 2)
+    return round(share * located.spec.sensor.symbol_pitch_mm, 2)
 
 
 def _with_pitch(located: LocatedSpec, pitch_mm: float) -> LocatedSpec:

@@ -17,7 +17,7 @@ How files become values that remember line and column: `encoded_objects.base.doc
 
 from __future__ import annotations
 
-from encoded_objects.base.document.problem import Problem
+from encoded_objects.base.document import Problem
 from generator.spec.located import LocatedSpec, error_at, locate
 from generator.spec.problem import SpecError
 from generator.spec.read import read_specs

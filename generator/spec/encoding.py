@@ -13,8 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from encoded_objects.base.document.block import Block, whole_number
-from encoded_objects.base.document.quantity import refuse
+from encoded_objects.base.settings import Block, refuse, whole_number
 
 Family = Literal["prbs", "prmvs", "prba", "prmva", "prpa", "prmvpa"]
 CELLS_MAX = 2**64

@@ -6,9 +6,9 @@ import re
 
 from pydantic import BaseModel, ValidationError
 
-from encoded_objects.base.document.explain import SettingWords, explain_settings, model_at
-from encoded_objects.base.document.problem import Problem, SourceMark, did_you_mean
-from encoded_objects.base.document.tree import Place, Tree
+from encoded_objects.base.document import Problem, SourceMark, did_you_mean
+from encoded_objects.base.settings import SettingWords, explain_settings, model_at
+from encoded_objects.base.yaml_tree import Place, Tree
 from generator.spec.settings import Defaults, ObjectSettings
 from generator.spec.shape import EXAMPLES, KINDS, OTHER_NAMES
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from encoded_objects.base.document.problem import Problem, SourceMark
-from encoded_objects.base.document.tree import Place, Tree
+from encoded_objects.base.document import Problem, SourceMark
+from encoded_objects.base.yaml_tree import Place, Tree
 from generator.errors import GeneratorError
 from generator.spec.problem import SpecError
 from generator.spec.resolved import ObjectSpec

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator
 
-from encoded_objects.base.document.quantity import refuse
+from encoded_objects.base.settings import refuse
 
 NAME_LENGTH_MAX = 60
 _NAME = re.compile(r"[^\W_][\w .()+-]*\Z")

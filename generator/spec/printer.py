@@ -11,10 +11,9 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, ValidationError
 
-from encoded_objects.base.document.block import Block, PathText
-from encoded_objects.base.document.problem import did_you_mean
-from encoded_objects.base.document.quantity import Angle, Length, refuse
-from encoded_objects.base.document.tree import Tree, read_tree
+from encoded_objects.base.document import did_you_mean
+from encoded_objects.base.settings import Angle, Block, Length, PathText, refuse
+from encoded_objects.base.yaml_tree import Tree, read_tree
 from generator.errors import GeneratorError
 from generator.printers import MACHINES, PRINTERS, Printer, printer_named, printer_of_nozzle
 from generator.spec.name import ObjectName

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from encoded_objects.base.document.problem import DocumentError, DocumentKind
+from encoded_objects.base.document import DocumentError, DocumentKind
 from generator.errors import GeneratorError
 
 

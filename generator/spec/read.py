@@ -11,8 +11,8 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from encoded_objects.base.document.problem import Problem
-from encoded_objects.base.document.tree import Place, Tree, read_tree
+from encoded_objects.base.document import Problem
+from encoded_objects.base.yaml_tree import Place, Tree, read_tree
 from generator.spec.explain import explain_errors
 from generator.spec.located import LocatedSpec, mark_of
 from generator.spec.problem import SPEC, SpecError

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from difflib import get_close_matches
 from pathlib import Path
 
-from encoded_objects.base.document.tree import Tree
+from encoded_objects.base.yaml_tree import Tree
 from generator.spec.resolved import ShapeSpec
 from generator.spec.shape import EXAMPLES, KINDS, Shape
 

@@ -8,7 +8,7 @@ from pydantic import TypeAdapter
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import core_schema
 
-from encoded_objects.base.document.json_schema import DescribedSchema
+from encoded_objects.base.json_schema import DescribedSchema
 from generator.spec.settings import ObjectSettings, SetSettings
 from generator.spec.shape import Shape
 

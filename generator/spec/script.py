@@ -14,8 +14,8 @@ from typing import Any
 import yaml
 from pydantic import ValidationError
 
-from encoded_objects.base.document.problem import Problem
-from encoded_objects.base.document.tree import Tree, tree_of
+from encoded_objects.base.document import Problem
+from encoded_objects.base.yaml_tree import Tree, tree_of
 from generator.spec.explain import explain_errors
 from generator.spec.located import LocatedSpec
 from generator.spec.problem import SPEC, SpecError

@@ -10,8 +10,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from encoded_objects.base.document.block import Block, PathText, whole_number
-from encoded_objects.base.document.quantity import Angle, Density, Length, LengthOrZero, refuse
+from encoded_objects.base.settings import (
+    Angle,
+    Block,
+    Density,
+    Length,
+    LengthOrZero,
+    PathText,
+    refuse,
+    whole_number,
+)
 from generator.alphabet.known import ALPHABETS
 from generator.array.lab_key import read_lab_key
 from generator.errors import LabKeyError

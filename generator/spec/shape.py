@@ -10,8 +10,16 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from encoded_objects.base.document.block import Block, PathText, whole_number
-from encoded_objects.base.document.quantity import Coordinate, Length, coordinates, refuse, sides
+from encoded_objects.base.settings import (
+    Block,
+    Coordinate,
+    Length,
+    PathText,
+    coordinates,
+    refuse,
+    sides,
+    whole_number,
+)
 
 SIDES_MAX = 64
 Sides = Annotated[int, Field(ge=3, le=SIDES_MAX), whole_number(3, SIDES_MAX, "sides")]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from encoded_objects.base.document.problem import Problem, did_you_mean
+from encoded_objects.base.document import Problem, did_you_mean
 from generator.spec.problem import SpecError
 from generator.spec.shape import EXAMPLES, OTHER_NAMES
 

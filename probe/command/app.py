@@ -35,7 +35,7 @@ def _head(
     version: bool = typer.Option(False, "--version", help="Say which version this is."),
     as_json: Json = False,
 ) -> None:
-    from encoded_objects.base.console import output
+    from encoded_objects.base import output
     from probe.command import NAME
 
     if version:

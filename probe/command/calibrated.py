@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from encoded_objects.base.console import FAILED
-from encoded_objects.base.console.files import refuse_taken
-from encoded_objects.base.console.output import pairs, warning, write, write_json
+from encoded_objects.base.files import refuse_taken
+from encoded_objects.base.output import pairs, warning, write, write_json
 from probe.calibration import (
     calibration_from,
     calibration_hash,

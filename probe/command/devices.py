@@ -21,7 +21,7 @@ def list_(as_json: Json = False) -> Action:
     """Print the ports that are there, which of them may be a probe, and URLs that always work."""
 
     def action() -> int:
-        from encoded_objects.base.console import output
+        from encoded_objects.base import output
         from probe.port.listing import list_ports
 
         ports = list_ports()
@@ -61,7 +61,7 @@ def info(
     """Say what a probe is and how well it comes through, or what a file holds."""
 
     def action() -> int:
-        from encoded_objects.base.console import output
+        from encoded_objects.base import output
         from probe.command import described
         from probe.port.url import means_port
 

@@ -96,7 +96,7 @@ def import_(
     """Make a recording of others' images; values that are no counts are scaled."""
 
     def action() -> int:
-        from encoded_objects.base.console.output import count_of, write, write_json
+        from encoded_objects.base.output import count_of, write, write_json
         from probe.command.recorded import check_output
         from probe.recording.imported import import_array
 
@@ -127,7 +127,7 @@ def repair(recording: Recording, as_json: Json = False) -> Action:
     def action() -> int:
         from dataclasses import asdict
 
-        from encoded_objects.base.console.output import count_of, write, write_json
+        from encoded_objects.base.output import count_of, write, write_json
         from probe.recording.repair import repair as repaired
 
         done = repaired(recording)

@@ -12,9 +12,8 @@ from threading import Event
 from rich.console import Console
 from rich.live import Live
 
-from encoded_objects.base.console import INTERRUPTED
-from encoded_objects.base.console.interruption import interruption
-from encoded_objects.base.console.output import message, write, write_json
+from encoded_objects.base.console import INTERRUPTED, interruption
+from encoded_objects.base.output import message, write, write_json
 from probe.calibration import read_calibration
 from probe.client.stream import Stream, name_of
 from probe.command.keys import KeyReader, keys

@@ -51,8 +51,7 @@ def _pipe(url: str, *, as_json: bool) -> int:
     """Write every frame when its time has come."""
     import sys
 
-    from encoded_objects.base.console import INTERRUPTED
-    from encoded_objects.base.console.interruption import interruption
+    from encoded_objects.base.console import INTERRUPTED, interruption
     from probe.client.stream import Stream
 
     with interruption() as interrupted, Stream(url) as stream:

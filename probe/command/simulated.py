@@ -10,12 +10,10 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from encoded_objects.base.console import INTERRUPTED
-from encoded_objects.base.console.files import refuse_taken, staged_file
-from encoded_objects.base.console.interruption import interruption
-from encoded_objects.base.console.output import message, write, write_json
-from encoded_objects.base.console.progress import progress_bar
+from encoded_objects.base.console import INTERRUPTED, interruption
 from encoded_objects.base.errors import require
+from encoded_objects.base.files import refuse_taken, staged_file
+from encoded_objects.base.output import message, progress_bar, write, write_json
 from probe.command.recorded import check_output
 from probe.simulate.simulated_probe import SimulatedProbe, SimulatedTouch
 

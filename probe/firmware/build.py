@@ -15,7 +15,7 @@ import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from encoded_objects.base.console.cache import cache_folder
+from encoded_objects.base.cache import cache_folder
 from probe.errors import PortError
 
 SOURCES = Path(__file__).parent

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from encoded_objects.base.console.cache import cache_folder
+from encoded_objects.base.cache import cache_folder
 from probe.errors import PortError
 from probe.firmware.settings import EMULATOR
 

@@ -14,7 +14,7 @@ import typer
 
 from encoded_objects.base import console
 from encoded_objects.base.console import Action
-from encoded_objects.base.console.progress import progress_bar
+from encoded_objects.base.output import progress_bar
 
 if TYPE_CHECKING:
     from probe.kit.make import Kit
@@ -62,15 +62,15 @@ def kit(
     """Make the kit."""
 
     def action() -> int:
-        from encoded_objects.base.console import output
+        from encoded_objects.base import output
 
         if version:
             output.version(NAME, as_json=as_json)
             return console.DONE
         if not sensor_type:
             raise typer.BadParameter("no sensor type is named: probe-sensor types lists them")
+        from encoded_objects.base.sensor_type_file import sensor_type_named
         from probe.kit.make import make_kit
-        from probe.sensor_types.read import sensor_type_named
 
         with progress_bar("reading", 1) as bar:
             made = make_kit(sensor_type_named(sensor_type), folder, verify=verify,

@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType, choose_sensor_type, sensor_type_text
 from probe.errors import RecordingError
 from probe.frame import WRIST
 from probe.recording.files import check_name, draft_of, explain_errors, final_name
@@ -35,8 +36,6 @@ from probe.recording.hdf5 import write_hdf5
 from probe.recording.layout import NOMINAL_HZ, FrameBlock, RecordingOrigin
 from probe.recording.read import Recording
 from probe.recording.table import table_header
-from probe.sensor import SensorType
-from probe.sensor_types import choose_sensor_type, sensor_type_text
 
 if TYPE_CHECKING:
     import h5py
@@ -158,7 +157,7 @@ def _choose_array(
 
 def _types_of(arrays: list[FileArray]) -> str:
     """Return the shipped types of which one of the arrays holds images, in words."""
-    from probe.sensor_types.read import sensor_type_named, shipped_names
+    from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_names
 
     shapes = {name: sensor_type_named(name).shape for name in shipped_names()}
     alike = [n for n, shape in shapes.items() if any(one.frames(shape) for one in arrays)]

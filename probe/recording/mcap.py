@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.errors import require
+from encoded_objects.base.sensor_type import SensorType, choose_sensor_type, sensor_type_text
 from probe.errors import FrameError, RecordingError
 from probe.frame import Frame, frame_from
 from probe.recording.files import check_name, draft_of, explain_errors, final_name
@@ -43,8 +44,6 @@ from probe.recording.ros import (
     image_message,
     pose_message,
 )
-from probe.sensor import SensorType
-from probe.sensor_types import choose_sensor_type, sensor_type_text
 
 IMAGE_TOPIC: Final = "/touch/image"
 POSE_TOPIC: Final = "/touch/pose"

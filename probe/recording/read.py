@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
+from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
 from probe.errors import RecordingError
 from probe.frame import Frame
 from probe.recording.files import explain_errors, part_of, series_of
@@ -20,8 +21,6 @@ from probe.recording.guard import superblock_of
 from probe.recording.hdf5 import open_hdf5_frames
 from probe.recording.journal import is_journal, open_journal
 from probe.recording.layout import FrameBlock, FrameFile, RecordingOrigin, join_blocks
-from probe.sensor import SensorType
-from probe.sensor_types import choose_sensor_type
 
 _AT_ONCE: Final = 256  #: frames read at a time
 _VALUES_AT_ONCE: Final = 1 << 24  #: of larger images fewer: 256 of 256 x 256

@@ -16,14 +16,13 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NoReturn, Self
 
+from encoded_objects.base.sensor_type import SensorType, sensor_type_text
 from probe.errors import RecordingError
 from probe.frame import Frame
 from probe.recording.files import check_name, draft_of, explain_errors, final_name, part_of
 from probe.recording.hdf5 import write_hdf5
 from probe.recording.journal import JournalWriter, open_journal
 from probe.recording.layout import CHUNK, FrameBlock, RecordingOrigin, block_of
-from probe.sensor import SensorType
-from probe.sensor_types import sensor_type_text
 
 
 class Recorder:

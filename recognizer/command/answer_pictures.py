@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from threading import Event
 
-from encoded_objects.base.console.files import file_exists_error, refuse_taken, staged_file
-from encoded_objects.base.console.progress import progress_bar
 from encoded_objects.base.errors import require
+from encoded_objects.base.files import file_exists_error, refuse_taken, staged_file
+from encoded_objects.base.output import progress_bar
 from recognizer.command.answers import Answer
 from recognizer.touch.reader import Reader
 from recognizer.touch.source import TouchSource

@@ -8,7 +8,7 @@ from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING
 
-from encoded_objects.base.console.output import warning
+from encoded_objects.base.output import warning
 from probe.frame import Frame
 from recognizer.command.learning import SensorLearning
 from recognizer.command.scanning import (

@@ -137,7 +137,7 @@ def recognize(
 ) -> Callable[[], int]:  # fmt: skip
     """Read touches; `HELP` is what people see."""
     if version:
-        from encoded_objects.base.console import output
+        from encoded_objects.base import output
         from recognizer.command import NAME
         from recognizer.touch.symbols.kernels import kernels_in_use
 

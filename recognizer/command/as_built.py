@@ -13,7 +13,7 @@ from encoded_objects.base.console import Action
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from encoded_objects.base.console.progress import ProgressBar
+    from encoded_objects.base.output import ProgressBar
     from recognizer.as_built.estimate import FeltPrint
     from recognizer.touch.contacts import TouchImage
 
@@ -69,7 +69,7 @@ def as_built(
         raise typer.BadParameter(f"--overlay {overlay}: give tab or pad")
 
     def action() -> int:
-        from encoded_objects.base.console.output import message, write, write_json
+        from encoded_objects.base.output import message, write, write_json
         from recognizer.as_built.parts import estimate_parts
         from recognizer.as_built.words import (
             as_built_entry,
@@ -107,8 +107,7 @@ def _feel(
     recording: Path, database: str, sensor_type: str, overlay: str, calibration: Path | None
 ) -> tuple[FeltPrint, ...]:
     """Return how the touches of a recording felt the print."""
-    from encoded_objects.base.console.output import warning
-    from encoded_objects.base.console.progress import progress_bar
+    from encoded_objects.base.output import progress_bar, warning
     from probe.recording.read import Recording
     from recognizer.as_built.settings import settings_for_prints
     from recognizer.as_built.touches import feel_prints

@@ -81,7 +81,7 @@ def _placed_touches(
     recording: Path | None, port: str, sensor_type: str, at: str, every: bool
 ) -> tuple[TouchSource, list[TouchImage]]:
     """Return the touches of a recording, or the next one at a port."""
-    from encoded_objects.base.console.output import message
+    from encoded_objects.base.output import message
     from probe.recording.read import Recording
     from recognizer.command.port import listen, source_at
     from recognizer.touch.source import source_of
@@ -103,7 +103,7 @@ def _report(
     as_json: bool,
 ) -> int:  # fmt: skip
     """Say what touches tell of the mounting; returns the exit code."""
-    from encoded_objects.base.console.output import write, write_json
+    from encoded_objects.base.output import write, write_json
     from recognizer.sensor.mounting import WORDS, FoundMounting, find_mounting
 
     told = [

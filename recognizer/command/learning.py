@@ -10,8 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from encoded_objects.base.console.output import message
-from encoded_objects.base.console.progress import progress_bar
+from encoded_objects.base.output import message, progress_bar
 from recognizer.errors import SensorStateError
 from recognizer.touch.contacts import TouchImage
 from recognizer.touch.reader import Reader

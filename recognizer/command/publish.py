@@ -20,8 +20,8 @@ import re
 from threading import Thread
 from typing import Any, Final
 
-from encoded_objects.base.console.output import json_value, message
 from encoded_objects.base.errors import EncodedObjectsError, require
+from encoded_objects.base.output import json_value, message
 from probe.frame import Frame
 from probe.recording.ros import IMAGE, POSE_WITH_COVARIANCE, cdr_bytes, image_message
 from recognizer.command import report

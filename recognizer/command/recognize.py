@@ -8,10 +8,8 @@ from contextlib import ExitStack
 from threading import Event
 from typing import Any
 
-from encoded_objects.base.console import FAILED, INTERRUPTED
-from encoded_objects.base.console.interruption import interruption
-from encoded_objects.base.console.output import message, warning, write_json
-from encoded_objects.base.console.progress import ProgressBar, progress_bar
+from encoded_objects.base.console import FAILED, INTERRUPTED, interruption
+from encoded_objects.base.output import ProgressBar, message, progress_bar, warning, write_json
 from probe.frame import Frame
 from probe.recording.layout import RecordingOrigin
 from probe.recording.read import Recording

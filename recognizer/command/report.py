@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from encoded_objects.base.console.output import count_of
+from encoded_objects.base.output import count_of
 
 if TYPE_CHECKING:
     from recognizer.thesis.edges.line import Edge

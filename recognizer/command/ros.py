@@ -19,8 +19,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from encoded_objects.base.console.files import refuse_taken, staged_file
-from encoded_objects.base.console.output import json_value
+from encoded_objects.base.files import refuse_taken, staged_file
+from encoded_objects.base.output import json_value
 from probe.arm.carried import SensorPose
 from probe.frame import Frame
 from probe.recording.layout import RecordingOrigin

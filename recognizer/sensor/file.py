@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from encoded_objects.base.console.files import staged_file
+from encoded_objects.base.files import staged_file
 from recognizer.errors import SensorStateError
 from recognizer.touch.sensor_state import SensorState
 

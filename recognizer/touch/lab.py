@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Connection, Engine
 
-from encoded_objects.base.console.output import count_of
+from encoded_objects.base.output import count_of
 from generator.alphabet import Alphabet, SymbolStyle, alphabet_from
 from generator.array import FoldedArray, ProductArray, array_from
 from generator.database.as_built import AsBuilt, read_as_built

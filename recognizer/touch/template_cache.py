@@ -1,4 +1,4 @@
-"""Templates and banks of lattices, kept between runs (`encoded_objects.base.console.cache`).
+"""Templates and banks of lattices, kept between runs (`encoded_objects.base.cache`).
 
 What symbols feel like depends on alphabet, style, sensor and settings alone, and takes longer to
 work out than a touch to read: .1 s for tabs, seconds for a pad.
@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 import generator.alphabet
 import probe.contact
 import recognizer.touch.symbols
-from encoded_objects.base.console.cache import cached_bytes, content_key
+from encoded_objects.base.cache import cached_bytes, content_key
+from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet import Alphabet, SymbolStyle
-from probe.sensor import SensorType
 from recognizer.touch.settings import SearchSettings, TemplateSettings
 from recognizer.touch.symbols.search import Bank, bank_of
 from recognizer.touch.symbols.template import ResponseTemplate, template_of

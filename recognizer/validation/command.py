@@ -21,9 +21,9 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
-from encoded_objects.base import console
-from encoded_objects.base.console import Action, output
-from encoded_objects.base.console.progress import progress_bar
+from encoded_objects.base import console, output
+from encoded_objects.base.console import Action
+from encoded_objects.base.output import progress_bar
 from probe.contact.engines import ENGINES
 from probe.simulate.world.levels import LEVELS
 

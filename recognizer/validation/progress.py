@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterable
 from datetime import timedelta
 
-from encoded_objects.base.console.progress import ProgressBar
+from encoded_objects.base.output import ProgressBar
 from recognizer.validation.rows import Row
 from recognizer.validation.trial import REJECTED, RIGHT, WRONG
 

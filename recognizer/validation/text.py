@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from encoded_objects.base.console import output
+from encoded_objects.base import output
 
 
 def comparison(found: dict[str, Any], page: Path | None, *, as_json: bool) -> None:

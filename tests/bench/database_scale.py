@@ -15,7 +15,7 @@ At each number of objects it prints medians: one more cube placed and registered
 (open, taken cells, layout, rows, commit), wall time and CPU time of this process (a server's is
 its own), reading the taken cells alone, and the object and face of a 3 x 4 window of cells, on an
 open connection and with opening it. `opened` is used cells by those of the corner that placing
-has opened (`generator.layout.board.board_size`: it grows when nothing fits into it any more),
+has opened (`generator.layout.torus.board_size`: it grows when nothing fits into it any more),
 `array` by those of the array.
 
 `--full` places the mixture, edges `--size` times as long, until none of its shapes fits anywhere,
@@ -48,10 +48,10 @@ from generator.database.register import ObjectRecord, register
 from generator.database.retire import remove
 from generator.database.transaction import read_transaction, write_transaction
 from generator.errors import LayoutError
-from generator.layout.board import board_size
 from generator.layout.layout import lay_out
 from generator.layout.occupancy import Occupancy
 from generator.layout.placement import FaceLayout, Layout, Placement
+from generator.layout.torus import board_size
 from generator.pipeline import encode
 from generator.pipeline.place import occupancy_with
 from generator.polyhedron import shapes

@@ -30,9 +30,9 @@ from decoder import Likelihood, decode_good_tuple
 from decoder.likelihood import _weigh
 from decoder.ordered import Ordered
 from decoder.ranking import AllPlaces
-from decoder.score import hard_scores
 from decoder.transform import LARGEST_TRANSFORM
 from decoder.view import strength_of_window
+from decoder.window import hard_scores
 from generator.array import FoldedArray, ProductArray, array_from, profile
 
 DAMAGE = ((0.02, 0.0), (0.05, 0.0), (0.10, 0.0), (0.20, 0.0), (0.0, 0.20), (0.0, 0.40))

@@ -26,7 +26,7 @@ from pathlib import Path
 import numpy as np
 
 from decoder import Decodings, Likelihood, MethodError, decode_exact
-from decoder.convert import METHODS, conversion
+from decoder.exact import METHODS, conversion
 from generator.array import FoldedArray, array_from, next_larger, profile
 from generator.array.keyed import keyed_array
 

@@ -14,7 +14,7 @@ import time
 import numpy as np
 
 from decoder import Likelihood, decode_exact
-from decoder.convert import METHODS
+from decoder.exact import METHODS
 from generator.array import PROFILES
 
 CHUNK = 4096

@@ -5,8 +5,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from decoder import Likelihood, decode_exact, strength
-from decoder.element import elements_of
-from decoder.keys import Keys
+from decoder.element import Keys, elements_of
 from decoder.register import eliminate
 from generator.array import PROFILES, array_from
 from generator.array.field import field_of_order

@@ -9,7 +9,7 @@ import yaml
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from encoded_objects.base.document.quantity import MILLIMETRES, length_mm
+from encoded_objects.base.settings import MILLIMETRES, length_mm
 from generator.spec import LocatedSpec, SpecError, read_specs
 
 MUTATIONS = int(os.environ.get("SPEC_MUTATIONS", "300"))

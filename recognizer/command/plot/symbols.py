@@ -8,9 +8,9 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet import Alphabet
 from probe.plot.canvas import HEAT, in_mm
-from probe.sensor import SensorType
 from recognizer.command.plot.winning import WinningLattice
 from recognizer.touch.signal import Signal
 

@@ -15,8 +15,8 @@ from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.plot.touch import MARK
-from probe.sensor import SensorType
 from recognizer.command.plot.symbols import strokes_mm
 from recognizer.command.plot.winning import WinningLattice
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.database.read import read_object
 from generator.database.registered import Polyhedron
 from generator.database.transaction import read_transaction
 from probe.plot.touch import MARK
-from probe.sensor import SensorType
 from probe.surface.solids import triangulate
 from recognizer.command.plot.window import FACE
 from recognizer.touch.lab import EmbossedArray

@@ -7,15 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import decoder.joint
 import decoder.likelihood
+import decoder.ranking
 from decoder import Likelihood, WindowError, decode_likelihood
 from decoder.errors import MethodError
-from decoder.joint import Joint
-from decoder.places import Places
-from decoder.ranked import Ranked, best_of, best_of_all
-from decoder.ranking import ranking_of
-from decoder.score import hard_scores, unrelated_score
+from decoder.ranking import Joint, Places, Ranked, best_of, best_of_all, ranking_of
+from decoder.window import hard_scores, unrelated_score
 from generator.array import array_from
 
 BINARY = array_from({"family": "prba", "order": 2, "degree": 8})  # 15 x 17
@@ -416,7 +413,7 @@ def test_a_window_of_a_product_array_is_searched_as_it_is_weighed(
     scores[7][..., array.law] = rows_alone  # all places of a row are alike
     scores -= scores.max(axis=-1, keepdims=True)
     flat = scores.reshape(8, shape[0] * shape[1], -1).astype(np.float32)
-    monkeypatch.setattr(decoder.joint, "_PAIRS", pairs)
+    monkeypatch.setattr(decoder.ranking, "_PAIRS", pairs)
     found = ranking_of(array, shape).rank(flat, number)
     _, shown = hypotheses(array, shape)  # 7 x 15
     for i in range(8):
@@ -466,7 +463,7 @@ def test_product_arrays_of_more_than_2_to_the_16_rows_or_columns_are_refused(row
 @pytest.mark.parametrize("number", [2, 16])
 @pytest.mark.parametrize("shape", [(3, 5), (5, 3)])
 def test_every_window_of_a_product_array_is_found_row_by_row(monkeypatch, shape, number):
-    monkeypatch.setattr(decoder.joint, "_PAIRS", 15)  # one row
+    monkeypatch.setattr(decoder.ranking, "_PAIRS", 15)  # one row
     places, shown = hypotheses(PRODUCT, shape)
     labels = shown.reshape(len(places), 15, -1).argmax(axis=2)
     found = ranking_of(PRODUCT, shape).rank(hard_scores(labels, PRODUCT.order, 0.1), number)

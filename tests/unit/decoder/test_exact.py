@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from decoder import MethodError, WindowError, decode_exact
-from decoder.convert import conversion
+from decoder.exact import conversion
 from generator.array import PROFILES, array_from
 from generator.array.primitive import search_primitive
 

@@ -5,9 +5,8 @@ import pytest
 
 from decoder import Likelihood, MethodError, WindowError, decode_good_tuple, decode_likelihood
 from decoder.ordered import Ordered
-from decoder.ranked import best_of
-from decoder.ranking import AllPlaces
-from decoder.score import hard_scores
+from decoder.ranking import AllPlaces, best_of
+from decoder.window import hard_scores
 from generator.array import PROFILES, array_from
 
 ROBUST = array_from({"family": "prba", "polynomial": "0x1655", "rows": 63, "columns": 65})

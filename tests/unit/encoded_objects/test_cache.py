@@ -6,7 +6,7 @@ from multiprocessing import get_context
 
 import pytest
 
-from encoded_objects.base.console.cache import cache_folder, cached_bytes, content_key
+from encoded_objects.base.cache import cache_folder, cached_bytes, content_key
 
 
 @pytest.fixture(autouse=True)

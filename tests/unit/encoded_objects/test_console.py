@@ -1,8 +1,14 @@
-"""A command's process: what its start leaves out, and how it ends."""
+"""A command's process: what its start leaves out, its help page, and how it ends."""
 
 import json
 import subprocess
 import sys
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from encoded_objects.base import console
 
 PROGRAM = """
 import gc, json, os, sys
@@ -44,3 +50,55 @@ def test_a_command_does_not_walk_through_what_stays():
 def test_plugins_that_somebody_asks_for_are_left():
     done = process(PROGRAM, PYDANTIC_DISABLE_PLUGINS="one")
     assert json.loads(done.stdout)[1] == "one"
+
+
+app = console.application()
+part = console.application()
+app.add_typer(part, name="part")
+
+
+@app.callback()
+def head(loud: bool = False) -> None:
+    """Do things."""
+
+
+@app.command()
+def one(number: int = typer.Argument(help="How [bold]many[/].")) -> None:
+    """Do one."""
+
+
+@part.command()
+def two(name: str = "x") -> None:
+    """Do two."""
+
+
+@part.command()
+def three() -> None:
+    """Do three."""
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["--help"], ["-h"], ["one", "--help"], ["part", "-h"], ["part", "two", "--help"],
+     ["--loud", "one", "-h"], ["part", "two", "--name", "y", "--help"]],
+)  # fmt: skip
+def test_page_is_that_of_typer(words, capsys):
+    expected = CliRunner().invoke(app, words, prog_name="do")
+    assert console.run("do", lambda _: app, words) == expected.exit_code == 0
+    assert capsys.readouterr().out == expected.output
+
+
+def test_errors_beside_help_are_told(capsys):
+    assert console.run("do", lambda _: app, ["four", "--help"]) == 2
+    assert "four" in capsys.readouterr().err
+
+
+def test_stand_ins_are_gone_afterwards(monkeypatch):
+    for name in (*console.UNUSED_BY_HELP, "typer.rich_utils"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    monkeypatch.setitem(console.UNUSED_BY_HELP, "rich.markdown", ())  # typer asks for it
+    console._import_help_page()
+    assert not set(console.UNUSED_BY_HELP) & set(sys.modules)
+    from rich.markdown import Markdown
+
+    assert Markdown("*x*").parsed

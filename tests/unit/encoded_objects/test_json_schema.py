@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from pydantic import BaseModel
 
-from encoded_objects.base.document.json_schema import DescribedSchema, field_docstrings
+from encoded_objects.base.json_schema import DescribedSchema, field_docstrings
 
 
 class Inner(BaseModel):

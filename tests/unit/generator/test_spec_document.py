@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from encoded_objects.base.document.tree import read_tree
+from encoded_objects.base.yaml_tree import read_tree
 from generator.spec import SpecError, read_specs
 from generator.spec.problem import SPEC
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from pydantic_core import PydanticCustomError
 
-from encoded_objects.base.document.quantity import length_mm
+from encoded_objects.base.settings import length_mm
 from generator.alphabet.known import ALPHABETS
 from generator.alphabet.outline import SymbolStyle
 from generator.alphabet.printable import check_printable

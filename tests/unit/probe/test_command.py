@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from encoded_objects.base.console.output import write_json
+from encoded_objects.base.output import write_json
 from probe.calibration import calibration_from, even_load, write_calibration
 from probe.circuit import QUIET, Electronics, fsr_of, read_sequence
 from probe.command import run

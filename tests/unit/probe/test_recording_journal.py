@@ -33,7 +33,7 @@ def journal(tmp_path):
     for i, counts in enumerate(COUNTS):
         recorder.append(
             frame_from(
-                counts, t_ns=i * 10**6, seq=i, wrist=[1, 2, 3, i], pose=POSE if i % 3 else None
+                counts, t_ns=i * 10**6, seq=i, wrist=[1, 2, 3, i], pose=np.eye(4) if i % 3 else None
             )
         )
     recorder.flush()

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.calibration import calibration_from, even_load, write_calibration
@@ -18,7 +19,6 @@ from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.frame import frame_from
 from probe.recording.record import Recorder
-from probe.sensor import Overlay, SensorType
 from probe.simulate.registered import registered_surface
 from probe.wrist.distances import counts_of, distances_at
 from probe.wrist.geometry import Wrist

@@ -1,14 +1,4 @@
-"""How every command starts, shows progress, and ends. Imports nothing of ours but the errors.
-
-::
-
-    __init__.py       which exit code an error, a signal or a closed pipe means
-    help_page.py      the page of --help, without what it does not need
-    output.py         results to stdout, messages to stderr, as text and as JSON
-    progress.py       a bar on a terminal, notices beside it
-    interruption.py   Ctrl-C as an event
-    files.py          files that are whole or not there
-    cache.py          what takes long to compute, kept between runs
+"""How every command starts and ends: exit codes of errors and signals, the page of `--help`.
 
 A command is a typer application whose functions read options and return an `Action`; the
 action does the work and returns the exit code, or raises an `EncodedObjectsError`.
@@ -21,8 +11,10 @@ import io
 import os
 import signal
 import sys
-from collections.abc import Callable, Sequence
-from types import FrameType
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType, ModuleType
 from typing import TYPE_CHECKING, Any, NoReturn
 
 if TYPE_CHECKING:
@@ -37,6 +29,10 @@ Chosen = Callable[[list[str]], "Typer"]
 """Arguments -> the application that reads them; heavy parts load when it is called."""
 
 MATRIX_LIBRARIES = ("OMP", "OPENBLAS", "MKL")
+
+HELP_OPTIONS = ("-h", "--help")
+#: What typer's help page imports and no page of ours uses: names that it imports, by module.
+UNUSED_BY_HELP = {"rich.markdown": ("Markdown",), "rich.traceback": ("Traceback",)}
 
 GARBAGE = (50_000, 20, 100)
 """New objects between collections of cycles, and younger collections between older ones.
@@ -101,7 +97,7 @@ def run(
     """Run one command; returns its exit code. Errors are reported, not raised."""
     from typer import BadParameter, Exit
 
-    from encoded_objects.base.console import help_page, output
+    from encoded_objects.base import output
     from encoded_objects.base.errors import EncodedObjectsError
 
     usage_error: type[Exception] = BadParameter.__mro__[1]  # of every misused option
@@ -111,8 +107,8 @@ def run(
     try:
         asked = [*arguments, "--help"] if unsaid else arguments
         app = chosen(arguments)
-        if any(word in help_page.HELP for word in asked):
-            action = help_page.show_help(app, name, asked)
+        if any(word in HELP_OPTIONS for word in asked):
+            action = _show_help(app, name, asked)
         else:
             action = app(asked, prog_name=name, standalone_mode=False)
         code = action() if callable(action) else int(action or 0)
@@ -147,7 +143,7 @@ def application(**settings: Any) -> Typer:
         add_completion=False,
         pretty_exceptions_enable=False,
         rich_markup_mode="rich",
-        context_settings={"help_option_names": ["-h", "--help"]},
+        context_settings={"help_option_names": list(HELP_OPTIONS)},
         **settings,
     )
 
@@ -159,6 +155,23 @@ def one_thread() -> None:
     """
     for library in MATRIX_LIBRARIES:
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
+
+@contextmanager
+def interruption() -> Iterator[threading.Event]:
+    """Yield an event that Ctrl-C sets; a second Ctrl-C interrupts at once."""
+    interrupted = threading.Event()
+
+    def note(_number: int, _frame: FrameType | None) -> None:
+        if interrupted.is_set():
+            raise KeyboardInterrupt
+        interrupted.set()
+
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield interrupted
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _spare_start() -> None:
@@ -192,3 +205,44 @@ def _misuse(error: Exception) -> str:
 def _end(number: int, _frame: FrameType | None) -> NoReturn:
     """Leave on a request to end, so that what is half done is taken back."""
     sys.exit(128 + number)
+
+
+def _show_help(app: Typer, name: str, arguments: list[str]) -> Any:
+    """Run the command that the arguments name: its own `--help` shows its page.
+
+    To find a subcommand, typer reads the options of all groups above it, and imports pydantic for
+    that, a third of the time of a page.
+    """
+    from typer.main import get_command
+
+    command: Any = get_command(app)
+    words, rest = [name], list(arguments)
+    while rest and rest[0] in getattr(command, "commands", {}):
+        command = command.commands[rest[0]]
+        words.append(rest.pop(0))
+    _import_help_page()
+    named = {"prog_name": " ".join(words), "help_option_names": list(HELP_OPTIONS)}
+    return command.main(args=rest, standalone_mode=False, **named)
+
+
+def _import_help_page() -> None:
+    """Import typer's page with stand-ins for what it does not use here.
+
+    Our pages are written in rich's markup; typer imports a parser of Markdown for other ones, a
+    fifth of the time of a page.
+    """
+    stand_ins = {}
+    for module, names in UNUSED_BY_HELP.items():
+        if module not in sys.modules:
+            stand_in = ModuleType(module)
+            for one in names:
+                setattr(stand_in, one, type(one, (), {}))
+            stand_ins[module] = stand_in
+    sys.modules.update(stand_ins)
+    try:
+        import typer.rich_utils  # noqa: F401
+    except ImportError:  # of a typer that asks them for more: it imports them itself
+        pass
+    finally:
+        for module in stand_ins:
+            del sys.modules[module]

@@ -1,6 +1,7 @@
-"""What is wrong with a file that a person wrote: places, problems, and how they read.
+"""Files that people write: their text, and what is wrong with it at which line and column.
 
-A problem prints as `file:line:column: error: cause`, the line, a caret and a `fix:`.
+A `DocumentKind` holds the words of messages about one kind of file, and the error that its package
+raises. A problem prints as `file:line:column: error: cause`, the line, a caret and a `fix:`.
 Lines and columns count from 1.
 """
 
@@ -11,11 +12,13 @@ import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from pathlib import Path
 from typing import Any
 
 from encoded_objects.base.errors import EncodedObjectsError, printable
 
 _LINE_END = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
+BYTES_MAX = 256 * 1024  #: of a file
 LINE_SHOWN = 100  # characters of a source line that are printed
 
 
@@ -134,11 +137,60 @@ class DocumentKind:
     large: str = "make it smaller"
 
 
+def read_text(path: Path, kind: DocumentKind) -> str:
+    """Return the text of a file: UTF-8, at most 256 KiB.
+
+    Raises
+    ------
+    DocumentError
+        The file is missing (the fix names similar ones), too large, or not UTF-8.
+    """
+    try:
+        with path.open("rb") as file:
+            data = file.read(BYTES_MAX + 1)
+    except FileNotFoundError:
+        raise kind.error(
+            [Problem("there is no such file", _suggest_similar(path, kind), file=str(path))]
+        ) from None
+    except IsADirectoryError:
+        fix = f"name the files in it, for example {path / '*.yaml'}"
+        raise kind.error(
+            [Problem(f"this is a folder, not {kind.name}", fix, file=str(path))]
+        ) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        fix = "check the name and the rights of the file"
+        raise kind.error([Problem(f"cannot read: {reason}", fix, file=str(path))]) from None
+    if len(data) > BYTES_MAX:
+        cause = f"the file is larger than {BYTES_MAX // 1024} KiB"
+        raise kind.error([Problem(cause, kind.large, file=str(path))])
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        source = TextSource.of(str(path), data.decode("utf-8", errors="replace"))
+        mark = SourceMark.at(source, data[: error.start].decode("utf-8"))
+        cause = f"byte 0x{data[error.start]:02x} is not UTF-8 text"
+        raise kind.error([Problem(cause, "save the file as UTF-8", mark)]) from None
+    return text
+
+
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """Return the known word nearest to `word`, or an empty string where none is near."""
     lowered = {name.lower(): name for name in known}
     near = get_close_matches(word.lower()[:80], lowered, n=1, cutoff=0.6)
     return lowered[near[0]] if near else ""
+
+
+def _suggest_similar(path: Path, kind: DocumentKind) -> str:
+    """Return a fix that names files like `path` beside it."""
+    try:
+        beside = sorted(entry.name for entry in path.parent.iterdir())
+    except (OSError, ValueError):
+        return f"check the folder '{path.parent}'"
+    near = get_close_matches(path.name, beside, n=3, cutoff=0.6)
+    if near:
+        return "did you mean " + " or ".join(f"'{path.parent / name}'" for name in near) + "?"
+    return kind.first
 
 
 def _excerpt(mark: SourceMark) -> list[str]:
