@@ -33,9 +33,8 @@ from numpy.typing import ArrayLike, NDArray
 from encoded_objects import encode
 from encoded_objects.base.sensor_type import USUAL_SENSOR, SensorType
 from encoded_objects.base.sensor_type_file import sensor_type_named
-from generator.database.entries import object_names
 from generator.database.open import open_if_there
-from generator.database.read import read_object
+from generator.database.read import object_names, read_object
 from generator.database.transaction import read_transaction
 from generator.layout.placement import FaceLayout
 from generator.layout.recognition_rate import (
