@@ -33,7 +33,7 @@ HOMES = {
     "Recognition": "recognizer.touch.recognition",
     "Recording": "probe.recording.read",
     "Scan": "recognizer.scan.session",
-    "SensorType": "probe.sensor",
+    "SensorType": "encoded_objects.base.sensor_type",
     "decode": "decoder.any_method",
     "encode": "generator.cad.encode",
     "open_lab": "recognizer.touch.lab",

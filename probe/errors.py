@@ -11,9 +11,9 @@
         ├── SurfaceError      a mesh or a face that gives no height map
         ├── ContactError      a scene without an equilibrium, or out of a model's range
         ├── CircuitError      a network that cannot be read or inverted as asked
-        ├── SensorTypeError   probe.sensor_types: no such type, or a file that tells none
         └── PoseError         wrist or arm outside its range, or near a singularity
 
+A sensor type that cannot be used is a `SensorTypeError` of `encoded_objects.base.sensor_type`.
 Every error says what was given, what is allowed, and the way out (`fix`).
 """
 

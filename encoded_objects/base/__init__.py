@@ -12,5 +12,6 @@
     settings     blocks of settings (pydantic), quantities, errors in plain words
     json_schema  the schema of such blocks
     compiled     loops compiled from C: where their library lies, and whether it may be used
-    sensor_size  rows, columns and pitch of a sensor type, by name
+    sensor_type       matrix, overlay and values of a sensor, and which type images are of
+    sensor_type_file  types by name and as YAML; `sensor_types` holds the shipped ones
 """

@@ -27,8 +27,7 @@ from generator.export.slicer_settings import SlicerSettings, slicer_settings
 from generator.export.step import assembly_chunks, gzip_chunks, step_chunks
 from generator.export.stl import stl_chunks
 from generator.export.threemf import print_files
-from generator.layout.object_code import object_code
-from generator.layout.placement import Layout
+from generator.layout.placement import Layout, object_code
 from generator.pipeline.blame import errors_at
 from generator.pipeline.faces import FaceReport, face_reports
 from generator.pipeline.plan import ObjectPlan

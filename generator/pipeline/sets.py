@@ -16,9 +16,8 @@ from pathlib import Path
 from sqlalchemy import Connection, Engine
 
 from encoded_objects.base.errors import install_line
-from generator.database.entries import find_object, natural_key
-from generator.database.part_state import part_state
-from generator.database.read import read_layout, read_parts
+from generator.database.part_file import part_state
+from generator.database.read import find_object, natural_key, read_layout, read_parts
 from generator.database.register import require_in_use
 from generator.database.transaction import read_transaction
 from generator.export.overview import can_draw

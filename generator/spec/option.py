@@ -8,7 +8,7 @@ from typing import get_args
 from pydantic_core import PydanticCustomError
 
 from encoded_objects.base.document import Problem, did_you_mean
-from encoded_objects.base.sensor_size import SENSOR_FILES, sensor_size
+from encoded_objects.base.sensor_type import SENSOR_FILES
 from generator.spec.problem import SpecError
 from generator.spec.settings import Format, database_url
 
@@ -33,7 +33,9 @@ def format_option(text: str) -> tuple[str, ...]:
 
 def sensor_type_option(text: str) -> str:
     """Return `--sensor-type`, a file by its whole path; raises `SensorTypeError`."""
-    sensor_size(text)
+    from encoded_objects.base.sensor_type_file import sensor_type_named  # costs start-up
+
+    sensor_type_named(text)
     return str(Path(text).absolute()) if Path(text).suffix in SENSOR_FILES else text
 
 

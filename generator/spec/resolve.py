@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from encoded_objects.base.document import DocumentError, Problem
-from encoded_objects.base.sensor_size import SENSOR_FILES, USUAL_SENSOR, SensorSize, sensor_size
+from encoded_objects.base.sensor_type import SENSOR_FILES, USUAL_SENSOR, SensorType
 from encoded_objects.base.yaml_tree import Tree
 from generator.alphabet.known import ALPHABETS, Alphabet
 from generator.alphabet.outline import SymbolStyle
@@ -82,7 +82,7 @@ def resolve(
     sensor = _sensor(settings, tree, problems)
     encoding, order = _array(settings, refuse)
     if settings.encoding is None and _profile(settings) == AUTO:
-        defaults = auto_defaults(sensor.pitch_mm)
+        defaults = auto_defaults(sensor.symbol_pitch_mm)
     elif settings.encoding is None or order is None:
         defaults = defaults_of_profile(_array_profile(settings))
     else:
@@ -148,14 +148,16 @@ def folder_name(name: str) -> str:
     return re.sub(r"[\s-]+", "-", name.lower())
 
 
-def _sensor(settings: NamedSettings, tree: Tree, problems: list[Problem]) -> SensorSize:
+def _sensor(settings: NamedSettings, tree: Tree, problems: list[Problem]) -> SensorType:
     """Return what will touch the object; problems with its type are added."""
     name = settings.sensor_type
     if name is None:
         return USUAL_SENSOR
+    from encoded_objects.base.sensor_type_file import sensor_type_named  # costs start-up
+
     file = Path(name).suffix in SENSOR_FILES
     try:
-        return sensor_size(str(tree.folder / name) if file else name)
+        return sensor_type_named(str(tree.folder / name) if file else name)
     except DocumentError as error:
         mark = mark_of(tree, "sensor_type")
         problems += [

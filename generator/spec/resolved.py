@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from encoded_objects.base.sensor_size import USUAL_SENSOR, SensorSize
+from encoded_objects.base.sensor_type import USUAL_SENSOR, SensorType
 from generator.alphabet.outline import SymbolStyle
 from generator.errors import GeneratorError
 from generator.printers import Printer, printer_named
@@ -68,7 +68,7 @@ class ObjectSpec:
     colours: int = 1  #: of the filament: 2 where it is changed for the symbols
     density_kg_m3: float = 1240.0  #: of what is printed, for robots and simulators
     collision: Literal["body", "symbols"] = "body"  #: what other bodies hit there
-    sensor: SensorSize = USUAL_SENSOR  #: what will touch it
+    sensor: SensorType = USUAL_SENSOR  #: what will touch it
     array_key: str = ""  #: lab key that `encoding` was made from; empty: the published array
 
     @property

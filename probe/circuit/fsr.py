@@ -22,9 +22,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.circuit.settings import FILM
 from probe.errors import CircuitError
-from probe.sensor import SensorType
 
 Image = NDArray[np.float64]  #: (..., rows, columns)
 

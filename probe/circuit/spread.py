@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.circuit.fsr import Fsr
 from probe.circuit.settings import FILM
 from probe.errors import CircuitError
-from probe.sensor import SensorType
 
 _USUAL = SensorType()
 

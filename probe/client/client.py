@@ -15,6 +15,7 @@ from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
 
+from encoded_objects.base.errors import EncodedObjectsError
 from probe.client.diagnosis import no_probe
 from probe.client.receiver import Receiver
 from probe.client.settings import CLIENT
@@ -80,7 +81,9 @@ class Client(Closing):
         self._outbox = b""
         self._stop = threading.Event()
         self._ended = False
-        self._failure: ProbeError | None = ProbeError("reading ended by a fault of the programme")
+        self._failure: EncodedObjectsError | None = ProbeError(
+            "reading ended by a fault of the programme"
+        )
         self._port: Port = open_port(url)
         self._thread = threading.Thread(target=self._run, name=f"client of {url}", daemon=True)
         self._thread.start()
@@ -165,7 +168,7 @@ class Client(Closing):
                 self._converse()
             self._hand_on(self._receiver.settle(time.monotonic_ns()))
             self._failure = None
-        except ProbeError as failure:
+        except EncodedObjectsError as failure:
             self._failure = failure
         finally:
             self._leave()

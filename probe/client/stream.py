@@ -10,10 +10,10 @@ import queue
 import threading
 import time
 
+from encoded_objects.base.errors import EncodedObjectsError
 from probe.client.client import Client
 from probe.client.settings import CLIENT
 from probe.closing import Closing
-from probe.errors import ProbeError
 from probe.frame import Frame
 from probe.port.url import address_of
 from probe.protocol import IdentPacket
@@ -40,7 +40,7 @@ class Stream(Closing):
             self.client.select_sensor(sensor)  # so that the ident tells of the sensor selected
         self.ended = False  #: whether there will be no more frames
         self._queue: queue.Queue[Frame | None] = queue.Queue(CLIENT.waiting)
-        self._failure: ProbeError | None = None
+        self._failure: EncodedObjectsError | None = None
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._feed, name="frames", daemon=True)
         self._thread.start()
@@ -90,7 +90,7 @@ class Stream(Closing):
         try:
             for frame in self.client.frames():
                 self._put(frame)
-        except ProbeError as failure:
+        except EncodedObjectsError as failure:
             self._failure = failure
         self._put(None)
 

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.output import count_of
+from encoded_objects.base.sensor_type import SensorType
 from probe.client.stream import Stream, name_of
 from probe.command.settings import COMMAND
 from probe.port.typed import typed_port
 from probe.recording.read import Recording
-from probe.sensor import SensorType
 
 Described = tuple[dict[str, Any], dict[str, str]]
 """What `--json` prints, and what people read."""

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from encoded_objects.base.errors import require
 from encoded_objects.base.files import refuse_taken, staged_file
 from encoded_objects.base.output import count_of, write, write_json
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.calibration import Calibration, calibrate_image, read_calibration
 from probe.errors import CalibrationError, RecordingError
 from probe.frame import median_filter
 from probe.recording.read import Recording
-from probe.sensor import Overlay, SensorType
 
 
 @dataclass(frozen=True, slots=True)

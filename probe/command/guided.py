@@ -17,6 +17,7 @@ import numpy as np
 
 from encoded_objects.base.files import refuse_taken
 from encoded_objects.base.output import message
+from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
 from probe.calibration.load_words import describe_load
 from probe.circuit import Electronics
 from probe.client.stream import Stream, name_of
@@ -27,8 +28,6 @@ from probe.errors import CalibrationError, PortError
 from probe.frame import Frame
 from probe.port.typed import typed_port
 from probe.recording.record import Recorder
-from probe.sensor import SensorType
-from probe.sensor_types import choose_sensor_type
 
 LIST = "loads.csv"
 

@@ -7,14 +7,13 @@ from numpy.typing import NDArray
 
 from encoded_objects.base.console import interruption
 from encoded_objects.base.output import message
+from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
 from probe.client.stream import Stream, name_of
 from probe.errors import PortError
 from probe.port.typed import typed_port
 from probe.port.url import means_port
 from probe.recording.layout import FrameBlock
 from probe.recording.read import Recording
-from probe.sensor import SensorType
-from probe.sensor_types import choose_sensor_type
 
 Counts = NDArray[np.uint16]
 

@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 
 from encoded_objects.base.errors import MissingExtraError, require
 from encoded_objects.base.files import staged_file
+from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
 from probe.calibration import Calibration, calibrate_image, calibration_hash, drift_of
 from probe.calibration.settings import AVERAGE
 from probe.command.settings import COMMAND
 from probe.frame import Frame, median_filter
 from probe.recording.names import next_free
 from probe.recording.record import Recorder
-from probe.sensor import SensorType
-from probe.sensor_types import choose_sensor_type
 
 Image = NDArray[np.float64]
 

@@ -9,6 +9,7 @@ from threading import Event
 from typing import Any
 
 from encoded_objects.base.console import INTERRUPTED, interruption
+from encoded_objects.base.errors import EncodedObjectsError
 from encoded_objects.base.output import (
     ProgressBar,
     count_of,
@@ -17,15 +18,15 @@ from encoded_objects.base.output import (
     write,
     write_json,
 )
+from encoded_objects.base.sensor_type import choose_sensor_type
 from probe.calibration import Calibration, calibration_hash, read_calibration
 from probe.client.stream import Stream, name_of
 from probe.command.settings import COMMAND
-from probe.errors import PortError, ProbeError, RecordingError
+from probe.errors import PortError, RecordingError
 from probe.frame import Frame
 from probe.port.typed import typed_port
 from probe.recording.names import check_name
 from probe.recording.record import Recorder
-from probe.sensor_types import choose_sensor_type
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +93,7 @@ def record_port(
         try:
             with recorder, progress_bar("recording", limits.total) as told:
                 ended, seconds = _run(stream, recorder, first, limits, interrupted, told)
-        except ProbeError:
+        except EncodedObjectsError:
             files = ", ".join(map(str, recorder.files))
             kept = count_of(recorder.frames, "frame")
             message(f"{files} is complete and holds {kept}")

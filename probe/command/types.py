@@ -10,7 +10,7 @@ from encoded_objects.base.console import Action
 from probe.command.options import Json
 
 if TYPE_CHECKING:
-    from probe.sensor import SensorType
+    from encoded_objects.base.sensor_type import SensorType
 
 
 def types(
@@ -27,9 +27,13 @@ def types(
 
     def action() -> int:
         from encoded_objects.base import output
-        from probe.sensor_types import sensor_type_text
-        from probe.sensor_types.read import sensor_type_named, shipped_names, shipped_text
-        from probe.sensor_types.settings import sensor_type_schema
+        from encoded_objects.base.sensor_type import sensor_type_text
+        from encoded_objects.base.sensor_type_file import (
+            sensor_type_named,
+            sensor_type_schema,
+            shipped_names,
+            shipped_text,
+        )
 
         if schema:
             output.write_json(sensor_type_schema())
@@ -65,8 +69,6 @@ def types(
 
 def _entry(sensor: SensorType) -> dict[str, Any]:
     """Return what is said of a type."""
-    from probe.sensor_types import proposed_pitch_mm
-
     wide, high = sensor.half_mm
     return {
         "name": sensor.name,
@@ -82,5 +84,5 @@ def _entry(sensor: SensorType) -> dict[str, Any]:
         "wiring": sensor.wiring,
         "noise": sensor.noise,
         "missing": len(sensor.missing),
-        "proposed_pitch_mm": proposed_pitch_mm(sensor),
+        "proposed_pitch_mm": sensor.symbol_pitch_mm,
     }

@@ -28,11 +28,11 @@ import numpy as np
 import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact.layer_influence import influence, nearest_tactel
 from probe.contact.layer_kernel import base_ratio
 from probe.contact.settings import DEBLUR
 from probe.errors import ContactError
-from probe.sensor import SensorType
 
 Array = NDArray[np.float64]
 

@@ -18,6 +18,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Contact, Touch
 from probe.contact.elements_line import Array
 from probe.contact.elements_pad import CondensedPad, PadLines, condense
@@ -26,7 +27,6 @@ from probe.contact.elements_unilateral import rest, tips
 from probe.contact.heights import heights_at
 from probe.contact.settings import CONTACT, ELEMENTS
 from probe.errors import ContactError
-from probe.sensor import SensorType
 from probe.surface.contract import HeightMap
 
 

@@ -11,13 +11,13 @@ import math
 
 import numpy as np
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Contact, Touch
 from probe.contact.plate import PlatePose, checked_load, load_of
 from probe.contact.settings import FOOTPRINT
 from probe.contact.tabs import heights_under
 from probe.contact.tips import Tips, tip_points
 from probe.errors import ContactError
-from probe.sensor import SensorType
 from probe.surface.contract import HeightMap
 
 

@@ -23,13 +23,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Contact, Touch
 from probe.contact.heights import heights_at, nothing_under
 from probe.contact.neo_hooke import Linear
 from probe.contact.plate import checked_load, load_of, rest
 from probe.contact.settings import CONTACT, GEL
 from probe.errors import ContactError
-from probe.sensor import SensorType
 from probe.surface.contract import HeightMap
 
 Array = NDArray[np.float64]

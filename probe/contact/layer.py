@@ -16,6 +16,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Contact, Touch
 from probe.contact.layer_active_set import LayerContact, deep_mm, equilibrium
 from probe.contact.layer_descent import descend
@@ -28,7 +29,6 @@ from probe.contact.neo_hooke import Linear
 from probe.contact.plate import PlatePose, load_of, rest
 from probe.contact.settings import CONTACT, LAYER
 from probe.errors import ContactError
-from probe.sensor import SensorType
 from probe.surface.contract import HeightMap
 
 Array = NDArray[np.float64]

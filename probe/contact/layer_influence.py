@@ -26,10 +26,10 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact.layer_kernel import base_ratio, edge_compliance, layer_compliance
 from probe.contact.settings import LAYER_INFLUENCE
 from probe.errors import ContactError
-from probe.sensor import SensorType
 
 Array = NDArray[np.float64]
 

@@ -16,11 +16,11 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
 from probe.contact.heights import heights_at
 from probe.contact.settings import LAYER_PATCH
 from probe.errors import ContactError
-from probe.sensor import SensorType
 from probe.surface.contract import HeightMap
 
 Array = NDArray[np.float64]

@@ -22,10 +22,10 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 from importlib import resources
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Contact, Touch
 from probe.contact.settings import CONTACT
 from probe.errors import ContactError
-from probe.sensor import SensorType
 from probe.surface.contract import HeightMap
 
 #: "auto", the name of a level, or the largest error of an image.

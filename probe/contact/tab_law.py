@@ -20,10 +20,10 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
+from encoded_objects.base.sensor_type import Overlay
 from probe.contact.neo_hooke import NeoHooke
 from probe.contact.settings import TABS
 from probe.errors import ContactError
-from probe.sensor import Overlay
 
 
 @lru_cache(maxsize=16)

@@ -19,6 +19,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Contact, Touch
 from probe.contact.heights import heights_at, nothing_under
 from probe.contact.neo_hooke import Linear
@@ -29,7 +30,6 @@ from probe.contact.tab_law import checked_tabs, tip_laws
 from probe.contact.tabs_foreseen import columns_foreseen, foreseen_pose
 from probe.contact.tips import Tips, tip_points
 from probe.errors import ContactError
-from probe.sensor import Overlay, SensorType
 from probe.surface.contract import HeightMap
 
 Array = NDArray[np.float64]

@@ -12,10 +12,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import Overlay
 from probe.contact.neo_hooke import NeoHooke
 from probe.contact.plate import PlateLoad, PlatePose, rest
 from probe.contact.settings import TABS
-from probe.sensor import Overlay
 
 Array = NDArray[np.float64]
 

@@ -15,8 +15,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.errors import ContactError
-from probe.sensor import SensorType
 
 Array = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ import math
 from dataclasses import dataclass
 from html import escape
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.kit.sizes import KitSizes
-from probe.sensor import SensorType
 
 LINES_MAX = 16  #: rows or columns of the board
 LOAD_OHM = 1000  #: of film of 100 uS / N under 20 to 120 N (docs/probe.md, "Which load resistor")

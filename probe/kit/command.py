@@ -69,8 +69,8 @@ def kit(
             return console.DONE
         if not sensor_type:
             raise typer.BadParameter("no sensor type is named: probe-sensor types lists them")
+        from encoded_objects.base.sensor_type_file import sensor_type_named
         from probe.kit.make import make_kit
-        from probe.sensor_types.read import sensor_type_named
 
         with progress_bar("reading", 1) as bar:
             made = make_kit(sensor_type_named(sensor_type), folder, verify=verify,

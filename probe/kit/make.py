@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from encoded_objects.base.errors import require
+from encoded_objects.base.sensor_type import SensorType, sensor_type_text
 from generator.export.atomic import Staging
 from generator.export.slicer_settings import slicer_settings
 from generator.export.step import step_chunks
@@ -36,8 +37,6 @@ from probe.kit.model import PARTS
 from probe.kit.settings import KIT
 from probe.kit.sheet import FILAMENT, RESIN, PrintedPart, sheet_html
 from probe.kit.sizes import KitSizes, kit_sizes
-from probe.sensor import SensorType
-from probe.sensor_types import proposed_pitch_mm, sensor_type_text
 
 FINE_MM = 4.0  #: pitch below which the coupon is printed in resin
 Progress = Callable[[str, float], None]
@@ -84,7 +83,7 @@ def make_kit(
         The folder cannot be written.
     """
     require("build123d", extra="cad", purpose="probe-kit")
-    pitch = proposed_pitch_mm(sensor)
+    pitch = sensor.symbol_pitch_mm
     k = kit_sizes(sensor, pitch)
     parts, meshes, reports = [], [], []
     with Staging(folder) as staging, tempfile.TemporaryDirectory() as beside:

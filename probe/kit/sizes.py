@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.kit.settings import KIT, KitSettings
-from probe.sensor import SensorType
 
 
 @dataclass(frozen=True, slots=True)

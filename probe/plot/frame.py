@@ -15,8 +15,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from numpy.typing import ArrayLike, NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.plot.canvas import HEAT, in_mm, page
-from probe.sensor import SensorType
 
 UNITS = {"counts": "reading (ADC counts)", "N": "force (N)", "scaled": "reading (scaled)"}
 WIDTH, HEIGHT = 1000, 440  #: px, of each image

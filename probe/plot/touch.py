@@ -18,10 +18,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from numpy.typing import ArrayLike, NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
 from probe.plot.canvas import HEAT, in_mm, page
 from probe.plot.frame import UNITS
-from probe.sensor import SensorType
 from probe.surface.contract import HeightMap
 
 Array = NDArray[np.float64]

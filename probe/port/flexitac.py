@@ -12,6 +12,8 @@ import time
 
 import numpy as np
 
+from encoded_objects.base.sensor_type import SensorType
+from encoded_objects.base.sensor_type_file import sensor_type_named
 from probe.port.address import Address, refuse_unknown
 from probe.port.commanded import CommandedProbe
 from probe.port.contract import Port
@@ -19,8 +21,6 @@ from probe.port.marked import MarkedImages
 from probe.port.serial_line import open_line
 from probe.port.url import USUAL_TYPES
 from probe.protocol import FramePacket, IdentPacket, encode
-from probe.sensor import SensorType
-from probe.sensor_types.read import sensor_type_named
 
 BAUD = 2_000_000
 

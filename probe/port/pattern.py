@@ -13,9 +13,9 @@ from itertools import count
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.frame import WRIST, Frame
 from probe.port.settings import PORT
-from probe.sensor import SensorType
 
 
 def moving_pattern(rate: float, sensor: SensorType | None = None) -> Iterator[Frame]:

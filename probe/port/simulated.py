@@ -11,7 +11,9 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING
 
-from probe.errors import PortError, ProbeError
+from encoded_objects.base.errors import EncodedObjectsError
+from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
+from probe.errors import PortError
 from probe.frame import Frame
 from probe.port.address import Address, number, refuse_unknown, split_url
 from probe.port.contract import Port
@@ -19,8 +21,6 @@ from probe.port.pattern import moving_pattern
 from probe.port.settings import PORT
 from probe.port.software import SoftwareProbe
 from probe.protocol import IdentPacket
-from probe.sensor import SensorType
-from probe.sensor_types import choose_sensor_type
 
 if TYPE_CHECKING:
     from probe.port.emulated import EmulatedProbe
@@ -84,7 +84,7 @@ class EmulatedPort:
             self._emulator.__exit__(None, None, None)
             raise
         self._closed = threading.Event()
-        self._ended: EOFError | ProbeError | None = None
+        self._ended: EOFError | EncodedObjectsError | None = None
         self._shower = threading.Thread(
             target=self._show, args=(probe, frames, 1 / rate), name="images", daemon=True
         )
@@ -120,5 +120,5 @@ class EmulatedPort:
                 if self._closed.wait(period_s):
                     return
             self._ended = EOFError()
-        except ProbeError as failure:  # of the simulation: the reader shall know
+        except EncodedObjectsError as failure:  # of the simulation: the reader shall know
             self._ended = failure

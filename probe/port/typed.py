@@ -6,9 +6,8 @@ sensor has it (`flexitac:`). What a serial line carries is known by its first fr
 
 from __future__ import annotations
 
+from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
 from probe.port.url import USUAL_TYPES, address_of
-from probe.sensor import SensorType
-from probe.sensor_types import choose_sensor_type
 
 OPTION = "sensor_type"
 

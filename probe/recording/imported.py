@@ -19,6 +19,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType, choose_sensor_type, sensor_type_text
 from probe.errors import RecordingError
 from probe.frame import WRIST
 from probe.recording.arrays import FileArray, arrays_of
@@ -27,8 +28,6 @@ from probe.recording.names import check_name, final_name, part_of, unless_it_fai
 from probe.recording.pictures import folder_array, table_array
 from probe.recording.read import Recording
 from probe.recording.write import FileWriter
-from probe.sensor import SensorType
-from probe.sensor_types import choose_sensor_type, sensor_type_text
 
 _AT_ONCE: Final = 1024  #: images read at a time
 _FULL: Final = 65535
@@ -134,7 +133,7 @@ def _choose_array(
 
 def _types_of(arrays: list[FileArray]) -> str:
     """Return the shipped types of which one of the arrays holds images, in words."""
-    from probe.sensor_types.read import sensor_type_named, shipped_names
+    from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_names
 
     shapes = {name: sensor_type_named(name).shape for name in shipped_names()}
     alike = [n for n, shape in shapes.items() if any(one.frames(shape) for one in arrays)]

@@ -29,8 +29,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.frame import WRIST, Frame
-from probe.sensor import SensorType
 
 FORMAT: Final = "tactile recording"
 FORMAT_VERSION: Final = 1
@@ -57,7 +57,7 @@ class RecordingOrigin:
     sensor: str = ""  #: ident of the probe, or what was simulated
     calibration: str = ""  #: hash of the calibration file; empty: none
     units: str = "counts"
-    sensor_type: str = ""  #: as YAML, `probe.sensor_types`; empty: not told
+    sensor_type: str = ""  #: as YAML, `sensor_type_text`; empty: not told
     more: MappingProxyType[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.errors import require
+from encoded_objects.base.sensor_type import SensorType, choose_sensor_type, sensor_type_text
 from probe.errors import FrameError, RecordingError
 from probe.frame import Frame, frame_from
 from probe.recording.layout import RecordingOrigin
@@ -28,8 +29,6 @@ from probe.recording.read import Recording
 from probe.recording.record import block_of
 from probe.recording.ros import IMAGE, METADATA, POSE, TOUCH_FRAME
 from probe.recording.write import FileWriter
-from probe.sensor import SensorType
-from probe.sensor_types import choose_sensor_type, sensor_type_text
 
 _AT_ONCE: Final = 1024  #: frames read at a time
 _ENCODINGS: Final = {"32FC1": "f4", "16UC1": "u2", "mono16": "u2", "mono8": "u1", "8UC1": "u1"}

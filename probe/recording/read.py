@@ -13,14 +13,13 @@ from typing import Final
 
 import numpy as np
 
+from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
 from probe.errors import RecordingError
 from probe.frame import Frame
 from probe.recording.checked import check_recording, read_block
 from probe.recording.layout import FrameBlock, RecordingOrigin
 from probe.recording.names import part_of, series_of
 from probe.recording.opened import is_blank, open_recording
-from probe.sensor import SensorType
-from probe.sensor_types import choose_sensor_type
 
 _AT_ONCE: Final = 256  #: frames read at a time
 _VALUES_AT_ONCE: Final = 1 << 24  #: of larger images fewer: 256 of 256 x 256

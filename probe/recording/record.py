@@ -15,14 +15,13 @@ from typing import Any, Final, NoReturn
 
 import numpy as np
 
+from encoded_objects.base.sensor_type import SensorType, sensor_type_text
 from probe.closing import Closing
 from probe.errors import RecordingError
 from probe.frame import Frame
 from probe.recording.layout import CHUNK, FrameBlock, RecordingOrigin
 from probe.recording.names import check_name, final_name, part_of
 from probe.recording.write import FileWriter
-from probe.sensor import SensorType
-from probe.sensor_types import sensor_type_text
 
 _NO_POSE: Final = np.full((4, 4), np.nan)
 

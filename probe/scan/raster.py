@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch, WristStiffness
 from probe.errors import SurfaceError
 from probe.scan.settings import TOUCH_PATH
-from probe.sensor import SensorType
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.circuit import QUIET, Electronics, FilmState, Fsr, Noise, fsr_of, read_counts
-from probe.sensor import SensorType
 
 Array = NDArray[np.float64]
 

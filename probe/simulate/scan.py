@@ -15,6 +15,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.arm.links import Arm
 from probe.contact.contract import Contact, Touch
 from probe.errors import SurfaceError
@@ -22,7 +23,6 @@ from probe.scan.approach import ApproachLimits, guarded_approach
 from probe.scan.kinesthetic import JointErrors, follow_poses
 from probe.scan.places import surface_to_sensor, touch_at
 from probe.scan.raster import raster
-from probe.sensor import SensorType
 from probe.simulate.scene import Scene
 from probe.simulate.settings import SIMULATED_SCAN
 from probe.simulate.touch import pose_of

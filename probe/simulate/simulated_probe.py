@@ -20,13 +20,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.files import staged_file
+from encoded_objects.base.sensor_type import (
+    SensorType,
+    choose_sensor_type,
+    force_share,
+    usual_force_n,
+)
 from probe.contact.contract import Contact, Touch
 from probe.contact.press import accuracy_of, level_for, press
 from probe.errors import SurfaceError
 from probe.frame import Frame, frame_from
 from probe.recording.record import Recorder
-from probe.sensor import SensorType
-from probe.sensor_types import choose_sensor_type, force_share, usual_force_n
 from probe.simulate.readout import readout_of
 from probe.simulate.scan import ScanKind, ScanPath, scan_path
 from probe.simulate.scene import Scene

@@ -13,9 +13,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.frame import Frame
 from probe.recording.names import check_name
-from probe.sensor import SensorType
 from probe.simulate.scan import ScanKind
 from probe.simulate.simulated_probe import SimulatedProbe, SimulatedTouch, TouchOptions
 

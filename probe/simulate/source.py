@@ -27,12 +27,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType, choose_sensor_type, usual_force_n
 from probe.contact.contract import Touch
 from probe.contact.press import Accuracy, accuracy_of, level_for, press
 from probe.errors import ContactError, SurfaceError
 from probe.frame import Frame, frame_from
-from probe.sensor import SensorType
-from probe.sensor_types import choose_sensor_type, usual_force_n
 from probe.simulate.readout import SensorReadout, readout_of
 from probe.simulate.scene import Scene
 from probe.simulate.settings import SIMULATED_PORT

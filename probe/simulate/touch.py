@@ -13,12 +13,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.circuit import Electronics, Fsr, read_counts
 from probe.contact.contract import Contact, Touch, WristStiffness
 from probe.contact.press import Accuracy, press
 from probe.errors import SurfaceError
 from probe.frame import Frame, frame_from
-from probe.sensor import SensorType
 from probe.simulate.settings import TOUCH_DRAW
 from probe.surface.contract import HeightMap
 from probe.surface.polygon import FaceRegion

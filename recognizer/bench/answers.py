@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.touch.lab import EmbossedArray, EncodedFace, Lab
 from recognizer.touch.recognition import Recognition
 

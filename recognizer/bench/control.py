@@ -13,8 +13,8 @@ from fastapi import APIRouter, Request, Response
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, ConfigDict, Field
 
+from encoded_objects.base.sensor_type import usual_force_n
 from probe.port.listing import list_ports
-from probe.sensor_types import usual_force_n
 from recognizer.bench.errors import UnknownError
 from recognizer.bench.files import find_file
 from recognizer.bench.images import FILTERS

@@ -9,7 +9,7 @@ import threading
 from pathlib import Path
 from typing import Protocol
 
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.bench.feed import Feed
 from recognizer.bench.frames import FrameHandler
 from recognizer.bench.recognition_thread import RecognitionThread

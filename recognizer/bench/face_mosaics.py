@@ -5,13 +5,13 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.bench.broker import Broker
 from recognizer.bench.message import MosaicMessage, mosaic_message
 from recognizer.bench.settings import RECOGNITION
 from recognizer.scan.mosaic.grow import add_touch
 from recognizer.scan.mosaic.mosaic import Mosaic, no_touches
-from recognizer.scan.mosaic.touch import PlacedTouch, decoded_place
+from recognizer.scan.mosaic.planar import PlacedTouch, decoded_place
 from recognizer.touch.recognition import Recognition
 from recognizer.touch.signal import Signal
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 import time
 from typing import Any, Protocol
 
+from encoded_objects.base.errors import EncodedObjectsError
 from probe.client.statistics import ClientStatistics
 from probe.client.stream import Stream
-from probe.errors import ProbeError
 from probe.frame import Frame
 from probe.protocol import IdentPacket
 from recognizer.bench.errors import BenchError
@@ -97,7 +97,7 @@ class ProbeFeed:
             stream = self._opened(began_s)
             if stream is not None:
                 frames = stream.take(timeout_s)
-        except ProbeError as gone:
+        except EncodedObjectsError as gone:
             self._lose(gone)
         self._judge(frames)
         if not frames:  # an ended stream does not wait
@@ -165,7 +165,7 @@ class ProbeFeed:
             self._stream = Stream(self.url, sensor=self._sensor)
         return self._stream
 
-    def _lose(self, gone: ProbeError) -> None:
+    def _lose(self, gone: EncodedObjectsError) -> None:
         if self._stream is not None:
             self._counts = self._stream.client.statistics()
             self._stream.__exit__(None, None, None)

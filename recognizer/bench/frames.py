@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.calibration import calibration_hash, write_calibration
 from probe.errors import ProbeError
 from probe.frame import Frame
 from probe.recording.names import next_free
 from probe.recording.record import Recorder
-from probe.sensor import SensorType
 from recognizer.bench.broker import Broker
 from recognizer.bench.calibration_guide import CalibrationGuide, condition_json
 from recognizer.bench.calibration_state import CalibrationState, values_or_counts

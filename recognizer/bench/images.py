@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.thesis.filters import median, sobel, subtract_bias
 from recognizer.touch.tactile_image import tactile_image
 

@@ -15,11 +15,11 @@ from itertools import count
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.circuit import FilmState
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.frame import Frame, frame_from
-from probe.sensor import SensorType
 from probe.simulate.readout import readout_of
 from probe.simulate.scene import Scene
 from recognizer.bench.errors import BenchError

@@ -14,8 +14,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from probe.sensor import SensorType
-from probe.sensor_types.text import sensor_type_text
+from encoded_objects.base.sensor_type import SensorType, sensor_type_text
 from recognizer.bench.errors import BenchError
 from recognizer.bench.settings import DATABASE
 

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.errors import EncodedObjectsError
+from encoded_objects.base.sensor_type import SensorType
 from probe.calibration import Calibration
 from probe.errors import ProbeError
 from probe.frame import Frame
-from probe.sensor import SensorType
 from recognizer.bench.answers import answer_json
 from recognizer.bench.broker import Broker
 from recognizer.bench.face_mosaics import FaceMosaics

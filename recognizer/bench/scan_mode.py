@@ -11,7 +11,7 @@ import math
 import threading
 from typing import Any
 
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.bench.answers import answer_json
 from recognizer.bench.broker import Broker
 from recognizer.bench.settings import SCAN

@@ -17,10 +17,10 @@ from types import FrameType
 
 import uvicorn
 
+from encoded_objects.base.sensor_type import choose_sensor_type
 from generator.database import DatabaseError
 from generator.database.open import database_exists
 from probe.errors import ProbeError
-from probe.sensor_types import choose_sensor_type
 from recognizer.bench.app import BenchContext, app_for
 from recognizer.bench.broker import Broker
 from recognizer.bench.errors import BenchError

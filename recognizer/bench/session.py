@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.frame import Frame
 from probe.port.url import address_of
 from probe.recording.read import Recording
-from probe.sensor import SensorType
 from recognizer.bench.broker import Broker
 from recognizer.bench.calibration_desk import CalibrationDesk
 from recognizer.bench.calibration_state import CalibrationState

@@ -20,13 +20,13 @@ from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet import Alphabet
 from generator.database.read import read_object
 from generator.database.registered import Polyhedron
 from generator.database.transaction import read_transaction
 from probe.plot.canvas import HEAT, in_mm, page
 from probe.plot.touch import MARK
-from probe.sensor import SensorType
 from probe.surface.solids import triangulate
 from recognizer.touch.hypothesis import Hypothesis, labels_at
 from recognizer.touch.lab import EmbossedArray

@@ -9,11 +9,11 @@ from pathlib import Path
 from threading import Event
 
 from encoded_objects.base.output import message
+from encoded_objects.base.sensor_type import SensorType
 from probe.frame import Frame
 from probe.port.typed import typed_port
 from probe.port.url import address_of
 from probe.recording.read import Recording
-from probe.sensor import SensorType
 from recognizer.touch.source import TouchSource, source_of
 
 SLICE_S = 0.1  #: how long frames are waited for before an interruption is looked for

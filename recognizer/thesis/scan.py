@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.arm.carried import SensorPose
-from probe.sensor import SensorType
 from recognizer.scan.mosaic.grow import add_touch
 from recognizer.scan.mosaic.mosaic import no_touches
 from recognizer.scan.session import TouchPlaces

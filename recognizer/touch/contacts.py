@@ -16,8 +16,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.frame import Frame
-from probe.sensor import SensorType
 from recognizer.touch.settings import DEFAULTS, ContactSettings, ReaderSettings
 from recognizer.touch.signal import signal_of
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.touch.around import combine_around, mean_of_strongest
 from recognizer.touch.settings import NextSettings
 from recognizer.touch.signal import Signal

@@ -6,8 +6,7 @@ import math
 from dataclasses import replace
 from functools import lru_cache
 
-from probe.sensor import SensorType
-from probe.sensor_types import force_share
+from encoded_objects.base.sensor_type import SensorType, force_share
 from recognizer.touch.settings import DEFAULTS, NextSettings
 
 

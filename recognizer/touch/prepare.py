@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.touch.lab import EmbossedArray, Lab
 from recognizer.touch.settings import DEFAULTS, ReaderSettings
 from recognizer.touch.symbols.search import Bank

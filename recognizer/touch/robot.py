@@ -17,9 +17,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.arm.carried import SensorPose, sensor_pose
 from probe.arm.links import Arm
-from probe.sensor import SensorType
 from probe.wrist.distances import distances_mm, wrist_pose
 from probe.wrist.geometry import Wrist
 from recognizer.touch.recognition import Recognition

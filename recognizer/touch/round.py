@@ -15,8 +15,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.database.registered import Bend
-from probe.sensor import SensorType
 from recognizer.touch.belief import VerifiedHypothesis
 from recognizer.touch.hypothesis import Hypothesis, log_likelihood, shown_at
 from recognizer.touch.lab import EmbossedArray

@@ -13,8 +13,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.errors import CircuitError
-from probe.sensor import SensorType
 from recognizer.errors import SensorStateError
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.touch.around import quantile
 from recognizer.touch.sensor_state import SensorState
 from recognizer.touch.settings import DEFAULTS, SignalSettings

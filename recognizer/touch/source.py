@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.errors import CalibrationError, RecordingError
 from probe.frame import Frame
 from probe.recording.layout import RecordingOrigin
 from probe.recording.read import Recording
-from probe.sensor import SensorType
 from recognizer.touch.contacts import TouchImage, cut_touches, every_frame
 from recognizer.touch.settings import DEFAULTS, ReaderSettings
 

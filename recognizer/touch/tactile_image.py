@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.errors import RecognizerError
 
 Array = NDArray[np.float64]

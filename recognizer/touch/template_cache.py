@@ -17,8 +17,8 @@ import generator.alphabet
 import probe.contact
 import recognizer.touch.symbols
 from encoded_objects.base.cache import cached_bytes, content_key
+from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet import Alphabet, SymbolStyle
-from probe.sensor import SensorType
 from recognizer.touch.settings import SearchSettings, TemplateSettings
 from recognizer.touch.symbols.search import Bank, bank_of
 from recognizer.touch.symbols.template import ResponseTemplate, template_of

@@ -66,7 +66,7 @@ class Campaign:
     seed: int = 1
     kinds: Shares = KINDS
     levels: Shares = LEVEL_SHARES
-    sensor_type: str = ""  #: as YAML, `probe.sensor_types`; empty: `fsr-16`
+    sensor_type: str = ""  #: as YAML, `sensor_type_text`; empty: `fsr-16`
     overlay: str = "tab"
     surfaces: str = "files"  #: what is touched: `SURFACES`
     print_profile: str = ""  #: of printed surfaces: machine, nozzle, layers

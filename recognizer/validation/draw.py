@@ -15,9 +15,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
 from probe.errors import ContactError
-from probe.sensor import SensorType
 from probe.simulate.scene import Scene
 from probe.simulate.touch import TouchRanges
 from probe.simulate.world.reading import read_sensor

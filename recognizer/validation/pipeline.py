@@ -11,8 +11,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
-from probe.sensor import SensorType
-from probe.sensor_types import choose_sensor_type, sensor_type_text
+from encoded_objects.base.sensor_type import SensorType, choose_sensor_type, sensor_type_text
 from recognizer.validation.campaign import PRINTED, series_of, shards_of
 from recognizer.validation.errors import ValidationError
 from recognizer.validation.files import write_json

@@ -14,9 +14,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_names
 from probe.contact.engines import engine_named
 from probe.contact.press import level_for
-from probe.sensor_types.read import sensor_type_named, shipped_names
 from probe.simulate.world.levels import LEVELS
 from recognizer.touch.symbols.kernels import kernels_in_use
 from recognizer.validation.campaign import KINDS, LEVEL_SHARES, Campaign, Shares

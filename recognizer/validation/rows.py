@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.touch.lab import EncodedFace, Lab
 from recognizer.validation.settings import JUDGING
 from recognizer.validation.trial import Trial

@@ -22,8 +22,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from probe.sensor import SensorType
-from probe.sensor_types import sensor_type_text
+from encoded_objects.base.sensor_type import SensorType, sensor_type_text
 from recognizer.validation.campaign import Campaign, batches_of, series_of, shards_of
 from recognizer.validation.encoded_set import LAB, PARTS, make_parts, set_digest
 from recognizer.validation.errors import ValidationError

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from probe.sensor import SensorType
-from probe.sensor_types import choose_sensor_type, force_share
+from encoded_objects.base.sensor_type import SensorType, choose_sensor_type, force_share
 from probe.simulate.registered import registered_object, registered_objects, scene_of_face
 from probe.simulate.scene import Scene
 from probe.simulate.touch import TouchRanges

@@ -27,11 +27,11 @@ from contact_precision import BALL_MM, STIFF, TABLE, places, write_table
 from manifold3d import Manifold
 
 from encoded_objects import encode
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import WristStiffness
 from probe.contact.engines import engine_named
 from probe.contact.engines.mujoco import MujocoSettings
 from probe.contact.tips import Tips
-from probe.sensor import SensorType
 from probe.simulate.part import part_surface
 from probe.surface.body import body_of
 from probe.surface.mesh import mesh

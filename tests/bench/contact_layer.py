@@ -27,6 +27,7 @@ import scipy.fft
 import scipy.linalg
 from contact_precision import ROUND, cases, places, reference
 
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.layer import layer, press_patch
 from probe.contact.layer_active_set import equilibrium
@@ -36,7 +37,6 @@ from probe.contact.layer_patch import patch_under
 from probe.contact.layer_solve import contact_system, plate_of, solve_glued
 from probe.contact.plate import PlatePose
 from probe.errors import ContactError
-from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import (
     Cross,
     HalfPlane,

@@ -32,13 +32,13 @@ import numpy as np
 from reference.elements_axisymmetric import section
 from reference.elements_round import indented, washer_pad
 
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.layer import layer
 from probe.contact.press import LEVELS, press
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.errors import ContactError
-from probe.sensor import Overlay, SensorType
 from probe.surface.face import endless_face
 from probe.surface.indenters import RaisedStrip, Sphere, TiltedPlane, Washer
 

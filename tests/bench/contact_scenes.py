@@ -24,10 +24,10 @@ from pathlib import Path
 
 import numpy as np
 
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.press import press
 from probe.errors import ContactError
-from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import FlatPlate, HalfPlane, RaisedStrip, Sphere, Washer
 from probe.surface.mesh import mesh
 

@@ -20,6 +20,7 @@ import time
 
 import numpy as np
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
 from probe.contact.plate import load_of, rest
 from probe.contact.plate_newton import Columns
@@ -27,7 +28,6 @@ from probe.contact.settings import TABS
 from probe.contact.tab_law import tip_laws
 from probe.contact.tabs import heights_under, tabs, tabs_at_rest
 from probe.contact.tips import Tips, tip_points
-from probe.sensor import SensorType
 from probe.surface.face import endless_face
 from probe.surface.indenters import Cross, HalfPlane, RaisedStrip, Sphere, Washer
 

@@ -17,9 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from encoded_objects import Reader, encode, open_lab
+from encoded_objects.base.sensor_type_file import sensor_type_named
 from probe.contact.contract import Touch
-from probe.sensor_types import proposed_pitch_mm
-from probe.sensor_types.read import sensor_type_named
 from probe.simulate.registered import registered_surface
 from probe.simulate.world.levels import LEVELS
 from probe.simulate.world.reading import read_sensor
@@ -46,7 +45,7 @@ def print_small_faces(
     shapes: dict[str, object] = {
         f"S{side}": {"box": [f"{side} mm", f"{side} mm", "30 mm"]} for side in sides
     }
-    database = make_lab(folder, pitch_mm or proposed_pitch_mm(sensor), shapes)
+    database = make_lab(folder, pitch_mm or sensor.symbol_pitch_mm, shapes)
     reader = Reader(open_lab(database), sensor)
     for level in levels:
         for name in shapes:

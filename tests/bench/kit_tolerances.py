@@ -20,9 +20,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from encoded_objects import Reader, encode, open_lab
+from encoded_objects.base.sensor_type import SensorType
+from encoded_objects.base.sensor_type_file import sensor_type_named
 from probe.errors import ContactError
-from probe.sensor import SensorType
-from probe.sensor_types.read import sensor_type_named
 from probe.simulate.registered import registered_surface
 from probe.simulate.touch import TouchRanges, random_touches
 from probe.simulate.world.levels import TYPICAL, Level

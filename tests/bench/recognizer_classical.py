@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.arm.links import Arm
@@ -30,7 +31,6 @@ from probe.contact.tips import Tips
 from probe.scan.kinesthetic import JointErrors, follow_poses
 from probe.scan.places import surface_to_sensor, touch_at
 from probe.scan.raster import raster
-from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from probe.surface.face import FaceSurface
 from probe.surface.polygon import polygon

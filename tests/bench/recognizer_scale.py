@@ -25,10 +25,10 @@ for library in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 import numpy as np  # noqa: E402
 from sqlalchemy import create_engine  # noqa: E402
 
+from encoded_objects.base.sensor_type import SensorType  # noqa: E402
 from generator.alphabet import SymbolStyle, alphabet_named  # noqa: E402
 from generator.array import next_larger, profile  # noqa: E402
 from probe.contact.contract import Touch  # noqa: E402
-from probe.sensor import SensorType  # noqa: E402
 from probe.simulate.world.levels import TYPICAL  # noqa: E402
 from probe.simulate.world.reading import read_sensor  # noqa: E402
 from probe.surface.face import FaceSurface  # noqa: E402

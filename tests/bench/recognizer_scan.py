@@ -28,20 +28,26 @@ from pathlib import Path
 
 import numpy as np
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.arm.links import Arm
 from probe.contact.contract import Touch
 from probe.errors import ContactError
 from probe.scan.kinesthetic import JointErrors, follow_poses
 from probe.scan.places import surface_to_sensor
 from probe.scan.raster import raster
-from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from probe.simulate.world.levels import LEVELS
 from probe.simulate.world.reading import READOUT, read_sensor
 from probe.simulate.world.worn import wear_face
 from recognizer.scan.grow import begin_scan, extend_scan
-from recognizer.scan.mosaic.planar import inverse, planar_covariance, planar_pose, transform_points
-from recognizer.scan.mosaic.touch import PlacedTouch, planar_belief
+from recognizer.scan.mosaic.planar import (
+    PlacedTouch,
+    inverse,
+    planar_belief,
+    planar_covariance,
+    planar_pose,
+    transform_points,
+)
 from recognizer.thesis.scan import read_scan as read_classically
 from recognizer.thesis.settings import MergingSettings
 from recognizer.touch.lab import open_lab

@@ -19,13 +19,13 @@ from pathlib import Path
 
 import numpy as np
 
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.circuit import Electronics, fsr_of, read_counts
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.contact.tips import Tips, tip_points
-from probe.sensor import Overlay, SensorType
 from probe.simulate.part import part_surface
 from probe.simulate.registered import registered_surface
 from probe.simulate.source import frames_of

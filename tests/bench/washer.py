@@ -22,12 +22,12 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.circuit import Electronics, fsr_of, read_sequence
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.frame import median_filter
 from probe.plot.frame import frames_picture
-from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import Washer
 
 FORCE_N = 80.0

@@ -10,7 +10,7 @@ whatever else the reader asks of an answer can only refuse more. Faces under 3-2
 
 from __future__ import annotations
 
-import argparse
+import runner
 
 from recognizer.touch.chance import expected_by_border, expected_matches
 from recognizer.touch.lab import open_lab
@@ -49,17 +49,13 @@ def doubt_of_best(reader: Reader, signal: Signal, judged) -> float | None:
 
 def main() -> None:
     """Print a line for each set of touches."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("database")
-    parser.add_argument("--touches", type=int, default=400, help="of each set")
-    parser.add_argument("--seed", type=int, default=7)
+    parser = runner.arguments(__doc__, "database", touches=400, seed=7)
     parser.add_argument("--engine", default="own")
-    asked = parser.parse_args()
+    asked = runner.parse(parser)
     reader = Reader(open_lab(asked.database), sensor_of("", "tab"))
     limit = reader.settings.belief.doubt
-    columns = ("of", "likeliest place true", f"and doubt <= {limit:g}", "answered")
-    print(f"| touches, {asked.engine} | {' | '.join(columns)} |")
-    print("| --- | --- | --- | --- | --- |")
+    heads = ("of", "likeliest place true", f"and doubt <= {limit:g}", "answered")
+    runner.table((f"touches, {asked.engine}", *heads))
     for name, kind, levels in SETS:
         campaign = Campaign(asked.touches, asked.seed, ((kind, 1.0),), levels, engine=asked.engine)
         series = series_of(campaign)[0]
@@ -76,7 +72,7 @@ def main() -> None:
             true += doubt is not None
             sure += doubt is not None and doubt <= limit
             answered += judged(recognise(reader, signal, number)) == RIGHT
-        print(f"| {name} | {asked.touches} | {true} | {sure} | {answered} |", flush=True)
+        runner.row(name, asked.touches, true, sure, answered)
 
 
 if __name__ == "__main__":

@@ -28,8 +28,8 @@ import trimesh
 from PIL import Image
 from sliced import repairs, sliced
 
+from encoded_objects.base.sensor_type_file import shipped_names
 from generator.printers import printer_named
-from probe.sensor_types.read import shipped_names
 
 FILAMENT = "Metadata/Slic3r_PE.config"  #: in a plate that holds settings
 RESIN = printer_named("resin")

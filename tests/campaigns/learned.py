@@ -9,39 +9,30 @@ of registered faces and judged on as many others, amid faces, at 20-120 N. Print
 
 from __future__ import annotations
 
-import argparse
-import math
-import os
 from dataclasses import replace
 
-for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(name, "1")
+import runner
 
-from recognizer.sensor.learn import learn_sensor  # noqa: E402
-from recognizer.touch.lab import open_lab  # noqa: E402
-from recognizer.touch.reader import Reader  # noqa: E402
-from recognizer.touch.recognise import recognise  # noqa: E402
-from recognizer.validation.draw import DrawnTouch, draw_touch  # noqa: E402
-from recognizer.validation.statistics import chi2_quantile  # noqa: E402
-from recognizer.validation.touch_plan import TouchPlan  # noqa: E402
-from recognizer.validation.trial import Trial, judge  # noqa: E402
+from recognizer.sensor.learn import learn_sensor
+from recognizer.touch.lab import open_lab
+from recognizer.touch.reader import Reader
+from recognizer.touch.recognise import recognise
+from recognizer.validation.draw import DrawnTouch, draw_touch
+from recognizer.validation.touch_plan import TouchPlan
+from recognizer.validation.trial import Trial, judge
 
 LEVELS = "typical,dead-10,dead-20,dead-40,hot-5,gain-30,places-25,floating"
-INSIDE = chi2_quantile(0.95)  #: squared error over covariance, 95 % of three degrees of freedom
 
 
 def main() -> None:
     """Print what sensors answer before and after."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("database")
-    parser.add_argument("--seed", type=int, default=52)
+    parser = runner.arguments(__doc__, "database", seed=52)
     parser.add_argument("--levels", default=LEVELS)
     parser.add_argument("--sensors", type=int, default=2, help="of each level")
     parser.add_argument("--touches", type=int, default=50, help="of each sensor, twice")
-    asked = parser.parse_args()
+    asked = runner.parse(parser)
     reader = Reader(open_lab(asked.database))
-    print("| sensor | touches | before: right, rms mm, inside, wrong | after |")
-    print("| --- | --- | --- | --- |")
+    runner.table(("sensor", "touches", "before: right, rms mm, inside, wrong", "after"))
     for level in asked.levels.split(","):
         before: list[Trial] = []
         after: list[Trial] = []
@@ -54,7 +45,7 @@ def main() -> None:
             state = learn_sensor(reader, [one.counts for one in learned_from])
             before += read_all(reader, plan, others)
             after += read_all(replace(reader, state=state), plan, others)
-        print(f"| `{level}` | {len(before)} | {words(before)} | {words(after)} |", flush=True)
+        runner.row(f"`{level}`", len(before), words(before), words(after))
 
 
 def read_all(reader: Reader, plan: TouchPlan, drawn: list[DrawnTouch]) -> list[Trial]:
@@ -67,13 +58,8 @@ def read_all(reader: Reader, plan: TouchPlan, drawn: list[DrawnTouch]) -> list[T
 
 def words(trials: list[Trial]) -> str:
     """Return right answers, their errors, how many are inside, and wrong ones."""
-    right = [one for one in trials if one.verdict == "right"]
-    wrong = sum(one.verdict == "wrong" for one in trials)
-    if not right:
-        return f"0, -, -, {wrong}"
-    rms = math.sqrt(sum(one.error_mm**2 for one in right) / len(right))
-    inside = sum(one.chi2 < INSIDE for one in right) / len(right)
-    return f"{len(right)}, {rms:.3f}, {inside:.0%}, {wrong}"
+    found = runner.outcome(trials)
+    return "{right}, {rms_mm:.3f}, {inside:.0%}, {wrong}".format(**found)
 
 
 if __name__ == "__main__":

@@ -18,22 +18,15 @@ from __future__ import annotations
 
 import argparse
 import json
-import subprocess
+import math
 import sys
 import time
-from collections import Counter
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pyarrow as pa
-import pyarrow.compute as pc
-import pyarrow.parquet as pq
-
-from recognizer.validation.files import write_json
-from recognizer.validation.statistics import chi2_quantile
+import runner
 
 SPECS = Path("docs/validation")
 SUMMARY = "million.json"  #: of the worlds that are finished
@@ -41,7 +34,6 @@ COUNTS = ("touches", "on_faces", "right", "wrong")
 #: What is kept of a wrong answer.
 WRONG = ("number", "kind", "level", "object", "face", "x_mm", "y_mm", "theta_deg", "force_n",
          "tilt_deg", "edge_mm", "answer", "margin")  # fmt: skip
-INSIDE = chi2_quantile(0.95)  #: chi square of three numbers at 95 %
 #: One of its own each; a quarter turn of the mounting is left out, which no touch tells.
 SENSORS = (
     "sound,places-08,bleed-2,places-25,domed,dead-10,dead-20,dead-40,hot-5,gain-30,hysteresis-15,"
@@ -114,47 +106,21 @@ def touch(name: str, asked: argparse.Namespace) -> None:
     if "printed" in name:
         shared = asked.small_prints if world.spec == "small" else asked.prints
         options += ["--prints", str(shared or asked.output / f"prints-{world.spec}")]
-    command = [
-        sys.executable, "-c", "from recognizer.validation.command import main; main()", *options,
-        "--touches", str(touches), "--seed", str(world.seed), "--study", "0", "--resume",
-        "-j", str(asked.jobs), "-o", str(folder),
-    ]  # fmt: skip
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL) as run:
-        try:
-            code = run.wait()
-        except KeyboardInterrupt:  # it hears it too, and writes what it has
-            run.wait()
-            raise
-    if code:
-        raise SystemExit(code)
+    runner.run("recognizer.validation", *options, "--touches", touches, "--seed", world.seed,
+               "--study", 0, "--resume", "-j", asked.jobs, "-o", folder)  # fmt: skip
 
 
-def rows_of(folder: Path) -> pa.Table | None:
-    """Return all touches of a world that are there."""
-    files = sorted((folder / "shards").glob("touches/*.parquet"))
-    return pa.concat_tables([pq.read_table(file) for file in files]) if files else None
-
-
-def line_of(rows: pa.Table) -> dict[str, Any]:
+def line_of(rows: list[runner.Row]) -> dict[str, Any]:
     """Return what became of the touches of a world."""
-    known = pc.not_equal(rows["object"], "")
-    verdicts = Counter(rows["verdict"].to_pylist())
-    on_faces = Counter(rows.filter(known)["verdict"].to_pylist())
-    right = rows.filter(pc.equal(rows["verdict"], "right"))
-    line: dict[str, Any] = {
-        "touches": len(rows), "on_faces": on_faces.total(), "right": on_faces["right"],
-        "wrong": verdicts["wrong"],
-    }  # fmt: skip
-    if len(right):
-        mm, chi2 = right["error_mm"].to_numpy(), right["chi2"].to_numpy()
-        line["rms_mm"] = round(float(np.sqrt(np.mean(mm**2))), 4)
-        line["worst_mm"] = round(float(mm.max()), 3)
-        line["inside"] = round(float(np.mean(chi2 < INSIDE)), 4)
-    if verdicts["wrong"]:
-        line["wrong_answers"] = [
-            {name: row[name] for name in WRONG}
-            for row in rows.filter(pc.equal(rows["verdict"], "wrong")).to_pylist()
-        ]
+    found = runner.outcome(rows)
+    line = {"touches": len(rows), "on_faces": sum(row["object"] != "" for row in rows),
+            "right": found["right"], "wrong": found["wrong"]}  # fmt: skip
+    for name, digits in (("rms_mm", 4), ("worst_mm", 3), ("inside", 4)):
+        if not math.isnan(found[name]):
+            line[name] = round(found[name], digits)
+    wrong = [row for row in rows if row["verdict"] == "wrong"]
+    if wrong:
+        line["wrong_answers"] = [{name: row[name] for name in WRONG} for row in wrong]
     return line
 
 
@@ -172,12 +138,11 @@ def all_of(lines: Collection[dict[str, Any]]) -> dict[str, Any]:
 
 def table(lines: Mapping[str, dict[str, Any]]) -> None:
     """Print what became of all touches, as Markdown."""
-    print("| world | touches | on faces | right | wrong | rms mm | inside |")
-    print("| --- " * 7 + "|")
+    runner.table(("world", "touches", "on faces", "right", "wrong", "rms mm", "inside"))
     for name, line in lines.items():
         inside = f"{100 * line['inside']:.0f} %" if "inside" in line else ""
-        counts = " | ".join(f"{line[key]:,}" for key in COUNTS)
-        print(f"| {name} | {counts} | {line.get('rms_mm', '')} | {inside} |")
+        counts = (f"{line[key]:,}" for key in COUNTS)
+        runner.row(name, *counts, str(line.get("rms_mm", "")), inside)
 
 
 def run(asked: argparse.Namespace, finished: dict[str, dict[str, Any]]) -> None:
@@ -189,23 +154,18 @@ def run(asked: argparse.Namespace, finished: dict[str, dict[str, Any]]) -> None:
         start = time.monotonic()
         print(f"run {number} of {len(WORLDS)}: {name}", end="", flush=True, file=sys.stderr)
         touch(name, asked)
-        rows = rows_of(asked.output / name)
-        assert rows is not None
-        finished[name] = line_of(rows)
-        write_json(asked.output / SUMMARY, finished)
+        finished[name] = line_of(runner.rows_of(asked.output / name))
+        (asked.output / SUMMARY).write_text(json.dumps(finished, indent=1) + "\n")
         print(f", {time.monotonic() - start:.0f} s", flush=True, file=sys.stderr)
 
 
 def main() -> int:
     """Run what is left and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("-o", "--output", type=Path, required=True)
-    parser.add_argument("--touches", type=int, default=1_000_000)
-    parser.add_argument("-j", "--jobs", type=int, default=1)
+    parser = runner.arguments(__doc__, output=True, touches=1_000_000, jobs=1)
     parser.add_argument("--prints", type=Path, help="printed surfaces of the forty objects")
     parser.add_argument("--small-prints", type=Path, help="those of the small ones")
     parser.add_argument("--table", action="store_true", help="of the touches that are there")
-    asked = parser.parse_args()
+    asked = runner.parse(parser)
     asked.output = asked.output.absolute()
     summary = asked.output / SUMMARY
     finished = json.loads(summary.read_text()) if summary.exists() else {}
@@ -219,7 +179,7 @@ def main() -> int:
     for name in WORLDS:
         if name in finished:
             lines[name] = finished[name]
-        elif (rows := rows_of(asked.output / name)) is not None:
+        elif rows := runner.rows_of(asked.output / name):
             lines[name] = line_of(rows)
     table({**lines, "all": all_of(lines.values())})
     return 0

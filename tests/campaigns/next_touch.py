@@ -10,14 +10,14 @@ random directions. Prints right at once, within two and within three for both, b
 
 from __future__ import annotations
 
-import argparse
 import math
 import time
 from collections import Counter
 
 import numpy as np
+import runner
 
-from probe.sensor_types.read import sensor_type_named
+from encoded_objects.base.sensor_type_file import sensor_type_named
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import NextTouch, Recognition
@@ -33,11 +33,8 @@ def walk(_answer: Recognition, rng: np.random.Generator) -> NextTouch:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("database")
-    parser.add_argument("--touches", type=int, default=200)
+    parser = runner.arguments(__doc__, "database", touches=200, seed=17)
     parser.add_argument("--first", type=int, default=0, help="number of the first touch")
-    parser.add_argument("--seed", type=int, default=17)
     parser.add_argument("--kinds", default="face=.55,edge=.1,corner=.05,worn=.1")
     parser.add_argument("--levels", default="typical,mismatch")
     parser.add_argument("--engine", default="own")
@@ -45,7 +42,7 @@ def main() -> None:
     parser.add_argument("--most", type=int, default=3)
     parser.add_argument("--policy", choices=("next", "walk"), action="append")
     parser.add_argument("--seconds", type=float, default=math.inf, help="end after so many")
-    options = parser.parse_args()
+    options = runner.parse(parser)
     campaign = Campaign(
         seed=options.seed, kinds=kinds_of(options.kinds), levels=levels_of(options.levels),
         engine=options.engine, sensor_type=options.sensor_type,

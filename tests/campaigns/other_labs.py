@@ -13,30 +13,25 @@ What is there is kept, and an interrupted run goes on.
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
-import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(name, "1")
+import numpy as np
+import runner
 
-import numpy as np  # noqa: E402
-
-from encoded_objects import encode  # noqa: E402
-from generator.array.lab_key import lab_key_of  # noqa: E402
-from recognizer.touch.lab import open_lab  # noqa: E402
-from recognizer.touch.reader import Reader  # noqa: E402
-from recognizer.touch.recognise import recognise_with_rivals  # noqa: E402
-from recognizer.touch.settings import DEFAULTS  # noqa: E402
-from recognizer.validation.campaign import LEVEL_SHARES  # noqa: E402
-from recognizer.validation.draw import draw_touch  # noqa: E402
-from recognizer.validation.touch_plan import TouchPlan  # noqa: E402
-from recognizer.validation.trial import judge  # noqa: E402
+from encoded_objects import encode
+from generator.array.lab_key import lab_key_of
+from recognizer.touch.lab import open_lab
+from recognizer.touch.reader import Reader
+from recognizer.touch.recognise import recognise_with_rivals
+from recognizer.touch.settings import DEFAULTS
+from recognizer.validation.campaign import LEVEL_SHARES
+from recognizer.validation.draw import draw_touch
+from recognizer.validation.touch_plan import TouchPlan
+from recognizer.validation.trial import judge
 
 LABS, OBJECTS, SIZES_MM = 8, 40, (35.0, 75.0)
 KINDS = (("face", 0.5), ("edge", 0.35), ("corner", 0.15))  # nearly as touches fall on such faces
@@ -51,27 +46,18 @@ LIMITS = (math.inf, 1e-2, 1e-3, 1e-4)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("-o", "--output", type=Path, required=True)
-    parser.add_argument("--touches", type=int, default=0, help="of other labs' parts")
+    """Touch what is not touched yet, and print the tables."""
+    parser = runner.arguments(__doc__, output=True, touches=0, seed=18)
     parser.add_argument("--own", type=int, default=0, help="touches of the lab's own parts")
-    parser.add_argument("--seed", type=int, default=18)
-    asked = parser.parse_args()
+    asked = runner.parse(parser)
     own, others = make_labs(asked.output, asked.seed)
     belief = replace(DEFAULTS.belief, doubt=math.inf)
     reader = Reader(open_lab(own), settings=replace(DEFAULTS, belief=belief))
     for name, labs, number in (("touches", others, asked.touches), ("own", [own], asked.own)):
-        kept = asked.output / f"{name}.jsonl"
-        kept.touch()
-        done = len(kept.read_text().splitlines())
-        with kept.open("a", encoding="utf-8") as file:
-            for row in touch_labs(
-                reader, labs, range(done, number), asked.seed, registered=name == "own"
-            ):
-                file.write(json.dumps(row) + "\n")
-                file.flush()
+        work = touch_labs(reader, labs, asked.seed, registered=name == "own")
+        rows = runner.resume(asked.output / f"{name}.jsonl", range(number), work)
         print(f"\n{name}")
-        table([json.loads(line) for line in kept.read_text().splitlines()])
+        table(rows)
 
 
 def make_labs(folder: Path, seed: int) -> tuple[str, list[str]]:
@@ -114,12 +100,13 @@ def _random_objects(rng: np.random.Generator) -> Iterator[dict[str, Any]]:
 
 
 def touch_labs(
-    reader: Reader, labs: list[str], numbers: range, seed: int, *, registered: bool
-) -> Iterator[dict[str, Any]]:
-    """Yield what became of touches of labs' parts; each is drawn from seed and number alone."""
+    reader: Reader, labs: list[str], seed: int, *, registered: bool
+) -> Callable[[int], runner.Row]:
+    """Return what touches a part of the labs; a touch is drawn from seed and number alone."""
     makers = [Reader(open_lab(lab)) for lab in labs]
     usual = Reader(reader.lab)
-    for number in numbers:
+
+    def touch(number: int) -> runner.Row:
         rng = np.random.default_rng([seed, number, 8])
         lab = int(rng.integers(len(labs)))
         kind, level = (_choose(rng, shares) for shares in (KINDS, LEVEL_SHARES))
@@ -129,13 +116,15 @@ def touch_labs(
         accepted = bool(answer) and bool(usual.read(drawn.counts, seq=number))
         if not registered:  # every answer is wrong
             drawn = replace(drawn, scene=None)
-        yield {
+        return {
             "number": number, "lab": lab + 1, "kind": kind, "level": level,
             "verdict": judge(plan, number, drawn, answer, 0.0).verdict,
             "answer": f"{answer.object}/{answer.face}" if answer else "",
             "reason": answer.reason, "doubt": answer.doubt if answer else None,
             "margin": answer.margin, "accepted": accepted,
         }  # fmt: skip
+
+    return touch
 
 
 def _choose(rng: np.random.Generator, shares: tuple[tuple[str, float], ...]) -> str:
@@ -145,16 +134,12 @@ def _choose(rng: np.random.Generator, shares: tuple[tuple[str, float], ...]) -> 
 
 def table(rows: list[dict[str, Any]]) -> None:
     """Print how many touches are accepted at each limit, by kind, and why others are not."""
-    print(
-        "| touches of | number | " + " | ".join(f"doubt <= {x:g}" for x in LIMITS) + " | accepted |"
-    )
-    print("| --- " * (3 + len(LIMITS)) + "|")
+    runner.table(("touches of", "number", *(f"doubt <= {x:g}" for x in LIMITS), "accepted"))
     for kind in ("all", *(kind for kind, _ in KINDS)):
         some = [row for row in rows if kind in ("all", row["kind"])]
         doubts = [row["doubt"] for row in some if row["answer"]]
-        counts = " | ".join(str(sum(doubt <= limit for doubt in doubts)) for limit in LIMITS)
-        accepted = sum(row["accepted"] for row in some)
-        print(f"| {kind} | {len(some)} | {counts} | {accepted} |")
+        counts = [sum(doubt <= limit for doubt in doubts) for limit in LIMITS]
+        runner.row(kind, len(some), *counts, sum(row["accepted"] for row in some))
     reasons = [row["reason"] for row in rows if row["reason"]]
     print({reason: reasons.count(reason) for reason in sorted(set(reasons))})
     for row in rows:

@@ -9,17 +9,14 @@ shares. `auto` takes its pitches from here (docs/pitches.md). Runs that are ther
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow.parquet as pq
+import runner
 
 BOXES = {"Box": (60, 45, 30), "Small": (38, 24, 18)}  #: mm; faces down to 24 x 18 mm
 PRINTED = {"Box": (46, 38, 24)}  #: fewer and smaller panels: slicing costs more than reading
@@ -95,62 +92,44 @@ def run(symbols: Symbols, world: World, folder: Path) -> None:
     here.mkdir(parents=True, exist_ok=True)
     spec = here / "boxes.yaml"
     spec.write_text(symbols.spec(PRINTED if "printed" in world.options else BOXES))
-    command = [
-        sys.executable, "-c", "from recognizer.validation.command import main; main()", str(spec),
-        "--touches", str(world.touches), "--kinds", KINDS, "--study", "0", "--seed", "5",
-        "-o", str(here), *world.options,
-    ]  # fmt: skip
-    if "printed" in world.options:
-        command += ["--prints", str(place / "prints")]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    prints = ["--prints", place / "prints"] if "printed" in world.options else []
+    runner.run("recognizer.validation", spec, "--touches", world.touches, "--kinds", KINDS,
+               "--study", 0, "--seed", 5, "-o", here, *world.options, *prints)  # fmt: skip
 
 
 def row_of(here: Path) -> dict[str, Any]:
     """Return what a run says: shares of right ones, wrong ones, rms, margins, sizes, time."""
-    rows = pq.read_table(here / "trials.parquet").to_pylist()
-    right = [r for r in rows if r["verdict"] == "right"]
-    small = [r for r in rows if r["object"] == "Small"]
+    rows = runner.rows_of(here)
+    line = runner.outcome(rows)
     found: dict[str, Any] = {"touches": len(rows)}
-    for kind in ("face", "edge", "corner"):
-        some = [r["verdict"] == "right" for r in rows if r["kind"] == kind]
-        found[kind] = float(np.mean(some)) if some else math.nan
-    found["small"] = float(np.mean([r["verdict"] == "right" for r in small])) if small else math.nan
-    found["wrong"] = sum(r["verdict"] == "wrong" for r in rows)
-    for name, key in (("mm", "error_mm"), ("deg", "error_deg")):
-        errors = np.array([r[key] for r in right])
-        found[name] = float(np.sqrt(np.mean(errors**2))) if len(errors) else math.nan
-    margins = [r["margin"] for r in right if math.isfinite(r["margin"])]
-    found["margin"] = float(np.median(margins)) if margins else math.nan
-    times = here / "times.json"
-    if times.exists():
-        found["times"] = json.loads(times.read_text())
-    return found
+    groups = {kind: [r for r in rows if r["kind"] == kind] for kind in ("face", "edge", "corner")}
+    for name, some in (groups | {"small": [r for r in rows if r["object"] == "Small"]}).items():
+        right = [r["verdict"] == "right" for r in some]
+        found[name] = float(np.mean(right)) if right else math.nan
+    margins = [r["margin"] for r in rows if r["verdict"] == "right" and math.isfinite(r["margin"])]
+    margin = float(np.median(margins)) if margins else math.nan
+    errors = {name: line[name] for name in ("wrong", "rms_mm", "rms_deg")}
+    return found | errors | {"margin": margin}
 
 
 def table(folder: Path) -> None:
-    print("| world | q | pitch mm | stroke | touches | face | edge | corner | small | wrong "
-          "| rms mm | deg | margin |")  # fmt: skip
-    print("| --- " * 13 + "|")
+    heads = ("touches", "face", "edge", "corner", "small", "wrong", "rms_mm", "rms_deg", "margin")
+    runner.table(("world", "q", "pitch mm", "stroke", *heads))
     for symbols, world in sorted(
         cells(), key=lambda c: (c[1].name, c[0].order, c[0].share, c[0].pitch_mm)
     ):
         here = folder / symbols.name / world.name
         if not (here / "results.json").exists():
             continue
-        r = row_of(here)
-        print(
-            f"| {world.name} | {symbols.order} | {symbols.pitch_mm:g} | {symbols.share:g} "
-            f"| {r['touches']} | {r['face']:.2f} | {r['edge']:.2f} | {r['corner']:.2f} "
-            f"| {r['small']:.2f} | {r['wrong']} | {r['mm']:.3f} | {r['deg']:.2f} "
-            f"| {r['margin']:.0f} |"
-        )
+        line = row_of(here)
+        runner.row(world.name, symbols.order, symbols.pitch_mm, symbols.share,
+                   *(line[head] for head in heads))  # fmt: skip
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser = runner.arguments(__doc__, output=True)
     parser.add_argument("--table", action="store_true", help="of the runs that are there")
-    asked = parser.parse_args()
+    asked = runner.parse(parser)
     for symbols, world in [] if asked.table else cells():
         print(f"{symbols.name} {world.name}", flush=True)
         run(symbols, world, asked.output)

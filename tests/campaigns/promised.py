@@ -8,7 +8,7 @@ Two sets of solids by default: a table that is made from the first is checked on
 sizes of the second. With `--save` a table of both is kept (`generator/layout/answers.json`). In
 each round every face is touched once, anywhere, and in every third round again where the answer's
 `next` says, up to three times; so any number of rounds is a fair sample. A touch is looked at as
-`generator.layout.views` sees it. What is there is kept, and an interrupted run goes on.
+`generator.layout.recognition_rate` sees it. What is there is kept, and an interrupted run goes on.
 
 Of another sensor type than `fsr-16` every third solid of the second set is touched, at the pitch
 that the type proposes, and held against what `encode-object --sensor-type` promises; that was set
@@ -19,40 +19,37 @@ A step over a re-entrant edge may end on another face, which is told and counted
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import json
-import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(name, "1")
+import numpy as np
+import runner
+from numpy.typing import ArrayLike, NDArray
 
-import numpy as np  # noqa: E402
-from numpy.typing import ArrayLike, NDArray  # noqa: E402
-
-from encoded_objects import encode  # noqa: E402
-from encoded_objects.base.sensor_size import USUAL_SENSOR, SensorSize, sensor_size  # noqa: E402
-from generator.database.entries import object_names  # noqa: E402
-from generator.database.open import open_if_there  # noqa: E402
-from generator.database.read import read_object  # noqa: E402
-from generator.database.transaction import read_transaction  # noqa: E402
-from generator.layout.placement import FaceLayout  # noqa: E402
-from generator.layout.promise import (  # noqa: E402
+from encoded_objects import encode
+from encoded_objects.base.sensor_type import USUAL_SENSOR, SensorType
+from encoded_objects.base.sensor_type_file import sensor_type_named
+from generator.database.open import open_if_there
+from generator.database.read import object_names, read_object
+from generator.database.transaction import read_transaction
+from generator.layout.placement import FaceLayout
+from generator.layout.recognition_rate import (
     AnswerTable,
+    SensorView,
     answered_at_once,
     measured_answers,
+    sensor_view,
+    views_at,
 )
-from generator.layout.views import SensorView, sensor_view, views_at  # noqa: E402
-from probe.sensor_types.read import sensor_type_named  # noqa: E402
-from recognizer.touch.lab import open_lab  # noqa: E402
-from recognizer.touch.reader import Reader  # noqa: E402
-from recognizer.validation.policy import NEXT, touch_until_answered  # noqa: E402
-from recognizer.validation.touch_plan import TouchPlan  # noqa: E402
-from recognizer.validation.trial import judge  # noqa: E402
+from recognizer.touch.lab import open_lab
+from recognizer.touch.reader import Reader
+from recognizer.validation.policy import NEXT, touch_until_answered
+from recognizer.validation.touch_plan import TouchPlan
+from recognizer.validation.trial import judge
 
 Points = NDArray[np.float64]
 
@@ -151,19 +148,15 @@ class Touched:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser = runner.arguments(__doc__, output=True, seed=25)
     parser.add_argument("--rounds", type=int, default=100, help="touches of each face")
-    parser.add_argument("--seed", type=int, default=25)
     parser.add_argument("--sensor-type", default=USUAL_SENSOR.name, metavar="T")
     parser.add_argument("--save", action="store_true", help="the table, as the one that ships")
-    asked = parser.parse_args()
-    kept = asked.output / "touches.jsonl"
-    sensor = sensor_size(asked.sensor_type)
-    touch_faces(asked.output, kept, asked.rounds, asked.seed, sensor)
-    touches = [_touched(json.loads(line)) for line in kept.read_text().splitlines()]
+    asked = runner.parse(parser)
+    sensor = sensor_type_named(asked.sensor_type)
+    touches = list(map(_touched, touch_faces(asked.output, asked.rounds, asked.seed, sensor)))
     if sensor.name != USUAL_SENSOR.name:
-        print(f"{sensor.name}, {sensor.pitch_mm:g} mm")
+        print(f"{sensor.name}, {sensor.symbol_pitch_mm:g} mm")
         compare(touches, measured_answers(), sensor)
         return
     table = measured_table([one for one in touches if one.group == "learn"])
@@ -180,17 +173,14 @@ def _touched(values: dict[str, Any]) -> Touched:
     return Touched(**(values | lists))
 
 
-def touch_faces(folder: Path, kept: Path, rounds: int, seed: int, sensor: SensorSize) -> None:
+def touch_faces(folder: Path, rounds: int, seed: int, sensor: SensorType) -> list[runner.Row]:
     """Touch every face once a round, the rounds that are not there yet."""
     folder.mkdir(parents=True, exist_ok=True)
-    kept.touch()
-    done = len(kept.read_text().splitlines())
-    if not rounds:
-        return
     readers, faces = {}, []
     usual = sensor.name == USUAL_SENSOR.name
     reading = sensor_type_named(sensor.name)
-    for group, solids in SETS.items() if usual else [("check", SETS["check"][::3])]:
+    groups = SETS if usual else {"check": SETS["check"][::3]}
+    for group, solids in groups.items() if rounds else ():
         lab = folder / f"{group}.db"
         if not lab.exists():
             unfinished = lab.with_suffix(".part")
@@ -198,21 +188,21 @@ def touch_faces(folder: Path, kept: Path, rounds: int, seed: int, sensor: Sensor
             for k, solid in enumerate(solids):  # one by one: each has the pitch that suits it
                 spec = {"name": f"{group} {k + 1}", "output": {"lab_key": LAB_KEY}} | solid
                 spec |= {} if usual else {"sensor_type": sensor.name}
-                spec |= {"print": {"printer": "resin"}} if sensor.pitch_mm < RESIN_MM else {}
+                spec |= {"print": {"printer": "resin"}} if sensor.symbol_pitch_mm < RESIN_MM else {}
                 encode(spec, database=str(unfinished), formats=())
             unfinished.rename(lab)
         readers[group] = Reader(open_lab(lab), reading)
         faces += list(faces_of(lab, group, sensor))
-    with kept.open("a", encoding="utf-8") as file:
-        for number in range(done, rounds * len(faces)):
-            face, most = faces[number % len(faces)], 3 if number // len(faces) % EVERY == 0 else 1
-            lab = str(folder / f"{face.group}.db")
-            one = touch_face(face, lab, number, most, readers[face.group], seed)
-            file.write(json.dumps(asdict(one)) + "\n")
-            file.flush()
+
+    def touch(number: int) -> runner.Row:
+        face, most = faces[number % len(faces)], 3 if number // len(faces) % EVERY == 0 else 1
+        lab = str(folder / f"{face.group}.db")
+        return asdict(touch_face(face, lab, number, most, readers[face.group], seed))
+
+    return runner.resume(folder / "touches.jsonl", range(rounds * len(faces)), touch)
 
 
-def faces_of(lab: Path, group: str, sensor: SensorSize) -> Iterator[Face]:
+def faces_of(lab: Path, group: str, sensor: SensorType) -> Iterator[Face]:
     """Yield the faces of a set that bear symbols, one of those that are equal."""
     engine = open_if_there(f"sqlite:///{lab}", writable=False)
     assert engine is not None
@@ -252,7 +242,7 @@ def touch_face(face: Face, lab: str, number: int, most: int, reader: Reader, see
     )  # fmt: skip
 
 
-def compare(touches: list[Touched], table: AnswerTable, sensor: SensorSize = USUAL_SENSOR) -> None:
+def compare(touches: list[Touched], table: AnswerTable, sensor: SensorType = USUAL_SENSOR) -> None:
     """Print promise and reading by size and face, and how far they lie apart."""
     for title, within in (("at once", False), ("within three", True)):
         some = [one for one in touches if one.most > 1] if within else touches
@@ -277,7 +267,7 @@ def compare(touches: list[Touched], table: AnswerTable, sensor: SensorSize = USU
 
 
 def _shares(
-    touches: Sequence[Touched], table: AnswerTable, within: bool, sensor: SensorSize
+    touches: Sequence[Touched], table: AnswerTable, within: bool, sensor: SensorType
 ) -> tuple[float, float, float]:
     """Return what is promised and answered, and the standard error of the second."""
     p = np.array([

@@ -4,34 +4,36 @@
     python tests/campaigns/promised_types.py out/types --save    # and what ships is set by them
 
 Every touch inside a face, at an edge or a corner of the levels of `promised.py`, as
-`generator.layout.views` sees it: the probability of an answer that the shipped table gives, and
-what became of it. With `--save` each type's share of the usual sensor's answers
-(`generator.layout.promise.AnsweredShare`) is the likeliest for its touches, and kept in
+`generator.layout.recognition_rate` sees it: the probability of an answer that the shipped table
+gives, and what became of it. With `--save` each type's share of the usual sensor's answers
+(`generator.layout.recognition_rate.AnsweredShare`) is the likeliest for its touches, and kept in
 `generator/layout/answers_of_types.json`. On other faces it is checked by `promised.py
 --sensor-type`.
 """
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
+import runner
 from promised import LEVELS
 from scipy.optimize import minimize
 
-from encoded_objects.base.sensor_size import USUAL_SENSOR, SensorSize, sensor_size
+from encoded_objects.base.sensor_type import USUAL_SENSOR, SensorType
+from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_names
 from generator.database.open import open_if_there
 from generator.database.read import read_object
 from generator.database.transaction import read_transaction
-from generator.layout.promise import answered_share, measured_answers
-from generator.layout.views import sensor_view, views_at
-from probe.sensor_types.read import shipped_names
+from generator.layout.recognition_rate import (
+    answered_share,
+    measured_answers,
+    sensor_view,
+    views_at,
+)
 
 Array = np.ndarray
 KINDS = ("face", "edge", "corner")
@@ -40,12 +42,11 @@ STRENGTH = 0.02  #: of the pull of both numbers to 0, as in `promised.py`
 SHIPPED = Path(__file__).parents[2] / "generator" / "layout" / "answers_of_types.json"
 
 
-def touches_of(folder: Path, sensor: SensorSize) -> Array:
+def touches_of(folder: Path, sensor: SensorType) -> Array:
     """Return (N, 3) of a type's touches: the usual sensor's probability, loaded share, right."""
-    files = sorted(folder.glob("own-*/shards/touches/*.parquet"))
-    if not files:
+    rows = [row for one in sorted(folder.glob("own-*")) for row in runner.rows_of(one)]
+    if not rows:
         return np.empty((0, 3))
-    rows = pa.concat_tables([pq.read_table(file) for file in files]).to_pylist()
     engine = open_if_there(f"sqlite:///{folder / 'lab.db'}", writable=False)
     assert engine is not None, f"{folder}: touches of a lab that is not there"
     with read_transaction(engine) as connection:
@@ -56,7 +57,7 @@ def touches_of(folder: Path, sensor: SensorSize) -> Array:
     ]).reshape(-1, 3)  # fmt: skip
 
 
-def _seen(row: dict[str, Any], held: Any, sensor: SensorSize) -> tuple[float, float, bool]:
+def _seen(row: dict[str, Any], held: Any, sensor: SensorType) -> tuple[float, float, bool]:
     face = next(face for face in held.faces if face.name == row["face"])
     layout = next(one for one in held.layout.faces if one.face == face.face_id)
     pitch = held.style.pitch_mm
@@ -84,7 +85,7 @@ def likeliest(touches: Array) -> tuple[float, float]:
     return round(float(constant), 2), round(float(by_loaded), 2)
 
 
-def compare(name: str, touches: Array, sensor: SensorSize) -> None:
+def compare(name: str, touches: Array, sensor: SensorType) -> None:
     """Print promised and answered by how much of the sensor is loaded."""
     usual, loaded, right = touches.T
     share = answered_share(sensor)
@@ -94,27 +95,28 @@ def compare(name: str, touches: Array, sensor: SensorSize) -> None:
         if some.any():
             p, q = promised[some], right[some]
             chance = np.sqrt((p * (1 - p)).sum()) / len(p)
-            print(f"| {name} | {low:g} to {min(high, 1):g} | {len(p)} | {usual[some].mean():.2f} "
-                  f"| {p.mean():.2f} +- {chance:.2f} | {q.mean():.2f} |")  # fmt: skip
+            runner.row(name, f"{low:g} to {min(high, 1):g}", len(p), f"{usual[some].mean():.2f}",
+                       f"{p.mean():.2f} +- {chance:.2f}", f"{q.mean():.2f}")  # fmt: skip
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = runner.arguments(__doc__)
     parser.add_argument("folder", type=Path, help="-o of sensor_types.py")
     parser.add_argument("--save", action="store_true", help="what ships")
-    asked = parser.parse_args()
-    print("| type | loaded | touches | usual sensor's | promised | answered |")
-    print("| --- " * 6 + "|")
+    asked = runner.parse(parser)
+    runner.table(("type", "loaded", "touches", "usual sensor's", "promised", "answered"))
     kept = {}
     for name in shipped_names():
-        sensor = sensor_size(name)
+        sensor = sensor_type_named(name)
         touches = touches_of(asked.folder / name, sensor)
         if not len(touches):
             continue
         compare(name, touches, sensor)
         if name != USUAL_SENSOR.name:
-            kept[name] = {"touches": len(touches), "across_mm": round(sensor.across_mm, 2),
-                          "pitch_mm": sensor.pitch_mm, "logit": likeliest(touches)}  # fmt: skip
+            kept[name] = {
+                "touches": len(touches), "across_mm": round(sensor.across_mm, 2),
+                "pitch_mm": sensor.symbol_pitch_mm, "logit": likeliest(touches),
+            }  # fmt: skip
     if asked.save:
         lines = ",\n".join(f"  {json.dumps(n)}: {json.dumps(one)}" for n, one in kept.items())
         SHIPPED.write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")

@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 from rosbags.highlevel import AnyReader
 
+from encoded_objects.base.sensor_type_file import shipped_names
 from probe.recording.mcap_reader import import_mcap
 from probe.recording.mcap_writer import export_mcap
 from probe.recording.read import Recording
 from probe.recording.record import Recorder
-from probe.sensor_types.read import shipped_names
 
 SPEC = "name: Cube\nshape: {cube: 60 mm}\noutput: {lab_key: 0123-4567-89AB-CDER}\n"
 TOUCHES, FRAMES = 8, 250

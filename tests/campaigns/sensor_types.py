@@ -14,21 +14,14 @@ Ctrl-C it goes on with the touches that are there.
 
 from __future__ import annotations
 
-import argparse
-import subprocess
-import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.compute as pc
-import pyarrow.parquet as pq
+import runner
 
-from probe.sensor_types import proposed_pitch_mm
-from probe.sensor_types.read import sensor_type_named, shipped_names
-from recognizer.validation.statistics import chi2_quantile
+from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_names
 
 SHAPES = {
     "Cube": "{cube: 80 mm}",
@@ -39,7 +32,6 @@ SHAPES = {
 BLOCK = {"Block": "{box: [80 mm, 64 mm, 40 mm]}"}  #: that is printed
 KEY = "VA11-DATE-0000-0002"  #: of the labs, so that a run can be repeated
 FINE_MM = 4.0  #: below this filament printers make no strokes
-INSIDE = chi2_quantile(0.95)  #: chi square of three numbers at 95 %
 
 
 @dataclass(frozen=True)
@@ -54,7 +46,7 @@ class World:
         """Whether a type can touch here: MuJoCo has tabs, filament no fine symbols."""
         sensor = sensor_type_named(name)
         if self.shapes:
-            return proposed_pitch_mm(sensor) >= FINE_MM
+            return sensor.symbol_pitch_mm >= FINE_MM
         return not self.options or sensor.overlay.kind == "tab"
 
 
@@ -72,14 +64,14 @@ def make_lab(place: Path, name: str, shapes: Mapping[str, str]) -> Path:
     database = place / "lab.db"
     if not (place / "made").exists():
         place.mkdir(parents=True, exist_ok=True)
-        pitch = proposed_pitch_mm(sensor_type_named(name))
+        pitch = sensor_type_named(name).symbol_pitch_mm
         printer = "resin" if pitch < FINE_MM else "fdm-0.4"
         objects = [f"  - {{name: {key}, shape: {shape}}}" for key, shape in shapes.items()]
         lines = [f"sensor_type: {name}", f"print: {{printer: {printer}}}", "objects:"]
         spec = place / "set.yaml"
         spec.write_text("\n".join([*lines, *objects, ""]))
-        _run("generator", str(spec), "-o", str(place / "parts"), "--database", str(database),
-             "--format", "stl", "--lab-key", KEY)  # fmt: skip
+        runner.run("generator", spec, "-o", place / "parts", "--database", database,
+                   "--format", "stl", "--lab-key", KEY)  # fmt: skip
         (place / "made").touch()
     return database
 
@@ -95,76 +87,57 @@ def touch(folder: Path, name: str, world: str, number: int, processes: int) -> N
         place = place / "block"
         options = (*options, "--prints", str(place / "prints"))
     database = make_lab(place, name, one.shapes or SHAPES)
-    _run("recognizer.validation", "--database", str(database), "--sensor-type", name, "--touches",
-         str(one.touches), "--seed", str(100 + number), "--shard", "100", "--study", "0",
-         "--resume", "-j", str(processes), "-o", str(here), *options)  # fmt: skip
+    runner.run("recognizer.validation", "--database", database, "--sensor-type", name,
+               "--touches", one.touches, "--seed", 100 + number, "--shard", 100, "--study", 0,
+               "--resume", "-j", processes, "-o", here, *options)  # fmt: skip
 
 
-def _run(package: str, *arguments: str) -> None:
-    code = f"from {package}.command import main; main()"
-    subprocess.run([sys.executable, "-c", code, *arguments], check=True, stdout=subprocess.DEVNULL)
+def rows_of(folder: Path, name: str, world: str, what: str = "shards") -> list[runner.Row]:
+    """Return all touches of a type in a world, or their times."""
+    runs = sorted((folder / name).glob(f"{world}-*"))
+    return [row for one in runs for row in runner.rows_of(one, what)]
 
 
-def rows_of(folder: Path, name: str, world: str) -> tuple[pa.Table, float] | None:
-    """Return all touches of a type in a world, and the mean CPU time of reading one, ms."""
-    found = []
-    for what in ("shards", "times"):
-        files = sorted((folder / name).glob(f"{world}-*/{what}/touches/*.parquet"))
-        found.append([pq.read_table(file) for file in files])
-    rows, times = found
-    if not rows:
-        return None
-    return pa.concat_tables(rows), 1e3 * float(pc.mean(pa.concat_tables(times)["reading"]).as_py())
-
-
-def lines_of(rows: pa.Table) -> Iterator[tuple[str, pa.Table]]:
-    """Yield what is told apart: faces by level, other kinds, what no database knows."""
-    known = pc.not_equal(rows["object"], "")
-    face = pc.and_(known, pc.equal(rows["kind"], "face"))
-    for level in dict.fromkeys(("low", "typical", "hard", "mismatch")):
-        yield f"faces, {level}", rows.filter(pc.and_(face, pc.equal(rows["level"], level)))
+def lines_of(rows: list[runner.Row]) -> Iterator[tuple[str, list[runner.Row]]]:
+    """Yield the lines of the table: faces by level, other kinds, what no database knows."""
+    known = [row for row in rows if row["object"]]
+    for level in ("low", "typical", "hard", "mismatch"):
+        faces = [row for row in known if (row["kind"], row["level"]) == ("face", level)]
+        yield f"faces, {level}", faces
     for kind in ("edge", "corner", "worn"):
-        yield f"{kind}, all levels", rows.filter(pc.and_(known, pc.equal(rows["kind"], kind)))
-    yield "blank and foreign", rows.filter(pc.invert(known))
+        yield f"{kind}, all levels", [row for row in known if row["kind"] == kind]
+    yield "blank and foreign", [row for row in rows if not row["object"]]
+    yield "all", rows
 
 
 def table(folder: Path, names: list[str]) -> None:
     """Print what became of the touches, as Markdown."""
-    print("| type | world | touches | right | wrong | refused | rms mm / degrees | inside | ms |")
-    print("| --- " * 9 + "|")
+    counts = ("touches", "right", "wrong", "rejected")
+    runner.table(("type", "world", *counts, "rms mm / degrees", "inside", "ms"))
     for name in names:
         for world in WORLDS:
-            found = rows_of(folder, name, world)
-            if found is None:
-                continue
-            rows, ms = found
-            for label, some in [*lines_of(rows), ("all", rows)]:
-                if len(some):
-                    _line(name, f"{world}, {label}", some, f"{ms:.0f}" if label == "all" else "")
-
-
-def _line(name: str, label: str, rows: pa.Table, ms: str) -> None:
-    verdicts = rows["verdict"].to_pylist()
-    counts = " | ".join(str(verdicts.count(one)) for one in ("right", "wrong", "rejected"))
-    right = rows.filter(pc.equal(rows["verdict"], "right"))
-    errors = inside = ""
-    if len(right):
-        mm, deg, chi2 = (right[key].to_numpy() for key in ("error_mm", "error_deg", "chi2"))
-        errors = f"{np.sqrt(np.mean(mm**2)):.3f} / {np.sqrt(np.mean(deg**2)):.2f}"
-        inside = f"{100 * np.mean(chi2 < INSIDE):.0f} %"
-    print(f"| {name} | {label} | {len(rows)} | {counts} | {errors} | {inside} | {ms} |")
+            rows = rows_of(folder, name, world)
+            for label, some in lines_of(rows):
+                if some:
+                    line, ms, errors, inside = runner.outcome(some), "", "", ""
+                    if line["right"]:
+                        errors = f"{line['rms_mm']:.3f} / {line['rms_deg']:.2f}"
+                        inside = f"{100 * line['inside']:.0f} %"
+                    if label == "all":
+                        spent = [one["reading"] for one in rows_of(folder, name, world, "times")]
+                        ms = f"{1e3 * np.mean(spent):.0f}"
+                    count = (line[key] for key in counts)
+                    runner.row(name, f"{world}, {label}", *count, errors, inside, ms)
 
 
 def main() -> None:
     """Run what is asked for and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = runner.arguments(__doc__, output=True, jobs=1)
     parser.add_argument("types", nargs="*", default=list(shipped_names()))
-    parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--rounds", type=int, default=10)
-    parser.add_argument("-j", "--processes", type=int, default=1)
     parser.add_argument("--worlds", default=",".join(WORLDS), help="own,mujoco,printed")
     parser.add_argument("--table", action="store_true", help="of the runs that are there")
-    asked = parser.parse_args()
+    asked = runner.parse(parser)
     folder = asked.output.absolute()
     runs = [
         (number, world, name)
@@ -175,7 +148,7 @@ def main() -> None:
     ]
     for done, (number, world, name) in enumerate(runs, 1):
         print(f"run {done} of {len(runs)}: {name}, {world}, round {number + 1}", flush=True)
-        touch(folder, name, world, number, asked.processes)
+        touch(folder, name, world, number, asked.jobs)
     table(folder, asked.types)
 
 

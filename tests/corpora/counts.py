@@ -157,8 +157,8 @@ def _by_bench(place: Path) -> Iterator[tuple[str, Any]]:
 
     No public door leads there: the frame at which a click arrives is left to the clock.
     """
+    from encoded_objects.base.sensor_type import SensorType
     from probe.contact.contract import Touch
-    from probe.sensor import SensorType
     from probe.simulate.target import surface_of
     from recognizer.bench.press_sequence import PressSequence, SimulationSettings
 

@@ -7,6 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import Overlay, SensorType, choose_sensor_type
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
 from generator.array.profiles import profile
@@ -22,14 +23,12 @@ from probe.contact.contract import Touch, WristStiffness
 from probe.contact.press import LEVELS, press
 from probe.contact.tabs import tabs
 from probe.errors import ContactError
-from probe.sensor import Overlay, SensorType
-from probe.sensor_types import choose_sensor_type
 from probe.surface.face import endless_face
 from probe.surface.indenters import FlatPlate, HalfPlane, RaisedStrip
 from probe.surface.polygon import polygon
-from recognizer.scan.mosaic.pair import register_patches
 from recognizer.scan.mosaic.patch import patch_of
 from recognizer.scan.mosaic.planar import compose_poses
+from recognizer.scan.mosaic.register import register_patches
 from recognizer.touch.settings import SignalSettings
 from recognizer.touch.signal import signal_of
 

@@ -6,9 +6,9 @@ from reference.elements_axisymmetric import DEGREES, apparent_modulus, section
 from reference.elements_round import indented, washer_pad
 from reference.elements_tab import Tab, compressed, partly_covered
 
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.elements import elements
-from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import Sphere
 
 NEAR_HALF = (0.499, 0.4999, 0.49999, 0.5)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from reference.elements_round import indented, washer_pad
 
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.layer import layer
 from probe.contact.layer_influence import influence
@@ -17,7 +18,6 @@ from probe.contact.layer_kernel import (
     edge_compliance,
     layer_compliance,
 )
-from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import Paraboloid, RaisedStrip, Washer
 
 POISSON = (0.0, 0.3, 0.45, 0.49, 0.499, 0.4999, 0.49999, 0.5 - 2**-40, 0.5)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import shapely
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.circuit import QUIET, Electronics, fsr_of
@@ -17,7 +18,6 @@ from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.errors import SurfaceError
 from probe.recording.read import Recording
-from probe.sensor import SensorType
 from probe.simulate.part import part_surface
 from probe.simulate.registered import DatabaseUnreadableError, registered_object, registered_surface
 from probe.simulate.source import frames_of, options_of

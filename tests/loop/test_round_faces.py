@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet.known import alphabet_from
 from generator.alphabet.outline import outlines
 from generator.array import array_from
@@ -26,7 +27,6 @@ from generator.plane.rings import distance
 from generator.polyhedron.developable import developable_from
 from generator.polyhedron.development import development
 from generator.spec import read_specs
-from probe.sensor import SensorType
 from probe.simulate.registered import registered_object
 from probe.simulate.round import round_part
 from probe.simulate.touch import TouchRanges, random_touches

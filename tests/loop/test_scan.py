@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.command import run as encode_object
 from probe.circuit import Electronics, Noise, fsr_of, read_counts
 from probe.contact.contract import Touch
@@ -15,7 +16,6 @@ from probe.frame import frame_from
 from probe.recording.record import Recorder
 from probe.scan.places import surface_to_sensor
 from probe.scan.raster import raster
-from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from probe.simulate.touch import pose_of
 from probe.surface.face import FaceSurface

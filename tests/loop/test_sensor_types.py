@@ -8,8 +8,8 @@ import math
 import pytest
 
 from encoded_objects import encode
+from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_names
 from probe.command import run as probe_sensor
-from probe.sensor_types.read import sensor_type_named, shipped_names
 from recognizer.command import run as recognize_object
 
 

@@ -6,10 +6,10 @@ Stiffness of tips, wrist and force each over 1e+-6, tips from 1 to 256. Numerics
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import WristStiffness
 from probe.contact.neo_hooke import Linear, NeoHooke
 from probe.contact.plate import PlateLoad, rest
-from probe.sensor import SensorType
 
 POINTS = SensorType().centres_mm().reshape(-1, 2)
 HALF = 12.7  # mm

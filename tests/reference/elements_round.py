@@ -18,9 +18,9 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact.elements_line import Array
 from probe.errors import ContactError
-from probe.sensor import SensorType
 from reference.elements_axisymmetric import Kind, Section, section
 
 STEPS = 60

@@ -15,11 +15,11 @@ import time
 
 import numpy as np
 
+from encoded_objects.base.sensor_type_file import sensor_type_named
 from probe.errors import PortError
 from probe.port.address import Address, refuse_unknown
 from probe.port.commanded import CommandedProbe
 from probe.protocol import FramePacket, IdentPacket, encode
-from probe.sensor_types.read import sensor_type_named
 
 
 class UdpPort(CommandedProbe):

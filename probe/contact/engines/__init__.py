@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING
 from probe.errors import ContactError
 
 if TYPE_CHECKING:  # a command's help names the engines and needs nothing of these
+    from encoded_objects.base.sensor_type import SensorType
     from probe.contact.contract import Contact, Touch
     from probe.contact.tips import Tips
-    from probe.sensor import SensorType
     from probe.surface.contract import HeightMap
 
     Press = Callable[[HeightMap, SensorType, Touch, Tips], Contact]

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.errors import require
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Contact, Touch
 from probe.contact.engines import Engine
 from probe.contact.engines.under_sensor import UNDER, Mesh, mesh_under
@@ -29,7 +30,6 @@ from probe.contact.neo_hooke import NeoHooke
 from probe.contact.plate import checked_load, load_of
 from probe.contact.tips import Tips, tip_points
 from probe.errors import ContactError
-from probe.sensor import SensorType
 from probe.surface.body import body_of
 from probe.surface.contract import HeightMap
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact import press as ladder
 from probe.contact.contract import Contact, Touch
 from probe.contact.engines import Engine
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
-from probe.sensor import SensorType
 from probe.surface.contract import HeightMap
 
 

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import grey_closing
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
 from probe.contact.heights import heights_at, nothing_under
-from probe.sensor import SensorType
 from probe.surface.body import body_of, indexed_triangles, manifold_from, manifold_of
 from probe.surface.contract import HeightMap
 from probe.surface.height_mesh import close_below, mesh_heights

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.press import press
 from probe.errors import ProbeError
-from probe.sensor import Overlay, SensorType
 from probe.surface.contract import HeightMap
 from probe.surface.indenters import Cross, FlatPlate, RaisedStrip, RoughSurface, TiltedPlane
 

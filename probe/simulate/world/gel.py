@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Contact, Touch
 from probe.contact.gel import depths_mm, gel
-from probe.sensor import SensorType
 from probe.simulate.world.levels import TYPICAL, Level
 from probe.simulate.world.mounting import mount
 from probe.simulate.world.sensor_copy import SensorCopy

@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.circuit.fsr import conductances
 from probe.circuit.loaded_column import loaded_columns
 from probe.circuit.settings import FILM
 from probe.contact.contract import Contact, Touch
 from probe.contact.engines import Engine, engine_named
 from probe.contact.tips import Tips
-from probe.sensor import SensorType
 from probe.simulate.world.distorted import DistortedSurface
 from probe.simulate.world.gel import read_gel
 from probe.simulate.world.levels import Level

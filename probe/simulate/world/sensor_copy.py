@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.circuit.fsr import Fsr, fsr_of
 from probe.circuit.settings import FILM
 from probe.contact.tips import Tips
-from probe.sensor import SensorType
 from probe.simulate.world.levels import Level
 
 Array = NDArray[np.float64]

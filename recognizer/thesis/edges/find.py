@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.thesis.edges.fit import FittedEdges, fit_edges
 from recognizer.thesis.edges.hough import segments
 from recognizer.thesis.edges.line import Corner, Edge, corner_between

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.thesis.edges.line import Edge
 from recognizer.thesis.edges.response import felt_at, responses
 from recognizer.thesis.settings import EDGE_RESPONSE, EdgeFitSettings

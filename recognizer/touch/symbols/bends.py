@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.database.registered import Bend
-from probe.sensor import SensorType
 from recognizer.touch.symbols.damped import ascend, damped_step
 from recognizer.touch.symbols.gain import Image, bounded_gain
 

@@ -15,8 +15,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.database.registered import Bend
-from probe.sensor import SensorType
 from recognizer.touch.sensor_state import PRIOR
 from recognizer.touch.settings import DEFAULTS, ReaderSettings
 from recognizer.touch.signal import Signal

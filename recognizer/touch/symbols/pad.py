@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet import Alphabet, SymbolStyle
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.layer import layer
-from probe.sensor import SensorType
 from probe.surface.face import endless_face
 from probe.surface.symbols import Relief
 from recognizer.touch.settings import TemplateSettings

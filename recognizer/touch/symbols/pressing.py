@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.touch.settings import DEFAULTS, GainSettings
 
 Array = NDArray[np.float64]

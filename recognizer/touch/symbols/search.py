@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.compiled import addresses
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.touch.settings import DEFAULTS, SearchSettings
 from recognizer.touch.symbols.kernels import compiled_kernels, kernels_in_use
 from recognizer.touch.symbols.template import Floats, ResponseTemplate

@@ -24,8 +24,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet import Alphabet, SymbolStyle
-from probe.sensor import SensorType
 from recognizer.touch.settings import DEFAULTS, TemplateSettings
 
 Array = NDArray[np.float64]

@@ -5,21 +5,23 @@ import math
 import numpy as np
 import pytest
 
-from encoded_objects.base.sensor_size import SensorSize, sensor_size
+from encoded_objects.base.sensor_type import SensorType
+from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_names
 from generator.array import profile
 from generator.layout.layout import lay_out
 from generator.layout.placement import FaceLayout, Placement
-from generator.layout.promise import (
+from generator.layout.recognition_rate import (
     AnswerTable,
+    SensorView,
     answered_at_once,
     answered_share,
+    answered_shares,
+    face_views,
     measured_answers,
     measured_types,
-    promised_shares,
+    sensor_view,
 )
-from generator.layout.views import SensorView, ViewSettings, face_views, sensor_view
 from generator.polyhedron import face_polygon, shapes
-from probe.sensor_types.read import shipped_names
 
 NONE = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
 VIEW = SensorView((12.7, 9.0), 2.52)
@@ -66,7 +68,7 @@ def area(polygon):
 @pytest.mark.parametrize("loops", [(SQUARE,), (SQUARE, HOLE), (ELL,), (TRIANGLE,)])
 def test_views_are_those_of_each_pose_by_itself(loops):
     face = lattice(loops[0])
-    views = face_views(loops, face, 7.0, VIEW, ViewSettings(150))
+    views = face_views(loops, face, 7.0, VIEW, 150)
     assert len(views.seen) == 150
     for k in range(150):
         c, s = np.cos(views.turn_rad[k]), np.sin(views.turn_rad[k])
@@ -90,7 +92,7 @@ def test_views_are_those_of_each_pose_by_itself(loops):
 
 def test_centres_lie_on_the_face_evenly():
     face = lattice(ELL)
-    poses = ViewSettings(2000)
+    poses = 2000
     views = face_views((ELL,), face, 7.0, VIEW, poses)
     x, y = views.centre_mm.T
     assert (((y < 12) & (x < 50)) | ((x < 14) & (y < 60))).all()
@@ -114,7 +116,7 @@ def test_a_60_mm_face_shows_what_was_measured(pitch_mm, half_mm, mean):
     (face, *_) = lay_out(solid, array, pitch_mm, half_mm, clearances, NONE).faces
     views = face_views(
         face_polygon(solid, 0), face, pitch_mm, SensorView((12.7, 12.7), 0.36 * pitch_mm),
-        ViewSettings(4000),
+        4000,
     )  # fmt: skip
     near = (np.minimum(views.centre_mm, 60 - views.centre_mm) < 9).sum(axis=1)
     for sides, symbols in enumerate(mean):
@@ -141,11 +143,11 @@ def test_a_promise_weighs_measured_answers():
     views = face_views((SQUARE,), lattice(SQUARE), 7.0, VIEW)
     flat = AnswerTable((7.0,), (1.0,), (1.0,), np.array([[[0.7]]]), (0.0, 0.0, 0.0))
     later = 0.3 * 0.5 * (views.around > 0).mean()
-    assert promised_shares(views, flat, 6.0) == pytest.approx((0.7, 0.7 + later))
+    assert answered_shares(views, flat, 6.0) == pytest.approx((0.7, 0.7 + later))
     once = table.at(6.0, views.seen, views.loaded)
     logit = -1.0 + 1.5 * np.log(1 + views.around) - 0.5 * np.log(1 + views.seen)
     within = once + (1 - once) * np.where(views.around > 0, 1 / (1 + np.exp(-logit)), 0)
-    assert promised_shares(views, table, 6.0) == pytest.approx((once.mean(), within.mean()))
+    assert answered_shares(views, table, 6.0) == pytest.approx((once.mean(), within.mean()))
 
 
 def test_the_table_that_ships_was_measured():
@@ -165,8 +167,8 @@ def test_other_sensors_answer_a_share_of_what_the_usual_one_does():
     usual = answered_at_once(table, 5.0, seen, loaded)
     assert usual == pytest.approx(table.at(5.0, seen, loaded))
     for name in shipped_names():
-        sensor = sensor_size(name)
-        here = answered_at_once(table, sensor.pitch_mm, seen, loaded, sensor)
+        sensor = sensor_type_named(name)
+        here = answered_at_once(table, sensor.symbol_pitch_mm, seen, loaded, sensor)
         if name == "fsr-16":
             assert answered_share(sensor) is None
             assert here == pytest.approx(usual)
@@ -179,20 +181,20 @@ def test_other_sensors_answer_a_share_of_what_the_usual_one_does():
 
 
 def test_a_larger_sensor_steps_farther_and_within_three_is_said_of_the_usual_one_alone():
-    mat = sensor_size("mat-32x32")
+    mat = sensor_type_named("mat-32x32")
     assert sensor_view(mat, 2.0).around_mm == pytest.approx(20 * 64 / 25.4)
-    assert sensor_view(SensorSize(), 2.0) == SensorView((12.7, 12.7), 2.0)
+    assert sensor_view(SensorType(), 2.0) == SensorView((12.7, 12.7), 2.0)
     views = face_views((SQUARE,), lattice(SQUARE), 7.0, VIEW)
-    once, within = promised_shares(views, measured_answers(), 6.0, mat)
+    once, within = answered_shares(views, measured_answers(), 6.0, mat)
     assert 0 < once < 1
     assert within is None
-    assert promised_shares(views, measured_answers(), 6.0)[1] is not None
+    assert answered_shares(views, measured_answers(), 6.0)[1] is not None
 
 
 def test_a_type_of_your_own_is_taken_for_the_one_most_like_it():
-    mine = SensorSize("mine", (31.0, 33.0), 6.0)  # 62 x 66 mm: the mat is 64 x 64
+    mine = SensorType(33, 31, 2.0, name="mine")  # 62 x 66 mm: the mat is 64 x 64
     assert answered_share(mine) is measured_types()["mat-32x32"]
-    fine = SensorSize("fine", (8.0, 8.0), 3.0)
+    fine = SensorType(pitch_mm=1.0, name="fine")
     assert answered_share(fine) is measured_types()["gel-24x32"]
-    same = SensorSize("same", (12.7, 12.7), 5.0)
+    same = SensorType(name="same")
     assert answered_share(same) is None

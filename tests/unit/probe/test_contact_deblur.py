@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.deblur import blur_of, deblur, thickest_mm, transmitted_share
 from probe.contact.layer import layer
 from probe.contact.layer_influence import influence
 from probe.contact.settings import DEBLUR
 from probe.errors import ContactError
-from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import Washer
 
 HELD = WristStiffness(math.inf, math.inf)

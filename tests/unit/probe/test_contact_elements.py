@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.elements import condensed_pad, elements
 from probe.contact.press import press
 from probe.errors import ContactError
-from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import Cross, FlatPlate, Paraboloid, RaisedStrip, Sphere, TiltedPlane
 
 SMALL = {"rows": 8, "columns": 8}

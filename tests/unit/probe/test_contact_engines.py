@@ -11,13 +11,13 @@ import pytest
 from manifold3d import Manifold
 from scipy.optimize import brentq
 
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Contact, Touch, WristStiffness
 from probe.contact.engines import ENGINES, Engine, EngineEntry, engine_named
 from probe.contact.engines.mujoco import MujocoSettings
 from probe.contact.engines.under_sensor import UNDER, mesh_under
 from probe.contact.tips import Tips
 from probe.errors import ContactError, ProbeError
-from probe.sensor import Overlay, SensorType
 from probe.simulate.world.levels import LEVELS
 from probe.simulate.world.reading import read_sensor
 from probe.surface.mesh import mesh

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch
 from probe.contact.footprint import footprint
 from probe.contact.tips import Tips
 from probe.errors import ContactError
-from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import FlatPlate, HalfPlane, RaisedStrip, Sphere, TiltedPlane
 
 SENSOR = SensorType()

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import SensorType
+from encoded_objects.base.sensor_type_file import sensor_type_named
 from probe.contact.contract import Touch
 from probe.contact.gel import bridge, depths_mm, gel
 from probe.contact.press import level_for, press
 from probe.errors import ContactError
-from probe.sensor import SensorType
-from probe.sensor_types.read import sensor_type_named
 from probe.simulate.readout import readout_of
 from probe.simulate.world.levels import LEVELS
 from probe.simulate.world.reading import read_sensor

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.layer import layer, press_patch
 from probe.contact.layer_active_set import deep_mm, equilibrium, springs_mm
@@ -17,7 +18,6 @@ from probe.contact.plate import PlatePose
 from probe.contact.press import press
 from probe.contact.settings import CONTACT, LAYER, LAYER_LEVELS
 from probe.errors import ContactError
-from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import (
     Cross,
     FlatPlate,

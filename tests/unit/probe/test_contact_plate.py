@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.neo_hooke import Linear, NeoHooke
 from probe.contact.plate import PlateLoad, load_of, rest
 from probe.errors import ContactError
-from probe.sensor import SensorType
 
 POINTS = SensorType().centres_mm().reshape(-1, 2)
 FREE = WristStiffness(0.0, 0.0)

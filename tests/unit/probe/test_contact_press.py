@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch
 from probe.contact.press import LEVELS, accuracy_of, level_for, press, table
 from probe.contact.settings import CONTACT
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.errors import ContactError
-from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import RoughSurface, Washer
 
 TAB, PAD = (SensorType(overlay=Overlay(kind=kind)) for kind in ("tab", "pad"))

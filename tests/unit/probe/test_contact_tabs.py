@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact import tabs as tabs_module
 from probe.contact.contract import Touch, WristStiffness
 from probe.contact.plate import PlatePose, load_of, rest
@@ -15,7 +16,6 @@ from probe.contact.tab_law import tip_laws
 from probe.contact.tabs import heights_under, tabs, tabs_at_rest
 from probe.contact.tips import NUMBERS, Tips, rings, square, tip_points
 from probe.errors import ContactError
-from probe.sensor import Overlay, SensorType
 from probe.surface.indenters import (
     Cross,
     FlatPlate,

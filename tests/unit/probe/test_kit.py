@@ -15,6 +15,8 @@ import numpy as np
 import pytest
 
 from encoded_objects import Reader, open_lab
+from encoded_objects.base.sensor_type import Overlay, SensorType
+from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_names
 from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.kit import model
@@ -26,8 +28,6 @@ from probe.kit.mesh import mesh_of, step_text
 from probe.kit.settings import KIT
 from probe.kit.sheet import PrintedPart
 from probe.kit.sizes import frustum_mm3, kit_sizes
-from probe.sensor import Overlay, SensorType
-from probe.sensor_types.read import sensor_type_named, shipped_names
 from probe.simulate.registered import registered_surface
 
 SMALL = SensorType(rows=4, columns=5, pitch_mm=3.0, name="small",

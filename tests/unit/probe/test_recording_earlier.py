@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from encoded_objects import Reader, open_lab
+from encoded_objects.base.sensor_type import choose_sensor_type
 from probe.calibration.file import calibration_hash, read_calibration, write_calibration
 from probe.recording.read import Recording
-from probe.sensor_types import choose_sensor_type
 
 EARLIER = Path(__file__).parents[3] / "fixtures" / "recordings"
 DATABASES = EARLIER.parent / "database"

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.arm.inverse import inverse
 from probe.arm.links import Arm, forward
 from probe.contact.contract import Touch
@@ -15,7 +16,6 @@ from probe.scan.approach import ApproachLimits, guarded_approach
 from probe.scan.kinesthetic import JointErrors, follow_poses, joint_path, joints_with_play
 from probe.scan.places import surface_to_sensor, touch_at
 from probe.scan.raster import raster
-from probe.sensor import SensorType
 
 DEG = math.pi / 180
 SQUARE = [(0, 0), (60, 0), (60, 60), (0, 60)]

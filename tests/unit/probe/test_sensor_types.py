@@ -10,22 +10,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from encoded_objects.base.sensor_size import SensorSize, sensor_size
-from probe.command import run
-from probe.errors import ContactError
-from probe.frame import frame_from
-from probe.recording.read import Recording
-from probe.recording.record import Recorder
-from probe.sensor import Overlay, SensorType
-from probe.sensor_types import (
+from encoded_objects.base.sensor_type import (
+    Overlay,
+    SensorType,
     SensorTypeError,
     choose_sensor_type,
     force_share,
-    proposed_pitch_mm,
     sensor_type_text,
 )
-from probe.sensor_types.read import parse_sensor_type, sensor_type_named, shipped_names
-from probe.sensor_types.settings import sensor_type_schema
+from encoded_objects.base.sensor_type_file import (
+    parse_sensor_type,
+    sensor_type_named,
+    sensor_type_schema,
+    shipped_names,
+)
+from probe.command import run
+from probe.frame import frame_from
+from probe.recording.read import Recording
+from probe.recording.record import Recorder
 from probe.simulate.simulated_probe import SimulatedProbe, TouchOptions
 from probe.simulate.source import options_of
 
@@ -126,21 +128,14 @@ def test_which_type_images_are_of():
 
 
 def test_the_pitch_that_is_proposed():
-    assert proposed_pitch_mm(SensorType()) == 5.0
-    assert proposed_pitch_mm(SensorType().with_overlay("pad")) == 7.0
-    assert proposed_pitch_mm(sensor_type_named("flexitac-12x32")) == 6.0
-    assert proposed_pitch_mm(sensor_type_named("gel-24x32")) == 3.0
+    assert SensorType().symbol_pitch_mm == 5.0
+    assert SensorType().with_overlay("pad").symbol_pitch_mm == 7.0
+    assert sensor_type_named("flexitac-12x32").symbol_pitch_mm == 6.0
+    assert sensor_type_named("gel-24x32").symbol_pitch_mm == 3.0
     few = tuple((row, column) for row in range(16) for column in range(16) if column % 8)
     small, sparse = SensorType(8, 8, 1.5875), SensorType(missing=few)
-    assert proposed_pitch_mm(small) < proposed_pitch_mm(SensorType())
-    assert proposed_pitch_mm(sparse) < proposed_pitch_mm(SensorType())
-
-
-def test_making_knows_the_usual_type_without_loading_it():
-    sensor = SensorType()
-    usual = SensorSize()
-    assert (usual.name, usual.half_mm) == (sensor.name, sensor.half_mm)
-    assert sensor_size(sensor.name) == usual
+    assert small.symbol_pitch_mm < SensorType().symbol_pitch_mm
+    assert sparse.symbol_pitch_mm < SensorType().symbol_pitch_mm
 
 
 def test_an_overlay_is_taken_as_usual():
@@ -219,7 +214,8 @@ def test_every_command_takes_a_type(tmp_path, capsys):
 
 def test_the_usual_type_loads_no_reader_of_yaml():
     code = (
-        "import sys, probe.recording.read; from probe.sensor_types import choose_sensor_type;"
+        "import sys, probe.recording.read;"
+        "from encoded_objects.base.sensor_type import choose_sensor_type;"
         "choose_sensor_type(None, '', (16, 16), 'a');"
         "print({'pydantic', 'yaml'} & set(sys.modules))"
     )
@@ -237,12 +233,12 @@ def test_rows_may_stand_farther_apart_than_columns():
     assert centres[0, 1, 0] - centres[0, 0, 0] == pytest.approx(1.5)
     assert centres[0, 0, 1] - centres[1, 0, 1] == pytest.approx(2.1)
     assert parse_sensor_type(sensor_type_text(cloth), "text") == cloth
-    assert proposed_pitch_mm(cloth) == 6.5
+    assert cloth.symbol_pitch_mm == 6.5
     same = parse_sensor_type(UNEQUAL.replace("2.1", "1.5"), "cloth.yaml")
     assert same.row_pitch_mm == 0
     with pytest.raises(SensorTypeError, match=r"cloth.yaml:5:12(?s:.*)under a pad"):
         parse_sensor_type(UNEQUAL + "overlay: {kind: pad}\n", "cloth.yaml")
-    with pytest.raises(ContactError, match=r"rows 2\.1 mm and columns 1\.5 mm apart"):
+    with pytest.raises(SensorTypeError, match=r"rows 2\.1 mm and columns 1\.5 mm apart"):
         cloth.with_overlay("pad")
 
 

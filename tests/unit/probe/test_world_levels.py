@@ -5,6 +5,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.circuit.electronics import QUIET, Electronics
 from probe.circuit.loaded_column import loaded_columns
 from probe.circuit.readout import shares
@@ -12,7 +13,6 @@ from probe.contact.contract import Touch, WristStiffness
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.errors import CircuitError
-from probe.sensor import SensorType
 from probe.simulate.world.distorted import DistortedSurface
 from probe.simulate.world.levels import LEVELS, SOUND, TYPICAL
 from probe.simulate.world.mounting import MOUNTINGS, mount

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from encoded_objects import Reader, open_lab, simulate
+from encoded_objects.base.sensor_type import SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.frame import frame_from
 from probe.recording.read import Recording
-from probe.sensor import SensorType
 from recognizer.bench.broker import Broker
 from recognizer.bench.frames import FrameHandler
 from recognizer.bench.recognition_thread import PendingFrame, RecognitionThread

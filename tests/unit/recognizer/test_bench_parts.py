@@ -16,13 +16,13 @@ import numpy as np
 import pytest
 from hostile_recordings import HOSTILE, write_hostile, write_zeros
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.database.registered import RegisteredPart
 from probe.circuit import Electronics, fsr_of, read_counts
 from probe.errors import CalibrationError, RecordingError
 from probe.frame import frame_from
 from probe.recording.read import Recording
 from probe.recording.record import Recorder
-from probe.sensor import SensorType
 from recognizer.bench.answers import answer_json
 from recognizer.bench.broker import Broker, Subscriber
 from recognizer.bench.calibration_guide import CalibrationGuide, forces_given
@@ -42,7 +42,7 @@ from recognizer.bench.settings import GUIDE, TRIGGER, TouchLogSettings, UploadSe
 from recognizer.bench.simulated import parse_simulation
 from recognizer.bench.touch_log import TouchLog
 from recognizer.bench.uploads import Uploads, folder_bytes
-from recognizer.scan.mosaic.image import GlobalImage
+from recognizer.scan.mosaic.canvas import GlobalImage
 from recognizer.touch.cause import EDGE, NO_LOAD, Cause
 from recognizer.touch.lab import Lab
 from recognizer.touch.recognition import refusal

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from encoded_objects import simulate
+from encoded_objects.base.sensor_type import SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.contact.contract import Touch
 from probe.contact.press import press
-from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from recognizer.touch import cause
 from recognizer.touch.cause import Cause

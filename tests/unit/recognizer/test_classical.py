@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.arm.links import Arm
@@ -14,7 +15,6 @@ from probe.contact.tips import Tips
 from probe.scan.kinesthetic import JointErrors, follow_poses
 from probe.scan.places import surface_to_sensor, touch_at
 from probe.scan.raster import raster
-from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from recognizer.scan.mosaic.planar import relative_pose, transform_points
 from recognizer.thesis.image import average_touches, merge_touches, relative_poses

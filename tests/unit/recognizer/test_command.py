@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.calibration import calibration_from, even_load, write_calibration
@@ -18,7 +19,6 @@ from probe.contact.contract import Touch
 from probe.contact.press import press
 from probe.frame import frame_from
 from probe.recording.record import Recorder
-from probe.sensor import Overlay, SensorType
 from probe.simulate.registered import registered_surface
 from probe.wrist.distances import counts_of, distances_at
 from probe.wrist.geometry import Wrist
@@ -335,6 +335,8 @@ def test_the_symbols_of_the_picture_are_those_of_the_touch(lab, images):
     reader = Reader(open_lab(str(lab / "lab.db")), SensorType())
     signal = signal_of(images[0].astype(np.float64))
     won, found = winning_lattice(reader, signal), recognise(reader, signal)
+    face = won.encoding.face(won.place.face)
+    assert face.face == found.face
     points = np.array([[0.0, 0.0], [3.0, -4.0]])
     assert won.on_sensor(won.on_lattice(points)) == pytest.approx(points)
     # a symbol's centre, from the lattice and from the face, seen by the sensor
@@ -355,7 +357,7 @@ def test_the_symbols_of_the_picture_are_those_of_the_touch(lab, images):
             assert label == expected
             near += 1
     assert near >= 9
-    assert won.felt[won.registered >= 0].mean() > 0.8
+    assert won.matched[won.registered >= 0].mean() > 0.8
     assert winning_lattice(reader, signal_of(np.zeros((16, 16)))) is None
 
 

@@ -13,8 +13,8 @@ from hypothesis import given as drawn
 from hypothesis import strategies as st
 
 from encoded_objects.base.compiled import CHOICE
+from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet import SymbolStyle, alphabet_named
-from probe.sensor import SensorType
 from recognizer.touch.lab import EmbossedArray, cell_keys
 from recognizer.touch.locate import find_hypotheses
 from recognizer.touch.place_scores import add_scores, count_names, count_places, name_places

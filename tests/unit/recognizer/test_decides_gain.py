@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.database.registered import Bend
-from probe.sensor import SensorType
 from recognizer.touch.sensor_state import unknown_state
 from recognizer.touch.settings import ReaderSettings
 from recognizer.touch.signal import Signal

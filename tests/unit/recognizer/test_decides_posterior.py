@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet import SymbolStyle, alphabet_named
-from probe.sensor import SensorType
 from recognizer.touch.settings import DEFAULTS
 from recognizer.touch.signal import Signal
 from recognizer.touch.symbols.blur import second_differences

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.touch.settings import SignalSettings
 from recognizer.touch.signal import noise_of, signal_limits, signal_of
 

@@ -6,10 +6,10 @@ import math
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
-from probe.sensor import Overlay, SensorType
 from probe.surface.face import FaceSurface
 from probe.surface.polygon import polygon
 from recognizer.thesis.edges.find import classical_edges, face_edges, outline

@@ -7,9 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from probe.sensor import Overlay, SensorType
-from probe.sensor_types.force import TOUCH_FORCE
-from probe.sensor_types.read import sensor_type_named, shipped_names
+from encoded_objects.base.sensor_type import GEL_IMPRINT_MM, Overlay, SensorType
+from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_names
 from recognizer.touch.next_limits import next_limits
 from recognizer.touch.next_touch import propose_next
 from recognizer.touch.recognition import TOO_FEW, refusal
@@ -42,7 +41,7 @@ def test_a_gel_is_imprinted_as_deep_whatever_it_is_made_of():
     force_n = next_limits(gel).force_n
     area = 4 * math.prod(gel.half_mm)
     assert force_n / (gel.overlay.young_mpa / gel.overlay.height_mm * area) == pytest.approx(
-        TOUCH_FORCE.imprint_mm, rel=0.01
+        GEL_IMPRINT_MM, rel=0.01
     )
     stiff = replace(gel, overlay=replace(gel.overlay, young_mpa=0.6))
     assert next_limits(stiff).force_n == pytest.approx(2 * force_n, abs=0.1)

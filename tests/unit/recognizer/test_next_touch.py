@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from probe.sensor import SensorType
+from encoded_objects.base.sensor_type import SensorType
 from recognizer.touch.felt_area import EarlierTouch
 from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.lab import EncodedFace

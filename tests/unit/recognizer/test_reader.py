@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import recognizer.touch
+from encoded_objects.base.sensor_type import Overlay, SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.contact.contract import Touch
@@ -16,7 +17,6 @@ from probe.contact.press import press
 from probe.frame import frame_from
 from probe.recording.read import Recording
 from probe.recording.record import Recorder
-from probe.sensor import Overlay, SensorType
 from probe.simulate.registered import registered_surface
 from recognizer.errors import TouchError
 from recognizer.touch.lab import open_lab

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from encoded_objects.base.sensor_type import SensorType
 from probe.arm.carried import SensorPose
 from probe.arm.links import Arm, forward
 from probe.errors import PoseError
-from probe.sensor import SensorType
 from probe.wrist.distances import counts_of, distances_at
 from probe.wrist.geometry import Wrist, gripper_to_plate, plate_to_sensor
 from recognizer.touch.recognition import Recognition, refusal

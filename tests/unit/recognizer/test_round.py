@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.database.registered import Bend, Developable
 from probe.contact.contract import Touch
 from probe.contact.press import press
-from probe.sensor import SensorType
 from probe.surface.face import endless_face
 from recognizer.touch.lab import radii_of
 from recognizer.touch.settings import DEFAULTS

@@ -5,17 +5,17 @@ import math
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.arm.carried import SensorPose
 from probe.contact.contract import Touch
 from probe.scan.places import surface_to_sensor
-from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from probe.simulate.world.levels import MISMATCH, TYPICAL
 from probe.simulate.world.reading import read_sensor
 from recognizer.scan.grow import begin_scan, extend_scan, read_scan
-from recognizer.scan.mosaic.touch import PlacedTouch, planar_belief
+from recognizer.scan.mosaic.planar import PlacedTouch, planar_belief
 from recognizer.scan.session import Scan, TouchPlaces
 from recognizer.scan.settings import ScanSettings
 from recognizer.touch.lab import open_lab

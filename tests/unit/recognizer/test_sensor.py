@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
 from probe.circuit.network import effective_resistances
@@ -15,7 +16,6 @@ from probe.contact.press import press
 from probe.contact.tips import Tips
 from probe.frame import frame_from
 from probe.recording.record import Recorder
-from probe.sensor import SensorType
 from probe.simulate.registered import registered_surface
 from recognizer.command import run
 from recognizer.errors import SensorStateError, WiringError

@@ -7,8 +7,8 @@ import pytest
 from scipy.ndimage import percentile_filter
 from scipy.signal import fftconvolve
 
+from encoded_objects.base.sensor_type import SensorType
 from generator.alphabet import SymbolStyle, alphabet_named
-from probe.sensor import SensorType
 from recognizer.touch import template_cache
 from recognizer.touch.settings import DEFAULTS
 from recognizer.touch.symbols.gain import _percentiles_around

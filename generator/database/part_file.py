@@ -1,17 +1,46 @@
-"""A part's STL file -> its triangles, as they were written."""
+"""Whether the files that the database names are there, and still what was written."""
 
 from __future__ import annotations
 
+import hashlib
 import os
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from sqlalchemy import URL
 
+from generator.database.open import part_path
+from generator.database.registered import RegisteredPart
 from generator.errors import ShapeError
 from generator.polyhedron.read import file_content
 from generator.polyhedron.read.settings import MODEL
 from generator.polyhedron.read.stl import stl_triangles
+
+
+@dataclass(frozen=True, slots=True)
+class PartState:
+    """A part's file, as it is now."""
+
+    part: RegisteredPart
+    path: Path
+    state: str  #: ok, missing, changed, or unreadable
+
+
+def part_state(url: URL, part: RegisteredPart) -> PartState:
+    """Compare a part's file with the SHA-256 under which it is registered."""
+    path = part_path(url, part.file)
+    try:
+        with open(path, "rb") as file:
+            same = hashlib.file_digest(file, "sha256").hexdigest() == part.sha256
+        state = "ok" if same else "changed"
+    except (FileNotFoundError, NotADirectoryError):
+        state = "missing"
+    except OSError:
+        state = "unreadable"
+    return PartState(part, path, state)
+
 
 LARGEST_BYTES = 84 + 50 * MODEL.most_part_triangles
 

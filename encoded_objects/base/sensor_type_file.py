@@ -1,19 +1,42 @@
-"""What a file of a sensor type may say: names, defaults, descriptions. Lengths in mm.
+"""Files of sensor types: name or YAML file -> `SensorType`, and the JSON schema of such files.
 
-These models are the source of the JSON schema.
+A name without a folder or a suffix is that of a shipped type (`sensor_types/NAME.yaml`);
+everything else is a file. Errors read `file:line:column: error:`, the line, a caret and a fix.
+Lengths in mm.
 """
 
 from __future__ import annotations
 
 import re
+from functools import lru_cache
+from importlib import resources
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, ValidationError
 
-from encoded_objects.base.settings import Block, Length, LengthOrZero, refuse, whole_number
-from probe.sensor import Overlay, OverlayKind, SensorType, Value, Wiring
+from encoded_objects.base.document import DocumentKind, Problem, did_you_mean
+from encoded_objects.base.sensor_type import (
+    SENSOR_FILES,
+    Overlay,
+    OverlayKind,
+    SensorType,
+    SensorTypeError,
+    Value,
+    Wiring,
+)
+from encoded_objects.base.settings import (
+    Block,
+    Length,
+    LengthOrZero,
+    SettingWords,
+    explain_settings,
+    refuse,
+    whole_number,
+)
+from encoded_objects.base.yaml_tree import Tree, read_tree, tree_of
 
-LINES_MAX = 255  #: rows or columns: a packet tells them by a byte each
+LINES_MAX = 255  #: rows or columns: a packet holds each in a byte
 _NAME = re.compile(r"[a-z0-9][a-z0-9._-]{0,59}\Z")
 _LINES = re.compile(r"\s*([0-9]{1,4})\s*(?:-\s*([0-9]{1,4})\s*)?\Z")
 _PLAIN, _USUAL = SensorType(), Overlay()
@@ -190,6 +213,91 @@ class SensorTypeSettings(Block):
             missing=tuple(sorted(missing)),
             row_pitch_mm=self._row_pitch(),
         )
+
+
+_KIND = DocumentKind(
+    error=SensorTypeError,
+    name="a sensor type",
+    empty="write name:, rows:, columns: and pitch:, as probe-sensor types fsr-16 shows",
+    example="probe-sensor types fsr-16",
+    first="see those that are shipped with: probe-sensor types",
+)
+_WORDS = SettingWords(
+    whole="a sensor type is made of settings",
+    start="name: my-sensor",
+    see="probe-sensor types --schema",
+    missing={
+        "name": "name: my-sensor",
+        "rows": "rows: 16",
+        "columns": "columns: 16",
+        "pitch": "pitch: 1.5875 mm",
+    },
+    blocks={"overlay": "overlay: {kind: tab, height: 2 mm}", "missing": "missing: [...]"},
+)
+_FOLDER = resources.files("encoded_objects.base").joinpath("sensor_types")
+
+
+@lru_cache(maxsize=1)
+def shipped_names() -> tuple[str, ...]:
+    """Return the names of the shipped types, the usual one first."""
+    names = (item.name.removesuffix(".yaml") for item in _FOLDER.iterdir())
+    usual = SensorType().name
+    return (usual, *sorted(name for name in names if name != usual))
+
+
+@lru_cache(maxsize=64)
+def sensor_type_named(name: str) -> SensorType:
+    """Return a shipped type by its name, or that of a YAML file.
+
+    Raises
+    ------
+    SensorTypeError
+        No such type or file, or one that cannot be used.
+
+    Examples
+    --------
+    >>> sensor_type_named("flexitac-12x32").shape
+    (12, 32)
+    """
+    if name in shipped_names():
+        return parse_sensor_type(shipped_text(name), f"{name}.yaml")
+    path = Path(name)
+    if path.suffix in SENSOR_FILES or path.parent != Path() or path.exists():
+        return _sensor_type(read_tree(path, _KIND))
+    near = did_you_mean(name, shipped_names())
+    fix = f"did you mean '{near}'?" if near else f"take {', '.join(shipped_names())}, or a file"
+    raise SensorTypeError([Problem(f"there is no sensor type '{name}'", fix, file="--sensor-type")])
+
+
+def shipped_text(name: str) -> str:
+    """Return the file of a shipped type."""
+    return _FOLDER.joinpath(f"{name}.yaml").read_text("utf-8")
+
+
+def parse_sensor_type(text: str, place: str) -> SensorType:
+    """Return the type that a text describes; `place` stands in messages.
+
+    Raises
+    ------
+    SensorTypeError
+        With the line and the column of what is wrong.
+    """
+    return _sensor_type(tree_of(text, place, Path(), _KIND))
+
+
+def _sensor_type(tree: Tree) -> SensorType:
+    problems = list(tree.problems)
+    try:
+        settings = SensorTypeSettings.model_validate(tree.value)
+    except ValidationError as error:
+        problems += explain_settings(error, tree, SensorTypeSettings, _WORDS)
+    else:
+        problems += [
+            Problem(cause, fix, tree.value_mark(place)) for place, cause, fix in settings.faults()
+        ]
+    if problems:
+        raise SensorTypeError(problems)
+    return settings.sensor_type()
 
 
 def sensor_type_schema() -> dict[str, Any]:

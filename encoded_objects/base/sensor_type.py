@@ -1,0 +1,311 @@
+"""Sensor type: matrix, overlay, and the meaning of its values. Thesis 3.3, 4.2.
+
+Sensor frame: seen through its back, from outside the object; origin at the centre of
+the matrix in the plane of the undeformed overlay's tips; x right along columns, y up
+against rows, z away from the object; tactel (0, 0) top left. mm, N, MPa.
+
+Making takes the size and the proposed pitch of symbols from it, touching everything else.
+`sensor_type_file` reads and ships types as YAML; it loads pydantic, this module does not.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from encoded_objects.base.document import DocumentError, Problem
+
+SENSOR_FILES = (".yaml", ".yml")  #: suffixes of files of types; other words are names
+USUAL_FORCE_N = 80.0  #: on `fsr-16`, as the thesis pressed its washer
+#: Mean imprint of a gel. Of 300 touches of all kinds 206 are answered at .2 and at .3 mm, 189 at
+#: 1.2 mm, where the share of the area leads; at edges 35, 32 and 17 of 40, of mismatched gels amid
+#: faces 35, 38 and 42 of 42: noise hides weak imprints. Of 100 at edges and corners that follow
+#: `next` 93 are answered by the second at .2 mm, 84 at .3 mm.
+GEL_IMPRINT_MM = 0.3
+#: Tactels to a pitch of symbols. 5 mm of `fsr-16` (docs/pitches.md). Of 30 touches each of
+#: `flexitac-12x32`, typical and mismatch: at 6 mm 30 and 29 right amid faces, 17 and 12 at edges;
+#: at 8.5 mm, 4.2 tactels, 30 and 30, 10 and 11.
+TACTELS = 3.15
+PAD_TACTELS = 4.41  #: under a pad; 7 mm of `fsr-16`: at 5 mm 18 of 30 are right, at 7 mm 28
+CELLS = 11.7  #: symbols on the matrix's area: about eight of them are seen whole
+PITCH_GRID_MM = 0.5  #: proposed pitches are multiples of this
+LEAST_PITCH_MM = 3.0  #: finer strokes do not print
+
+OverlayKind = Literal["tab", "pad", "gel"]
+Value = Literal["counts", "conductance", "force", "depth"]
+Wiring = Literal["grounded", "floating", "virtual"]
+
+
+class SensorTypeError(DocumentError):
+    """A sensor type that is not known, or a file of one that cannot be used."""
+
+
+@dataclass(frozen=True, slots=True)
+class Overlay:
+    """The elastomer between the sensor and the object: separate tabs, one pad, or a gel.
+
+    Young's modulus and Poisson's ratio are those of the elastomer at small strain. A tab is
+    a round column bonded to the sensor; a pad is one layer bonded to it; a gel is a soft layer
+    behind a membrane, whose height is seen, not its force.
+    """
+
+    kind: OverlayKind = "tab"
+    height_mm: float = 2.0  #: of a tab, or thickness of pad or gel
+    tab_diameter_mm: float = 1.2666  #: half of a cell's area; no meaning for pad and gel
+    young_mpa: float = 1.0
+    poisson: float = 0.4999
+    membrane_mm: float = 0.0  #: of a gel: way over which its membrane bridges beside a stroke
+    blur_mm: float = 0.0  #: of a gel: standard deviation of what optics and matching blur
+
+
+@dataclass(frozen=True, slots=True)
+class SensorType:
+    """A matrix of tactels, its overlay and its readings; the default is `fsr-16`, the thesis's own.
+
+    Examples
+    --------
+    >>> sensor = SensorType()
+    >>> sensor.name, sensor.rows, sensor.columns, sensor.pitch_mm
+    ('fsr-16', 16, 16, 1.5875)
+    >>> sensor.half_mm
+    (12.7, 12.7)
+    """
+
+    rows: int = 16
+    columns: int = 16
+    pitch_mm: float = 1.5875  #: from column to column, and from row to row
+    overlay: Overlay = field(default_factory=Overlay)
+    name: str = "fsr-16"
+    value: Value = "counts"  #: what a reading is
+    unit: float = 1.0  #: of one count: S of conductance, N of force, mm of depth
+    bits: int = 10  #: of a reading
+    exponent: float = 1.0  #: law: a reading grows with force (depth) to this power
+    wiring: Wiring = "grounded"  #: of the rows that are not read
+    noise: float = 0.3  #: counts, standard deviation of a tactel at rest
+    missing: tuple[tuple[int, int], ...] = ()  #: (row, column) of places without a tactel
+    row_pitch_mm: float = 0.0  #: from row to row where it is another; 0: the same
+
+    def __post_init__(self) -> None:
+        """Refuse two pitches under a pad or a gel."""
+        if self.row_pitch_mm and self.overlay.kind != "tab":
+            cause = (
+                f"rows {self.row_pitch_mm:g} mm and columns {self.pitch_mm:g} mm apart under a "
+                f"{self.overlay.kind}"
+            )
+            raise SensorTypeError([Problem(cause, "take tabs, or one pitch for both")])
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.rows, self.columns
+
+    @property
+    def full(self) -> int:
+        """Highest reading, counts."""
+        return (1 << self.bits) - 1
+
+    @property
+    def step_mm(self) -> tuple[float, float]:
+        """From column to column (x) and from row to row (y), mm."""
+        return self.pitch_mm, self.row_pitch_mm or self.pitch_mm
+
+    @property
+    def half_mm(self) -> tuple[float, float]:
+        """Half the width (x) and half the height (y) of the matrix, mm."""
+        return self.columns * self.step_mm[0] / 2, self.rows * self.step_mm[1] / 2
+
+    @property
+    def reach_mm(self) -> float:
+        """Radius of the circle about the centre that holds the whole matrix, mm."""
+        return math.hypot(*self.half_mm)
+
+    @property
+    def across_mm(self) -> float:
+        """Side of the square of the matrix's area, mm."""
+        return 2 * math.sqrt(self.half_mm[0] * self.half_mm[1])
+
+    @property
+    def symbol_pitch_mm(self) -> float:
+        """Pitch of symbols that the type reads best, mm; `encode-object --sensor-type` takes it.
+
+        A touch needs several tactels on every symbol, and enough symbols on the sensor. The pitch
+        is the largest that shows `CELLS` symbols on the matrix's area, but at most `TACTELS`
+        tactels to a symbol (`PAD_TACTELS` under a pad, which blurs): finer sampling gains nothing.
+
+        Examples
+        --------
+        >>> SensorType().symbol_pitch_mm
+        5.0
+        """
+        tactels = PAD_TACTELS if self.overlay.kind == "pad" else TACTELS
+        area = float(self.present().sum()) * math.prod(self.step_mm)
+        most = min(tactels * max(self.step_mm), math.sqrt(area / CELLS))
+        return max(LEAST_PITCH_MM, math.floor(most / PITCH_GRID_MM + 1e-9) * PITCH_GRID_MM)
+
+    @property
+    def coarseness(self) -> float:
+        """How many times larger its symbols are than those of `fsr-16`."""
+        return self.symbol_pitch_mm / USUAL_SENSOR.symbol_pitch_mm
+
+    def centres_mm(self) -> NDArray[np.float64]:
+        """Return the tactels' centres, (rows, columns, 2), sensor frame."""
+        x = (np.arange(self.columns) - (self.columns - 1) / 2) * self.step_mm[0]
+        y = ((self.rows - 1) / 2 - np.arange(self.rows)) * self.step_mm[1]
+        centres = np.empty((self.rows, self.columns, 2))
+        centres[..., 0] = x
+        centres[..., 1] = y[:, None]
+        return centres
+
+    def with_overlay(self, kind: str) -> SensorType:
+        """Return the sensor under usual tabs or a usual pad; unchanged where `kind` is its own."""
+        if kind in ("", self.overlay.kind):
+            return self
+        if kind == "tab":
+            usual = Overlay()
+            share = self.pitch_mm / SensorType().pitch_mm
+            overlay = replace(usual, tab_diameter_mm=usual.tab_diameter_mm * share)
+            return replace(self, overlay=overlay)
+        return replace(self, overlay=Overlay(kind="pad")) if kind == "pad" else self
+
+    def present(self) -> NDArray[np.bool_]:
+        """Return where there are tactels, (rows, columns)."""
+        there = np.ones(self.shape, np.bool_)
+        for row, column in self.missing:
+            there[row, column] = False
+        return there
+
+
+USUAL_SENSOR = SensorType()
+
+
+def force_share(sensor: SensorType) -> float:
+    """Return the share of forces on `fsr-16` that a type is pressed with.
+
+    Pressure is the same, or for a gel the imprint: it is far softer than tabs, and the forces of
+    `fsr-16` on its area would press symbols and bare face alike into it.
+
+    Examples
+    --------
+    >>> force_share(SensorType())
+    1.0
+    """
+    area_mm2 = 4 * math.prod(sensor.half_mm)
+    if sensor.overlay.kind == "gel":
+        bed_n_mm3 = sensor.overlay.young_mpa / sensor.overlay.height_mm
+        return GEL_IMPRINT_MM * bed_n_mm3 * area_mm2 / USUAL_FORCE_N
+    return area_mm2 / (4 * math.prod(USUAL_SENSOR.half_mm))
+
+
+def usual_force_n(sensor: SensorType) -> float:
+    """Return the force that a type is pressed with by default, N.
+
+    Examples
+    --------
+    >>> usual_force_n(SensorType())
+    80.0
+    """
+    return USUAL_FORCE_N * force_share(sensor)
+
+
+def sensor_type_text(sensor: SensorType) -> str:
+    """Return a type as YAML, as recordings and runs carry it; equal types give equal text.
+
+    Examples
+    --------
+    >>> from encoded_objects.base.sensor_type_file import parse_sensor_type
+    >>> parse_sensor_type(sensor_type_text(SensorType()), "text") == SensorType()
+    True
+    """
+    overlay = sensor.overlay
+    lines = [
+        "version: 1",
+        f"name: {sensor.name}",
+        f"rows: {sensor.rows}",
+        f"columns: {sensor.columns}",
+        f"pitch: {sensor.pitch_mm!r} mm",
+        *([f"row_pitch: {sensor.row_pitch_mm!r} mm"] if sensor.row_pitch_mm else []),
+        "overlay:",
+        f"  kind: {overlay.kind}",
+        f"  height: {overlay.height_mm!r} mm",
+        f"  tip: {overlay.tab_diameter_mm!r} mm",
+        f"  young: {overlay.young_mpa!r}",
+        f"  poisson: {overlay.poisson!r}",
+        f"  membrane: {overlay.membrane_mm!r} mm",
+        f"  blur: {overlay.blur_mm!r} mm",
+        f"value: {sensor.value}",
+        f"unit: {sensor.unit!r}",
+        f"bits: {sensor.bits}",
+        f"exponent: {sensor.exponent!r}",
+        f"wiring: {sensor.wiring}",
+        f"noise: {sensor.noise!r}",
+        *(["missing:"] if sensor.missing else []),
+        *(f"  - {{rows: {row}, columns: {column}}}" for row, column in sensor.missing),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def choose_sensor_type(
+    asked: str | SensorType | None, stored: str, shape: tuple[int, int] | None, place: str
+) -> SensorType:
+    """Return the type of images: the one asked for, else the stored one, else `fsr-16`.
+
+    Parameters
+    ----------
+    asked
+        A type, its name or file, as a person gave it; None or empty: not given.
+    stored
+        YAML of a type, as a recording carries it; empty: none.
+    shape
+        Rows and columns of the images; None: not known yet.
+    place
+        File or URL, for messages.
+
+    Raises
+    ------
+    SensorTypeError
+        Images of another shape than the type.
+    """
+    if isinstance(asked, SensorType):
+        found = asked
+    elif asked:
+        from encoded_objects.base.sensor_type_file import sensor_type_named
+
+        found = sensor_type_named(asked)
+    elif stored and stored != sensor_type_text(USUAL_SENSOR):
+        from encoded_objects.base.sensor_type_file import parse_sensor_type
+
+        found = parse_sensor_type(stored, f"{place}, attribute sensor_type")
+    else:
+        found = USUAL_SENSOR
+        if shape is not None and shape != found.shape:
+            raise _unknown_type(shape, place)
+    if shape is not None and shape != found.shape:
+        raise SensorTypeError(
+            [
+                Problem(
+                    f"images of {shape[0]} x {shape[1]} readings, {found.name} has "
+                    f"{found.rows} x {found.columns}",
+                    _fix_for(shape),
+                    file=place,
+                )
+            ]
+        )
+    return found
+
+
+def _unknown_type(shape: tuple[int, int], place: str) -> SensorTypeError:
+    cause = f"images of {shape[0]} x {shape[1]} readings, and nothing tells their sensor type"
+    return SensorTypeError([Problem(cause, _fix_for(shape), file=place)])
+
+
+def _fix_for(shape: tuple[int, int]) -> str:
+    """Return the way out: the shipped types of that shape, or a file."""
+    from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_names
+
+    alike = [name for name in shipped_names() if sensor_type_named(name).shape == shape]
+    named = f"{' or '.join(alike)}, or " if alike else ""
+    return f"give --sensor-type {named}a file; probe-sensor types shows how one is written"

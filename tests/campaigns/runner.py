@@ -1,0 +1,181 @@
+"""What every campaign and benchmark does: options, processes, rows that resume, tables.
+
+    parser = runner.arguments(__doc__, "database", seed=7, touches=400, jobs=2)
+    options = runner.parse(parser)                  # with one BLAS thread
+    rows = runner.resume(file, jobs, work, options.jobs)
+    runner.table(("level", "right"), lines)
+
+A script of `tests/campaigns` imports it by `import runner`, one of `tests/bench` by
+`from campaigns import runner` after `sys.path.insert(0, str(Path(__file__).parents[1]))`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, TypeVar
+
+Job, Result = TypeVar("Job"), TypeVar("Result")
+Row = dict[str, Any]
+
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+INSIDE_CHI2 = 7.814727903251179  #: 95 % quantile of chi2 with 3 degrees of freedom: x, y, turn
+
+
+def arguments(
+    doc: str | None, *names: str, output: bool = False, seed: int | None = None,
+    touches: int | None = None, jobs: int | None = None,
+) -> argparse.ArgumentParser:  # fmt: skip
+    """Return a parser that knows the usual options.
+
+    Parameters
+    ----------
+    doc
+        Of the script; its first line is the help.
+    names
+        Positional arguments, such as "database".
+    output
+        Whether the script needs a folder or file, `-o`.
+    seed, touches, jobs
+        Defaults of `--seed`, `--touches`, `-j`; None: no such option.
+    """
+    parser = argparse.ArgumentParser(description=(doc or "").splitlines()[0])
+    for name in names:
+        parser.add_argument(name)
+    if output:
+        parser.add_argument("-o", "--output", type=Path, required=True)
+    if seed is not None:
+        parser.add_argument("--seed", type=int, default=seed)
+    if touches is not None:
+        parser.add_argument("--touches", type=int, default=touches)
+    if jobs is not None:
+        parser.add_argument("-j", "--jobs", type=int, default=jobs, help="processes")
+    return parser
+
+
+def parse(parser: argparse.ArgumentParser) -> argparse.Namespace:
+    """Return the options; the script starts again with one BLAS thread if it has more."""
+    options = parser.parse_args()
+    if any(name not in os.environ for name in ONE_THREAD):
+        os.execve(sys.executable, [sys.executable, *sys.argv], os.environ | ONE_THREAD)
+    return options
+
+
+def in_processes(
+    work: Callable[[Job], Result], jobs: Iterable[Job], processes: int = 1
+) -> Iterator[Result]:
+    """Yield `work(job)` for each job, in order; in this process if there is only one."""
+    if processes == 1:
+        yield from map(work, jobs)
+        return
+    with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
+        yield from pool.map(work, jobs)
+
+
+def resume(
+    file: Path, jobs: Sequence[Job], work: Callable[[Job], Row], processes: int = 1
+) -> list[Row]:
+    """Return a row for each job, in order; those that a JSON lines file holds are not done again.
+
+    Each row is written as soon as it is done, so an interrupted script goes on where it was. The
+    file belongs to one list of jobs, which may become longer.
+    """
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.touch()
+    kept = [json.loads(line) for line in file.read_text("utf-8").splitlines()]
+    with file.open("a", encoding="utf-8") as out:
+        for done in in_processes(work, jobs[len(kept) :], processes):
+            out.write(json.dumps(done) + "\n")
+            out.flush()
+            kept.append(done)
+    return kept
+
+
+def table(heads: Sequence[str], lines: Iterable[Sequence[object]] = ()) -> None:
+    """Print a Markdown table, each line as soon as it comes."""
+    print(f"| {' | '.join(heads)} |")
+    print("| --- " * len(heads) + "|", flush=True)
+    for line in lines:
+        row(*line)
+
+
+def row(*cells: object) -> None:
+    """Print a line of a Markdown table; numbers that are not whole to three digits."""
+    shown = (f"{cell:.3g}" if isinstance(cell, float) else str(cell) for cell in cells)
+    print(f"| {' | '.join(shown)} |", flush=True)
+
+
+def command(package: str, *words: object) -> list[str]:
+    """Return the words that run a command of a package: `recognizer.validation`, `generator`."""
+    return [sys.executable, "-c", f"from {package}.command import main; main()", *map(str, words)]
+
+
+def run(package: str, *words: object) -> None:
+    """Run a command of a package; its results are not shown.
+
+    Raises
+    ------
+    SystemExit
+        With its exit code, if it fails. An interrupt reaches it, too, and is passed on.
+    """
+    with subprocess.Popen(command(package, *words), stdout=subprocess.DEVNULL) as process:
+        try:
+            code = process.wait()
+        except KeyboardInterrupt:  # it writes what it has
+            process.wait()
+            raise
+    if code:
+        raise SystemExit(code)
+
+
+def rows_of(folder: Path, what: str = "shards") -> list[Row]:
+    """Return the rows of a run of `validate-set` that are written so far."""
+    import pyarrow.parquet as pq
+
+    files = sorted(folder.glob(f"{what}/touches/*.parquet"))
+    return [row for file in files for row in pq.read_table(file).to_pylist()]
+
+
+def outcome(trials: Iterable[Any]) -> Row:
+    """Return what became of touches.
+
+    Parameters
+    ----------
+    trials
+        Rows of `trials.parquet`, or values of `recognizer.validation.trial.Trial`.
+
+    Returns
+    -------
+    `touches`, `right`, `wrong`, `rejected`; of the right ones root mean squares `rms_mm` and
+    `rms_deg`, `worst_mm`, and the share `inside` the 95 % ellipsoid of the covariance (nan of
+    none); `reasons` of the rejected ones.
+    """
+    import numpy as np
+
+    def value(trial: Any, name: str) -> Any:
+        return trial[name] if isinstance(trial, Mapping) else getattr(trial, name)
+
+    found = list(trials)
+    count = Counter(value(one, "verdict") for one in found)
+    right = [one for one in found if value(one, "verdict") == "right"]
+    mm, deg, chi2 = (
+        np.array([value(one, name) for one in right]) for name in ("error_mm", "error_deg", "chi2")
+    )
+    none = not right
+    return {
+        "touches": len(found),
+        **{name: count[name] for name in ("right", "wrong", "rejected")},
+        "rms_mm": np.nan if none else float(np.sqrt(np.mean(mm**2))),
+        "rms_deg": np.nan if none else float(np.sqrt(np.mean(deg**2))),
+        "worst_mm": np.nan if none else float(mm.max()),
+        "inside": np.nan if none else float(np.mean(chi2 < INSIDE_CHI2)),
+        "reasons": dict(Counter(filter(None, (value(one, "reason") for one in found)))),
+    }
