@@ -32,9 +32,7 @@ from probe.recording.ros import (
     SENSOR_FRAME,
     covariance_message,
 )
-from recognizer.command import report
-from recognizer.command.answer_sink import AnswerSink
-from recognizer.command.answers import Answer
+from recognizer.command.answers import Answer, AnswerSink
 from recognizer.touch.recognition import Recognition
 from recognizer.touch.robot import ObjectPose, object_pose
 
@@ -91,7 +89,7 @@ def recognition_message(answer: Answer) -> dict[str, Any]:
         "margin": np.nan if found.margin is None else found.margin,
         "doubt": np.nan if found.doubt is None else found.doubt,
         "reason": found.reason,
-        "json": json.dumps(json_value(report.entry(answer.touch, found, answer.in_base))),
+        "json": json.dumps(json_value(answer.as_json())),
     }
 
 
@@ -103,11 +101,11 @@ def object_message(
     Parameters
     ----------
     found
-        What a touch says.
+        The answer to a touch.
     in_base
-        Where the object is in the robot's base; None: it is told in the sensor's frame.
+        The object in the robot's base; None: the sensor's frame is used.
     t_ns
-        When.
+        Time of the touch.
     """
     placed, frame_id = in_base, BASE_FRAME
     if placed is None:
