@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from generator.export.colours import BODY_RGB, SYMBOL_RGB
-from generator.export.stl import stl_chunks
+from generator.export.meshes import stl_chunks
 from generator.printed.deposit import deposit
 from generator.printed.faults import PrintFaults
 from generator.printed.profiles import PrintProfile
