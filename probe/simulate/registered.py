@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection
 
 from generator.database import DatabaseError
-from generator.database.entries import find_object, list_objects, object_names
 from generator.database.open import open_database
-from generator.database.read import read_object, read_parts
+from generator.database.read import find_object, list_objects, object_names, read_object, read_parts
 from generator.database.registered import RegisteredFace, RegisteredObject, RegisteredPart
 from generator.database.transaction import read_transaction
 from probe.errors import SurfaceError

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from generator.database.open import normal_url, part_file
 from generator.database.registered import RegisteredFace, RegisteredObject, RegisteredPart
-from generator.database.url import normal_url, part_file
 from probe.errors import SurfaceError
 from probe.simulate.registered import face_of, registered_object, registered_parts
 from probe.simulate.round import round_part

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from generator.database.open import normal_url, part_path
 from generator.database.registered import RegisteredFace, RegisteredObject, RegisteredPart
-from generator.database.url import normal_url, part_path
 from probe.contact.contract import Touch
 from probe.errors import SurfaceError
 from probe.simulate.scene import Scene

@@ -38,7 +38,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 import numpy as np  # noqa: E402
 
 from encoded_objects.base.sensor_type import SensorType  # noqa: E402
-from generator.database.url import normal_url, part_path  # noqa: E402
+from generator.database.open import normal_url, part_path  # noqa: E402
 from generator.pipeline import encode  # noqa: E402
 from generator.spec import read_specs  # noqa: E402
 from probe.contact.contract import Touch  # noqa: E402
