@@ -13,7 +13,7 @@ from generator.database.read import read_object
 from generator.database.registered import Polyhedron
 from generator.database.transaction import read_transaction
 from probe.plot.touch import MARK
-from probe.surface.solids import triangulate
+from probe.surface.body import triangulate
 from recognizer.command.plot.window import FACE
 from recognizer.touch.lab import EmbossedArray
 
