@@ -21,7 +21,7 @@ def heights_by_numpy(part: MeshSurface, points: np.ndarray) -> np.ndarray:
     offsets = np.cumsum(count) - count
     listed = np.repeat(bins.starts[cell] - offsets, count) + np.arange(count.sum())
     x, y = (np.repeat(points[asked, i], count) for i in (0, 1))
-    found[asked] = np.maximum.reduceat(_over(part, bins.triangles[listed], x, y), offsets)
+    found[asked] = np.maximum.reduceat(heights_over(part, bins.triangles[listed], x, y), offsets)
     return np.minimum(found, part.top_mm)  # a mean of equal heights may round up
 
 
@@ -36,7 +36,9 @@ def _bins_of(part: MeshSurface, points: np.ndarray) -> tuple[np.ndarray, np.ndar
     return i * bins.shape[1] + j, inside
 
 
-def _over(part: MeshSurface, triangle: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def heights_over(
+    part: MeshSurface, triangle: np.ndarray, x: np.ndarray, y: np.ndarray
+) -> np.ndarray:
     """Return the height of triangles over a point each; -inf where it is not under it."""
     (ax, bx, cx), (ay, by, cy), (az, bz, cz) = part.corners[triangle].transpose(2, 1, 0)
     # Twice the signed areas of the three parts; each edge runs up the order a < b < c.

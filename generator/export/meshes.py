@@ -1,8 +1,12 @@
-"""Parts -> GLB: one node for each face of the object, body and symbols as two materials.
+"""Parts and their triangles -> STL and GLB.
 
-The faces' nodes ("F1", ...) are in the object frame, mm, z up; the root node scales to the
-metres and turns to the y-up axes of glTF. Normals are left out: a viewer then shades flat.
-glTF 2.0, binary container.
+STL is binary, mm, part frame. Coordinates are 32-bit floats: near the local origin they resolve
+1e-5 mm at 100 mm. Vertices are shared by number, so that a vertex has the same bytes in all its
+triangles and the file is as closed as the mesh.
+
+GLB (glTF 2.0, binary container) has one node for each face of the object, and body and symbols as
+two materials. The faces' nodes ("F1", ...) are in the object frame, mm, z up; the root node scales
+to the metres and turns to the y-up axes of glTF. Normals are left out: viewers then shade flat.
 """
 
 from __future__ import annotations
@@ -17,13 +21,43 @@ from numpy.typing import NDArray
 
 from generator.export.colours import BODY_RGB, RGB, SYMBOL_RGB
 from generator.export.faces import named_facets, object_faces, symbol_triangles
+from generator.export.formats import ExportedObject, Files
 from generator.solid.part import Part
 from generator.solid.triangulate import Mesh
 
+_HEADER = b"encoded-objects binary STL, mm".ljust(80, b" ")
+_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_BLOCK = 16_384  # triangles written at once: they stay in the cache
 #: Column-major: (x, y, z) mm -> (x, z, -y) / 1000 m.
 _ROOT = [0.001, 0, 0, 0, 0, 0, -0.001, 0, 0, 0.001, 0, 0, 0, 0, 0, 1]
 _FLOAT, _UNSIGNED = 5126, 5125  # component types
 _VERTICES, _INDICES = 34962, 34963  # buffer targets
+
+
+def write_stl(_part: Part, mesh: Mesh) -> Iterator[bytes | memoryview]:
+    """Return the STL file of a part."""
+    return stl_chunks(mesh)
+
+
+def write_glb(exported: ExportedObject) -> Files:
+    """Yield the GLB file of an object."""
+    yield f"{exported.name}.glb", glb_bytes(exported.name, exported.parts, exported.meshes)
+
+
+def stl_chunks(mesh: Mesh) -> Iterator[bytes | memoryview]:
+    """Yield the file of a mesh, piece by piece.
+
+    Normals are of unit length, or zero where the corners lie on a line.
+    """
+    yield _HEADER + struct.pack("<I", len(mesh.triangles))
+    for start in range(0, len(mesh.triangles), _BLOCK):
+        corners = mesh.vertices[mesh.triangles[start : start + _BLOCK]]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        facets = np.zeros(len(corners), _FACET)
+        facets["normal"] = np.divide(normals, lengths, out=normals, where=lengths > 0)
+        facets["corners"] = corners
+        yield facets.view(np.uint8).data
 
 
 def glb_bytes(name: str, parts: Sequence[Part], meshes: Sequence[Mesh]) -> bytes:
