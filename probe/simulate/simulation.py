@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
 from probe.frame import Frame
-from probe.recording.names import check_name
+from probe.recording.files import check_name
 from probe.simulate.scan import ScanKind
 from probe.simulate.simulated_probe import SimulatedProbe, SimulatedTouch, TouchOptions
 

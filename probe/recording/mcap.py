@@ -1,8 +1,15 @@
-"""MCAP files of ROS 2 messages -> recordings, without ROS and without loss.
+"""Recordings as MCAP files of ROS 2 messages, and back, without ROS and without loss.
 
-What `probe.recording.mcap_writer` wrote comes back as it was. Of a file by somebody else
-`sensor_msgs/Image` messages (32FC1, 16UC1 or mono8) are enough; their stamps are the times, and a
-`PoseStamped` belongs to the image of its stamp.
+::
+
+    /touch/image   sensor_msgs/Image              counts as 32FC1
+    /touch/pose    geometry_msgs/PoseStamped      T_base_sensor, m, where it is known
+    /touch/frame   encoded_objects_msgs/TouchFrame  the rest, see `probe.recording.ros`
+    metadata "recording"                          the attributes of the recording, as JSON
+
+What was exported comes back as it was. Of a file by somebody else `sensor_msgs/Image` messages
+(32FC1, 16UC1 or mono8) are enough; their stamps are the times, and a `PoseStamped` belongs to the
+image of its stamp.
 """
 
 from __future__ import annotations
@@ -13,7 +20,7 @@ from collections.abc import Collection, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final
+from typing import IO, Any, Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,16 +29,110 @@ from encoded_objects.base.errors import require
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type, sensor_type_text
 from probe.errors import FrameError, RecordingError
 from probe.frame import Frame, frame_from
-from probe.recording.layout import RecordingOrigin
-from probe.recording.names import check_name, final_name, part_of, unless_it_fails
-from probe.recording.opened import explain_errors
+from probe.recording.files import check_name, draft_of, explain_errors, final_name
+from probe.recording.hdf5 import write_hdf5
+from probe.recording.layout import FrameBlock, RecordingOrigin, block_of
 from probe.recording.read import Recording
-from probe.recording.record import block_of
-from probe.recording.ros import IMAGE, METADATA, POSE, TOUCH_FRAME
-from probe.recording.write import FileWriter
+from probe.recording.ros import (
+    BASE_FRAME,
+    DEFINITIONS,
+    IMAGE,
+    METADATA,
+    POSE,
+    TOUCH_FRAME,
+    frame_message,
+    image_message,
+    pose_message,
+)
 
+IMAGE_TOPIC: Final = "/touch/image"
+POSE_TOPIC: Final = "/touch/pose"
+FRAME_TOPIC: Final = "/touch/frame"
 _AT_ONCE: Final = 1024  #: frames read at a time
 _ENCODINGS: Final = {"32FC1": "f4", "16UC1": "u2", "mono16": "u2", "mono8": "u1", "8UC1": "u1"}
+
+
+class McapWriter:
+    """An MCAP file of ROS 2 messages that is being written.
+
+    Parameters
+    ----------
+    stream
+        Where it goes.
+    origin
+        Where the frames come from.
+
+    Raises
+    ------
+    MissingExtraError
+        The libraries of the extra `robot` are not installed.
+    """
+
+    def __init__(self, stream: IO[bytes], origin: RecordingOrigin) -> None:
+        require("mcap_ros2.writer", extra="robot", purpose="MCAP")
+        from mcap_ros2.writer import Writer
+
+        self._writer = Writer(stream)
+        self._schemas: dict[str, Any] = {}
+        said = {
+            "sensor": origin.sensor,
+            "calibration": origin.calibration,
+            "units": origin.units,
+            "sensor_type": origin.sensor_type,
+            "more": json.dumps({name: _plain(value) for name, value in origin.more.items()}),
+        }
+        self._writer.add_metadata(METADATA, said)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def frame(self, frame: Frame) -> None:
+        """Append a frame."""
+        self.message(IMAGE_TOPIC, IMAGE, image_message(frame), frame.t_ns, frame.seq)
+        self.message(FRAME_TOPIC, TOUCH_FRAME, frame_message(frame), frame.t_ns, frame.seq)
+        if frame.pose is not None:
+            pose = pose_message(frame.pose, frame.t_ns, BASE_FRAME)
+            self.message(POSE_TOPIC, POSE, pose, frame.t_ns, frame.seq)
+
+    def message(self, topic: str, kind: str, fields: Mapping[str, Any], t_ns: int, n: int) -> None:
+        """Append a message of one of the types of `DEFINITIONS`."""
+        if kind not in self._schemas:
+            self._schemas[kind] = self._writer.register_msgdef(kind, DEFINITIONS[kind])
+        self._writer.write_message(
+            topic, self._schemas[kind], fields, log_time=max(t_ns, 0), sequence=n & 0xFFFFFFFF
+        )
+
+    def close(self) -> None:
+        """Write what belongs at the end of the file; the stream stays open."""
+        self._writer.finish()
+
+
+def export_mcap(recording: Recording, out: Path) -> int:
+    """Write a recording as an MCAP file; returns the number of frames.
+
+    Raises
+    ------
+    RecordingError
+        The recording cannot be read, or the file not be written.
+    """
+    with (
+        explain_errors(out, "write"),
+        open(out, "wb") as stream,
+        McapWriter(stream, recording.origin) as writer,
+    ):
+        for frame in recording.frames():
+            writer.frame(frame)
+    return len(recording)
+
+
+def _plain(value: Any) -> Any:
+    """Return a value of an attribute as JSON holds it."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def import_mcap(
@@ -54,33 +155,18 @@ def import_mcap(
         No MCAP file, no images in it, or images that are none of a touch; a name that is taken.
     """
     check_name(out, replace=replace)
-    origin, frames, poses = read_mcap(path)
+    origin, frames = _read_mcap(path)
     if sensor_type and not origin.sensor_type:
-        told = sensor_type_text(choose_sensor_type(sensor_type, "", None, str(path)))
-        origin = dataclasses.replace(origin, sensor_type=told)
-    with unless_it_fails(part_of(out)) as part, FileWriter(part, origin) as writer:
-        while some := list(islice(frames, _AT_ONCE)):
-            odd = [frame for frame in some if frame.counts.shape != some[0].counts.shape]
-            if odd:
-                raise RecordingError(
-                    f"images of {some[0].counts.shape} and of {odd[0].counts.shape} readings",
-                    fix="keep the images of one sensor in a file", place=str(path),
-                )  # fmt: skip
-            writer.write(block_of(some, poses=poses))
-    final_name(part, out, [], last=True, replace=replace)
+        kind = choose_sensor_type(sensor_type, "", None, str(path))
+        origin = dataclasses.replace(origin, sensor_type=sensor_type_text(kind))
+    draft = draft_of(out)
+    write_hdf5(draft, origin, _blocks(frames, path), out)
+    final_name(draft, out, replace=replace)
     return Recording(out)
 
 
-def read_mcap(path: Path) -> tuple[RecordingOrigin, Iterator[Frame], bool]:
-    """Return where the frames of an MCAP file come from, these, and whether any may have a pose.
-
-    The frames come in order of their time.
-
-    Raises
-    ------
-    RecordingError
-        No MCAP file, or no images in it.
-    """
+def _read_mcap(path: Path) -> tuple[RecordingOrigin, Iterator[Frame]]:
+    """Return where the frames of an MCAP file come from, and these in order of their time."""
     require("mcap_ros2.decoder", extra="robot", purpose="MCAP")
     from mcap.exceptions import McapError
     from mcap.reader import make_reader
@@ -110,7 +196,18 @@ def read_mcap(path: Path) -> tuple[RecordingOrigin, Iterator[Frame], bool]:
         said.get("sensor", ""), said.get("calibration", ""), said.get("units", "counts"),
         said.get("sensor_type", ""), MappingProxyType(dict(more)),
     )  # fmt: skip
-    return origin, _frames(path), summary is None or POSE in kinds.values()
+    return origin, _frames(path)
+
+
+def _blocks(frames: Iterator[Frame], path: Path) -> Iterator[FrameBlock]:
+    while some := list(islice(frames, _AT_ONCE)):
+        odd = [frame for frame in some if frame.counts.shape != some[0].counts.shape]
+        if odd:
+            raise RecordingError(
+                f"images of {some[0].counts.shape} and of {odd[0].counts.shape} readings",
+                fix="keep the images of one sensor in a file", place=str(path),
+            )  # fmt: skip
+        yield block_of(some)
 
 
 def _frames(path: Path) -> Iterator[Frame]:
