@@ -25,13 +25,11 @@ from probe.errors import SurfaceError
 from probe.simulate.round import round_scene
 from probe.simulate.scene import Scene
 from probe.simulate.settings import FACE_AROUND
-from probe.surface.face import FaceSurface
-from probe.surface.lattice import LatticeSurface, list_lookup
+from probe.surface.body import symbol_triangles, triangulate
+from probe.surface.face import FaceSurface, LatticeSurface, list_lookup, template
 from probe.surface.mesh import MeshSurface, mesh
 from probe.surface.polygon import polygon
-from probe.surface.solids import symbol_triangles, triangulate
 from probe.surface.symbols import Relief, SymbolReliefs, emboss
-from probe.surface.template import template
 
 Array = NDArray[np.float64]
 

@@ -39,7 +39,7 @@ from probe.simulate.registered import registered_surface
 from probe.simulate.world.levels import LEVELS
 from probe.simulate.world.reading import READOUT, read_sensor
 from probe.simulate.world.worn import wear_face
-from recognizer.scan.grow import begin_scan, extend_scan
+from recognizer.scan.belief import begin_scan, extend_scan
 from recognizer.scan.mosaic.planar import (
     PlacedTouch,
     inverse,
