@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.circuit.fsr import conductances
-from probe.circuit.loaded_column import loaded_columns
-from probe.circuit.settings import FILM
+from probe.circuit.fsr import GAIN_S, conductances
+from probe.circuit.network import loaded_columns
 from probe.contact.contract import Contact, Touch
 from probe.contact.engines import Engine, engine_named
 from probe.contact.tips import Tips
@@ -139,4 +138,4 @@ def _bleed_rows(share: Array, bleed: float) -> Array:
 def _amplification(load_ohm: float) -> float:
     """Return supply over full scale: small forces read alike, but the supply stays within range."""
     full = (1 << READOUT.bits) - 1
-    return max(1.0, READOUT.counts_per_n / (full * load_ohm * FILM.gain_s))
+    return max(1.0, READOUT.counts_per_n / (full * load_ohm * GAIN_S))

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.circuit.fsr import Fsr, fsr_of
-from probe.circuit.settings import FILM
+from probe.circuit.fsr import GAIN_S, Fsr, fsr_of
 from probe.contact.tips import Tips
 from probe.simulate.world.levels import Level
 
@@ -47,7 +46,7 @@ class SensorCopy:
         plain, none = fsr_of(rows, columns), np.zeros((rows, columns))
         dead = self.dead(level) | ~sensor.present()
         hot = np.zeros(dead.size)
-        hot[self.failing[dead.size - round(level.hot * dead.size) :]] = FILM.gain_s * level.hot_n
+        hot[self.failing[dead.size - round(level.hot * dead.size) :]] = GAIN_S * level.hot_n
         return Fsr(
             gain_s=plain.gain_s * np.exp(level.gain * self.gains),
             exponent=level.exponent * sensor.exponent * plain.exponent,
