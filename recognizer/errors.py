@@ -7,6 +7,7 @@
         ├── LabError          the database holds nothing that can be read by touch
         ├── TouchError        an image that is none of the sensor's
         ├── AsBuiltError      touches that do not tell how a part was printed
+        ├── MosaicError       touches without a pose in one plane, or a pose that is none
         ├── WiringError       a change of the image that there is not
         └── SensorStateError  a file that does not tell of a sensor, or tells of another one
 
@@ -32,6 +33,10 @@ class TouchError(RecognizerError):
 
 class AsBuiltError(RecognizerError):
     """Touches that do not tell how a part was printed."""
+
+
+class MosaicError(RecognizerError):
+    """Touches that cannot lie in one plane: no pose, no covariance, two sensors."""
 
 
 class SensorStateError(RecognizerError):

@@ -1,9 +1,7 @@
-"""Inner loops compiled from C: where their library lies, and whether it may be used.
+"""Inner loops compiled from C, which a package keeps beside the Python that calls them.
 
-A package keeps the C beside the Python that calls it, and the numpy form as the reference; both
-give the same answers. `hatch_build.py` makes one `kernels.so` of all C files in a folder when the
-project is installed. It is left out where it is missing (a checkout that nobody installed), older
-than its source (install again) or unwanted (`ENCODED_OBJECTS_KERNELS=numpy`).
+`hatch_build.py` makes one `kernels.so` of all C files in a folder when the project is installed.
+Each loop has a form in numpy, its reference, in `tests/reference`; tests hold both together.
 """
 
 from __future__ import annotations
@@ -11,11 +9,20 @@ from __future__ import annotations
 import ctypes
 import os
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-CHOICE = "ENCODED_OBJECTS_KERNELS"  #: variable; "numpy" leaves the compiled form out
+from encoded_objects.base.errors import EncodedObjectsError
+
+WHOLE, REAL, POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p  #: types of arguments
+
+#: Result and arguments of each function of a library.
+Signatures = Mapping[str, tuple[Any, Sequence[Any]]]
+
+
+class KernelsError(EncodedObjectsError):
+    """The compiled loops are missing, or older than their source."""
 
 
 class _Start(ctypes.Array[ctypes.c_char]):
@@ -25,14 +32,44 @@ class _Start(ctypes.Array[ctypes.c_char]):
     _length_ = 0
 
 
-def is_wanted() -> bool:
-    """Return whether compiled loops may be used."""
-    return os.environ.get(CHOICE) != "numpy"
-
-
 def sources_in(folder: Path) -> tuple[Path, ...]:
     """Return the C files and headers of which a folder's library is made."""
     return tuple(sorted(folder.rglob("*.[ch]")))
+
+
+def load_library(folder: Path, signatures: Signatures, file: Path | None = None) -> ctypes.CDLL:
+    """Return the compiled loops of a folder.
+
+    Parameters
+    ----------
+    file
+        Library to load; by default `kernels.so` in the folder.
+
+    Raises
+    ------
+    KernelsError
+        There is none, or it was made of other sources.
+    """
+    file = file or folder / "kernels.so"
+    library = ctypes.CDLL(str(file)) if file.is_file() else None
+    if library is None or not _is_made_of(library, sources_in(folder)):
+        raise KernelsError(
+            f"the compiled loops are {'missing' if library is None else 'older than their source'}",
+            fix="install the project again: pip install -e . (or pip install encoded-objects)",
+            place=str(file),
+        )
+    for name, (result, arguments) in signatures.items():
+        function = getattr(library, name)
+        function.restype, function.argtypes = result, arguments
+    return library
+
+
+CHOICE = "ENCODED_OBJECTS_KERNELS"  #: variable; goes when nobody calls the two functions below
+
+
+def is_wanted() -> bool:
+    """Return whether compiled loops may be used."""
+    return os.environ.get(CHOICE) != "numpy"
 
 
 def library_made_of(sources: Sequence[Path], file: Path) -> ctypes.CDLL | None:
@@ -40,12 +77,15 @@ def library_made_of(sources: Sequence[Path], file: Path) -> ctypes.CDLL | None:
     if not file.is_file():
         return None
     library = ctypes.CDLL(str(file))
+    return library if _is_made_of(library, sources) else None
+
+
+def _is_made_of(library: ctypes.CDLL, sources: Sequence[Path]) -> bool:
     if not hasattr(library, "source_sum"):
-        return None
+        return False
     library.source_sum.restype = ctypes.c_uint32
-    if library.source_sum() != zlib.crc32(b"".join(one.read_bytes() for one in sources)):
-        return None
-    return library
+    made_of: int = library.source_sum()
+    return made_of == zlib.crc32(b"".join(one.read_bytes() for one in sources))
 
 
 def addresses(*arrays: Any) -> list[int | None]:

@@ -12,17 +12,17 @@ from rich.markup import escape
 
 from encoded_objects.base import output
 from generator.command.lab_report import fullness_text, fullness_values
+from generator.database.open import without_password
 from generator.database.read import surfaces_of
-from generator.database.url import without_password
 
 if TYPE_CHECKING:
     from encoded_objects.base.sensor_type import SensorType
-    from generator.database.carry import CopyReport
-    from generator.database.fullness import Fullness
-    from generator.database.part_state import PartState
+    from generator.database.lab import Fullness
+    from generator.database.part_file import PartState
     from generator.database.registered import ObjectEntry, RegisteredObject
+    from generator.database.transfer import CopyReport
     from generator.layout.placement import FaceLayout, Placement
-    from generator.pipeline.promise import FacePromise
+    from generator.layout.recognition_rate import RecognitionRate
 
 
 def print_list(
@@ -172,18 +172,28 @@ class _Face:
     area_mm2: float  #: of a round face, of all its facets
     placement: Placement | None
     layout: FaceLayout
-    promise: FacePromise | None = None  #: None: nothing was measured
+    promise: RecognitionRate | None = None  #: None: nothing was measured
 
 
 def _faces(held: RegisteredObject, sensor: SensorType) -> list[_Face]:
     """Return the faces of an object with their symbols; layouts may be in another order."""
-    from generator.pipeline.registered_promise import registered_promises
+    from generator.layout.recognition_rate import face_rates
 
     layouts = {layout.face: layout for layout in held.layout.faces}
     area = {face.face_id: face.area_mm2 for face in held.faces}
     surfaces = {surface.carrier: surface for surface in surfaces_of(held.spec)}
     facets = {facet for surface in surfaces.values() for facet in surface.facets[1:]}
-    promises = registered_promises(held, sensor)
+    flat = [
+        (face.polygon_mm, layouts[face.face_id])
+        for face in held.faces
+        if face.face_id in layouts
+        and len(layouts[face.face_id].labels)
+        and face.face_id not in facets | surfaces.keys()
+    ]
+    array, style = held.array, held.style
+    reach = held.alphabet["reach"] * style.pitch_mm + style.stroke_mm / 2
+    cells = array.rows * array.columns
+    rates = face_rates(flat, array.order, cells, style.pitch_mm, reach, sensor)
     found = []
     for face in held.faces:
         if face.face_id not in layouts or face.face_id in facets:
@@ -196,7 +206,7 @@ def _faces(held: RegisteredObject, sensor: SensorType) -> list[_Face]:
                 area_mm2=sum(area[n] for n in surface.facets) if surface else face.area_mm2,
                 placement=face.placement,
                 layout=layouts[face.face_id],
-                promise=promises.get(face.face_id),
+                promise=rates.get(face.face_id),
             )
         )
     return found

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from generator.layout.promise import PROMISE
+from generator.layout.recognition_rate import LOW, NOT_READABLE, RecognitionRate
 from generator.pipeline.faces import FaceReport
-from generator.pipeline.promise import FacePromise
 
 NAMED = 3  #: kinds of faces that are named one by one
 
@@ -26,7 +25,7 @@ def promise_lines(faces: Sequence[FaceReport]) -> list[str]:
     lines = [f"  {_percent(share)} of touches are answered at once{within}"]
     alike: dict[tuple[str, ...], list[FaceReport]] = {}
     for face, promise in sorted(promised, key=lambda one: one[1].at_once):
-        if promise.at_once < PROMISE.low:
+        if promise.at_once < LOW:
             key = f"{min(face.size_mm):.3g}", _why(face, promise), promise.remedy
             alike.setdefault(key, []).append(face)
     lines += [_low_text(key[1], key[2], some) for key, some in list(alike.items())[:NAMED]]
@@ -35,13 +34,13 @@ def promise_lines(faces: Sequence[FaceReport]) -> list[str]:
     return lines
 
 
-def _why(face: FaceReport, promise: FacePromise) -> str:
+def _why(face: FaceReport, promise: RecognitionRate) -> str:
     """Return why a face answers less than half of its touches."""
     if not face.symbols:
         return "not readable: it is blank"
     if promise.one_row:
         return "not readable by single touches: one row of symbols"
-    return "not readable by single touches" if promise.at_once < PROMISE.nothing else ""
+    return "not readable by single touches" if promise.at_once < NOT_READABLE else ""
 
 
 def _low_text(why: str, remedy: str, faces: Sequence[FaceReport]) -> str:

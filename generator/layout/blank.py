@@ -1,33 +1,31 @@
-"""What to tell a person whose faces show no identifiable place, and what would help.
+"""What would help faces that show no identifiable place, and how small a face could be.
 
-Faces without a place -> one message that lists them, and remedies that were tried: a pitch at
-which every one of them shows a place, and a size of the object that does.
+Faces without a place -> a message that lists them, and remedies that were tried: a pitch at
+which every one of them shows a place, and a size of the object that does. Region -> the least
+size, in the face's own proportions, at which it shows one; symbols and clearances are kept.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
 from generator.layout.footprint import Region
-from generator.layout.lattice import choose_lattice
-from generator.layout.places import Identifies
-from generator.layout.settings import LAYOUT
+from generator.layout.lattice import LatticeRequest
+
+HINT_BISECTIONS = 7  #: of the pitch or size that a message proposes: to 1 % of the range
+LEAST_PITCH = 0.1  #: finest pitch proposed, as a share of the one asked for
+MOST_SIZE = 8.0  #: largest object proposed, times its size
+SIZE_BISECTIONS = 8  #: of the smallest size that shows a place: to 1.1 % of the size
+SIZE_RANGE = 16.0  #: how many times smaller and larger than the face is tried
 
 
-@dataclass(frozen=True, slots=True)
-class Request:
-    """What the faces are to carry."""
-
-    half_mm: float  #: half side of a symbol's footprint
-    pitch_mm: float
-    window: tuple[int, int]  #: rows, columns
-    identifies: Identifies
-
-
-def describe_blank(names: Mapping[str, Region], cells: Sequence[int], request: Request) -> str:
+def describe_blank(
+    names: Mapping[str, Region], cells: Sequence[int], request: LatticeRequest
+) -> str:
     """Return the list of faces without a place: names, sizes, cells they hold and need.
 
     Parameters
@@ -36,13 +34,10 @@ def describe_blank(names: Mapping[str, Region], cells: Sequence[int], request: R
         Name and region of each face.
     cells
         Number of cells that each face holds.
-    request
-        Symbols and window.
     """
     alike: dict[str, list[str]] = {}
     for (name, region), held in zip(names.items(), cells, strict=True):
-        low = np.minimum(region.start, region.end).min(axis=0)
-        width, height = (np.maximum(region.start, region.end).max(axis=0) - low).tolist()
+        width, height = extent_mm(region)
         size = f"{width:.1f} x {height:.1f} mm, {held} cell{'' if held == 1 else 's'}"
         alike.setdefault(size, []).append(name)
     rows, columns = request.window
@@ -56,7 +51,7 @@ def describe_blank(names: Mapping[str, Region], cells: Sequence[int], request: R
     )
 
 
-def remedies(regions: Sequence[Region], request: Request) -> str:
+def remedies(regions: Sequence[Region], request: LatticeRequest) -> str:
     """Return what would give every face a place; each remedy with a number has been tried."""
     different = {_key(region): region for region in regions}
     ways = []
@@ -71,13 +66,38 @@ def remedies(regions: Sequence[Region], request: Request) -> str:
     return ", ".join(ways) + ", or leave the faces blank"
 
 
-def _pitch(region: Region, request: Request) -> float:
+def extent_mm(region: Region) -> tuple[float, float]:
+    """Return width and height of a face in its own frame, mm."""
+    low = np.minimum(region.start, region.end).min(axis=0)
+    width, height = (np.maximum(region.start, region.end).max(axis=0) - low).tolist()
+    return width, height
+
+
+def smallest_mm(region: Region, request: LatticeRequest) -> tuple[float, float]:
+    """Return width and height at which the face still shows a place; infinite if never, mm."""
+
+    def shows(scale: float) -> bool:
+        scaled = Region(region.start * scale, region.end * scale, region.clearance)
+        return _shows_place(scaled, request)
+
+    works, fails = (1.0, 1.0 / SIZE_RANGE) if shows(1.0) else (SIZE_RANGE, 1.0)
+    if works == SIZE_RANGE and not shows(SIZE_RANGE):
+        return math.inf, math.inf
+    for _ in range(SIZE_BISECTIONS):
+        middle = math.sqrt(works * fails)
+        works, fails = (middle, fails) if shows(middle) else (works, middle)
+    width, height = extent_mm(region)
+    return width * works, height * works
+
+
+def _pitch(region: Region, request: LatticeRequest) -> float:
     """Return a pitch (mm) at which the face shows a place, symbols in proportion; 0 if none."""
 
     def shows(share: float) -> bool:
-        return _shows_place(region, request.half_mm * share, request.pitch_mm * share, request)
+        half, pitch = request.half_mm * share, request.pitch_mm * share
+        return _shows_place(region, replace(request, half_mm=half, pitch_mm=pitch))
 
-    share = _largest_share(shows, LAYOUT.least_pitch, 1.0)
+    share = _largest_share(shows, LEAST_PITCH, 1.0)
     for step in (0.1, 0.05, 0.01):  # the roundest number that still works
         pitch = float(np.floor(share * request.pitch_mm / step + 1e-9)) * step
         if pitch > 0.0 and shows(pitch / request.pitch_mm):
@@ -85,14 +105,14 @@ def _pitch(region: Region, request: Request) -> float:
     return 0.0
 
 
-def _scale(region: Region, request: Request) -> float:
+def _scale(region: Region, request: LatticeRequest) -> float:
     """Return how many times larger the face must be to show a place; infinite if unknown."""
 
     def shows(inverse: float) -> bool:
         larger = Region(region.start / inverse, region.end / inverse, region.clearance)
-        return _shows_place(larger, request.half_mm, request.pitch_mm, request)
+        return _shows_place(larger, request)
 
-    inverse = _largest_share(shows, 1.0 / LAYOUT.most_size, 1.0)
+    inverse = _largest_share(shows, 1.0 / MOST_SIZE, 1.0)
     if inverse == 0.0:
         return float(np.inf)
     for step in (0.1, 0.01):
@@ -106,7 +126,7 @@ def _largest_share(shows: Callable[[float], bool], low: float, high: float) -> f
     """Return a share from low (works) to high (does not) that works, by bisection; 0 if none."""
     if not shows(low):
         return 0.0
-    for _ in range(LAYOUT.hint_bisections):
+    for _ in range(HINT_BISECTIONS):
         middle = float(np.sqrt(low * high))
         if shows(middle):
             low = middle
@@ -115,11 +135,8 @@ def _largest_share(shows: Callable[[float], bool], low: float, high: float) -> f
     return low
 
 
-def _shows_place(region: Region, half: float, pitch: float, request: Request) -> bool:
-    lattice = choose_lattice(
-        [region], half, pitch, request.window, request.identifies, search=False
-    )
-    return any(lattice.places)
+def _shows_place(region: Region, request: LatticeRequest) -> bool:
+    return any(request.choose([region], search=False).places)
 
 
 def _key(region: Region) -> bytes:

@@ -1,24 +1,34 @@
 """Choose how the lattice of symbols lies on a face, or on several faces of a net at once.
 
 Regions (mm) + pitch + window -> Lattice: rotation and shift that show the most identifiable
-places, of those that `lattice_search` finds. The lattice frame is the face (or net) frame turned
-by `rotation_rad`; cell (j, i) has its centre at (x_mm + i p, y_mm + j p), j against the array's
-rows.
+places. Rotations: along the edges, and twelfths of a quarter turn between them; shifts: a regular
+grid, and those at which a row of cells touches what an edge forbids. All shifts of one rotation
+are tried at once. The lattice frame is the face (or net) frame turned by `rotation_rad`; cell
+(j, i) has its centre at (x_mm + i p, y_mm + j p), j against the array's rows.
+
+Other numbers below give other lattices, so other cells for the same spec: objects that are
+registered keep theirs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.layout.footprint import Region, mirror_region, move_region, slack
-from generator.layout.lattice_search import FACE_WORTH, CellSet, lattice_candidates
-from generator.layout.places import Cells, Identifies, array_cells, count_places
+from generator.layout.footprint import Region, free_grid, mirror_region, move_region, slack
+from generator.layout.places import Cells, Identifies, array_cells, count_places, windows_in
 
 Points = NDArray[np.float64]
+
+SAME_RAD = 1e-9  #: rotations nearer than this are the same
+CENTRES = 1 << 17  #: candidate centres looked at for one rotation
+SEARCH_ROTATIONS = 12  #: steps over a quarter turn between the edges' directions: 7.5 degrees
+EDGE_ROTATIONS = 12  #: edge directions tried at most
+COMPARED_SETS = 8  #: sets of cells with equal scores whose margins to the edges are compared
+FACE_WORTH = 1 << 32  #: a face that shows a place counts more than any number of places elsewhere
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +42,41 @@ class Lattice:
     places: tuple[int, ...]  #: per region
     quarter: int  #: quarter turns from lattice x to array x (columns)
     margin_mm: float  #: least way to the next edge along x or y
+
+
+@dataclass(frozen=True, slots=True)
+class CellSet:
+    """The cells that one shift of the lattice shows."""
+
+    y: float  #: mm, lattice frame
+    x: float
+    cells: tuple[Cells, ...]  #: per region (n, 2): j, i
+
+
+@dataclass(frozen=True, slots=True)
+class LatticeCandidate:
+    """One rotation and the shifts that show the most there."""
+
+    worth: int  #: places, and FACE_WORTH for every face that shows one
+    cells: int
+    rotation: float  #: rad
+    sets: tuple[CellSet, ...]  #: with these numbers of places and cells
+
+
+@dataclass(frozen=True, slots=True)
+class LatticeRequest:
+    """What lattices carry: symbols, and the window that a place takes."""
+
+    half_mm: float  #: half side of a symbol's footprint
+    pitch_mm: float
+    window: tuple[int, int]  #: rows, columns
+    identifies: Identifies
+
+    def choose(self, regions: Sequence[Region], *, search: bool) -> Lattice:
+        """Return the best lattice of faces; see `choose_lattice`."""
+        return choose_lattice(
+            regions, self.half_mm, self.pitch_mm, self.window, self.identifies, search=search
+        )
 
 
 def choose_lattice(
@@ -63,7 +108,8 @@ def choose_lattice(
     """
     found = lattice_candidates(regions, half_mm, pitch_mm, window, search)
     if not found:
-        return Lattice(0.0, 0.0, 0.0, (_no_cells(),) * len(regions), (0,) * len(regions), 0, 0.0)
+        none = np.empty((0, 2), dtype=np.int64)
+        return Lattice(0.0, 0.0, 0.0, (none,) * len(regions), (0,) * len(regions), 0, 0.0)
     best = max((c.worth, c.cells) for c in found)
     if best[0] == 0 and identifies is not None:
         for candidate in sorted(found, key=lambda c: -c.cells):
@@ -75,6 +121,147 @@ def choose_lattice(
     choice = [_centre(regions, half_mm, pitch_mm, head.rotation, cells) for cells in head.sets]
     lattice = max(choice, key=lambda lattice: lattice.margin_mm)
     return _with_places(lattice, window, identifies)
+
+
+def lattice_candidates(
+    regions: Sequence[Region],
+    half: float,
+    pitch: float,
+    window: tuple[int, int],
+    search: bool,
+) -> list[LatticeCandidate]:
+    """Return the best shifts (mm) for every rotation worth a look, edge directions first.
+
+    Parameters as for `choose_lattice`.
+    """
+    area = sum(abs(_area(region)) for region in regions) / pitch**2
+    fine = int(np.clip(np.sqrt(CENTRES / (2.0 * area + 8.0)), 4, 16))
+    found = []
+    best = (0, 0)
+    for rotation in edge_rotations(regions):
+        found += _best_shifts(regions, half, pitch, window, rotation, fine, best)
+        best = max(((c.worth, c.cells) for c in found), default=best)
+    if search:
+        steps = SEARCH_ROTATIONS
+        for rotation in (np.arange(1, steps) / steps * np.pi / 2).tolist():
+            # A coarse look is enough to see whether a rotation may win.
+            coarse = _best_shifts(regions, half, pitch, window, rotation, 4, best)
+            if best[0] == 0:
+                found += coarse
+            elif coarse:
+                found += _best_shifts(regions, half, pitch, window, rotation, fine, best)
+            best = max(((c.worth, c.cells) for c in found), default=best)
+    return found
+
+
+def edge_rotations(regions: Sequence[Region]) -> list[float]:
+    """Return the rotations (rad) that lay the lattice along an edge; the first edge is first."""
+    side = np.concatenate([region.end - region.start for region in regions])
+    length = np.hypot(side[:, 0], side[:, 1])
+    order = np.concatenate([[0], 1 + np.argsort(-length[1:], kind="stable")])
+    quarter = np.pi / 2
+    rotations: list[float] = []
+    for dx, dy in side[order].tolist():
+        angle = -float(np.arctan2(dy, dx))
+        angle -= quarter * round(angle / quarter)
+        if angle <= -np.pi / 4 + SAME_RAD:
+            angle += quarter
+        apart = ((angle - r + quarter / 2) % quarter - quarter / 2 for r in rotations)
+        if all(abs(turn) > SAME_RAD for turn in apart):
+            rotations.append(0.0 if abs(angle) <= SAME_RAD else angle)
+        if len(rotations) == EDGE_ROTATIONS:
+            break
+    return rotations
+
+
+def _best_shifts(
+    regions: Sequence[Region],
+    half: float,
+    pitch: float,
+    window: tuple[int, int],
+    rotation: float,
+    steps: int,
+    best: tuple[int, int],
+) -> list[LatticeCandidate]:
+    """Return the shifts with the most places, then cells, at one rotation.
+
+    None without cells, nor if it falls short of the best (worth, cells) so far.
+    """
+    turned = [move_region(region, rotation) for region in regions]
+    ys = _shifts(turned, half, pitch, steps)
+    xs = _shifts([mirror_region(region) for region in turned], half, pitch, steps)
+    along = np.zeros((len(ys), len(xs)), dtype=np.int64)
+    across, cells = along.copy(), along.copy()
+    grids: list[tuple[NDArray[np.bool_], tuple[int, int]]] = []
+    for region in turned:
+        j, y = _lines(region.start[:, 1], ys, pitch)
+        i, x = _lines(region.start[:, 0], xs, pitch)
+        free = free_grid(region, half, y.ravel(), x.ravel())
+        free = free.reshape(len(y), len(ys), len(x), len(xs))
+        grids.append((free, (j, i)))
+        cells += free.sum(axis=(0, 2))
+        for total, shape in ((along, window), (across, window[::-1])):
+            here = windows_in(free, *shape).sum(axis=(0, 2))
+            total += here + FACE_WORTH * (here > 0)
+    if cells.max() == 0:
+        return []
+    worth = np.maximum(along, across)
+    cells[worth < worth.max()] = -1
+    at = np.argwhere(cells == cells.max())
+    reached = int(worth.max()), int(cells.max())
+    if best[0] > 0 and reached < best:
+        return []
+    return [LatticeCandidate(*reached, rotation, _unique_sets(grids, at, ys, xs))]
+
+
+def _unique_sets(
+    grids: Sequence[tuple[NDArray[np.bool_], tuple[int, int]]],
+    at: NDArray[np.intp],
+    ys: Points,
+    xs: Points,
+) -> tuple[CellSet, ...]:
+    """Return the different sets of cells at some shifts (k, 2), the first few of them."""
+    if len(at) > 8 * COMPARED_SETS:
+        at = at[np.linspace(0, len(at) - 1, 8 * COMPARED_SETS).astype(int)]
+    sets: dict[bytes, CellSet] = {}
+    for y, x in at.tolist():
+        masks = [free[:, y, :, x] for free, _ in grids]
+        key = b"".join(np.packbits(mask).tobytes() for mask in masks)
+        if key not in sets:
+            cells = tuple(
+                np.argwhere(mask).astype(np.int64) + first
+                for mask, (_, first) in zip(masks, grids, strict=True)
+            )
+            sets[key] = CellSet(float(ys[y]), float(xs[x]), cells)
+        if len(sets) == COMPARED_SETS:
+            break
+    return tuple(sets.values())
+
+
+def _shifts(regions: Sequence[Region], half: float, pitch: float, steps: int) -> Points:
+    """Return shifts along y worth trying: a regular grid, and rows that touch what edges forbid."""
+    start, end = (
+        np.concatenate([getattr(r, name)[:, 1] for r in regions]) for name in ("start", "end")
+    )
+    reach = np.concatenate([r.clearance for r in regions]) + half
+    level = np.abs(end - start)
+    touching = np.concatenate([np.maximum(start, end) + reach, np.minimum(start, end) - reach])
+    order = np.argsort(np.tile(level, 2), kind="stable")[:steps]
+    shifts = np.concatenate([np.arange(steps) * (pitch / steps), np.mod(touching[order], pitch)])
+    shifts = np.sort(np.where(shifts >= pitch, 0.0, shifts))
+    return shifts[np.diff(shifts, prepend=-1.0) > 1e-6 * pitch]
+
+
+def _lines(values: Points, shifts: Points, pitch: float) -> tuple[int, Points]:
+    """Return the first cell number, and all lattice lines (k, shifts) that may meet the region."""
+    first = int(np.ceil(values.min() / pitch)) - 1
+    last = int(np.floor(values.max() / pitch))
+    return first, np.arange(first, last + 1)[:, None] * pitch + shifts
+
+
+def _area(region: Region) -> float:
+    (ax, ay), (bx, by) = region.start.T, region.end.T
+    return 0.5 * float(np.sum(ax * by - ay * bx))
 
 
 def _centre(
@@ -118,15 +305,7 @@ def _with_places(
         places = _places(lattice.cells, turn, window, identifies)
         if not best or _worth(places) > _worth(best):
             best, quarter = places, turn
-    return Lattice(
-        lattice.rotation_rad,
-        lattice.x_mm,
-        lattice.y_mm,
-        lattice.cells,
-        best,
-        quarter,
-        lattice.margin_mm,
-    )
+    return replace(lattice, places=best, quarter=quarter)
 
 
 def _places(
@@ -137,7 +316,3 @@ def _places(
 
 def _worth(places: Sequence[int]) -> int:
     return sum(n + FACE_WORTH * (n > 0) for n in places)
-
-
-def _no_cells() -> Cells:
-    return np.empty((0, 2), dtype=np.int64)

@@ -17,21 +17,24 @@ from numpy.typing import ArrayLike, NDArray
 
 from generator.array.contract import SymbolArray
 from generator.errors import LayoutError
-from generator.layout.blank import Request, describe_blank, remedies
+from generator.layout.blank import describe_blank, remedies
 from generator.layout.footprint import Region, region_of
-from generator.layout.lattice import choose_lattice
-from generator.layout.piece import Piece, PiecePose, piece_of, turn_piece
-from generator.layout.placement import FaceLayout, Layout, Placement
-from generator.layout.places import rank_test
-from generator.layout.plan import (
+from generator.layout.lattice import LatticeRequest
+from generator.layout.occupancy import Occupancy
+from generator.layout.piece import (
     LayoutPlan,
     LayoutTask,
-    face_lattice,
+    Piece,
+    PiecePose,
     faces_plan,
     net_piece,
     net_plan,
+    piece_of,
+    turn_piece,
 )
-from generator.layout.torus import Occupancy, Spot, place_pieces
+from generator.layout.placement import FaceLayout, Layout, Placement
+from generator.layout.places import rank_test
+from generator.layout.torus import TorusPosition, place_pieces
 from generator.layout.unfold import split, unfold
 from generator.polyhedron.frame import face_polygon
 from generator.polyhedron.winged import Polyhedron
@@ -116,7 +119,7 @@ def lay_out(
         region_of(outline, clearances)
         for outline, clearances in zip(outlines, clearances_mm, strict=True)
     )
-    request = Request(footprint_half_mm, pitch_mm, array.window, rank_test(array))
+    request = LatticeRequest(footprint_half_mm, pitch_mm, array.window, rank_test(array))
     task = LayoutTask(polyhedron, array, request, regions, frozenset(blank_faces))
 
     plans = []
@@ -152,13 +155,10 @@ def lay_out_face(
     array, pitch_mm, footprint_half_mm
         As for `lay_out`.
     """
-    identifies = rank_test(array)
-    lattice = choose_lattice(
-        [region], footprint_half_mm, pitch_mm, array.window, identifies, search=False
-    )
-    pose = PiecePose(0.0, 0.0, 0.0)
-    piece = piece_of((0,), (pose,), lattice, pitch_mm, array.window, identifies)
-    return _face_layout(array, pitch_mm, piece, 0, Spot(0, 0, 0))
+    request = LatticeRequest(footprint_half_mm, pitch_mm, array.window, rank_test(array))
+    lattice = request.choose([region], search=False)
+    piece = piece_of((0,), (PiecePose(0.0, 0.0, 0.0),), lattice, request)
+    return _face_layout(array, pitch_mm, piece, 0, TorusPosition(0, 0, 0))
 
 
 def _without_place(task: LayoutTask, plan: LayoutPlan, allowed: bool) -> tuple[str, ...]:
@@ -171,7 +171,7 @@ def _without_place(task: LayoutTask, plan: LayoutPlan, allowed: bool) -> tuple[s
     faces = sorted(face for face, places in shown.items() if places == 0)
     if not faces:
         return ()
-    lattices = [face_lattice(task, face) for face in faces]
+    lattices = [task.request.choose([task.regions[face]], search=True) for face in faces]
     names = {task.polyhedron.faces[face].name: task.regions[face] for face in faces}
     cause = describe_blank(names, [len(lattice.cells[0]) for lattice in lattices], task.request)
     if allowed:
@@ -185,13 +185,13 @@ def _without_place(task: LayoutTask, plan: LayoutPlan, allowed: bool) -> tuple[s
 
 def _place_plan(
     task: LayoutTask, plan: LayoutPlan, occupancy: Occupancy
-) -> tuple[LayoutPlan, tuple[Spot | None, ...]] | None:
+) -> tuple[LayoutPlan, tuple[TorusPosition | None, ...]] | None:
     """Place a plan; pieces of a net that find no place are cut in two until they do."""
     while True:
-        spots = place_pieces(occupancy, [(p.owner >= 0, p.turns) for p in plan.pieces])
-        lost = [k for k, p in enumerate(plan.pieces) if p.cells and spots[k] is None]
+        positions = place_pieces(occupancy, [(p.owner >= 0, p.turns) for p in plan.pieces])
+        lost = [k for k, p in enumerate(plan.pieces) if p.cells and positions[k] is None]
         if not lost:
-            return plan, tuple(spots)
+            return plan, tuple(positions)
         if plan.net is None or any(len(plan.net.pieces[k]) < 2 for k in lost):
             return None
         net = plan.net
@@ -206,37 +206,42 @@ def _place_plan(
 
 
 def _layout(
-    task: LayoutTask, plan: LayoutPlan, spots: tuple[Spot | None, ...], warnings: tuple[str, ...]
+    task: LayoutTask,
+    plan: LayoutPlan,
+    positions: tuple[TorusPosition | None, ...],
+    warnings: tuple[str, ...],
 ) -> Layout:
-    """Return the finished layout of a plan whose pieces have their spots."""
+    """Return the finished layout of a plan whose pieces have their positions."""
     none = np.empty(0, dtype=np.int64)
     count = len(task.polyhedron.faces)
     faces = [
         FaceLayout(face, Placement(0, 0, 0.0, 0.0, 0.0), none, none, none, np.empty((0, 2)), 0)
         for face in range(count)
     ]
-    for piece, spot in zip(plan.pieces, spots, strict=True):
-        if spot is not None:
-            lying = turn_piece(piece, spot.quarter, task.request.pitch_mm)
+    for piece, at in zip(plan.pieces, positions, strict=True):
+        if at is not None:
+            lying = turn_piece(piece, at.quarter, task.request.pitch_mm)
             for k, face in enumerate(piece.faces):
                 if piece.places[k]:
                     pitch = task.request.pitch_mm
-                    faces[face] = _face_layout(task.array, pitch, lying, k, spot)
+                    faces[face] = _face_layout(task.array, pitch, lying, k, at)
     blank = tuple(face.face for face in faces if len(face.rows) == 0)
     return Layout(plan.kind, task.request.pitch_mm, tuple(faces), blank, warnings)
 
 
-def _face_layout(array: SymbolArray, pitch: float, piece: Piece, k: int, spot: Spot) -> FaceLayout:
-    """Return one face of a piece that has been turned and has its spot."""
+def _face_layout(
+    array: SymbolArray, pitch: float, piece: Piece, k: int, at: TorusPosition
+) -> FaceLayout:
+    """Return one face of a piece that has been turned and has its position."""
     pose = piece.poses[k]
     r, c = (index.astype(np.int64) for index in np.nonzero(piece.owner == k))
     rotation = math.remainder(pose.rotation_rad, 2 * math.pi)
     cosine, sine = math.cos(rotation), math.sin(rotation)
     u, v = (c + 0.5) * pitch - pose.x_mm, -(r + 0.5) * pitch - pose.y_mm
-    rows, columns = (r + spot.row) % array.rows, (c + spot.column) % array.columns
+    rows, columns = (r + at.row) % array.rows, (c + at.column) % array.columns
     return FaceLayout(
         piece.faces[k],
-        Placement(spot.row, spot.column, rotation, pose.x_mm, pose.y_mm),
+        Placement(at.row, at.column, rotation, pose.x_mm, pose.y_mm),
         rows,
         columns,
         array.symbols(rows, columns),

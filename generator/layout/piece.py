@@ -1,20 +1,27 @@
-"""A piece: what is placed on the array as a whole, one face or several faces of a net.
+"""Pieces of a layout, and plans made of them, before they have cells on the array.
 
-Lattice (mm, per face) -> Piece: a small grid that says which face owns which cell, and the
-transform of each face into the grid's plane. Grid cell (r, c) has its centre at
-((c + 1/2) p, -(r + 1/2) p), p = pitch, mm, as cells of the array have.
+A piece is what is placed on the array as a whole: one face, or several faces of a net. It is a
+small grid that says which face owns which cell, and the transform of each face into the grid's
+plane; grid cell (r, c) has its centre at ((c + 1/2) p, -(r + 1/2) p), p = pitch, mm, as cells
+of the array have. Plan `faces` gives every face a lattice of its own, plan `net` lets one run
+through each piece of the unfolded object. Thesis 6.3.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.layout.lattice import Lattice
-from generator.layout.places import Identifies, count_places
+from generator.array.contract import SymbolArray
+from generator.layout.footprint import ROUNDING, Region, move_region
+from generator.layout.lattice import Lattice, LatticeRequest
+from generator.layout.places import count_places
+from generator.layout.unfold import Net
+from generator.polyhedron.winged import Polyhedron
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,13 +49,89 @@ class Piece:
         return int(np.count_nonzero(self.owner >= 0))
 
 
+@dataclass(frozen=True, slots=True)
+class LayoutPlan:
+    """One way to lay out the object, before it has cells."""
+
+    kind: str
+    pieces: tuple[Piece, ...]
+    net: Net | None
+
+    @property
+    def worth(self) -> tuple[int, int, int]:
+        """Faces that are identified, then places, then few cells."""
+        places = [n for piece in self.pieces for n in piece.places]
+        return sum(n > 0 for n in places), sum(places), -sum(p.cells for p in self.pieces)
+
+
+@dataclass(frozen=True, slots=True)
+class LayoutTask:
+    """What is to be laid out."""
+
+    polyhedron: Polyhedron
+    array: SymbolArray
+    request: LatticeRequest
+    regions: tuple[Region, ...]  #: per face, face frame
+    blank: frozenset[int]  #: faces that shall carry no symbols
+
+
+def faces_plan(task: LayoutTask) -> LayoutPlan:
+    """Give every face a lattice of its own; faces with equal polygons share the work."""
+    known: dict[bytes, Piece] = {}
+    pieces = []
+    for face, region in enumerate(task.regions):
+        if face in task.blank:
+            continue
+        step = ROUNDING * task.request.pitch_mm
+        edges = np.column_stack([region.start, region.end, region.clearance])
+        key = (np.round(edges / step) + 0.0).tobytes()
+        if key not in known:
+            known[key] = _piece(task, (face,), (PiecePose(0.0, 0.0, 0.0),), search=True)
+        pieces.append(replace(known[key], faces=(face,)))
+    return LayoutPlan("faces", tuple(pieces), None)
+
+
+def net_plan(task: LayoutTask, net: Net) -> LayoutPlan:
+    """Let one lattice run through each piece of the net."""
+    pieces = tuple(net_piece(task, net, faces) for faces in net.pieces)
+    return LayoutPlan("net", pieces, net)
+
+
+def net_piece(task: LayoutTask, net: Net, faces: Sequence[int]) -> Piece:
+    """Return some faces of a net, on one lattice."""
+    shown = tuple(face for face in faces if face not in task.blank)
+    poses = tuple(
+        PiecePose(math.atan2(T[1, 0], T[0, 0]), float(T[0, 2]), float(T[1, 2]))
+        for T in net.T_net_face[list(shown)]
+    )
+    return _piece(task, shown, poses, search=False)
+
+
+def _piece(
+    task: LayoutTask, faces: tuple[int, ...], poses: tuple[PiecePose, ...], *, search: bool
+) -> Piece:
+    """Choose the lattice of some faces and drop the cells of those that it does not identify."""
+    request = task.request
+    if not faces:
+        return Piece((), (), np.empty((0, 0), dtype=np.int64), (), (0,))
+    regions = [
+        move_region(task.regions[face], pose.rotation_rad, pose.x_mm, pose.y_mm)
+        for face, pose in zip(faces, poses, strict=True)
+    ]
+    lattice = request.choose(regions, search=search)
+    cells = tuple(
+        own if places else own[:0]
+        for own, places in zip(lattice.cells, lattice.places, strict=True)
+    )
+    lattice = replace(lattice, cells=cells)
+    return piece_of(faces, poses, lattice, request)
+
+
 def piece_of(
     faces: Sequence[int],
     poses: Sequence[PiecePose],
     lattice: Lattice,
-    pitch_mm: float,
-    window: tuple[int, int],
-    identifies: Identifies | None = None,
+    request: LatticeRequest,
 ) -> Piece:
     """Return the piece that a lattice shows.
 
@@ -58,21 +141,17 @@ def piece_of(
         Numbers of the faces, one per region of the lattice.
     poses
         T_net_face, in the frame in which the lattice was chosen.
-    lattice, pitch_mm
-        The lattice and its pitch.
-    window, identifies
-        As for `choose_lattice`: they decide which quarter turns are allowed.
+    lattice, request
+        The lattice and what it carries, which decides what quarter turns are allowed.
     """
     owner, low, high = _grid(lattice)
     lattice_poses = [
-        _turn_pose(pose, lattice.rotation_rad, *_corner(lattice, low, high, pitch_mm))
+        _turn_pose(pose, lattice.rotation_rad, *_corner(lattice, low, high, request.pitch_mm))
         for pose in poses
     ]
     piece = Piece(tuple(faces), tuple(lattice_poses), owner, lattice.places, (0,))
-    piece = turn_piece(piece, lattice.quarter, pitch_mm)
-    return Piece(
-        piece.faces, piece.poses, piece.owner, lattice.places, _turns(piece, window, identifies)
-    )
+    piece = turn_piece(piece, lattice.quarter, request.pitch_mm)
+    return replace(piece, turns=_turns(piece, request))
 
 
 def turn_piece(piece: Piece, quarter: int, pitch_mm: float) -> Piece:
@@ -88,7 +167,7 @@ def turn_piece(piece: Piece, quarter: int, pitch_mm: float) -> Piece:
             for pose in poses
         )
         owner = np.ascontiguousarray(np.rot90(owner))
-    return Piece(piece.faces, poses, owner, piece.places, piece.turns)
+    return replace(piece, poses=poses, owner=owner)
 
 
 def _grid(lattice: Lattice) -> tuple[NDArray[np.int64], tuple[int, int], tuple[int, int]]:
@@ -123,13 +202,13 @@ def _turn_pose(pose: PiecePose, rotation: float, x: float, y: float) -> PiecePos
     )
 
 
-def _turns(piece: Piece, window: tuple[int, int], identifies: Identifies | None) -> tuple[int, ...]:
+def _turns(piece: Piece, request: LatticeRequest) -> tuple[int, ...]:
     """Return the quarter turns under which no face loses a place."""
     allowed = [0]
     for quarter in (1, 2, 3):
         owner = np.rot90(piece.owner, quarter)
         if all(
-            count_places(*_cells(owner == k), window, identifies) >= places
+            count_places(*_cells(owner == k), request.window, request.identifies) >= places
             for k, places in enumerate(piece.places)
         ):
             allowed.append(quarter)

@@ -13,21 +13,24 @@ W. Schlickenrieder, Nets of polyhedra, 1997: steepest-edge cuts.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from manifold3d import triangulate
 from numpy.typing import NDArray
 
-from generator.layout.overlap import Triangles, overlap, triangles_of
-from generator.layout.settings import LAYOUT
-from generator.plane.polygon import triangle_areas
+from generator.plane.polygon import is_convex, triangle_areas
 from generator.polyhedron.frame import face_polygon
 from generator.polyhedron.winged import Polyhedron
 
 Points = NDArray[np.float64]
+Triangles = NDArray[np.float64]  #: (n, 3, 2), counter-clockwise
 
 TOLERANCE = 1e-7  #: faces that overlap by less than this share of the net's size touch
+FACES_LAID = 6000  #: over all trees at most: bounds the time for objects of many faces
+BREADTH_ROOTS = 12  #: faces from which a tree by breadth is begun
+RANDOM_TREES = 24  #: in random order of edges, after those by breadth and by direction
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +79,7 @@ def unfold(polyhedron: Polyhedron, *, seed: int = 0) -> Net:
         if best is None or len(net.pieces) < len(best.pieces):
             best = net
         work += len(polyhedron.faces)
-        if len(best.pieces) == 1 or work >= LAYOUT.faces_laid:
+        if len(best.pieces) == 1 or work >= FACES_LAID:
             break
     if best is None:
         raise ValueError("a polyhedron without faces has no net")
@@ -123,12 +126,12 @@ def _trees(polyhedron: Polyhedron, surface: _Surface, seed: int) -> Iterator[tup
     """Yield the face to begin with and the order of folds, promising ones first."""
     areas = [float(np.sum(triangle_areas(triangles))) for triangles in surface.triangles]
     roots = sorted(range(len(areas)), key=lambda face: (-round(areas[face], 6), face))
-    for root in roots[: LAYOUT.breadth_roots]:
+    for root in roots[:BREADTH_ROOTS]:
         yield root, lambda _edge, depth: float(depth)
     for direction in _directions():
         yield roots[0], _uncut_first(_steepest_edges(polyhedron, direction))
     random = np.random.default_rng(seed)
-    for _ in range(LAYOUT.random_trees):
+    for _ in range(RANDOM_TREES):
         yield roots[0], _edge_order(random.permutation(len(polyhedron.edges)))
 
 
@@ -226,3 +229,48 @@ def _hinge_transform(surface: _Surface, parent: int, hinge: _Hinge) -> Points:
     T[:2, :2] = R
     T[:2, 2] = (a + b) / 2 - R @ (c + d) / 2
     return T
+
+
+def triangles_of(loops: Sequence[Points]) -> Triangles:
+    """Return triangles (n, 3, 2) that fill a polygon: outer loop, then holes."""
+    points = np.concatenate(loops)
+    if len(loops) == 1 and is_convex(points):
+        k = np.arange(1, len(points) - 1)
+        corners = points[np.column_stack([np.zeros_like(k), k, k + 1])]
+    else:
+        corners = points[np.asarray(triangulate([np.asarray(loop) for loop in loops]))]
+    size = float(np.ptp(points, axis=0).max())
+    return np.asarray(corners[triangle_areas(corners) > 0.5e-12 * size * size])
+
+
+def overlap(first: Triangles, second: Triangles, tolerance: float) -> bool:
+    """Whether any triangle of the first set reaches into one of the second (lengths in mm).
+
+    Separating axes: two triangles overlap if along every edge normal of both they reach into each
+    other by more than the tolerance; so faces that share an edge or a vertex of the net never do.
+    """
+    second = _near_triangles(second, first, tolerance)
+    first = _near_triangles(first, second, tolerance)
+    if len(first) == 0 or len(second) == 0:
+        return False
+    gap = np.maximum(_separation(first, second), _separation(second, first).T)
+    return bool((gap < -tolerance).any())
+
+
+def _near_triangles(triangles: Triangles, others: Triangles, tolerance: float) -> Triangles:
+    """Return the triangles that reach into the bounding box of the others."""
+    if len(others) == 0:
+        return triangles[:0]
+    low, high = others.min(axis=(0, 1)) + tolerance, others.max(axis=(0, 1)) - tolerance
+    near = (triangles.max(axis=1) > low) & (triangles.min(axis=1) < high)
+    return np.asarray(triangles[near.all(axis=1)])
+
+
+def _separation(first: Triangles, second: Triangles) -> Points:
+    """Return the widest gap (n, m) that an edge normal of the first shows to the second, mm."""
+    side = np.roll(first, -1, axis=1) - first
+    normal = np.stack([side[..., 1], -side[..., 0]], axis=-1)
+    normal /= np.sqrt(np.einsum("nki,nki->nk", side, side))[..., None]
+    foot = np.einsum("nki,nki->nk", normal, first)
+    reach = np.einsum("nki,mci->nkmc", normal, second).min(axis=-1)
+    return np.asarray((reach - foot[..., None]).max(axis=1))

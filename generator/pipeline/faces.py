@@ -1,22 +1,41 @@
-"""What each face of an object shows and promises, and how small it could be."""
+"""What each face of an object shows, its expected recognition rate, and what would raise that.
+
+Plan + layout -> a report on every face that symbols can stand on. A remedy has been tried: the
+face is laid out again, wider or at another pitch, and its rate is computed again. Round faces have
+no rate, since none was measured.
+"""
 
 from __future__ import annotations
 
+import dataclasses
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from generator.layout.blank import Request
-from generator.layout.footprint import region_of
+from generator.alphabet.outline import SymbolStyle, footprint_half_mm
+from generator.alphabet.printable import check_printable
+from generator.errors import GeneratorError
+from generator.layout.blank import extent_mm, smallest_mm
+from generator.layout.footprint import Points, Region, region_of
+from generator.layout.lattice import LatticeRequest
+from generator.layout.layout import lay_out_face
 from generator.layout.placement import Layout
 from generator.layout.places import rank_test
-from generator.layout.smallest import extent_mm, smallest_mm
+from generator.layout.recognition_rate import LOW, Loops, RecognitionRate, face_rate, face_rates
 from generator.pipeline.plan import ObjectPlan
-from generator.pipeline.promise import FacePromise, promise_faces
-from generator.plane.polygon import signed_area
+from generator.plane.polygon import is_convex, signed_area
 from generator.polyhedron import Polyhedron, face_normal, face_polygon
+from generator.solid.inset import inset, regular
 
 Size = tuple[float, float]  #: width and height in the face's frame, mm
+
+TRIES = 150  #: poses on each face that is tried as a remedy
+PITCHES_MM = (6.5, 6.0, 5.5, 5.0, 4.5, 4.0)
+"""Tried as remedies, times the coarseness of the sensor; rates were measured from 4 to 7 mm."""
+WIDER = 3.0  #: times the width that is tried at most
+THICKER_MM = (2, 3, 4, 5, 6, 8, 10, 12, 15)  #: that bars of faces that are not convex are widened
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +49,7 @@ class FaceReport:
     area_mm2: float
     symbols: int
     places: int  #: windows that fit, or one where all its symbols together name it
-    promise: FacePromise | None  #: None where a touch promises nothing that was measured
+    promise: RecognitionRate | None  #: None where no rate was measured
     smallest_mm: Size | None = None  #: at which it would still show a place, in its proportions
 
 
@@ -46,8 +65,8 @@ def face_reports(
     smallest
         Say also how small each face could be, for which its layout is searched many times.
     """
-    promises = promise_faces(plan, layout)
-    request = Request(
+    rates = _rates(plan, layout)
+    request = LatticeRequest(
         plan.footprint_half_mm, plan.spec.style.pitch_mm, plan.array.window, rank_test(plan.array)
     )
     kinds = {surface.carrier: surface.kind for surface in plan.polyhedron.surfaces}
@@ -72,7 +91,7 @@ def face_reports(
                 area_mm2=round(float(sum(signed_area(loop) for loop in outline)), 3),
                 symbols=len(face.labels),
                 places=face.places,
-                promise=promises.get(face.face),
+                promise=rates.get(face.face),
                 smallest_mm=known.get(key),
             )
         )
@@ -92,3 +111,111 @@ def _place(polyhedron: Polyhedron, face: int, size: Size, kind: str) -> str:
     else:
         where = "about ({})".format(", ".join(f"{value + 0.0:.3g}" for value in middle))
     return f"the {width:.3g} x {height:.3g} mm face {where}"
+
+
+def _rates(plan: ObjectPlan, layout: Layout) -> dict[int, RecognitionRate]:
+    """Return the rate of each flat face by its number, low ones with a remedy."""
+    round_faces = {surface.carrier for surface in plan.polyhedron.surfaces}
+    flat = [
+        (face_polygon(plan.polyhedron, face.face), face)
+        for face in layout.faces
+        if face.face not in plan.blank_faces and face.face not in round_faces
+    ]
+    array, style, sensor = plan.array, plan.spec.style, plan.spec.sensor
+    cells = array.rows * array.columns
+    half = _symbol_half_mm(plan, style)
+    rates = face_rates(flat, array.order, cells, layout.pitch_mm, half, sensor)
+    remedies: dict[tuple[float, float, bool], str] = {}
+    for loops, face in flat:
+        rate = rates.get(face.face)
+        if rate is None or rate.at_once >= LOW:
+            continue
+        # Faces of one width that are longer than a sensor have one remedy.
+        narrow, wide = sorted(np.ptp(loops[0], axis=0).round(1).tolist())
+        like = narrow, min(wide, 1.5 * sensor.across_mm), is_convex(loops[0])
+        if like not in remedies:
+            remedies[like] = _remedy(plan, loops, face.face)
+        rates[face.face] = dataclasses.replace(rate, remedy=remedies[like])
+    return rates
+
+
+def _symbol_half_mm(plan: ObjectPlan, style: SymbolStyle) -> float:
+    """Return the distance from a symbol's centre to the end of its strokes."""
+    return plan.alphabet.reach * style.pitch_mm + style.stroke_mm / 2
+
+
+def _remedy(plan: ObjectPlan, loops: Loops, face: int) -> str:
+    """Return what would bring the face's rate to `LOW`; empty if nothing that was tried does."""
+    style = plan.spec.style
+    region = region_of(plan.developed.get(face) or loops, plan.clearances_mm[face])
+    found = []
+    width, factor = _wider(plan, loops, region)
+    if width:
+        found.append(f"{math.ceil(width * factor - 1e-9):g} mm wide instead of {width:.3g}")
+    elif more := _thicker(plan, loops, plan.clearances_mm[face]):
+        found.append(f"{more:g} mm wider all along")
+    for usual in PITCHES_MM:
+        pitch = round(usual * plan.spec.sensor.coarseness, 1)
+        if pitch >= style.pitch_mm:
+            continue
+        finer = dataclasses.replace(
+            style, pitch_mm=pitch, stroke_mm=round(style.stroke_mm * pitch / style.pitch_mm, 2)
+        )
+        if _prints(plan, finer) and _rate_of(plan, loops, region, finer) >= LOW:
+            found.append(f"pitch {pitch:g} mm")
+            break
+    return " or ".join(found)
+
+
+def _wider(plan: ObjectPlan, loops: Loops, region: Region) -> tuple[float, float]:
+    """Return the width (mm) of a simple face and how many times wider it must be; zeros if not."""
+    size = np.ptp(loops[0], axis=0)
+    narrow = int(np.argmin(size))
+    if len(region.start) != len(loops[0]) or not is_convex(loops[0]):
+        return 0.0, 0.0
+
+    def enough(factor: float) -> bool:
+        stretch = np.ones(2)
+        stretch[narrow] = factor
+        wide = Region(region.start * stretch, region.end * stretch, region.clearance)
+        return _rate_of(plan, (loops[0] * stretch,), wide, plan.spec.style) >= LOW
+
+    low, high = 1.0, WIDER
+    if not enough(high):
+        return 0.0, 0.0
+    while (high - low) * size[narrow] > 2.0:  # mm
+        middle = (low + high) / 2
+        low, high = (low, middle) if enough(middle) else (middle, high)
+    return float(size[narrow]), high
+
+
+def _thicker(plan: ObjectPlan, loops: Loops, clearances: Sequence[Points]) -> int:
+    """Return by how many mm a face of bars must be thicker, its outline moved outward; 0: none.
+
+    Of faces that are not convex and have no holes: an L, a T, a frame that is cut open.
+    """
+    if len(loops) > 1 or is_convex(loops[0]):
+        return 0
+    for more in THICKER_MM:
+        grown = (inset(loops[0], np.full(len(loops[0]), -more / 2)),)
+        if not regular(loops, grown, more):
+            return 0
+        if _rate_of(plan, grown, region_of(grown, clearances), plan.spec.style) >= LOW:
+            return more
+    return 0
+
+
+def _prints(plan: ObjectPlan, style: SymbolStyle) -> bool:
+    try:
+        check_printable(plan.alphabet, style, plan.printer)
+    except GeneratorError:
+        return False
+    return True
+
+
+def _rate_of(plan: ObjectPlan, loops: Loops, region: Region, style: SymbolStyle) -> float:
+    """Return the share of touches answered at once on a face that is laid out in a style."""
+    half = footprint_half_mm(plan.alphabet, style)
+    face = lay_out_face(region, plan.array, style.pitch_mm, half)
+    reach = _symbol_half_mm(plan, style)
+    return face_rate(loops, face, style.pitch_mm, reach, plan.spec.sensor, TRIES).at_once

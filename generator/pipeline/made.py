@@ -13,7 +13,7 @@ from generator.pipeline.overhang import overhang_of
 from generator.pipeline.plan import ObjectPlan
 
 if TYPE_CHECKING:
-    from generator.export.fit_check import FitReport
+    from generator.export.check import FitReport
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,8 +16,7 @@ from generator.export.bed import Plate
 from generator.export.sheet.drawing import draw_back, draw_front, draw_plate, draw_step, is_panel
 from generator.export.sheet.page import sheet_html
 from generator.export.sheet.values import BuildSheet, Check, GlueStep, PartCard, Rows
-from generator.layout.object_code import object_code
-from generator.layout.placement import FaceLayout, Layout
+from generator.layout.placement import FaceLayout, Layout, object_code
 from generator.pipeline.overhang import overhang_of
 from generator.pipeline.plan import ObjectPlan
 from generator.polyhedron import face_polygon

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from generator.export.stl import stl_chunks
+from generator.export.meshes import stl_chunks
 from generator.printed.deposit import deposit
 from generator.printed.faults import PrintFaults
 from generator.printed.profiles import PrintProfile

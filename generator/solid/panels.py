@@ -71,7 +71,7 @@ def panels(
         Of the object, engraved on the backs, and put before each face's name to name the part:
         "Cube-F1".
     code
-        Engraved in place of the name where that has no room, see `layout.object_code`.
+        Engraved in place of the name where that has no room, see `layout.placement.object_code`.
     gap_mm
         Least distance of two panels in the finished object.
     numbers

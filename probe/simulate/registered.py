@@ -18,12 +18,10 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection
 
 from generator.database import DatabaseError
-from generator.database.entries import find_object, list_objects, object_names
-from generator.database.open import open_database
-from generator.database.read import read_object, read_parts
+from generator.database.open import normal_url, open_database, part_file, part_path
+from generator.database.read import find_object, list_objects, object_names, read_object, read_parts
 from generator.database.registered import RegisteredFace, RegisteredObject, RegisteredPart
 from generator.database.transaction import read_transaction
-from generator.database.url import normal_url, part_file, part_path
 from probe.errors import SurfaceError
 from probe.simulate.scene import Scene
 from probe.simulate.written import part_mesh, round_part

@@ -29,7 +29,7 @@ from probe.contact.contract import Contact, Touch
 from probe.contact.press import accuracy_of, level_for
 from probe.errors import SurfaceError
 from probe.frame import Frame, frame_from
-from probe.recording.names import check_name
+from probe.recording.files import check_name
 from probe.recording.record import Recorder
 from probe.simulate.scan import ScanKind, ScanPath, scan_path
 from probe.simulate.scene import Scene

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from encoded_objects.base.errors import EncodedObjectsError
-from generator.database.part_triangles import part_triangles
+from generator.database.part_file import part_triangles
 from probe.contact.contract import Touch
 from probe.errors import SurfaceError
 from probe.simulate.scene import Scene

@@ -11,7 +11,7 @@ from recognizer.bench.message import MosaicMessage, mosaic_message
 from recognizer.bench.settings import RECOGNITION
 from recognizer.scan.mosaic.grow import add_touch
 from recognizer.scan.mosaic.mosaic import Mosaic, no_touches
-from recognizer.scan.mosaic.touch import PlacedTouch, decoded_place
+from recognizer.scan.mosaic.planar import PlacedTouch, decoded_place
 from recognizer.touch.recognition import Recognition
 from recognizer.touch.signal import Signal
 

@@ -14,8 +14,7 @@ import numpy as np
 from sqlalchemy import Connection, select
 
 from generator.database import tables
-from generator.database.entries import list_objects
-from generator.database.read import read_object
+from generator.database.read import list_objects, read_object
 from generator.database.registered import RegisteredObject
 from probe.surface.solids import symbol_triangles
 from probe.surface.symbols import Relief, emboss

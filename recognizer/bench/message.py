@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from encoded_objects.base.sensor_type import SensorType
 from recognizer.bench.images import FILTERS, filter_image
 from recognizer.bench.settings import PAGE
-from recognizer.scan.mosaic.image import GlobalImage
+from recognizer.scan.mosaic.canvas import GlobalImage
 
 Array = NDArray[np.float64]
 

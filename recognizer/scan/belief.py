@@ -13,7 +13,7 @@ from recognizer.scan.answer import (
 from recognizer.scan.lattice import (
     PlaneLattice,
 )
-from recognizer.scan.mosaic.touch import PlacedTouch
+from recognizer.scan.mosaic.planar import PlacedTouch
 from recognizer.scan.settings import ScanSettings
 from recognizer.scan.views import (
     LatticeView,

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from recognizer.scan.belief import ScanBelief, begin_scan
 from recognizer.scan.join import join_touch
-from recognizer.scan.mosaic.planar import relative_pose
-from recognizer.scan.mosaic.touch import PlacedTouch, planar_belief
+from recognizer.scan.mosaic.planar import PlacedTouch, planar_belief, relative_pose
 from recognizer.scan.settings import ScanSettings
 from recognizer.scan.views import (
     TouchPoses,

@@ -28,7 +28,7 @@ from recognizer.scan.lattice import (
     same_lattice,
     seed_lattice,
 )
-from recognizer.scan.mosaic.touch import PlacedTouch
+from recognizer.scan.mosaic.planar import PlacedTouch
 from recognizer.scan.path import follow_path, path_touch_poses
 from recognizer.scan.settings import LATTICES, ScanSettings
 from recognizer.scan.steps import steps_of

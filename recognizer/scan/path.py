@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.scan.mosaic.planar import (
+    PlanarBelief,
     wrap_angle,
 )
-from recognizer.scan.mosaic.touch import PlanarBelief
 from recognizer.scan.settings import PATHS, ScanSettings
 from recognizer.scan.steps import log_freedom, step_between
 from recognizer.scan.views import LatticeView, TouchPoses

@@ -21,8 +21,13 @@ from probe.arm.carried import SensorPose
 from recognizer.scan.belief import ScanBelief, begin_scan
 from recognizer.scan.faces import TouchedFace, contradict, join_faces
 from recognizer.scan.grow import extend_scan
-from recognizer.scan.mosaic.planar import planar_covariance, planar_pose
-from recognizer.scan.mosaic.touch import PlacedTouch, PlanarBelief, planar_belief
+from recognizer.scan.mosaic.planar import (
+    PlacedTouch,
+    PlanarBelief,
+    planar_belief,
+    planar_covariance,
+    planar_pose,
+)
 from recognizer.scan.settings import ScanSettings
 from recognizer.touch.contacts import TouchImage
 from recognizer.touch.lab import Lab

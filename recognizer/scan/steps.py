@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.scan.mosaic.planar import (
+    PlacedTouch,
+    PlanarBelief,
     compose_poses,
     composed_covariance,
     relative_covariance,
     relative_pose,
     wrap_angle,
 )
-from recognizer.scan.mosaic.touch import PlacedTouch, PlanarBelief
 from recognizer.scan.settings import PATHS, ScanSettings
 from recognizer.touch.symbols.fit import Fit
 

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.scan.mosaic.grow import add_touch
-from recognizer.scan.mosaic.mosaic import Mosaic, MosaicSettings, no_touches
-from recognizer.scan.mosaic.planar import wrap_angle
-from recognizer.scan.mosaic.touch import PlacedTouch
+from recognizer.scan.mosaic.mosaic import Mosaic, no_touches
+from recognizer.scan.mosaic.planar import PlacedTouch, wrap_angle
 from recognizer.scan.settings import VIEWS, ScanSettings
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.reader import Reader
@@ -82,7 +81,7 @@ def stands_of(
         poses = np.concatenate([before.poses, pose])
         return TouchPoses(poses, np.concatenate([before.covariances, covariance]), None)
     if mosaic is None:
-        mosaic = no_touches(reader.sensor, MosaicSettings(period_mm=pitch))
+        mosaic = no_touches(reader.sensor, pitch)
         for touch in touches[:-1]:
             mosaic = add_touch(mosaic, touch)
     mosaic = add_touch(mosaic, last)

@@ -25,7 +25,7 @@ from recognizer.scan.mosaic.planar import (
     relative_pose,
     transform_points,
 )
-from recognizer.scan.mosaic.settings import CANVAS
+from recognizer.scan.mosaic.search import MAGNIFIED
 from recognizer.thesis.filters import magnify_image
 from recognizer.thesis.product import product_shift
 from recognizer.thesis.settings import ROUNDING, MergingSettings
@@ -123,7 +123,7 @@ def average_touches(
     sensor: SensorType, images: Sequence[TactileImage], placed: Array
 ) -> TactileImage:
     """Return the mean of images laid at poses (n, 3), sampled four times as finely."""
-    cell = sensor.pitch_mm / CANVAS.magnified
+    cell = sensor.pitch_mm / MAGNIFIED
     half = np.array(sensor.half_mm) - sensor.pitch_mm / 2
     corners = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     ends = np.concatenate([transform_points(pose, corners) for pose in placed])

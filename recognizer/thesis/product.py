@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.scan.mosaic.settings import CANVAS
+from recognizer.scan.mosaic.search import MAGNIFIED
 
 Array = NDArray[np.float64]
 
@@ -50,11 +50,11 @@ def product_shift(a: Array, b: Array, believed: tuple[float, float], window: flo
     """
     first, second = magnify_samples(a), magnify_samples(b)
     rows, columns = first.shape
-    right, down = round(believed[0] * CANVAS.magnified), -round(believed[1] * CANVAS.magnified)
+    right, down = round(believed[0] * MAGNIFIED), -round(believed[1] * MAGNIFIED)
     i0, i1 = max(0, down), min(rows, rows + down)
     j0, j1 = max(0, right), min(columns, columns + right)
     zone = first[i0:i1, j0:j1]
-    reach = math.floor(window * CANVAS.magnified + 1e-9)
+    reach = math.floor(window * MAGNIFIED + 1e-9)
     wide = np.pad(second, max(rows, columns) + reach)  # no reading beyond the matrix
     best, shift = -math.inf, (right, down)
     for k in range(-reach, reach + 1):
@@ -65,4 +65,4 @@ def product_shift(a: Array, b: Array, believed: tuple[float, float], window: flo
             total = float((zone * under).sum())
             if total > best:
                 best, shift = total, (right + n, down + k)
-    return np.array([shift[0], -shift[1]]) / CANVAS.magnified
+    return np.array([shift[0], -shift[1]]) / MAGNIFIED

@@ -1,16 +1,4 @@
-"""Whether the best hypothesis about a touch may be believed. Thesis 6.3.
-
-The best of all registered places always exists; it is an answer only if
-
-- no other place explains the image nearly as well (`margin`),
-- it explains the image better than symbols of no registered place (`surprise`),
-- the symbols that are registered there, worn ones excepted, explain most of the image
-  (`explained`), enough of them are in view, and no cell speaks clearly for another symbol
-  (`contradicted`),
-- where few symbols are plainly read, they are at least so many that they can name one of the
-  registered cells (`symbols_to_name`), and leave other places farther behind: bare cells, which are
-  as well beyond an edge, between two edges or worn, then weigh as much as the symbols.
-"""
+"""What the image says of a verified place: the evidence that `verdict` judges. Thesis 6.3."""
 
 from __future__ import annotations
 
@@ -36,34 +24,10 @@ from recognizer.touch.symbols.fit import Fit
 from recognizer.touch.symbols.gain import Image
 from recognizer.touch.symbols.posterior import refit_pose
 from recognizer.touch.symbols.template import ResponseTemplate
+from recognizer.touch.verdict import CONTRADICTION, STRONG_CONTRADICTION, Evidence
 
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
-
-
-@dataclass(frozen=True, slots=True)
-class Support:
-    """What speaks for a hypothesis."""
-
-    surprise: float  #: nats over symbols of no registered place
-    explained: float  #: share of the image's variance
-    inliers: int  #: cells that are seen, with a registered symbol that is not worn
-    clear: int  #: cells that speak clearly for another symbol
-    plain: int  #: and plainly
-    wider: float  #: tenths of a mm by which strokes would be wider than asked
-    worn: int  #: cells that are seen, with a registered symbol that is not felt
-
-    def holds(self, limits: BeliefSettings) -> bool:
-        """Return whether an encoded surface is believed."""
-        few = self.inliers < limits.many_inliers
-        doubtful = self.surprise < limits.sure or self.wider > limits.wide
-        return (
-            self.surprise >= limits.surprise
-            and (self.explained >= limits.well or not doubtful)
-            and self.explained >= (limits.explained if few else limits.explained_by_many)
-            and self.clear <= limits.contradicted
-            and self.plain == 0
-        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,13 +69,13 @@ class VerifiedHypothesis:
 
         return refit_pose(self.image, self.template, fit, shown)
 
-    def support(self) -> Support:
+    def evidence(self) -> Evidence:
         """Return what speaks for it."""
-        return _support_of(self)
+        return _evidence_of(self)
 
 
 @lru_cache(maxsize=8)
-def _support_of(found: VerifiedHypothesis) -> Support:
+def _evidence_of(found: VerifiedHypothesis) -> Evidence:
     embossed, fit, limits = found.embossed, found.fit, found.image.settings.belief
     cells = weigh_cells(embossed, fit, found.hypothesis, limits)
     worn = fit.cells[cells.worn]
@@ -119,13 +83,13 @@ def _support_of(found: VerifiedHypothesis) -> Support:
     def shown(at: Ints) -> Ints:
         return unworn_labels_at(embossed, found.hypothesis, worn, at)
 
-    return Support(
-        surprise=found.score - null_log_likelihood(embossed, fit),
+    return Evidence(
+        log_likelihood_ratio=found.score - null_log_likelihood(embossed, fit),
         explained=explained_share(found.image, found.template, fit.pose, fit.gain, shown),
         inliers=int(cells.agree.sum()),
-        clear=int((cells.seen & (cells.against > limits.clearly)).sum()),
-        plain=int((cells.seen & (cells.against > limits.plainly)).sum()),
-        wider=fit.wider,
+        contradictions=int((cells.seen & (cells.against > CONTRADICTION)).sum()),
+        strong_contradictions=int((cells.seen & (cells.against > STRONG_CONTRADICTION)).sum()),
+        stroke_excess=fit.stroke_excess,
         worn=int((cells.worn & cells.seen).sum()),
     )
 

@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 from encoded_objects.base.sensor_type import SensorType
 from recognizer.touch import cause
 from recognizer.touch.around import combine_around, quantile
-from recognizer.touch.belief import Support, VerifiedHypothesis, unworn_labels_at, weigh_cells
+from recognizer.touch.belief import VerifiedHypothesis, unworn_labels_at, weigh_cells
 from recognizer.touch.cause import Cause
 from recognizer.touch.first_look import shows_strokes
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.signal import Signal
 from recognizer.touch.symbols.explained import explained_share
 from recognizer.touch.symbols.projection import project_symbols
+from recognizer.touch.verdict import Evidence
 from recognizer.touch.verify import fit_touch
 
 Array = NDArray[np.float64]
@@ -127,9 +128,9 @@ def _is_plain(image: ImageFeatures, signal: Signal, settings: CauseSettings) -> 
     return filled > settings.filled and bool(forces.std() < settings.plain * forces.mean())
 
 
-def _is_there(support: Support | None, settings: CauseSettings) -> bool:
+def _is_there(evidence: Evidence | None, settings: CauseSettings) -> bool:
     """Whether the symbols of a place are plainly there: hard pressed ones, not a plain face."""
-    return support is not None and support.surprise >= settings.there
+    return evidence is not None and evidence.log_likelihood_ratio >= settings.there
 
 
 def diagnose(
@@ -149,32 +150,37 @@ def diagnose(
         return Cause(cause.NO_LOAD, {})
     pitch = min(each.style.pitch_mm for each in reader.lab.arrays)
     image = image_features(reader.sensor, signal, pitch, settings)
-    support = found[0].support() if found else None
+    evidence = found[0].evidence() if found else None
     seen = _by_image(image, signal, settings)
-    if seen is not None and not (seen.code == cause.PLAIN and _is_there(support, settings)):
+    if seen is not None and not (seen.code == cause.PLAIN and _is_there(evidence, settings)):
         return seen
-    symbols = 0 if support is None else support.inliers
+    symbols = 0 if evidence is None else evidence.inliers
     if image.width_mm < settings.narrow_mm and image.length_mm > settings.longer * image.width_mm:
         return Cause(cause.ONE_ROW, {"width_mm": image.width_mm, "symbols": float(symbols)})
     bare = not shows_strokes(reader, signal) or _is_plain(image, signal, settings)
-    if bare and not _is_there(support, settings):
+    if bare and not _is_there(evidence, settings):
         return Cause(cause.PLAIN, {"variation": image.variation, "plateau": image.plateau})
-    if support is None:
+    if evidence is None:
         code = cause.EDGE if image.loaded < settings.loaded else cause.UNCLEAR
         return Cause(code, {"symbols": 0.0, "explained": 0.0, "loaded": image.loaded})
-    numbers = {"symbols": float(symbols), "explained": support.explained, "loaded": image.loaded,
-               "surprise": support.surprise, "against": float(support.clear)}  # fmt: skip
+    numbers = {
+        "symbols": float(symbols),
+        "explained": evidence.explained,
+        "loaded": image.loaded,
+        "surprise": evidence.log_likelihood_ratio,
+        "against": float(evidence.contradictions),
+    }
     silent, ghosts = _disagreement(found[0], settings)
-    placed = support.surprise > settings.known and image.loaded > settings.lying
+    placed = evidence.log_likelihood_ratio > settings.known and image.loaded > settings.lying
     if placed and silent > settings.dead and ghosts < settings.ghosts:
         return Cause(cause.DEAD_TACTELS, {**numbers, "silent": silent})
     if image.loaded < settings.loaded:
         return Cause(cause.EDGE, numbers)
     explained, read = _read_anywhere(reader, signal, settings)
     numbers |= {"explained_anywhere": explained, "symbols_anywhere": float(read)}
-    if support.surprise < settings.known and explained > settings.explained:
+    if evidence.log_likelihood_ratio < settings.known and explained > settings.explained:
         return Cause(cause.NOT_REGISTERED, numbers)
-    if max(support.explained, explained) < settings.pattern:
+    if max(evidence.explained, explained) < settings.pattern:
         return Cause(cause.OTHER_PATTERN, numbers)
     return Cause(cause.UNCLEAR, numbers)
 

@@ -27,9 +27,12 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 
 def leaves_much(found: VerifiedHypothesis, settings: ExchangedSettings) -> bool:
     """Return whether a good part of a touch is left over by a hypothesis, and not for noise."""
-    support, image = found.support(), found.image
+    evidence, image = found.evidence(), found.image
     strongest = mean_of_strongest(image.forces * image.trust, settings.strongest)
-    poorly = support.surprise < settings.surprise and support.explained < settings.explained
+    poorly = (
+        evidence.log_likelihood_ratio < settings.surprise
+        and evidence.explained < settings.explained
+    )
     if poorly and strongest >= settings.soft * image.noise:
         return True
     return _lies_beside(found, settings.pressed * strongest, settings)

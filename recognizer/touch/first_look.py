@@ -19,12 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from recognizer.touch.around import mean_of_strongest, quantile
-from recognizer.touch.belief import Support, VerifiedHypothesis, symbols_to_name
+from recognizer.touch.belief import VerifiedHypothesis, symbols_to_name
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, TOO_FEW, Recognition
 from recognizer.touch.settings import FirstLookSettings
 from recognizer.touch.signal import Signal
+from recognizer.touch.verdict import MANY_INLIERS, Evidence
 
 Array = NDArray[np.float64]
 
@@ -62,7 +63,7 @@ def may_tell_more(
     answer: Recognition,
     judged: Recognition,
     best: VerifiedHypothesis | None,
-    support: Support | None,
+    evidence: Evidence | None,
 ) -> bool:
     """Return whether a wide search may find what the first try has not.
 
@@ -70,31 +71,31 @@ def may_tell_more(
     ----------
     answer, judged
         What the first try says; the same, or refused because few symbols say it.
-    best, support
+    best, evidence
         The hypothesis that was judged, and what speaks for it; None: there was none.
     """
-    arrays, belief = reader.lab.arrays, reader.settings.belief
-    if best is None or support is None:
+    arrays = reader.lab.arrays
+    if best is None or evidence is None:
         return True
-    if answer and support.inliers >= belief.many_inliers:
+    if answer and evidence.inliers >= MANY_INLIERS:
         return False
     if reader.sensor.overlay.kind != "tab" or any(each.radii_mm for each in arrays):
         return True  # what few symbols say is confirmed; on a round face few tactels are pressed
     if answer:
         return not judged and _is_nearly_sure(judged, reader.settings.first_look)
-    if answer.reason == AMBIGUOUS and support.inliers < symbols_to_name(best.embossed):
+    if answer.reason == AMBIGUOUS and evidence.inliers < symbols_to_name(best.embossed):
         return False  # the image is explained, and it shows no more
     if answer.reason == TOO_FEW:
         return False
-    return _is_unexplained(reader, signal, support)
+    return _is_unexplained(reader, signal, evidence)
 
 
-def may_be_chance(reader: PreparedLab, judged: Recognition, support: Support) -> bool:
+def may_be_chance(reader: PreparedLab, judged: Recognition, evidence: Evidence) -> bool:
     """Return whether a wide search had better look at an answer again."""
     settings = reader.settings
     if judged.doubt is None or judged.doubt <= settings.belief.looked_at_again:
         return False
-    return support.surprise < settings.first_look.plain
+    return evidence.log_likelihood_ratio < settings.first_look.plain
 
 
 def _is_nearly_sure(judged: Recognition, settings: FirstLookSettings) -> bool:
@@ -106,17 +107,19 @@ def _is_nearly_sure(judged: Recognition, settings: FirstLookSettings) -> bool:
     return False
 
 
-def _is_unexplained(reader: PreparedLab, signal: Signal, support: Support) -> bool:
+def _is_unexplained(reader: PreparedLab, signal: Signal, evidence: Evidence) -> bool:
     """Return whether symbols are pressed that are those of a place, or may be under another fit."""
     settings = reader.settings.first_look
-    if support.inliers < settings.agreed or support.surprise < settings.foreign:
+    if evidence.inliers < settings.agreed or evidence.log_likelihood_ratio < settings.foreign:
         return False
     if not shows_strokes(reader, signal):
         return False
     least = min(_tactels_to_name(reader, each, settings) for each in reader.lab.arrays)
     if pressed_tactels(signal, settings) < least:
         return False
-    return support.surprise < settings.plain or support.explained >= settings.explained
+    return (
+        evidence.log_likelihood_ratio < settings.plain or evidence.explained >= settings.explained
+    )
 
 
 def pressed_tactels(signal: Signal, settings: FirstLookSettings) -> int:

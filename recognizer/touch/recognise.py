@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from recognizer.touch.belief import Support, VerifiedHypothesis
+from recognizer.touch.belief import VerifiedHypothesis
 from recognizer.touch.cause import EXCHANGED, Cause
 from recognizer.touch.chance import expected_by_border, expected_matches
 from recognizer.touch.diagnose import diagnose
@@ -35,9 +35,7 @@ from recognizer.touch.pose import (
 from recognizer.touch.prepare import PreparedLab
 from recognizer.touch.recognition import (
     AMBIGUOUS,
-    BY_CHANCE,
     NO_CONTACT,
-    NOT_ENCODED,
     OUTSIDE,
     TOO_FEW,
     Recognition,
@@ -47,6 +45,13 @@ from recognizer.touch.recognition import (
 from recognizer.touch.settings import ReaderSettings
 from recognizer.touch.signal import Signal
 from recognizer.touch.symbols.fit import Fit
+from recognizer.touch.verdict import (
+    Evidence,
+    may_count_border,
+    reject_chance,
+    reject_few,
+    reject_reason,
+)
 from recognizer.touch.verify import verify_hypotheses
 
 
@@ -84,18 +89,18 @@ def _try_twice(
         return refusal(seq, NO_CONTACT), []
     settings = reader.settings
     first = verify_hypotheses(reader, signal, settings.first)
-    answer, support = _answer(first, settings, seq)
-    judged = _judge(reader, first, answer, support)
-    if not may_tell_more(reader, signal, answer, judged, first[0] if first else None, support):
-        if judged and support is not None and may_be_chance(reader, judged, support):
+    answer, evidence = _answer(first, settings, seq)
+    judged = _judge(reader, first, answer, evidence)
+    if not may_tell_more(reader, signal, answer, judged, first[0] if first else None, evidence):
+        if judged and evidence is not None and may_be_chance(reader, judged, evidence):
             return _look_again(reader, signal, judged, first)
         return judged, first
     # Spend more where it is needed: no answer yet, or one that few cells speak for.
     second = verify_hypotheses(reader, signal, settings.thorough)
-    final, support = _answer(second, settings, seq)
+    final, evidence = _answer(second, settings, seq)
     if answer and final and not first[0].coincides(second[0]):
         return refusal(seq, AMBIGUOUS, margin=0.0, runner_up=answer.runner_up), second
-    return _judge(reader, second, final, support), second
+    return _judge(reader, second, final, evidence), second
 
 
 def _look_again(
@@ -111,11 +116,10 @@ def _look_again(
     if not second or not first[0].coincides(second[0]):
         return refusal(answer.seq, AMBIGUOUS, margin=0.0, runner_up=runner_up), second
     doubt = _doubt_of(reader, second[0], answer)
-    if doubt > reader.settings.belief.doubt_again:
-        return refusal(
-            answer.seq, BY_CHANCE, margin=margin, runner_up=runner_up, doubt=doubt
-        ), second
-    return answer, first
+    reason = reject_chance(doubt, reader.settings.belief.doubt_again)
+    if not reason:
+        return answer, first
+    return refusal(answer.seq, reason, margin=margin, runner_up=runner_up, doubt=doubt), second
 
 
 def _read_exchanged(reader: PreparedLab, signal: Signal, best: VerifiedHypothesis) -> Cause | None:
@@ -130,16 +134,16 @@ def _read_exchanged(reader: PreparedLab, signal: Signal, best: VerifiedHypothesi
         return None
     for axis in (0, 1):
         found = verify_hypotheses(reader, exchange_halves(signal, axis), settings.first)
-        answer, support = _answer(found, settings, 0)
-        if _judge(reader, found, answer, support) and found[0].score > best.score:
+        answer, evidence = _answer(found, settings, 0)
+        if _judge(reader, found, answer, evidence) and found[0].score > best.score:
             return Cause(EXCHANGED, {"columns": float(axis)})
     return None
 
 
 def _answer(
     found: list[VerifiedHypothesis], settings: ReaderSettings, seq: int
-) -> tuple[Recognition, Support | None]:
-    """Return what hypotheses, best first, say together, and what speaks for the best; None of none.
+) -> tuple[Recognition, Evidence | None]:
+    """Return the answer of hypotheses, best first, and the evidence for the best; None of none.
 
     A place one pitch beside is the same place up to a cell's rounding and tells nothing of the
     margin, but for one case: it explains the image nearly as well. So it does where fewer cells
@@ -154,91 +158,58 @@ def _answer(
     if other is not None:
         face = other.embossed.face(other.hypothesis.face)
         runner_up = RunnerUp(face.object, face.face, other.index)
-    support = best.support()
-    beside = next((one for one in found[1:] if not best.coincides(one)), None)
-    reason = ""
-    if not support.holds(limits):
-        reason = NOT_ENCODED
-    elif support.inliers < limits.least_inliers:
-        reason = TOO_FEW
-    else:
-        if beside is not None and best.score - beside.score < limits.margin_by_few:
-            margin = min(margin, best.score - beside.score)
-        if margin < limits.margin:
-            reason = AMBIGUOUS
+    evidence = best.evidence()
+    adjacent = next((one for one in found[1:] if not best.coincides(one)), None)
+    nearest = margin
+    if adjacent is not None and best.score - adjacent.score < limits.margin_by_few:
+        nearest = min(margin, best.score - adjacent.score)
+    reason = reject_reason(evidence, nearest, limits)
+    if reason in ("", AMBIGUOUS):
+        margin = nearest
     answer = answer_at(
         best.embossed, best.fit if reason else best.last_fit(), best.hypothesis, settings, seq,
         reason=reason, margin=margin, runner_up=runner_up,
     )  # fmt: skip
-    return answer, support
+    return answer, evidence
 
 
 def _judge(
     reader: PreparedLab,
     found: list[VerifiedHypothesis],
     answer: Recognition,
-    support: Support | None,
+    evidence: Evidence | None,
 ) -> Recognition:
     """Return an answer with its doubt, or as refused: for few symbols, or for chance."""
-    if not answer or support is None:
+    if not answer or evidence is None:
         return answer
-    if support.inliers < reader.settings.belief.many_inliers:
-        answer = _refuse_few(reader, found[0], answer)
-    return _refuse_by_chance(reader, found[0], answer)
-
-
-def _refuse_few(reader: PreparedLab, best: VerifiedHypothesis, answer: Recognition) -> Recognition:
-    """Return an answer that few cells speak for, if they can name a place and do so plainly."""
-    settings, reason = reader.settings, ""
-    by_symbols = expected_matches(
+    settings, best, doubt = reader.settings, found[0], None
+    margin = math.inf if answer.margin is None else answer.margin
+    matches = expected_matches(
         reader.lab.arrays, best.embossed, best.fit, best.hypothesis, settings, borders=False
     )
-    if by_symbols > settings.belief.named:
-        reason = TOO_FEW
-    elif answer.margin is not None and answer.margin < settings.belief.margin_by_few:
-        reason = AMBIGUOUS
+    reason = reject_few(evidence, margin, matches, settings.belief)
     if not reason:
-        return answer
-    return refusal(answer.seq, reason, margin=answer.margin, runner_up=answer.runner_up)
-
-
-def _refuse_by_chance(
-    reader: PreparedLab, best: VerifiedHypothesis, answer: Recognition
-) -> Recognition:
-    """Return an answer with its doubt, or the refusal where that is too large."""
-    if not answer:
-        return answer
-    doubt = _doubt_of(reader, best, answer)
-    if doubt <= reader.settings.belief.doubt:
+        doubt = _doubt_of(reader, best, answer)
+        reason = reject_chance(doubt, settings.belief.doubt)
+    if not reason:
         return replace(answer, doubt=doubt)
-    margin, runner_up = answer.margin, answer.runner_up
-    return refusal(answer.seq, BY_CHANCE, margin=margin, runner_up=runner_up, doubt=doubt)
+    return refusal(answer.seq, reason, margin=margin, runner_up=answer.runner_up, doubt=doubt)
 
 
 def _doubt_of(reader: PreparedLab, best: VerifiedHypothesis, answer: Recognition) -> float:
     """Return how many places a foreign surface matches as well, by its border where that counts."""
     settings, arrays = reader.settings, reader.lab.arrays
     doubt = expected_matches(arrays, best.embossed, best.fit, best.hypothesis, settings)
-    if doubt > settings.belief.doubt and _is_plain(reader, best, answer):
+    tabs = reader.sensor.overlay.kind == "tab"  # a pad or a gel hides where a face ends
+    margin = math.inf if answer.margin is None else answer.margin
+    if (
+        tabs
+        and reject_chance(doubt, settings.belief.doubt)
+        and may_count_border(best.evidence(), margin, settings.belief)
+    ):
         tip_mm = reader.sensor.overlay.tab_diameter_mm
         doubt = min(doubt, expected_by_border(arrays, best, tip_mm, settings))
     return doubt
-
-
-def _is_plain(reader: PreparedLab, best: VerifiedHypothesis, answer: Recognition) -> bool:
-    """Return whether only too few symbols speak against a place, so that its border may count.
-
-    Where symbols of it are not felt, or read as others, the face may be another one, whose border
-    lies elsewhere, and the plate lifts off where that of the place is taken to be. Under a pad or a
-    gel nothing tells where a face ends.
-    """
-    support, settings = best.support(), reader.settings
-    return (
-        reader.sensor.overlay.kind == "tab"
-        and support.worn <= settings.border.worn
-        and support.clear == 0
-        and (answer.margin is None or answer.margin >= settings.belief.margin_by_few)
-    )
 
 
 def answer_at(
@@ -280,6 +251,6 @@ def answer_at(
         reason="",
         noise=fit.noise,
         scale=fit.scale,
-        stroke_mm=embossed.style.stroke_mm + fit.wider * settings.template.wider_mm,
+        stroke_mm=embossed.style.stroke_mm + fit.stroke_excess * settings.template.wider_mm,
         inside_mm=inside if face.round is None else None,
     )

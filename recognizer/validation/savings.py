@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from generator.database.entries import object_names
 from generator.database.open import open_database
-from generator.database.read import read_object
+from generator.database.read import object_names, read_object
 from generator.database.transaction import read_transaction
 from probe.contact.engines import ENGINES, engine_named, engine_table
 from probe.contact.press import LEVELS, level_for, table

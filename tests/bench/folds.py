@@ -20,8 +20,14 @@ from generator.array import FoldedArray, array_from, next_larger, profile
 from generator.array.profiles import Profile
 from generator.layout.layout import lay_out
 from generator.layout.placement import FaceLayout
-from generator.layout.promise import measured_answers, promised_shares
-from generator.layout.views import FaceViews, SensorView, ViewSettings, face_views
+from generator.layout.recognition_rate import (
+    POSES,
+    FaceViews,
+    SensorView,
+    answered_shares,
+    face_views,
+    measured_answers,
+)
 from generator.polyhedron import face_polygon, shapes
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -108,7 +114,7 @@ def chance() -> Iterable[str]:
     )  # fmt: skip
     yield "| --- |" * 1 + " --- |" * (4 + len(REGISTERED))
     for pitch in CHANCE_PITCHES_MM:
-        face, views = square_face(pitch, ViewSettings(20_000))
+        face, views = square_face(pitch, 20_000)
         near = (np.minimum(views.centre_mm, FACE_MM - views.centre_mm) < NEAR_MM).sum(axis=1)
         bits = [2 * views.seen[near == sides] for sides in range(3)]
         columns = [f"{one.mean():.0f}, {np.percentile(one, 10):.0f}" for one in bits]
@@ -125,7 +131,7 @@ def arrays() -> Iterable[str]:
     yield "| --- |" + " --- |" * len(REGISTERED)
     known = [one.array() for one in sizes(6)]
     for pitch in CHANCE_PITCHES_MM:
-        face, _ = square_face(pitch, ViewSettings(10))
+        face, _ = square_face(pitch, 10)
         columns = []
         for registered in REGISTERED:
             needed = registered * len(face.labels) / FILL
@@ -140,11 +146,11 @@ def promise() -> Iterable[str]:
     yield "| pitch | seen whole | loaded | answered at once | six faces |"
     yield "| --- | --- | --- | --- | --- |"
     for pitch in CHANCE_PITCHES_MM:
-        square_face(pitch, ViewSettings())
+        square_face(pitch, POSES)
         start = time.process_time()
         for _ in range(6):
-            _, views = square_face(pitch, ViewSettings(), laid=True)
-            share, _ = promised_shares(views, measured_answers(), pitch)
+            _, views = square_face(pitch, POSES, laid=True)
+            share, _ = answered_shares(views, measured_answers(), pitch)
         spent = time.process_time() - start
         yield (
             f"| {pitch:g} mm | {views.seen.mean():.1f} | {views.loaded.mean():.2f} | "
@@ -157,9 +163,7 @@ _array = profile("large").array()
 _solid = shapes.cube(FACE_MM)
 
 
-def square_face(
-    pitch_mm: float, settings: ViewSettings, *, laid: bool = False
-) -> tuple[FaceLayout, FaceViews]:
+def square_face(pitch_mm: float, poses: int, *, laid: bool = False) -> tuple[FaceLayout, FaceViews]:
     """Return a face of a 60 mm cube on the array of `large`, and what a sensor meets there."""
     if not laid:
         none = np.empty(0, dtype=np.int64)
@@ -171,7 +175,7 @@ def square_face(
     face = _laid[pitch_mm]
     view = SensorView(SENSOR_HALF_MM, SYMBOL_SHARE * pitch_mm)
     loops = face_polygon(_solid, face.face)
-    views = face_views(loops, face, pitch_mm, view, settings)
+    views = face_views(loops, face, pitch_mm, view, poses)
     return face, views
 
 

@@ -40,18 +40,21 @@ from probe.scan.places import surface_to_sensor
 from probe.scan.raster import raster
 from probe.simulate.registered import registered_object, registered_surface
 from recognizer.scan.mosaic.grow import add_touch, settle_mosaic
-from recognizer.scan.mosaic.mosaic import Mosaic, MosaicSettings, no_touches, outliers
-from recognizer.scan.mosaic.pair import register_patches
+from recognizer.scan.mosaic.mosaic import Mosaic, no_touches, outliers
 from recognizer.scan.mosaic.patch import TouchPatch, patch_of
 from recognizer.scan.mosaic.planar import (
+    PlacedTouch,
+    PlanarBelief,
     compose_poses,
+    decoded_place,
+    planar_belief,
     planar_covariance,
     planar_pose,
     relative_covariance,
     relative_pose,
     wrap_angle,
 )
-from recognizer.scan.mosaic.touch import PlacedTouch, PlanarBelief, decoded_place, planar_belief
+from recognizer.scan.mosaic.register import register_patches
 from recognizer.thesis.product import product_shift
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
@@ -202,7 +205,7 @@ def chained(links, scan: Scan, number: int) -> list[float]:
 
 def grown(touches: list[PlacedTouch], pitch_mm: float) -> tuple[Mosaic, float, float]:
     """Return a mosaic, ms per touch (median) and ms to settle."""
-    mosaic, times = no_touches(SENSOR, MosaicSettings(period_mm=pitch_mm)), []
+    mosaic, times = no_touches(SENSOR, pitch_mm), []
     for touch in touches:
         start = time.process_time()
         mosaic = add_touch(mosaic, touch)

@@ -41,8 +41,14 @@ from probe.simulate.world.levels import LEVELS
 from probe.simulate.world.sensor import BIAS, LevelSensor
 from probe.simulate.world.surfaces import worn_scene
 from recognizer.scan.grow import begin_scan, extend_scan
-from recognizer.scan.mosaic.planar import inverse, planar_covariance, planar_pose, transform_points
-from recognizer.scan.mosaic.touch import PlacedTouch, planar_belief
+from recognizer.scan.mosaic.planar import (
+    PlacedTouch,
+    inverse,
+    planar_belief,
+    planar_covariance,
+    planar_pose,
+    transform_points,
+)
 from recognizer.thesis.scan import read_scan as read_classically
 from recognizer.thesis.settings import MergingSettings
 from recognizer.touch.lab import open_lab

@@ -38,7 +38,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 import numpy as np  # noqa: E402
 
 from encoded_objects.base.sensor_type import SensorType  # noqa: E402
-from generator.database.url import normal_url, part_path  # noqa: E402
+from generator.database.open import normal_url, part_path  # noqa: E402
 from generator.pipeline import encode  # noqa: E402
 from generator.spec import read_specs  # noqa: E402
 from probe.contact.contract import Touch  # noqa: E402
@@ -49,7 +49,7 @@ from probe.simulate.world.levels import LEVELS  # noqa: E402
 from probe.simulate.world.sensor import LevelSensor  # noqa: E402
 from probe.simulate.written import RoundPart, round_part  # noqa: E402
 from recognizer.scan.grow import begin_scan, extend_scan  # noqa: E402
-from recognizer.scan.mosaic.touch import PlacedTouch, planar_belief  # noqa: E402
+from recognizer.scan.mosaic.planar import PlacedTouch, planar_belief  # noqa: E402
 from recognizer.touch.lab import open_lab  # noqa: E402
 from recognizer.touch.reader import Reader  # noqa: E402
 from recognizer.touch.recognise import recognise  # noqa: E402

@@ -12,7 +12,8 @@ import pytest
 
 from generator.array.profiles import profile
 from generator.layout.layout import lay_out
-from generator.layout.torus import Occupancy, cells_at, place_pieces
+from generator.layout.occupancy import Occupancy
+from generator.layout.torus import cells_at, place_pieces
 from generator.polyhedron import shapes
 
 NONE = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))

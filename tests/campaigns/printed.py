@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from generator.export.stl import stl_chunks
+from generator.export.meshes import stl_chunks
 from generator.pipeline.files import parts_of
 from generator.pipeline.place import place_object
 from generator.pipeline.plan import ObjectPlan, plan_object

@@ -8,7 +8,7 @@ Two sets of solids by default: a table that is made from the first is checked on
 sizes of the second. With `--save` a table of both is kept (`generator/layout/answers.json`). In
 each round every face is touched once, anywhere, and in every third round again where the answer's
 `next` says, up to three times; so any number of rounds is a fair sample. A touch is looked at as
-`generator.layout.views` sees it. What is there is kept, and an interrupted run goes on.
+`generator.layout.recognition_rate` sees it. What is there is kept, and an interrupted run goes on.
 
 Of another sensor type than `fsr-16` every third solid of the second set is touched, at the pitch
 that the type proposes, and held against what `encode-object --sensor-type` promises; that was set
@@ -33,17 +33,18 @@ from numpy.typing import ArrayLike, NDArray
 from encoded_objects import encode
 from encoded_objects.base.sensor_type import USUAL_SENSOR, SensorType
 from encoded_objects.base.sensor_type_file import sensor_type_named
-from generator.database.entries import object_names
 from generator.database.open import open_if_there
-from generator.database.read import read_object
+from generator.database.read import object_names, read_object
 from generator.database.transaction import read_transaction
 from generator.layout.placement import FaceLayout
-from generator.layout.promise import (
+from generator.layout.recognition_rate import (
     AnswerTable,
+    SensorView,
     answered_at_once,
     measured_answers,
+    sensor_view,
+    views_at,
 )
-from generator.layout.views import SensorView, sensor_view, views_at
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.validation.policy import NEXT, touch_until_answered

@@ -4,9 +4,9 @@
     python tests/campaigns/promised_types.py out/types --save    # and what ships is set by them
 
 Every touch inside a face, at an edge or a corner of the levels of `promised.py`, as
-`generator.layout.views` sees it: the probability of an answer that the shipped table gives, and
-what became of it. With `--save` each type's share of the usual sensor's answers
-(`generator.layout.promise.AnsweredShare`) is the likeliest for its touches, and kept in
+`generator.layout.recognition_rate` sees it: the probability of an answer that the shipped table
+gives, and what became of it. With `--save` each type's share of the usual sensor's answers
+(`generator.layout.recognition_rate.AnsweredShare`) is the likeliest for its touches, and kept in
 `generator/layout/answers_of_types.json`. On other faces it is checked by `promised.py
 --sensor-type`.
 """
@@ -28,8 +28,12 @@ from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_nam
 from generator.database.open import open_if_there
 from generator.database.read import read_object
 from generator.database.transaction import read_transaction
-from generator.layout.promise import answered_share, measured_answers
-from generator.layout.views import sensor_view, views_at
+from generator.layout.recognition_rate import (
+    answered_share,
+    measured_answers,
+    sensor_view,
+    views_at,
+)
 
 Array = np.ndarray
 KINDS = ("face", "edge", "corner")

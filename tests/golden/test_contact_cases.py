@@ -11,8 +11,8 @@ from encoded_objects.base.sensor_type import Overlay, SensorType, choose_sensor_
 from generator.alphabet.known import alphabet_named
 from generator.alphabet.outline import SymbolStyle, outlines
 from generator.array.profiles import profile
+from generator.export.meshes import stl_chunks
 from generator.export.step import step_chunks
-from generator.export.stl import stl_chunks
 from generator.layout.layout import lay_out
 from generator.polyhedron.shapes import cube
 from generator.polyhedron.winged import polyhedron
@@ -26,9 +26,9 @@ from probe.errors import ContactError
 from probe.surface.face import endless_face
 from probe.surface.indenters import FlatPlate, HalfPlane, RaisedStrip
 from probe.surface.polygon import polygon
-from recognizer.scan.mosaic.pair import register_patches
 from recognizer.scan.mosaic.patch import patch_of
 from recognizer.scan.mosaic.planar import compose_poses
+from recognizer.scan.mosaic.register import register_patches
 from recognizer.touch.settings import SignalSettings
 from recognizer.touch.signal import signal_of
 

@@ -15,8 +15,9 @@ from generator.errors import LayoutError
 from generator.layout.footprint import move_region, region_of
 from generator.layout.lattice import choose_lattice
 from generator.layout.layout import lay_out
+from generator.layout.occupancy import Occupancy
 from generator.layout.places import array_cells, count_places, count_windows
-from generator.layout.torus import Occupancy, cells_at, place_pieces
+from generator.layout.torus import cells_at, place_pieces
 from generator.layout.unfold import split, unfold
 from generator.polyhedron.frame import face_polygon
 from generator.polyhedron.winged import polyhedron

@@ -10,13 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from encoded_objects.base.sensor_type import SensorType
-from recognizer.scan.mosaic.canvas import CanvasEntry, empty_canvas, lay_touch
-from recognizer.scan.mosaic.correlation import cross_correlate
-from recognizer.scan.mosaic.graph import PLANE, Constraint, covariances, solve_pose_graph
-from recognizer.scan.mosaic.image import image_of
+from recognizer.scan.mosaic.canvas import CanvasEntry, empty_canvas, image_of, lay_touch
 from recognizer.scan.mosaic.patch import patch_of
 from recognizer.scan.mosaic.planar import compose_poses, inverse, relative_pose, transform_points
-from recognizer.scan.mosaic.raster import KnownRaster
+from recognizer.scan.mosaic.pose_graph import PLANE, Constraint, covariances, solve_pose_graph
+from recognizer.scan.mosaic.search import KnownRaster, cross_correlate
 from recognizer.touch.signal import signal_of
 
 SENSOR = SensorType()
@@ -93,7 +91,7 @@ def test_whatever_the_ties_say_there_is_a_pose_with_a_covariance(seed, n):
         a, b = rng.choice(n, 2, replace=False).tolist()
         root = rng.normal(size=(3, rng.integers(1, 4))) * 10.0 ** rng.uniform(-2, 3)
         constraints.append(Constraint(a, b, rng.normal(0, [50, 50, 2]), root @ root.T, "pair"))
-    found = solve_pose_graph(constraints, rng.normal(0, 50, (n, 3)), np.zeros(3), arm_stands=True)
+    found = solve_pose_graph(constraints, rng.normal(0, 50, (n, 3)), np.zeros(3), arm_fixed=True)
     assert np.isfinite(found.poses).all()
     assert ((found.weights > 0) & (found.weights <= 1)).all()
     spread = covariances(found.normal, range(n))

@@ -1,11 +1,13 @@
-"""The sums under the global tactile image, in tiles that are made where something was felt.
+"""The global tactile image and the sums that it is made of. Thesis 4.3.
 
 Cells of a quarter of a tactel in the mosaic's frame: cell (i, j) has its centre at
-((j + 1/2) h, -(i + 1/2) h). A canvas is a value: a touch that is laid, or taken off again,
-copies the tiles that it meets and shares the others. Thesis 4.3.
+((j + 1/2) h, -(i + 1/2) h). The sums stand in tiles that exist where touches lie. A canvas is a
+value: adding or removing a touch copies the tiles under it and shares the others.
 
-A touch says f with variance floor^2 + (slope along what its pose leaves open)^2, so that a
-doubtful pose counts little at edges, where it matters, and fully on flat ground.
+A touch contributes f with variance floor^2 + (slope times the uncertainty of its pose)^2, so that
+an uncertain pose counts little at edges, where it matters, and fully on flat ground. Values are
+readings (newtons or counts) of a touch of median strength: the gain of a touch against its
+neighbours is removed.
 """
 
 from __future__ import annotations
@@ -24,12 +26,13 @@ from recognizer.scan.mosaic.patch import (
     nearest_tactel,
 )
 from recognizer.scan.mosaic.planar import inverse, transform_points
-from recognizer.scan.mosaic.raster import KnownRaster
-from recognizer.scan.mosaic.settings import CANVAS
+from recognizer.scan.mosaic.search import MAGNIFIED, KnownRaster
 
 Array = NDArray[np.float64]
 
 WEIGHT, VALUE, SQUARE, COUNT = range(4)  #: sums of w, w f, w f^2 and 1
+TILE = 64  #: cells, as wide as a touch of 16 tactels
+FLOOR = 0.03  #: least standard deviation of a reading, share of the upper level
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,38 +45,55 @@ class Canvas:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CanvasEntry:
-    """How a touch lies on a canvas; the same value takes it off again."""
+    """Pose, covariance and gain with which a touch lies on a canvas; needed to remove it."""
 
     pose: Array  #: (3,) T_plane_touch
     covariance: Array  #: (3, 3) against its neighbours
     gain: float  #: readings times this are in the canvas's unit
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class GlobalImage:
+    """The image on cells of the plane; 0 where no touch lies. Cell (0, 0) is the upper left one."""
+
+    values: Array  #: (h, w) weighted means
+    deviation: Array  #: (h, w) standard deviation of the touches about their mean
+    error: Array  #: (h, w) standard deviation of the mean
+    count: NDArray[np.int64]  #: (h, w) touches
+    step_mm: float
+    corner_mm: tuple[float, float]  #: x and y of cell (0, 0), frame of the mosaic
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """(h, w) cells that a touch covers."""
+        return self.count > 0
+
+
 def empty_canvas(pitch_mm: float) -> Canvas:
-    """Return a canvas on which nothing lies."""
-    return Canvas(pitch_mm / CANVAS.magnified, {})
+    """Return a canvas without touches."""
+    return Canvas(pitch_mm / MAGNIFIED, {})
 
 
-def lay_touch(canvas: Canvas, patch: TouchPatch, how: CanvasEntry, sign: int = 1) -> Canvas:
-    """Return the canvas with a touch more, or with one less (sign -1)."""
+def lay_touch(canvas: Canvas, patch: TouchPatch, entry: CanvasEntry, sign: int = 1) -> Canvas:
+    """Return the canvas with a touch added, or removed (sign -1)."""
     h, (half_x, half_y) = canvas.cell_mm, patch.sensor.half_mm
-    x, y, theta = how.pose.tolist()
+    x, y, theta = entry.pose.tolist()
     c, s = math.cos(theta), math.sin(theta)
     wide, high = abs(c) * half_x + abs(s) * half_y, abs(s) * half_x + abs(c) * half_y
     j0, j1 = math.floor((x - wide) / h), math.ceil((x + wide) / h)
     i0, i1 = math.floor((-y - high) / h), math.ceil((-y + high) / h)
     i, j = np.mgrid[i0:i1, j0:j1]
     points = np.stack([(j + 0.5) * h, -(i + 0.5) * h], axis=-1).reshape(-1, 2)
-    inside = transform_points(inverse(how.pose), points)
+    inside = transform_points(inverse(entry.pose), points)
     known = np.flatnonzero(covers_points(patch.sensor, inside, beyond=0.5))
     known = known[patch.good.reshape(-1)[nearest_tactel(patch.sensor, inside[known])]]
     values, by_x, by_y = interpolate_patch(patch, inside[known])
     slope_x, slope_y = c * by_x - s * by_y, s * by_x + c * by_y
-    away = points[known] - how.pose[:2]
+    away = points[known] - entry.pose[:2]
     slopes = np.stack([slope_x, slope_y, slope_y * away[:, 0] - slope_x * away[:, 1]], axis=-1)
-    unit = how.gain * patch.scale
-    left_open = np.einsum("ni,ij,nj->n", slopes, how.covariance, slopes)
-    variance = unit**2 * (CANVAS.floor**2 + left_open)
+    unit = entry.gain * patch.scale
+    uncertain = np.einsum("ni,ij,nj->n", slopes, entry.covariance, slopes)
+    variance = unit**2 * (FLOOR**2 + uncertain)
     sums = np.zeros((4, points.shape[0]))
     weight = 1 / variance
     sums[WEIGHT, known], sums[COUNT, known] = weight, 1.0
@@ -84,7 +104,7 @@ def lay_touch(canvas: Canvas, patch: TouchPatch, how: CanvasEntry, sign: int = 1
 
 def rectangle_sums(canvas: Canvas, i0: int, j0: int, rows: int, columns: int) -> Array:
     """Return the sums (4, rows, columns) of a rectangle of cells."""
-    found, size = np.zeros((4, rows, columns)), CANVAS.tile
+    found, size = np.zeros((4, rows, columns)), TILE
     for (k, m), tile in canvas.tiles.items():
         top, left = k * size - i0, m * size - j0
         if -size < top < rows and -size < left < columns:
@@ -95,7 +115,7 @@ def rectangle_sums(canvas: Canvas, i0: int, j0: int, rows: int, columns: int) ->
 
 
 def reference(canvas: Canvas, x_mm: float, y_mm: float, reach_mm: float) -> KnownRaster:
-    """Return the mean about a place, for `search`."""
+    """Return the mean around a place, for `search`."""
     h = canvas.cell_mm
     size = 2 * math.ceil(reach_mm / h)
     j0, i0 = round(x_mm / h) - size // 2, round(-y_mm / h) - size // 2
@@ -105,8 +125,31 @@ def reference(canvas: Canvas, x_mm: float, y_mm: float, reach_mm: float) -> Know
     return KnownRaster(values, known, (j0 + 0.5) * h, -(i0 + 0.5) * h, h)
 
 
+def image_of(canvas: Canvas) -> GlobalImage:
+    """Return the image of a canvas, as large as its touches; (0, 0) without any."""
+    h = canvas.cell_mm
+    if not canvas.tiles:
+        none = np.zeros((0, 0))
+        return GlobalImage(none, none, none, none.astype(np.int64), h, (0.0, 0.0))
+    at = np.array(list(canvas.tiles))
+    low, high = at.min(axis=0) * TILE, (at.max(axis=0) + 1) * TILE
+    sums = rectangle_sums(canvas, low[0], low[1], *(high - low).tolist())
+    rows, columns = (np.flatnonzero((sums[COUNT] > 0.5).any(axis=axis)) for axis in (1, 0))
+    sums = sums[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    count = np.rint(sums[COUNT]).astype(np.int64)
+    weight = np.where(count > 0, sums[WEIGHT], 1.0)
+    mean = np.where(count > 0, sums[VALUE] / weight, 0.0)
+    rest = np.maximum(sums[SQUARE] / weight - mean**2, 0.0)
+    # touches that scatter more than expected are trusted less
+    excess = np.maximum(rest * weight / np.maximum(count - 1, 1), 1.0)
+    error = np.where(count > 0, np.sqrt(excess / weight), 0.0)
+    corner = (float(low[1] + columns[0] + 0.5) * h, -float(low[0] + rows[0] + 0.5) * h)
+    deviation = np.where(count > 1, np.sqrt(rest), 0.0)
+    return GlobalImage(mean, deviation, error, count, h, corner)
+
+
 def _add_sums(canvas: Canvas, sums: Array, i0: int, j0: int) -> Canvas:
-    tiles, size = dict(canvas.tiles), CANVAS.tile
+    tiles, size = dict(canvas.tiles), TILE
     rows, columns = sums.shape[1:]
     for k in range(i0 // size, (i0 + rows - 1) // size + 1):
         for m in range(j0 // size, (j0 + columns - 1) // size + 1):
@@ -119,7 +162,7 @@ def _add_sums(canvas: Canvas, sums: Array, i0: int, j0: int) -> Canvas:
             tile = tiles[k, m].copy() if (k, m) in tiles else np.zeros((4, size, size))
             under = tile[:, a - top : c - top, b - left : d - left]
             under += part
-            under[:, under[COUNT] < 0.5] = 0.0  # nothing is left there but rounding
+            under[:, under[COUNT] < 0.5] = 0.0  # rounding alone is left
             tile.setflags(write=False)
             tiles[k, m] = tile
     return Canvas(canvas.cell_mm, {key: tile for key, tile in tiles.items() if tile[COUNT].any()})

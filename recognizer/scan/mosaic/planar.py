@@ -1,21 +1,103 @@
-"""Poses in a plane: x, y (mm) and the turn theta (rad) of one frame in another. Thesis 4.3.
+"""Poses in a plane, and what is known about the pose of each touch. Thesis 4.3.
 
-A pose is (..., 3); `T_a_b` takes points of frame b to frame a:
-p_a = R(theta) p_b + (x, y). Errors of a pose are differences of its three numbers, so that
-covariances belong to (x, y, theta) in the axes of frame a.
+A pose is (..., 3): x, y (mm) and the turn theta (rad) of one frame in another. `T_a_b` takes
+points of frame b to frame a: p_a = R(theta) p_b + (x, y). Errors of a pose are differences of its
+three numbers, so covariances belong to (x, y, theta) in the axes of frame a.
+
+A touch has up to three sources for its pose. The arm believes a pose in a frame of its own (robot
+base or first touch), wrong by about a tactel. The reader decodes a pose in the frame of the face,
+right to hundredths of a tactel, where the touch shows enough symbols. A probe moved by hand counts
+the steps from touch to touch.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from recognizer.scan.mosaic.errors import MosaicError
-from recognizer.scan.mosaic.settings import PLANAR
+from recognizer.errors import MosaicError
+from recognizer.touch.recognition import Recognition
+from recognizer.touch.signal import Signal
 
 Array = NDArray[np.float64]
+
+LEAST_FACING_COS = 0.5  #: a sensor turned by more than 60 degrees does not face the plane
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlanarBelief:
+    """A pose in the plane with its uncertainty."""
+
+    pose: Array  #: (3,) x, y (mm), theta (rad)
+    covariance: Array  #: (3, 3) of them
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlacedTouch:
+    """The signal of a touch and its pose by at least one source."""
+
+    signal: Signal
+    believed: PlanarBelief | None = None  #: by the arm, in the arm's plane
+    decoded: PlanarBelief | None = None  #: by the reader, in the frame of the face
+    stepped: PlanarBelief | None = None  #: from the previous touch, in its frame (dead reckoning)
+    seq: int = 0
+
+    def __post_init__(self) -> None:
+        if self.believed is None and self.decoded is None and self.stepped is None:
+            raise MosaicError(
+                f"touch {self.seq} has no place",
+                fix="give the arm's pose, or leave out a touch that was not decoded",
+                place=f"touch {self.seq}",
+            )
+
+
+def planar_belief(pose: ArrayLike, covariance: ArrayLike) -> PlanarBelief:
+    """Return a checked pose with its covariance.
+
+    Parameters
+    ----------
+    pose
+        (3,) x, y (mm) and theta (rad), or T_plane_sensor (4, 4).
+    covariance
+        (3, 3) of x, y and theta; or (3,) standard deviations.
+
+    Raises
+    ------
+    MosaicError
+        The numbers are no pose, or the covariance is not positive definite.
+    """
+    at = np.array(pose, np.float64)
+    if at.shape == (4, 4):
+        at = planar_pose(at)
+    spread = np.array(covariance, np.float64)
+    if spread.shape == (3,):
+        spread = np.diag(spread**2)
+    if at.shape != (3,) or not np.isfinite(at).all():
+        raise MosaicError(
+            f"a place of shape {at.shape} or with values that are no numbers",
+            fix="give x, y (mm) and theta (rad), or T_plane_sensor (4, 4)",
+        )
+    sound = spread.shape == (3, 3) and bool(np.isfinite(spread).all())
+    sound = sound and np.allclose(spread, spread.T, rtol=1e-6, atol=0)
+    scale = np.sqrt(np.diag(spread)) if sound else np.zeros(3)
+    if not (scale > 0).all() or np.linalg.eigvalsh(spread / np.outer(scale, scale))[0] < 1e-12:
+        raise MosaicError(
+            "a covariance that is not positive definite",
+            fix="give (3,) standard deviations above 0, or a covariance (3, 3)",
+        )
+    at.setflags(write=False)
+    spread.setflags(write=False)
+    return PlanarBelief(at, spread)
+
+
+def decoded_place(recognition: Recognition) -> PlanarBelief | None:
+    """Return the pose on the face that the reader found; None without an answer."""
+    if recognition.T_face_probe is None or recognition.covariance is None:
+        return None
+    return planar_belief(recognition.T_face_probe, recognition.covariance)
 
 
 def compose_poses(T_a_b: Array, T_b_c: Array) -> Array:
@@ -49,10 +131,22 @@ def wrap_angle(angle: Array) -> Array:
     return np.asarray((angle + math.pi) % (2 * math.pi) - math.pi)
 
 
+def pose_difference(a: Array, b: Array) -> Array:
+    """Return a - b (..., 3), the turn from -pi up to pi."""
+    away = a - b
+    away[..., 2] = wrap_angle(away[..., 2])
+    return np.asarray(away)
+
+
+def rotation(theta: float) -> Array:
+    """Return (3, 3) that turns x, y of (x, y, theta) by an angle."""
+    c, s = math.cos(theta), math.sin(theta)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
 def relative_covariance(T_m_a: Array, T_m_b: Array, of_a: Array, of_b: Array) -> Array:
     """Return the covariance (3, 3) of T_a_b from those of T_m_a and T_m_b, errors independent."""
-    c, s = math.cos(T_m_a[2]), math.sin(T_m_a[2])
-    back = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    back = rotation(-float(T_m_a[2]))
     x, y = relative_pose(T_m_a, T_m_b)[:2]
     by_a = back.copy()
     by_a[:2, 2] = -y, x  # a turn of a moves b the other way round
@@ -62,8 +156,7 @@ def relative_covariance(T_m_a: Array, T_m_b: Array, of_a: Array, of_b: Array) ->
 
 def composed_covariance(T_m_a: Array, T_a_b: Array, of_a: Array, of_b: Array) -> Array:
     """Return the covariance (3, 3) of T_m_b from those of T_m_a and T_a_b, errors independent."""
-    c, s = math.cos(T_m_a[2]), math.sin(T_m_a[2])
-    turned = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    turned = rotation(float(T_m_a[2]))
     x, y = turned[:2, :2] @ T_a_b[:2]
     by_a = np.eye(3)
     by_a[:2, 2] = -y, x
@@ -77,12 +170,12 @@ def planar_pose(T_plane_sensor: ArrayLike) -> Array:
     Raises
     ------
     MosaicError
-        No pose, or one that does not face the plane.
+        It is no pose, or it does not face the plane.
     """
     T = np.asarray(T_plane_sensor, np.float64)
     if T.shape != (4, 4) or not np.isfinite(T).all():
         raise MosaicError(f"a pose of shape {T.shape}", fix="give T_plane_sensor (4, 4), mm")
-    if T[2, 2] < PLANAR.steepest_cos:
+    if T[2, 2] < LEAST_FACING_COS:
         angle = math.degrees(math.acos(max(-1.0, min(1.0, float(T[2, 2])))))
         raise MosaicError(
             f"the sensor is tilted by {angle:.0f} degrees, it must face the plane within 60",
@@ -92,7 +185,7 @@ def planar_pose(T_plane_sensor: ArrayLike) -> Array:
 
 
 def planar_covariance(covariance: ArrayLike, turn: ArrayLike | None = None) -> Array:
-    """Return the (3, 3) of x, y and theta that a spatial covariance leaves in the plane.
+    """Return the covariance (3, 3) of x, y and theta of a spatial covariance.
 
     Parameters
     ----------

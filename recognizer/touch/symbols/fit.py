@@ -64,7 +64,7 @@ class Fit:
         return 1.0 / (1.0 + float(self.nuisance[3]))
 
     @property
-    def wider(self) -> float:
+    def stroke_excess(self) -> float:
         """Return by how much strokes are felt wider than designed, `TemplateSettings.wider_mm`."""
         return float(self.nuisance[0])
 

@@ -4,13 +4,16 @@ import numpy as np
 import pytest
 import shapely
 
-from generator.layout import lattice_search
+from generator.layout import lattice as lattice_module
 from generator.layout.footprint import move_region, region_of
-from generator.layout.lattice import Lattice, _centre, _with_places, choose_lattice
-from generator.layout.lattice_search import (
+from generator.layout.lattice import (
     CellSet,
+    Lattice,
     LatticeCandidate,
+    _centre,
     _unique_sets,
+    _with_places,
+    choose_lattice,
     edge_rotations,
     lattice_candidates,
 )
@@ -392,7 +395,7 @@ def looks(monkeypatch, regions, answers=()):
         score = left.pop(0) if left else None
         return [LatticeCandidate(*score, rotation, ())] if score else []
 
-    monkeypatch.setattr(lattice_search, "_best_shifts", look)
+    monkeypatch.setattr(lattice_module, "_best_shifts", look)
     found = lattice_candidates(regions, HALF, PITCH, WINDOW, search=True)
     return calls, [(one.worth, one.cells) for one in found]
 

@@ -6,7 +6,7 @@ import pytest
 from generator.array.profiles import profile
 from generator.errors import LayoutError
 from generator.layout.layout import lay_out
-from generator.layout.torus import Occupancy
+from generator.layout.occupancy import Occupancy
 from generator.polyhedron import shapes
 
 NONE = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))

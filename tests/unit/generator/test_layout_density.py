@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from generator.layout.torus import Occupancy, cells_at, place_pieces
+from generator.layout.occupancy import Occupancy
+from generator.layout.torus import cells_at, place_pieces
 
 KINDS = {
     "rectangle": lambda a, b: np.ones((a, b), dtype=bool),

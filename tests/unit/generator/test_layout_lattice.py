@@ -5,8 +5,7 @@ import pytest
 
 from generator.array.profiles import profile
 from generator.layout.footprint import move_region, region_of
-from generator.layout.lattice import choose_lattice
-from generator.layout.lattice_search import edge_rotations
+from generator.layout.lattice import choose_lattice, edge_rotations
 from generator.layout.places import array_cells, count_places, count_windows, rank_test
 
 

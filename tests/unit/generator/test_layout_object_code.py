@@ -5,8 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from generator.layout.object_code import LETTERS, object_code
-from generator.layout.placement import FaceLayout, Layout, Placement
+from generator.layout.placement import (
+    CODE_LETTERS,
+    FaceLayout,
+    Layout,
+    Placement,
+    object_code,
+)
 
 
 def layout_at(*cells: tuple[int, int]) -> Layout:
@@ -34,7 +39,7 @@ def test_codes_count_cells(rows, columns, cells, code):
     found = object_code(layout_at(*cells), rows, columns)
     number = 0
     for letter in found:
-        number = number * len(LETTERS) + LETTERS.index(letter)
+        number = number * len(CODE_LETTERS) + CODE_LETTERS.index(letter)
     row, column = min(cells)
     assert number == row * columns + column
     assert len(found) == len(code)

@@ -5,9 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from generator.layout.board import board_size
 from generator.layout.occupancy import TILE, Occupancy, cells_of_tiles, tiles_of
-from generator.layout.settings import LAYOUT
+from generator.layout.torus import CORNER, board_size
 
 PLACES = {
     "corner": (np.array([0, 0, 63, 64, 127]), np.array([0, 64, 63, 64, 0])),
@@ -67,7 +66,7 @@ def test_more_cells_change_their_own_tiles_alone():
 
 def test_what_is_opened_of_a_large_array_follows_its_objects():
     far = block(2000, 3000, 8, 8)
-    assert board_size(of(4095, 4097)) == (LAYOUT.corner, LAYOUT.corner)
+    assert board_size(of(4095, 4097)) == (CORNER, CORNER)
     assert board_size(of(4095, 4097, block(0, 0, 700, 700))) == (704, 704)
     # another lab's objects, imported from elsewhere on the array, open nothing
     assert board_size(of(4095, 4097, block(0, 0, 700, 700)).with_cells(*far)) == (704, 704)
@@ -98,4 +97,4 @@ def test_what_is_opened_begins_at_the_first_cell(first):
     assert all(640 <= side <= 704 for side in board_size(near))
     rows, columns = block(first[0] + 1500, first[1] + 1500, 8, 8)
     far = Occupancy.from_cells(rows % 4095, columns % 4097, array)
-    assert board_size(far) == (LAYOUT.corner, LAYOUT.corner)
+    assert board_size(far) == (CORNER, CORNER)

@@ -10,15 +10,17 @@ from encoded_objects.base.sensor_type_file import sensor_type_named, shipped_nam
 from generator.array import profile
 from generator.layout.layout import lay_out
 from generator.layout.placement import FaceLayout, Placement
-from generator.layout.promise import (
+from generator.layout.recognition_rate import (
     AnswerTable,
+    SensorView,
     answered_at_once,
     answered_share,
+    answered_shares,
+    face_views,
     measured_answers,
     measured_types,
-    promised_shares,
+    sensor_view,
 )
-from generator.layout.views import SensorView, ViewSettings, face_views, sensor_view
 from generator.polyhedron import face_polygon, shapes
 
 NONE = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
@@ -66,7 +68,7 @@ def area(polygon):
 @pytest.mark.parametrize("loops", [(SQUARE,), (SQUARE, HOLE), (ELL,), (TRIANGLE,)])
 def test_views_are_those_of_each_pose_by_itself(loops):
     face = lattice(loops[0])
-    views = face_views(loops, face, 7.0, VIEW, ViewSettings(150))
+    views = face_views(loops, face, 7.0, VIEW, 150)
     assert len(views.seen) == 150
     for k in range(150):
         c, s = np.cos(views.turn_rad[k]), np.sin(views.turn_rad[k])
@@ -90,7 +92,7 @@ def test_views_are_those_of_each_pose_by_itself(loops):
 
 def test_centres_lie_on_the_face_evenly():
     face = lattice(ELL)
-    poses = ViewSettings(2000)
+    poses = 2000
     views = face_views((ELL,), face, 7.0, VIEW, poses)
     x, y = views.centre_mm.T
     assert (((y < 12) & (x < 50)) | ((x < 14) & (y < 60))).all()
@@ -114,7 +116,7 @@ def test_a_60_mm_face_shows_what_was_measured(pitch_mm, half_mm, mean):
     (face, *_) = lay_out(solid, array, pitch_mm, half_mm, clearances, NONE).faces
     views = face_views(
         face_polygon(solid, 0), face, pitch_mm, SensorView((12.7, 12.7), 0.36 * pitch_mm),
-        ViewSettings(4000),
+        4000,
     )  # fmt: skip
     near = (np.minimum(views.centre_mm, 60 - views.centre_mm) < 9).sum(axis=1)
     for sides, symbols in enumerate(mean):
@@ -141,11 +143,11 @@ def test_a_promise_weighs_measured_answers():
     views = face_views((SQUARE,), lattice(SQUARE), 7.0, VIEW)
     flat = AnswerTable((7.0,), (1.0,), (1.0,), np.array([[[0.7]]]), (0.0, 0.0, 0.0))
     later = 0.3 * 0.5 * (views.around > 0).mean()
-    assert promised_shares(views, flat, 6.0) == pytest.approx((0.7, 0.7 + later))
+    assert answered_shares(views, flat, 6.0) == pytest.approx((0.7, 0.7 + later))
     once = table.at(6.0, views.seen, views.loaded)
     logit = -1.0 + 1.5 * np.log(1 + views.around) - 0.5 * np.log(1 + views.seen)
     within = once + (1 - once) * np.where(views.around > 0, 1 / (1 + np.exp(-logit)), 0)
-    assert promised_shares(views, table, 6.0) == pytest.approx((once.mean(), within.mean()))
+    assert answered_shares(views, table, 6.0) == pytest.approx((once.mean(), within.mean()))
 
 
 def test_the_table_that_ships_was_measured():
@@ -183,10 +185,10 @@ def test_a_larger_sensor_steps_farther_and_within_three_is_said_of_the_usual_one
     assert sensor_view(mat, 2.0).around_mm == pytest.approx(20 * 64 / 25.4)
     assert sensor_view(SensorType(), 2.0) == SensorView((12.7, 12.7), 2.0)
     views = face_views((SQUARE,), lattice(SQUARE), 7.0, VIEW)
-    once, within = promised_shares(views, measured_answers(), 6.0, mat)
+    once, within = answered_shares(views, measured_answers(), 6.0, mat)
     assert 0 < once < 1
     assert within is None
-    assert promised_shares(views, measured_answers(), 6.0)[1] is not None
+    assert answered_shares(views, measured_answers(), 6.0)[1] is not None
 
 
 def test_a_type_of_your_own_is_taken_for_the_one_most_like_it():

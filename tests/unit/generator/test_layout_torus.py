@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from generator.layout.torus import Occupancy, Spot, cells_at, place_pieces
+from generator.layout.occupancy import Occupancy
+from generator.layout.torus import TorusPosition, cells_at, place_pieces
 
 NONE = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
 TURNS = (0, 1, 2, 3)
@@ -21,7 +22,7 @@ def block(rows, columns):
 
 def test_the_faces_of_a_cube_stand_side_by_side():
     spots = place_pieces(torus(63, 65), [(block(8, 8), TURNS)] * 6)
-    assert spots == [Spot(0, 8 * k, 0) for k in range(6)]
+    assert spots == [TorusPosition(0, 8 * k, 0) for k in range(6)]
 
 
 def test_a_piece_may_wrap_around_both_sides():
@@ -29,7 +30,7 @@ def test_a_piece_may_wrap_around_both_sides():
     taken[np.ix_([4, 0], [5, 0, 1])] = False
     occupancy = torus(5, 6, np.nonzero(taken))
     (spot,) = place_pieces(occupancy, [(block(2, 3), (0,))])
-    assert spot == Spot(4, 5, 0)
+    assert spot == TorusPosition(4, 5, 0)
     rows, columns = cells_at(block(2, 3), spot, 5, 6)
     assert sorted(zip(rows.tolist(), columns.tolist(), strict=True)) == [
         (0, 0), (0, 1), (0, 5), (4, 0), (4, 1), (4, 5),
@@ -41,7 +42,7 @@ def test_a_piece_is_turned_only_where_that_is_allowed():
     taken[1:4, 2] = False
     occupancy = torus(5, 7, np.nonzero(taken))
     assert place_pieces(occupancy, [(block(1, 3), (0, 2))]) == [None]
-    assert place_pieces(occupancy, [(block(1, 3), TURNS)]) == [Spot(1, 2, 1)]
+    assert place_pieces(occupancy, [(block(1, 3), TURNS)]) == [TorusPosition(1, 2, 1)]
 
 
 def test_turns_of_a_piece_without_symmetry():
@@ -50,7 +51,7 @@ def test_turns_of_a_piece_without_symmetry():
     taken = np.ones((9, 9), dtype=bool)
     taken[3:6, 4:6] = ~hole
     (spot,) = place_pieces(torus(9, 9, np.nonzero(taken)), [(form, TURNS)])
-    assert spot == Spot(3, 4, 3)
+    assert spot == TorusPosition(3, 4, 3)
     rows, columns = cells_at(form, spot, 9, 9)
     assert not taken[rows, columns].any()
 
@@ -59,14 +60,14 @@ def test_the_place_with_most_contact_is_taken():
     taken = np.zeros((12, 12), dtype=bool)
     taken[5, 3:9] = taken[6, 3] = taken[6, 8] = True  # a bay, four cells wide
     (spot,) = place_pieces(torus(12, 12, np.nonzero(taken)), [(block(1, 4), TURNS)])
-    assert spot == Spot(6, 4, 0)
+    assert spot == TorusPosition(6, 4, 0)
 
 
 def test_what_does_not_fit_is_left_and_the_rest_is_placed():
     spots = place_pieces(
         torus(6, 6), [(block(7, 1), (0,)), (block(6, 6), (0,)), (block(1, 1), (0,))]
     )
-    assert spots == [None, Spot(0, 0, 0), None]
+    assert spots == [None, TorusPosition(0, 0, 0), None]
 
 
 def test_empty_pieces_need_no_place():
@@ -107,7 +108,7 @@ def test_a_narrow_large_array_wraps_along_its_short_side_alone():
     taken = np.ones((3, 1 << 17), dtype=bool)
     taken[[2, 0], 100:104] = False
     (spot,) = place_pieces(torus(3, 1 << 17, np.nonzero(taken)), [(block(2, 4), (0,))])
-    assert spot == Spot(2, 100, 0)
+    assert spot == TorusPosition(2, 100, 0)
 
 
 @pytest.mark.parametrize("size", [(63, 65), (1023, 1025)])
@@ -118,6 +119,6 @@ def test_placing_from_another_first_cell_is_a_shift_of_the_same(size):
     array = SimpleNamespace(rows=rows, columns=columns, first=first)
     elsewhere = place_pieces(Occupancy.from_cells(*NONE, array), pieces)
     for one, other in zip(place_pieces(torus(rows, columns), pieces), elsewhere, strict=True):
-        assert other == Spot(
+        assert other == TorusPosition(
             (one.row + first[0]) % rows, (one.column + first[1]) % columns, one.quarter
         )

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from generator.layout.overlap import overlap, triangles_of
-from generator.layout.unfold import split, unfold
+from generator.layout.unfold import overlap, split, triangles_of, unfold
 from generator.polyhedron import shapes
 from generator.polyhedron.frame import face_polygon
 from generator.polyhedron.winged import polyhedron

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from generator.command.made_report import print_made
+from generator.layout.recognition_rate import RecognitionRate
 from generator.pipeline import Encoded, MadeObject
 from generator.pipeline.faces import FaceReport
-from generator.pipeline.promise import FacePromise
 
 
 def copy(number: int, name: str = "Cube", symbols: int = 384) -> MadeObject:
@@ -45,7 +45,7 @@ def test_plates_of_a_set_are_counted(capsys):
 
 def test_faces_of_which_the_same_is_to_be_said_share_a_line(capsys):
     def face(number, width):
-        size, promise = (width, 50.0), FacePromise(0.7, 0.99)
+        size, promise = (width, 50.0), RecognitionRate(0.7, 0.99)
         return FaceReport(
             f"F{number}", "", "plane", size, width * 50.0, 63, 40, promise, (16.0, 20.0)
         )

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from generator.command.promise_report import face_values, promise_lines
-from generator.layout.promise import PROMISE
+from generator.layout.recognition_rate import LOW
 from generator.pipeline import encode
 from generator.pipeline.faces import face_reports
 from generator.pipeline.place import NO_CELLS, lay_out_object
@@ -60,11 +60,11 @@ def test_a_bracket_of_narrow_legs_is_not_readable_and_says_so():
 def test_what_would_help_does_help():
     narrow = reports("name: Bar\nshape: {box: [80 mm, 40 mm, 14 mm]}\n")
     (face, *_) = [f for f in narrow if sorted(f.size_mm) == pytest.approx([14, 80])]
-    assert face.promise.at_once < PROMISE.low
+    assert face.promise.at_once < LOW
     width = float(face.promise.remedy.split(" mm wide instead of 14")[0])
     wide = reports(f"name: Bar\nshape: {{box: [80 mm, 40 mm, {width} mm]}}\n")
     (again, *_) = [f for f in wide if sorted(f.size_mm) == pytest.approx([width, 80])]
-    assert again.promise.at_once > PROMISE.low - 0.03
+    assert again.promise.at_once > LOW - 0.03
     assert again.promise.remedy == ""
 
 
@@ -93,10 +93,10 @@ def bracket(leg_mm):
 
 def test_a_bracket_by_default_says_what_would_help_its_l_faces():
     (el, *_) = [face for face in reports(bracket(9), "auto") if face.name == "F1"]
-    assert el.promise.at_once < PROMISE.low < el.promise.within_three
+    assert el.promise.at_once < LOW < el.promise.within_three
     more = int(el.promise.remedy.split(" mm wider all along")[0])
     (again, *_) = [face for face in reports(bracket(9 + more), "auto") if face.name == "F1"]
-    assert again.promise.at_once > PROMISE.low - 0.03
+    assert again.promise.at_once > LOW - 0.03
     assert again.promise.remedy == ""
 
 

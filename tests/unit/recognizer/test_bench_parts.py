@@ -42,7 +42,7 @@ from recognizer.bench.settings import GUIDE, TRIGGER, TouchLogSettings, UploadSe
 from recognizer.bench.simulated import parse_simulation
 from recognizer.bench.touch_log import TouchLog
 from recognizer.bench.uploads import Uploads, folder_bytes
-from recognizer.scan.mosaic.image import GlobalImage
+from recognizer.scan.mosaic.canvas import GlobalImage
 from recognizer.touch.cause import EDGE, NO_LOAD, Cause
 from recognizer.touch.lab import Lab
 from recognizer.touch.recognition import refusal

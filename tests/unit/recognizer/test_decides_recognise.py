@@ -9,7 +9,6 @@ import pytest
 
 import recognizer.touch.recognise
 from encoded_objects.base.sensor_type import SensorType
-from recognizer.touch.belief import Support
 from recognizer.touch.cause import EXCHANGED, Cause
 from recognizer.touch.hypothesis import Hypothesis
 from recognizer.touch.recognise import (
@@ -26,6 +25,7 @@ from recognizer.touch.recognition import (
     TOO_FEW,
 )
 from recognizer.touch.settings import ReaderSettings
+from recognizer.touch.verdict import MANY_INLIERS, Evidence
 
 TOUCHED = SimpleNamespace(contact=True, state=None)
 READER = SimpleNamespace(
@@ -33,7 +33,15 @@ READER = SimpleNamespace(
 )
 #: Limits of margins, nats: 10 and 14 but for rounding.
 TEN, FOURTEEN = READER.settings.belief.margin, READER.settings.belief.margin_by_few
-SURE = Support(surprise=19.9, explained=0.95, inliers=16, clear=0, plain=0, wider=0.0, worn=0)
+SURE = Evidence(
+    log_likelihood_ratio=19.9,
+    explained=0.95,
+    inliers=16,
+    contradictions=0,
+    strong_contradictions=0,
+    stroke_excess=0.0,
+    worn=0,
+)
 T_OBJECT_FACE = np.array([[0.0, 0, 1, 5], [1, 0, 0, 6], [0, 1, 0, 7], [0, 0, 0, 1]])
 
 
@@ -45,7 +53,7 @@ class Found:
     place: str
     score: float
     fit: object
-    speaks: Support = SURE
+    speaks: Evidence = SURE
     face: int = 0
     index: tuple = (3, 4)
     shift: int = 0  # pitches
@@ -64,7 +72,7 @@ class Found:
     def coincides(self, other):
         return self.place == other.place and self.shift == other.shift
 
-    def support(self):
+    def evidence(self):
         return self.speaks
 
 
@@ -90,7 +98,7 @@ def wide_unless_sure(reader, signal, answer, judged, best, support):
     """Ask for the second try as under a pad: `test_first_look` has when it is asked for."""
     assert (reader is READER, bool(best), bool(support)) in ((True,) * 3, (True, False, False))
     assert answer or judged is answer
-    return not (answer and support.inliers >= READER.settings.belief.many_inliers)
+    return not (answer and support.inliers >= MANY_INLIERS)
 
 
 @pytest.fixture
@@ -294,8 +302,8 @@ def test_what_few_cells_show_names_a_place(reads, named, inliers, reason):
 @pytest.mark.parametrize(
     ("changed", "reason"),
     [
-        ({"surprise": 2.0}, NOT_ENCODED),
-        ({"surprise": 2.0, "inliers": 2}, NOT_ENCODED),  # that it is none weighs more
+        ({"log_likelihood_ratio": 2.0}, NOT_ENCODED),
+        ({"log_likelihood_ratio": 2.0, "inliers": 2}, NOT_ENCODED),  # that it is none weighs more
         ({"inliers": 2}, TOO_FEW),
     ],
 )
@@ -348,7 +356,7 @@ def test_what_chance_nearly_allows_is_looked_at_again(reads, first, tries):
 
 
 def test_what_speaks_plainly_for_a_place_is_not_looked_at_again(reads):
-    found = [reads.one(surprise=20.0), reads.one("rival", -40.0)]
+    found = [reads.one(log_likelihood_ratio=20.0), reads.one("rival", -40.0)]
     answer, judged, tried = reads.read(found, [], doubt=1e-4)
     assert (tried, judged is found[0], bool(answer)) == (1, True, True)
 
@@ -489,7 +497,7 @@ def test_a_border_counts_there_too(reads):
         ({}, -40.0, 0.5, 0.3),  # never more than by symbols alone
         ({"worn": 1}, -40.0, 1e-5, 1e-5),
         ({"worn": 2}, -40.0, 1e-5, 0.3),
-        ({"clear": 1}, -40.0, 1e-5, 0.3),
+        ({"contradictions": 1}, -40.0, 1e-5, 0.3),
         ({}, -FOURTEEN, 1e-5, 1e-5),
         ({}, -13.9, 1e-5, 0.3),
     ],

@@ -6,13 +6,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from recognizer.touch.belief import Support
 from recognizer.touch.exchanged import exchange_halves, leaves_much
 from recognizer.touch.settings import DEFAULTS
 from recognizer.touch.signal import Signal
+from recognizer.touch.verdict import Evidence
 
 SETTINGS = DEFAULTS.exchanged
-PLAIN = Support(surprise=40.0, explained=0.95, inliers=16, clear=0, plain=0, wider=0.0, worn=0)
+PLAIN = Evidence(
+    log_likelihood_ratio=40.0,
+    explained=0.95,
+    inliers=16,
+    contradictions=0,
+    strong_contradictions=0,
+    stroke_excess=0.0,
+    worn=0,
+)
 SQUARE = (np.array([(0, 0), (40, 0), (40, 40), (0, 40)], float),)
 
 
@@ -37,7 +45,7 @@ def leaves(small, monkeypatch):
         face = Face(round_)
         found = SimpleNamespace(
             image=image, embossed=SimpleNamespace(face=lambda _: face),
-            hypothesis=SimpleNamespace(face=0), support=lambda: replace(PLAIN, **speaks),
+            hypothesis=SimpleNamespace(face=0), evidence=lambda: replace(PLAIN, **speaks),
         )  # fmt: skip
         return leaves_much(found, SETTINGS)
 
@@ -71,14 +79,14 @@ def test_what_is_half_trusted_is_pressed_half(leaves):
 
 
 def test_symbols_that_explain_little_leave_much(leaves):
-    assert leaves(surprise=24.9, explained=0.859)
-    assert not leaves(surprise=25.0, explained=0.859)
-    assert not leaves(surprise=24.9, explained=0.86)
+    assert leaves(log_likelihood_ratio=24.9, explained=0.859)
+    assert not leaves(log_likelihood_ratio=25.0, explained=0.859)
+    assert not leaves(log_likelihood_ratio=24.9, explained=0.86)
 
 
 def test_soft_symbols_explain_little_for_noise(leaves):
-    assert leaves(surprise=24.9, explained=0.85, forces=30.0, noise=1.0)
-    assert not leaves(surprise=24.9, explained=0.85, forces=29.9, noise=1.0)
+    assert leaves(log_likelihood_ratio=24.9, explained=0.85, forces=30.0, noise=1.0)
+    assert not leaves(log_likelihood_ratio=24.9, explained=0.85, forces=29.9, noise=1.0)
     assert leaves(beyond=15, noise=0.0334)
 
 

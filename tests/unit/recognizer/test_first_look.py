@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from encoded_objects.base.sensor_type import Overlay, SensorType
-from recognizer.touch.belief import Support
 from recognizer.touch.first_look import gap_share, may_tell_more, pressed_tactels, shows_strokes
 from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, NOT_ENCODED, TOO_FEW, refusal
 from recognizer.touch.settings import ReaderSettings
 from recognizer.touch.signal import signal_of
+from recognizer.touch.verdict import Evidence
 
 SETTINGS = ReaderSettings()
 STROKES = ((np.indices((16, 16)) % 4) < 2).any(axis=0)
@@ -71,7 +71,10 @@ def asked(small):
         answer = refusal(0, reason)
         if not reason:
             answer = replace(answer, object="Thing")
-        support = replace(Support(5.0, 0.9, 5, clear=0, plain=0, wider=0.0, worn=0), **speaks)
+        support = replace(
+            Evidence(5.0, 5, 0, explained=0.9),
+            **speaks,
+        )
         given = answer if judged is None else judged
         return may_tell_more(
             reader(small, **(lab or {})), touch_of(tactels), answer, given, best, support
@@ -92,8 +95,8 @@ def test_few_pressed_tactels_can_name_no_place(asked):
 
 
 def test_symbols_of_no_registered_place_are_not_sought_further(asked):
-    assert asked(surprise=3.0)
-    assert not asked(surprise=2.9)
+    assert asked(log_likelihood_ratio=3.0)
+    assert not asked(log_likelihood_ratio=2.9)
 
 
 def test_where_no_stroke_shows_none_are_sought_further(asked):
@@ -109,9 +112,9 @@ def test_where_hardly_a_symbol_agrees_no_place_is_found(asked):
 
 
 def test_plain_symbols_that_explain_little_stand_beside_something_else(asked):
-    assert asked(surprise=19.9, explained=0.1)
-    assert not asked(surprise=20.0, explained=0.59)
-    assert asked(surprise=20.0, explained=0.6)
+    assert asked(log_likelihood_ratio=19.9, explained=0.1)
+    assert not asked(log_likelihood_ratio=20.0, explained=0.59)
+    assert asked(log_likelihood_ratio=20.0, explained=0.6)
 
 
 def test_an_image_that_is_explained_shows_no_more(asked):

@@ -5,9 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from recognizer.scan.mosaic.graph import ARM, PLANE, Constraint, covariances, solve_pose_graph
 from recognizer.scan.mosaic.planar import compose_poses, relative_pose, wrap_angle
-from recognizer.scan.mosaic.settings import GRAPH
+from recognizer.scan.mosaic.pose_graph import (
+    ARM,
+    OUTLIER_WEIGHT,
+    PLANE,
+    Constraint,
+    covariances,
+    solve_pose_graph,
+)
 
 BELIEF, PAIR = np.diag([0.4, 0.4, 4e3]), np.diag([90.0, 60.0, 6e4])
 SURE = np.diag([1e3, 1e3, 3e5])
@@ -37,7 +43,7 @@ def test_ties_without_errors_give_the_truth_from_afar():
     constraints += [Constraint(PLANE, n, true[n], SURE, "decoded") for n in (0, 7)]
     start = true + rng.normal(0, [2, 2, 0.02], true.shape)
     found = solve_pose_graph(
-        constraints, start, arm + 0.05 * np.array([40, -40, 1]), arm_stands=False
+        constraints, start, arm + 0.05 * np.array([40, -40, 1]), arm_fixed=False
     )
     assert found.poses == pytest.approx(true, abs=1e-5)
     assert found.arm == pytest.approx(arm, abs=1e-4)
@@ -58,9 +64,9 @@ def test_wrong_pairs_are_let_go_and_named():
             Constraint(a, b, pose + np.array([7.0 * (k in wrong), 0, 0]), PAIR, "pair")
         )
     found = solve_pose_graph(
-        constraints, np.array([t.pose for t in constraints[:16]]), np.zeros(3), arm_stands=True
+        constraints, np.array([t.pose for t in constraints[:16]]), np.zeros(3), arm_fixed=True
     )
-    assert set((np.flatnonzero(found.weights < GRAPH.outlier) - 16).tolist()) == wrong
+    assert set((np.flatnonzero(found.weights < OUTLIER_WEIGHT) - 16).tolist()) == wrong
     shape = (found.poses - true)[:, :2]
     assert np.hypot(*(shape - shape.mean(axis=0)).T).max() < 1.0
 
@@ -77,7 +83,7 @@ def test_covariances_are_true():
         for a, b in near:
             pose = noisy(rng, relative_pose(true[a], true[b]), PAIR)
             constraints.append(Constraint(a, b, pose, PAIR, "pair"))
-        found = solve_pose_graph(constraints, true, np.zeros(3), arm_stands=True)
+        found = solve_pose_graph(constraints, true, np.zeros(3), arm_fixed=True)
         spread = covariances(found.normal, range(len(true)))
         dense = np.linalg.inv(found.normal.toarray())
         assert spread[5] == pytest.approx(dense[15:18, 15:18], rel=1e-6, abs=1e-12)
@@ -94,7 +100,7 @@ def test_a_tie_along_a_ridge_leaves_the_rest_to_belief():
         Constraint(ARM, 1, np.array([5.0, 1.0, 0.0]), BELIEF, "believed"),
         Constraint(0, 1, np.array([4.0, 9.0, 0.01]), across_only, "pair"),
     ]
-    found = solve_pose_graph(constraints, np.zeros((2, 3)), np.zeros(3), arm_stands=True)
+    found = solve_pose_graph(constraints, np.zeros((2, 3)), np.zeros(3), arm_fixed=True)
     assert found.poses[1] == pytest.approx([4.0, 1.0, 0.01], abs=0.01)
     spread = covariances(found.normal, [1])[0]
     assert spread[1, 1] == pytest.approx(2.5, rel=0.01)
@@ -116,6 +122,6 @@ def test_the_frame_does_not_matter():
         ]
         constraints += [Constraint(a, b, pose, PAIR, "pair") for a, b, pose in links]
         start = compose_poses(shift, np.array(poses))
-        return solve_pose_graph(constraints, start, np.zeros(3), arm_stands=False).poses
+        return solve_pose_graph(constraints, start, np.zeros(3), arm_fixed=False).poses
 
     assert compose_poses(T, solution(np.zeros(3))) == pytest.approx(solution(T), abs=1e-5)

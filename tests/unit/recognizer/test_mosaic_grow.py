@@ -12,12 +12,11 @@ from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.surface.face import endless_face
-from recognizer.scan.mosaic.errors import MosaicError
+from recognizer.errors import MosaicError
 from recognizer.scan.mosaic.grow import add_touch, mosaic_of, settle_mosaic
 from recognizer.scan.mosaic.mosaic import ALONE, no_touches, outliers
-from recognizer.scan.mosaic.pair import AMBIGUOUS, CONSTANT
-from recognizer.scan.mosaic.planar import compose_poses, relative_pose
-from recognizer.scan.mosaic.touch import PlacedTouch, planar_belief
+from recognizer.scan.mosaic.planar import PlacedTouch, compose_poses, planar_belief, relative_pose
+from recognizer.scan.mosaic.register import AMBIGUOUS, CONSTANT
 from recognizer.touch.settings import SignalSettings
 from recognizer.touch.signal import signal_of
 
@@ -189,7 +188,7 @@ def test_nothing_and_touches_that_cannot_be_placed():
     first, second = touches(decoded=(1,))[:2]
     decoded_only = PlacedTouch(second.signal, decoded=second.decoded)
     on_face, by_arm = add_touch(nothing, decoded_only), add_touch(nothing, first)
-    with pytest.raises(MosaicError, match="hangs on nothing"):
+    with pytest.raises(MosaicError, match="without a frame"):
         add_touch(on_face, first)
-    with pytest.raises(MosaicError, match="where it stands for the arm"):
+    with pytest.raises(MosaicError, match="no pose by the arm"):
         add_touch(by_arm, decoded_only)

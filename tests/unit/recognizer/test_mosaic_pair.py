@@ -11,9 +11,9 @@ from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.surface.face import endless_face
-from recognizer.scan.mosaic.pair import AMBIGUOUS, APART, CONSTANT, NOISE, register_patches
 from recognizer.scan.mosaic.patch import patch_of
 from recognizer.scan.mosaic.planar import compose_poses, inverse
+from recognizer.scan.mosaic.register import AMBIGUOUS, APART, CONSTANT, NOISE, register_patches
 from recognizer.touch.settings import SignalSettings
 from recognizer.touch.signal import signal_of
 

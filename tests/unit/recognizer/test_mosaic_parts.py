@@ -9,24 +9,41 @@ import pytest
 
 from encoded_objects.base.sensor_type import SensorType
 from probe.scan.places import surface_to_sensor
-from recognizer.scan.mosaic.canvas import CanvasEntry, empty_canvas, lay_touch, reference
-from recognizer.scan.mosaic.correlation import cross_correlate, peaks
-from recognizer.scan.mosaic.errors import MosaicError
-from recognizer.scan.mosaic.image import as_tactile_image, image_of
-from recognizer.scan.mosaic.patch import interpolate_patch, patch_of
+from recognizer.errors import MosaicError
+from recognizer.scan.mosaic.canvas import (
+    CanvasEntry,
+    empty_canvas,
+    image_of,
+    lay_touch,
+    reference,
+)
+from recognizer.scan.mosaic.patch import (
+    interpolate_patch,
+    patch_of,
+    restrict_information,
+    seen_motions,
+)
 from recognizer.scan.mosaic.planar import (
+    PlacedTouch,
     compose_poses,
     composed_covariance,
+    decoded_place,
     inverse,
+    planar_belief,
     planar_covariance,
     planar_pose,
     relative_covariance,
     relative_pose,
     transform_points,
 )
-from recognizer.scan.mosaic.raster import KnownRaster, laid_under, magnify_patch, points_mm
-from recognizer.scan.mosaic.texture import restrict_information, seen_motions
-from recognizer.scan.mosaic.touch import PlacedTouch, decoded_place, planar_belief
+from recognizer.scan.mosaic.search import (
+    KnownRaster,
+    cross_correlate,
+    laid_under,
+    magnify_patch,
+    peaks,
+    points_mm,
+)
 from recognizer.thesis.product import product_shift
 from recognizer.touch.recognition import Recognition, refusal
 from recognizer.touch.signal import Signal, signal_of
@@ -266,10 +283,6 @@ def test_the_image_is_the_mean_with_its_errors():
     spread = math.sqrt((2 * (1 - mean) ** 2 + (1.3 - mean) ** 2 / 1.69) / (2 + 1 / 1.69))
     assert image.deviation == pytest.approx(spread, abs=1e-6)
     assert (image.error > 0.03 / math.sqrt(3)).all()  # they scatter more than readings do
-    tactile = as_tactile_image(image, touches=3)
-    assert tactile.defined.all()
-    assert tactile.step_mm == P / 4
-    assert not as_tactile_image(image, touches=4).defined.any()
 
 
 def test_the_canvas_shows_a_touch_where_it_lies():

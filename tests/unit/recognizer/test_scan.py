@@ -17,7 +17,7 @@ from probe.simulate.world.levels import MISMATCH, TYPICAL
 from probe.simulate.world.sensor import LevelSensor
 from probe.surface.polygon import polygon
 from recognizer.scan.grow import begin_scan, extend_scan, read_scan
-from recognizer.scan.mosaic.touch import PlacedTouch, planar_belief
+from recognizer.scan.mosaic.planar import PlacedTouch, planar_belief
 from recognizer.scan.session import Scan, TouchPlaces
 from recognizer.scan.settings import ScanSettings
 from recognizer.touch.lab import open_lab

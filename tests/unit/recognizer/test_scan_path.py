@@ -7,7 +7,7 @@ import pytest
 
 from generator.pipeline import encode
 from generator.spec import read_specs
-from recognizer.scan.mosaic.touch import PlacedTouch, planar_belief
+from recognizer.scan.mosaic.planar import PlacedTouch, planar_belief
 from recognizer.scan.path import follow_path, path_touch_poses
 from recognizer.scan.settings import PATHS, ScanSettings
 from recognizer.scan.steps import log_freedom, step_between, steps_of

@@ -1,0 +1,462 @@
+"""The expected recognition rate of a face: the share of its touches that a reader would answer.
+
+Outline + symbols of a face (mm, cells) + sensor -> what the sensor meets at many poses: symbols
+seen whole, and the loaded share of its rectangle. Views + a table of measured answers -> the share
+of touches that are answered at once, and within three, each where the answer before says.
+
+A pose is a place of the sensor's centre on the face, and a turn. They are spread evenly, the same
+every time (an additive recurrence). Seen whole is a symbol whose centre lies at least the symbol's
+half size inside the sensor's rectangle. The loaded share is exact: the rectangle cut by the
+outline, holes and all. Thesis 6.3.
+
+`answers.json` is the table, measured (docs/folds.md): flat faces, a sensor of 25.4 mm whose centre
+lies on the face and whose plate rests there, 20 to 120 N, symbols of 4.5 to 7 mm. Of that, other
+sensor types answer a share that was measured too (`answers_of_types.json`,
+`tests/campaigns/promised_types.py`).
+
+M. Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018), for the recurrence.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from encoded_objects.base.sensor_type import USUAL_SENSOR, SensorType
+from generator.array.touches import touches_needed
+from generator.layout.footprint import Points
+from generator.layout.placement import FaceLayout
+from generator.plane.polygon import points_inside, signed_area
+
+LOW = 0.5  #: share of touches under which a face is named: `validate-set` calls it no use
+NOT_READABLE = 0.15  #: under which it is not readable: of seven touches one is answered
+ONE_ROW = 0.7
+"""Share of poses that show symbols of one row at most, from which that is the cause: all on a bar
+12 mm wide (7 mm), 84 % on an L of such bars."""
+POSES = 1000
+"""On each face: shares within .008 of those of 40,000 on faces of 28 to 60 mm (pitch 7 and 4.5
+mm); 6 to 10 ms a face."""
+AROUND_MM = 20.0  #: of the usual sensor: half its width and a step
+_STRIPS = 64  # poses looked at together
+_STEPS = 1.2207440846057596 ** -np.arange(1.0, 4.0)  # of x, y and turn: 1.22^4 = 1.22 + 1
+
+Loops = Sequence[Points]  #: outline of a face: outer loop (k, 2) counter-clockwise, then holes, mm
+
+
+@dataclass(frozen=True, slots=True)
+class RecognitionRate:
+    """Of one flat face."""
+
+    at_once: float  #: share of touches, the sensor's centre on the face, that are answered
+    #: within up to three touches, each where the answer before says; None: not measured
+    within_three: float | None
+    one_row: bool = False  #: touches show one row of symbols
+    remedy: str = ""  #: what would make it answer most touches, where it does not
+
+
+@dataclass(frozen=True, slots=True)
+class SensorView:
+    """What of a face a sensor can see whole."""
+
+    half_mm: tuple[float, float]  #: half width and half height of the sensor's rectangle
+    symbol_half_mm: float  #: from a symbol's centre to the end of its strokes
+    around_mm: float = AROUND_MM  #: from its centre to what a next touch may show
+
+
+@dataclass(frozen=True, slots=True)
+class FaceViews:
+    """A face as a sensor meets it, pose by pose; the sensor's centre is on the face."""
+
+    centre_mm: Points  #: (P, 2) of the sensor, face frame
+    turn_rad: Points  #: (P,) of the sensor against the face
+    seen: NDArray[np.int64]  #: (P,) symbols seen whole
+    lines: NDArray[np.int64]  #: (P,) rows or columns in which these stand, the fewer of both
+    loaded: Points  #: (P,) share of the sensor's rectangle that lies on the face
+    around: NDArray[np.int64]  #: (P,) symbols that stand within `SensorView.around_mm`
+
+
+@dataclass(frozen=True, slots=True)
+class AnswerTable:
+    """How often a reader answers, measured: pitch x symbols seen whole x loaded share.
+
+    Between its entries it is linear, beyond them constant. What is not answered at once is
+    answered by the second or third touch the likelier, the more symbols stand around those that
+    are seen whole already.
+    """
+
+    pitch_mm: tuple[float, ...]  #: rising
+    seen: tuple[float, ...]  #: rising
+    loaded: tuple[float, ...]  #: rising
+    probability: NDArray[np.float64]  #: (pitch, seen, loaded)
+    again: tuple[float, float, float]  #: its logit: constant, of log(1 + around), of log(1 + seen)
+
+    def at(self, pitch_mm: float, seen: NDArray[np.int64], loaded: Points) -> Points:
+        """Return the probability of an answer at each pose, (P,)."""
+        low, high, part = _between(pitch_mm, self.pitch_mm)
+        table = self.probability[low] * (1 - part) + self.probability[high] * part
+        rows = np.stack([np.interp(loaded, self.loaded, row) for row in table])
+        below, above, share = _between(seen, self.seen)
+        pose = np.arange(len(seen))
+        return np.asarray(rows[below, pose] * (1 - share) + rows[above, pose] * share)
+
+    def later(self, seen: ArrayLike, around: ArrayLike) -> Points:
+        """Return the probability that a touch is answered by the third, if not at once, (P,)."""
+        seen, around = np.asarray(seen, float), np.asarray(around, float)
+        constant, by_around, by_seen = self.again
+        logit = constant + by_around * np.log1p(around) + by_seen * np.log1p(seen)
+        return np.asarray(np.where(around > 0, 1 / (1 + np.exp(-logit)), 0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class AnsweredShare:
+    """How much a sensor type answers of what the usual one would of the same symbols, measured.
+
+    Logistic in the loaded share: larger sensors hang over borders, and membranes of gels bridge
+    them.
+    """
+
+    across_mm: float  #: of the type, as `SensorType.across_mm`
+    symbol_pitch_mm: float  #: that it was measured on
+    constant: float
+    by_loaded: float
+
+    def at(self, loaded: Points) -> Points:
+        """Return the share at each pose, (P,)."""
+        return np.asarray(1 / (1 + np.exp(-(self.constant + self.by_loaded * loaded))))
+
+
+def face_rates(
+    faces: Iterable[tuple[Loops, FaceLayout]],
+    order: int,
+    cells: int,
+    pitch_mm: float,
+    symbol_half_mm: float,
+    sensor: SensorType = USUAL_SENSOR,
+) -> dict[int, RecognitionRate]:
+    """Return the rate of each face by its number; equal faces share the work.
+
+    Nothing is returned of arrays that are read by a scan: no rate was measured there.
+
+    Parameters
+    ----------
+    faces
+        Flat faces: outline and symbols.
+    order, cells
+        Symbols and cells of the array.
+    pitch_mm, symbol_half_mm
+        Pitch of the symbols, and from a symbol's centre to the end of its strokes.
+    sensor
+        What touches the faces.
+    """
+    if touches_needed(order, cells, pitch_mm, sensor_mm=sensor.across_mm) > 1:
+        return {}
+    known: dict[bytes, RecognitionRate] = {}
+    rates = {}
+    for loops, face in faces:
+        key = _face_key(loops, face)
+        if key not in known:
+            known[key] = face_rate(loops, face, pitch_mm, symbol_half_mm, sensor)
+        rates[face.face] = known[key]
+    return rates
+
+
+def face_rate(
+    loops: Loops,
+    face: FaceLayout,
+    pitch_mm: float,
+    symbol_half_mm: float,
+    sensor: SensorType,
+    poses: int = POSES,
+) -> RecognitionRate:
+    """Return the rate of one face, to three places; parameters as for `face_rates`."""
+    if not len(face.labels):
+        return RecognitionRate(0.0, 0.0)
+    views = face_views(loops, face, pitch_mm, sensor_view(sensor, symbol_half_mm), poses)
+    once, within = answered_shares(views, measured_answers(), pitch_mm, sensor)
+    return RecognitionRate(
+        round(once, 3),
+        None if within is None else round(within, 3),
+        one_row=bool((views.lines <= 1).mean() >= ONE_ROW),
+    )
+
+
+def _face_key(loops: Loops, face: FaceLayout) -> bytes:
+    """Return equal bytes for faces that show equal symbols at every pose."""
+    place = face.placement
+    turn = np.array([math.cos(place.rotation_rad), math.sin(place.rotation_rad)])
+    numbers = [np.concatenate(list(loops)).ravel(), face.centres_mm.ravel(), turn]
+    return (np.round(np.concatenate(numbers), 6) + 0.0).tobytes()
+
+
+def sensor_view(sensor: SensorType, symbol_half_mm: float) -> SensorView:
+    """Return what a sensor type can see; a larger one steps farther, too."""
+    around = AROUND_MM * sensor.across_mm / USUAL_SENSOR.across_mm
+    return SensorView(sensor.half_mm, symbol_half_mm, around)
+
+
+def face_views(
+    loops: Loops,
+    face: FaceLayout,
+    pitch_mm: float,
+    view: SensorView,
+    poses: int = POSES,
+) -> FaceViews:
+    """Return what a sensor meets on one face.
+
+    Parameters
+    ----------
+    loops
+        Outline of the face: the outer loop (k, 2) counter-clockwise, holes clockwise, mm.
+    face, pitch_mm
+        Its symbols.
+    view
+        The sensor.
+    poses
+        How many of them.
+    """
+    centre, turn = _poses_on(loops, poses)
+    return views_at(loops, face, pitch_mm, view, centre, turn)
+
+
+def views_at(
+    loops: Loops,
+    face: FaceLayout,
+    pitch_mm: float,
+    view: SensorView,
+    centre_mm: Points,
+    turn_rad: Points,
+) -> FaceViews:
+    """Return what a sensor meets at given poses of one face.
+
+    Parameters
+    ----------
+    loops, face, pitch_mm, view
+        As for `face_views`.
+    centre_mm, turn_rad
+        (P, 2) and (P,) of the sensor, face frame.
+    """
+    start, end = _edges(loops)
+    c, s = np.cos(turn_rad)[:, None], np.sin(turn_rad)[:, None]
+    ax, ay = _in_sensor(start, centre_mm, c, s)
+    bx, by = _in_sensor(end, centre_mm, c, s)
+    area = _area_within(ax, ay, bx, by, *view.half_mm)
+    loaded = area / (4 * view.half_mm[0] * view.half_mm[1])
+    whole = _seen_whole(face, pitch_mm, view, centre_mm, turn_rad)
+    rows, columns = whole.any(axis=2).sum(axis=1), whole.any(axis=1).sum(axis=1)
+    lines, around = np.minimum(rows, columns), _around(face, centre_mm, view.around_mm)
+    return FaceViews(centre_mm, turn_rad, whole.sum(axis=(1, 2)), lines, loaded, around)
+
+
+def answered_shares(
+    views: FaceViews, table: AnswerTable, pitch_mm: float, sensor: SensorType = USUAL_SENSOR
+) -> tuple[float, float | None]:
+    """Return the shares of touches of a face that will be answered at once, and within three.
+
+    The second is known of the usual sensor alone: None of others. `pitch_mm` is that of the face's
+    symbols.
+    """
+    once = answered_at_once(table, pitch_mm, views.seen, views.loaded, sensor)
+    if sensor.name != USUAL_SENSOR.name:
+        return float(once.mean()), None
+    within = once + (1 - once) * table.later(views.seen, views.around)
+    return float(once.mean()), float(within.mean())
+
+
+def answered_share(sensor: SensorType) -> AnsweredShare | None:
+    """Return what a sensor type answers of what the usual one would; None of the usual one.
+
+    Of a type that was not measured it is that of the one most like it in size and pitch.
+    """
+    known = measured_types()
+    if sensor.name == USUAL_SENSOR.name or sensor.name in known:
+        return known.get(sensor.name)
+    nearest = min(known.values(), key=lambda one: _unlike(one, sensor))
+    return nearest if _unlike(nearest, sensor) < _unlike(USUAL_SENSOR, sensor) else None
+
+
+def _unlike(one: AnsweredShare | SensorType, sensor: SensorType) -> float:
+    size = one.across_mm / sensor.across_mm
+    pitch = one.symbol_pitch_mm / sensor.symbol_pitch_mm
+    return math.hypot(math.log(size), math.log(pitch))
+
+
+def answered_at_once(
+    table: AnswerTable,
+    pitch_mm: float,
+    seen: NDArray[np.int64],
+    loaded: Points,
+    sensor: SensorType = USUAL_SENSOR,
+) -> Points:
+    """Return the probability that a sensor's touch is answered at once at each pose, (P,).
+
+    Parameters
+    ----------
+    table
+        Measured with the usual sensor.
+    pitch_mm
+        Of the symbols.
+    seen, loaded
+        (P,) symbols seen whole, and the loaded share.
+    sensor
+        That touches; the table is looked up at the pitch divided by its coarseness.
+    """
+    usual, share = table.at(pitch_mm / sensor.coarseness, seen, loaded), answered_share(sensor)
+    return usual if share is None else usual * share.at(loaded)
+
+
+@lru_cache(maxsize=1)
+def measured_types() -> dict[str, AnsweredShare]:
+    """Return the shares of the sensor types that were measured, by name."""
+    text = (resources.files("generator.layout") / "answers_of_types.json").read_text("utf-8")
+    return {
+        name: AnsweredShare(one["across_mm"], one["pitch_mm"], *one["logit"])
+        for name, one in json.loads(text).items()
+    }
+
+
+@lru_cache(maxsize=1)
+def measured_answers() -> AnswerTable:
+    """Return the table that was measured with the reader and sensor of this version."""
+    text = (resources.files("generator.layout") / "answers.json").read_text(encoding="utf-8")
+    values = json.loads(text)
+    pitch, seen, loaded = (tuple(values[name]) for name in ("pitch_mm", "seen", "loaded"))
+    again = tuple(values["again"])
+    return AnswerTable(pitch, seen, loaded, np.array(values["probability"]), again)
+
+
+def _between(value: Any, steps: Sequence[float]) -> tuple[Any, Any, Any]:
+    """Return the entries around values, and how far each lies from the lower to the upper."""
+    place = np.interp(value, steps, np.arange(len(steps)))
+    low = np.floor(place).astype(np.int64)
+    return low, np.minimum(low + 1, len(steps) - 1), place - low
+
+
+def _around(face: FaceLayout, centre: Points, reach_mm: float) -> NDArray[np.int64]:
+    """Return how many symbols stand within a distance of each pose, (P,).
+
+    Symbols are sorted by x, so that each pose looks at its strip alone: as many as on a small face.
+    """
+    order = np.argsort(face.centres_mm[:, 0], kind="stable")
+    x, y = face.centres_mm[order].T
+    first, last = (np.searchsorted(x, centre[:, 0] + by) for by in (-reach_mm, reach_mm))
+    found = np.zeros(len(centre), np.int64)
+    for start in range(0, len(centre), _STRIPS):
+        some = slice(start, start + _STRIPS)
+        width = int((last[some] - first[some]).max(initial=0))
+        at = first[some, None] + np.arange(width)
+        within = at < last[some, None]
+        at = np.where(within, at, 0)
+        away = np.hypot(x[at] - centre[some, :1], y[at] - centre[some, 1:])
+        found[some] = (within & (away <= reach_mm)).sum(axis=1)
+    return found
+
+
+def _edges(loops: Loops) -> tuple[Points, Points]:
+    return np.concatenate(list(loops)), np.concatenate(
+        [np.roll(loop, -1, axis=0) for loop in loops]
+    )
+
+
+def _poses_on(loops: Loops, number: int) -> tuple[Points, Points]:
+    """Return centres (P, 2) inside the outline and turns (P,), `number` of them."""
+    corners = np.concatenate(list(loops))
+    low = corners.min(axis=0)
+    size = corners.max(axis=0) - low
+    area = sum(signed_area(loop) for loop in loops)
+    found = np.empty((0, 3))
+    first, batch = 1, int(1.1 * number * float(size.prod()) / area) + 16
+    while len(found) < number:
+        fractions = (0.5 + np.arange(first, first + batch)[:, None] * _STEPS) % 1.0
+        points = low + fractions[:, :2] * size
+        inside = points_inside(points, loops)
+        found = np.concatenate([found, np.c_[points, fractions[:, 2] * 2 * np.pi][inside]])
+        first += batch
+    return found[:number, :2], found[:number, 2]
+
+
+def _in_sensor(points: Points, centre: Points, c: Points, s: Points) -> tuple[Points, Points]:
+    """Return x and y, (P, n) each, of points (n, 2) in the frame of each pose."""
+    x, y = points[:, 0] - centre[:, :1], points[:, 1] - centre[:, 1:]
+    return c * x + s * y, c * y - s * x
+
+
+def _area_within(
+    ax: Points, ay: Points, bx: Points, by: Points, half_width: float, half_height: float
+) -> Points:
+    """Return the area (P,) of polygons inside a rectangle about the origin.
+
+    Minus the sum over edges a b of the integral of clamp(y) dx, x clamped too (Green's theorem):
+    what an edge does beside the rectangle adds up to nothing around a loop.
+    """
+    run = np.where(ax == bx, 1.0, bx - ax)
+    ends = []
+    for x in (ax, bx):
+        part = (np.clip(x, -half_width, half_width) - ax) / run
+        ends.append(ay + part * (by - ay))
+    low, high = ends
+    width = np.clip(bx, -half_width, half_width) - np.clip(ax, -half_width, half_width)
+    rise = high - low
+    flat = np.abs(rise) < 1e-9 * half_height
+    mean = (_integral(high, half_height) - _integral(low, half_height)) / np.where(flat, 1.0, rise)
+    mean = np.where(flat, np.clip(low, -half_height, half_height), mean)
+    return np.asarray(-(width * mean).sum(axis=1))
+
+
+def _integral(y: Points, half: float) -> Points:
+    """Return the integral of clamp(t, -half, half) from 0 to y."""
+    inside = np.clip(y, -half, half)
+    return np.asarray(inside * inside / 2 + half * (np.abs(y) - np.abs(inside)))
+
+
+def _seen_whole(
+    face: FaceLayout, pitch: float, view: SensorView, centre: Points, turn: Points
+) -> NDArray[np.bool_]:
+    """Return which cells around each pose bear a symbol seen whole, (P, rows, columns).
+
+    Only cells that the sensor can reach are looked at: as many on a large face as on a small one.
+    """
+    free = np.array(view.half_mm) - view.symbol_half_mm
+    place = face.placement
+    c, s = np.cos(place.rotation_rad), np.sin(place.rotation_rad)
+    x, y = centre.T
+    # Of the sensor's centre, cells from the anchor on: a cell's centre has whole numbers.
+    column = (c * x - s * y + place.x_mm) / pitch - 0.5
+    row = -(s * x + c * y + place.y_mm) / pitch - 0.5
+    reach = math.floor(float(np.hypot(*np.maximum(free, 0.0))) / pitch + 0.5)
+    steps = np.arange(-reach, reach + 1)
+    rows, columns = (np.rint(at).astype(np.int64)[:, None] + steps for at in (row, column))
+    along = ((columns - column[:, None]) * pitch)[:, None, :]
+    down = ((rows - row[:, None]) * pitch)[:, :, None]
+    c, s = (f(turn + place.rotation_rad)[:, None, None] for f in (np.cos, np.sin))
+    bears, low = _bearing(face, pitch)
+    i, j = rows - low[0], columns - low[1]
+    there = [(n >= 0) & (n < size) for n, size in zip((i, j), bears.shape, strict=True)]
+    i, j = np.where(there[0], i, 0), np.where(there[1], j, 0)
+    shown = bears[i[:, :, None], j[:, None, :]] & there[0][:, :, None] & there[1][:, None, :]
+    across, up = c * along - s * down, -s * along - c * down
+    return np.asarray(shown & (np.abs(across) <= free[0]) & (np.abs(up) <= free[1]))
+
+
+def _bearing(face: FaceLayout, pitch_mm: float) -> tuple[NDArray[np.bool_], tuple[int, int]]:
+    """Return which cells of a face's box bear symbols, and its least row and column.
+
+    Rows and columns count from the anchor, as they lie in the plane.
+    """
+    place = face.placement
+    c, s = np.cos(place.rotation_rad), np.sin(place.rotation_rad)
+    x, y = face.centres_mm.T
+    column = np.rint((c * x - s * y + place.x_mm) / pitch_mm - 0.5).astype(np.int64)
+    row = np.rint(-(s * x + c * y + place.y_mm) / pitch_mm - 0.5).astype(np.int64)
+    low = int(row.min(initial=0)), int(column.min(initial=0))
+    size = int(row.max(initial=0)) - low[0] + 1, int(column.max(initial=0)) - low[1] + 1
+    bears = np.zeros(size, dtype=bool)
+    bears[row - low[0], column - low[1]] = True
+    return bears, low

@@ -1,0 +1,221 @@
+"""Poses that agree best with beliefs, steps, registrations and decoded places. Thesis 4.3.
+
+Every constraint gives the pose of frame b in frame a with its information:
+
+    face   - touch    decoded by the reader
+    arm    - touch    believed by the arm, in a frame of its own
+    touch  - touch    registered images (`register`), or a counted step
+
+so there is one residual, r = T_a^-1 T_b - z. A constraint that disagrees with the rest is switched
+off: its chi^2 is scaled by s^2, s = min(1, 2 f / (f + chi^2)), which leaves good constraints
+unchanged (dynamic covariance scaling). Levenberg-Marquardt on sparse normal equations.
+
+Agarwal, Tipaldi, Spinello, Stachniss and Burgard, "Robust map optimization using dynamic
+covariance scaling", ICRA 2013. Kuemmerle et al., "g2o", ICRA 2011.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from recognizer.scan.mosaic.planar import pose_difference, relative_pose, wrap_angle
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+PLANE, ARM = -2, -1  #: the mosaic's frame, which is fixed, and the arm's
+
+FREE_CHI2 = 16.0  #: chi^2 of three numbers from which a constraint is doubted; .1 % of good ones
+OUTLIER_WEIGHT = 0.5  #: weight under which a constraint counts as wrong
+LEAST_WEIGHT = 1e-4  #: of a constraint that is switched off; keeps every touch somewhere
+STEPS = 30  #: at most
+DONE_MM = 1e-4  #: of x and y: a step under both is the last one
+DONE_RAD = 1e-6  #: of turns
+AT_ONCE = 64  #: poses whose covariances are solved for together
+
+Kind = Literal["decoded", "believed", "stepped", "pair"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Constraint:
+    """The pose of frame b in frame a."""
+
+    a: int  #: number of a touch, PLANE or ARM
+    b: int  #: number of a touch
+    pose: Array  #: (3,) T_a_b, mm and rad
+    information: Array  #: (3, 3) inverse covariance, axes of a; may be singular
+    kind: Kind
+    log_gain: float = 0.0  #: of readings of a over those of b
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseGraphSolution:
+    """Poses with the fit of each constraint."""
+
+    poses: Array  #: (n, 3) T_plane_touch
+    arm: Array  #: (3,) T_plane_arm
+    chi2: Array  #: (m,) of each constraint
+    weights: Array  #: (m,) 0 ... 1; under `OUTLIER_WEIGHT` a constraint counts as wrong
+    cost: float
+    steps: int
+    normal: Any  #: sparse matrix (3 n + 3) square, inverse covariance of poses and arm
+
+
+def solve_pose_graph(
+    constraints: Sequence[Constraint], poses: Array, arm: Array, *, arm_fixed: bool
+) -> PoseGraphSolution:
+    """Return the poses that agree best with all constraints.
+
+    Parameters
+    ----------
+    constraints
+        They must connect every touch to the plane.
+    poses, arm
+        (n, 3) and (3,) to start from.
+    arm_fixed
+        The arm's frame is the plane's: no touch was decoded.
+    """
+    from scipy.sparse import diags
+    from scipy.sparse.linalg import splu
+
+    graph = _graph(constraints, len(poses), arm_fixed=arm_fixed)
+    at = np.concatenate([poses, arm[None]])
+    damping, steps = 1e-6, 0
+    now = _linearise(graph, at)
+    while steps < STEPS:
+        steps += 1
+        diagonal = diags(now.normal.diagonal() * damping)
+        step = splu((now.normal + diagonal).tocsc()).solve(now.pull).reshape(-1, 3)
+        moved = at + step
+        moved[:, 2] = wrap_angle(moved[:, 2])
+        then = _linearise(graph, moved)
+        if then.cost > now.cost * (1 + 1e-12) and damping < 1e6:
+            damping *= 10
+            continue
+        damping = max(damping / 10, 1e-9)
+        at, now = moved, then
+        if np.abs(step[:, :2]).max() < DONE_MM and np.abs(step[:, 2]).max() < DONE_RAD:
+            break
+    return PoseGraphSolution(at[:-1], at[-1], now.chi2, now.weights, now.cost, steps, now.normal)
+
+
+def covariances(normal: Any, numbers: Sequence[int]) -> Array:
+    """Return covariances (k, 3, 3) of some poses, x, y (mm) and theta (rad).
+
+    The arm's frame has the number n, after all touches.
+    """
+    from scipy.sparse.linalg import splu
+
+    factor, size = splu(normal.tocsc()), normal.shape[0]
+    found = np.empty((len(numbers), 3, 3))
+    for first in range(0, len(numbers), AT_ONCE):
+        some = np.asarray(numbers[first : first + AT_ONCE])
+        rows = (3 * some[:, None] + np.arange(3)).reshape(-1)
+        right = np.zeros((size, len(rows)))
+        right[rows, np.arange(len(rows))] = 1.0
+        blocks = factor.solve(right)[rows].reshape(len(some), 3, len(some), 3)
+        k = np.arange(len(some))
+        found[first : first + len(some)] = blocks[k, :, k, :]
+    return (found + found.swapaxes(1, 2)) / 2
+
+
+def robust_cost(chi2: Array) -> tuple[Array, Array]:
+    """Return costs of constraints with dynamic covariance scaling, and their weights."""
+    scale = np.minimum(1.0, 2 * FREE_CHI2 / (FREE_CHI2 + chi2))
+    cost = scale**2 * chi2 + FREE_CHI2 * (1 - scale) ** 2
+    return np.asarray(cost), np.maximum(scale**2, LEAST_WEIGHT)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Graph:
+    """Constraints as arrays; the plane has the number n + 1, the arm n."""
+
+    a: Ints
+    b: Ints
+    pose: Array  #: (m, 3)
+    information: Array  #: (m, 3, 3)
+    n: int
+    fixed: NDArray[np.bool_]  #: (n + 2,) frames that do not move
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Linearisation:
+    cost: float
+    chi2: Array
+    weights: Array
+    normal: Any
+    pull: Array
+
+
+def _graph(constraints: Sequence[Constraint], n: int, *, arm_fixed: bool) -> _Graph:
+    number = {PLANE: n + 1, ARM: n}
+    fixed = np.zeros(n + 2, np.bool_)
+    arm_used = any(constraint.a == ARM for constraint in constraints)
+    fixed[n + 1], fixed[n] = True, arm_fixed or not arm_used
+    return _Graph(
+        a=np.array([number.get(constraint.a, constraint.a) for constraint in constraints]),
+        b=np.array([constraint.b for constraint in constraints]),
+        pose=np.array([constraint.pose for constraint in constraints]),
+        information=np.array([constraint.information for constraint in constraints]),
+        n=n,
+        fixed=fixed,
+    )
+
+
+def _linearise(graph: _Graph, at: Array) -> _Linearisation:
+    """Return cost, gradient and normal equations at poses (n + 1, 3), the arm's last."""
+    from scipy.sparse import coo_matrix
+
+    every = np.concatenate([at, np.zeros((1, 3))])
+    relative = relative_pose(every[graph.a], every[graph.b])
+    residual = pose_difference(relative, graph.pose)
+    pushed = (graph.information @ residual[:, :, None])[:, :, 0]
+    chi2 = (residual * pushed).sum(axis=1)
+    costs, weights = robust_cost(chi2)
+    by_a, by_b = _slopes(every[graph.a, 2], relative)
+    heavy = graph.information * weights[:, None, None]
+    rows, columns, blocks = [], [], []
+    pull = np.zeros((graph.n + 2, 3))
+    for one, by_one in ((graph.a, by_a), (graph.b, by_b)):
+        left = by_one.swapaxes(1, 2) @ heavy
+        free = ~graph.fixed[one]
+        np.add.at(pull, one[free], -(left @ residual[:, :, None])[free, :, 0])
+        for other, by_other in ((graph.a, by_a), (graph.b, by_b)):
+            both = free & ~graph.fixed[other]
+            rows.append(one[both])
+            columns.append(other[both])
+            blocks.append((left @ by_other)[both])
+    held = np.flatnonzero(graph.fixed[:-1])  # the arm, where it is fixed
+    rows.append(held)
+    columns.append(held)
+    blocks.append(np.broadcast_to(np.eye(3), (len(held), 3, 3)))
+    row, column = (3 * np.concatenate(k) for k in (rows, columns))
+    i, j = np.mgrid[:3, :3]
+    normal = coo_matrix(
+        (
+            np.concatenate(blocks).reshape(-1),
+            (
+                (row[:, None, None] + i).reshape(-1),
+                (column[:, None, None] + j).reshape(-1),
+            ),
+        ),
+        shape=(3 * graph.n + 3, 3 * graph.n + 3),
+    ).tocsc()
+    return _Linearisation(float(costs.sum()), chi2, weights, normal, pull[:-1].reshape(-1))
+
+
+def _slopes(theta_a: Array, relative: Array) -> tuple[Array, Array]:
+    """Return the derivatives of the residuals by the poses of a and b, (m, 3, 3) each."""
+    c, s = np.cos(theta_a), np.sin(theta_a)
+    by_b = np.zeros((len(theta_a), 3, 3))
+    by_b[:, 0, 0], by_b[:, 0, 1] = c, s
+    by_b[:, 1, 0], by_b[:, 1, 1] = -s, c
+    by_b[:, 2, 2] = 1.0
+    by_a = -by_b
+    by_a[:, 0, 2], by_a[:, 1, 2] = relative[:, 1], -relative[:, 0]
+    return by_a, by_b

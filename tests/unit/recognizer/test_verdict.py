@@ -1,0 +1,117 @@
+"""Whether a place is an answer, and why not: each bound from both sides."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from recognizer.touch.recognition import AMBIGUOUS, BY_CHANCE, NOT_ENCODED, TOO_FEW
+from recognizer.touch.settings import BeliefSettings
+from recognizer.touch.verdict import (
+    Evidence,
+    is_encoded,
+    least_explained,
+    may_count_border,
+    reject_chance,
+    reject_few,
+    reject_reason,
+)
+
+LIMITS = BeliefSettings()
+GOOD = Evidence(log_likelihood_ratio=20.0, explained=0.9, inliers=12, contradictions=0)
+#: Limits of margins, nats: 10 and 14 but for rounding.
+TEN, FOURTEEN = LIMITS.margin, LIMITS.margin_by_few
+
+
+@pytest.mark.parametrize(
+    ("changed", "believed"),
+    [
+        ({}, True),
+        # at least 3 nats over symbols of no registered place
+        ({"log_likelihood_ratio": 3.0}, True),
+        ({"log_likelihood_ratio": 2.99}, False),
+        ({"log_likelihood_ratio": -5.0}, False),
+        # below 7 nats at least four fifths are explained
+        ({"log_likelihood_ratio": 6.99, "explained": 0.8}, True),
+        ({"log_likelihood_ratio": 6.99, "explained": 0.799}, False),
+        ({"log_likelihood_ratio": 7.0, "explained": 0.799}, True),
+        # so where strokes are more than 0.09 mm wider than asked
+        ({"stroke_excess": 0.9, "explained": 0.799}, True),
+        ({"stroke_excess": 0.91, "explained": 0.799}, False),
+        ({"stroke_excess": 0.91, "explained": 0.8}, True),
+        ({"stroke_excess": -1.2, "explained": 0.799}, True),
+        # 72 % where fewer than 11 cells agree, 58 % where more do
+        ({"inliers": 10, "explained": 0.72}, True),
+        ({"inliers": 10, "explained": 0.719}, False),
+        ({"inliers": 11, "explained": 0.58}, True),
+        ({"inliers": 11, "explained": 0.579}, False),
+        ({"inliers": 0, "explained": 0.72}, True),  # too few symbols is another reason
+        # one cell may speak clearly for another symbol, none plainly
+        ({"contradictions": 1}, True),
+        ({"contradictions": 2}, False),
+        ({"contradictions": 1, "strong_contradictions": 1}, False),
+    ],
+)
+def test_each_bound_of_belief_from_both_sides(changed, believed):
+    assert is_encoded(replace(GOOD, **changed)) is believed
+
+
+@pytest.mark.parametrize(
+    ("changed", "margin", "reason"),
+    [
+        ({}, TEN, ""), ({}, 9.99, AMBIGUOUS), ({}, math.inf, ""),
+        ({"inliers": 4}, TEN, ""), ({"inliers": 3}, TEN, TOO_FEW),
+        # the first condition that fails is the reason
+        ({"log_likelihood_ratio": 2.99}, 9.0, NOT_ENCODED),
+        ({"log_likelihood_ratio": 2.99, "inliers": 2}, 9.0, NOT_ENCODED),
+        ({"inliers": 3}, 9.0, TOO_FEW),
+        # of a scan: half of the touches are too few
+        ({"touches": 4, "agreeing": 3}, TEN, ""), ({"touches": 4, "agreeing": 2}, TEN, TOO_FEW),
+        ({"touches": 4, "agreeing": 2, "contradictions": 2}, TEN, NOT_ENCODED),
+    ],
+)  # fmt: skip
+def test_each_reason_in_its_order(changed, margin, reason):
+    assert reject_reason(replace(GOOD, **changed), margin, LIMITS) == reason
+
+
+@pytest.mark.parametrize(
+    ("ratio", "best", "reason"),
+    [(8.0, 8.0, ""), (7.9, 8.0, TOO_FEW), (2.9, 8.0, NOT_ENCODED), (2.9, 7.9, TOO_FEW)],
+)
+def test_more_nats_may_be_asked_for(ratio, best, reason):
+    found = replace(GOOD, log_likelihood_ratio=ratio, best_ratio=best)
+    assert reject_reason(found, TEN, LIMITS, least_ratio=8.0) == reason
+
+
+@pytest.mark.parametrize(("wrong", "reason"), [(3, ""), (4, NOT_ENCODED)])
+def test_of_many_cells_a_share_may_contradict(wrong, reason):
+    found = replace(GOOD, inliers=60, contradictions=wrong)
+    assert reject_reason(found, TEN, LIMITS, wrong_share=0.05) == reason
+    assert reject_reason(found, TEN, LIMITS) == NOT_ENCODED
+
+
+@pytest.mark.parametrize(
+    ("inliers", "margin", "matches", "reason"),
+    [
+        (10, FOURTEEN, 1.0, ""), (10, 13.99, 1.0, AMBIGUOUS), (10, FOURTEEN, 1.01, TOO_FEW),
+        (10, 13.99, 1.01, TOO_FEW), (11, 10.0, 1.01, ""),
+    ],
+)  # fmt: skip
+def test_few_symbols_name_a_place_and_leave_others_behind(inliers, margin, matches, reason):
+    assert reject_few(replace(GOOD, inliers=inliers), margin, matches, LIMITS) == reason
+
+
+def test_chance_and_what_an_image_must_explain():
+    assert (reject_chance(1e-4, 1e-4), reject_chance(1.01e-4, 1e-4)) == ("", BY_CHANCE)
+    assert (least_explained(10), least_explained(11)) == (0.72, 0.58)
+
+
+@pytest.mark.parametrize(
+    ("changed", "margin", "counts"),
+    [
+        ({}, FOURTEEN, True), ({}, 13.9, False), ({"worn": 1}, 40.0, True),
+        ({"worn": 2}, 40.0, False), ({"contradictions": 1}, 40.0, False),
+    ],
+)  # fmt: skip
+def test_the_border_counts_for_a_place_that_lacks_only_symbols(changed, margin, counts):
+    assert may_count_border(replace(GOOD, **changed), margin, LIMITS) is counts
