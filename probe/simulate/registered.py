@@ -25,14 +25,12 @@ from generator.database.transaction import read_transaction
 from probe.errors import SurfaceError
 from probe.simulate.scene import Scene
 from probe.simulate.written import part_mesh, round_part
+from probe.surface.body import symbol_triangles, triangulate
 from probe.surface.contract import HeightMap
-from probe.surface.face import FaceSurface
-from probe.surface.lattice import LatticeSurface, list_lookup
+from probe.surface.face import FaceSurface, LatticeSurface, list_lookup, template
 from probe.surface.mesh import MeshSurface, mesh
 from probe.surface.polygon import polygon
-from probe.surface.solids import symbol_triangles, triangulate
 from probe.surface.symbols import Relief, SymbolReliefs, emboss
-from probe.surface.template import template
 
 Array = NDArray[np.float64]
 

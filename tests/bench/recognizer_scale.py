@@ -32,11 +32,14 @@ from probe.contact.contract import Touch  # noqa: E402
 from probe.simulate.scene import Scene  # noqa: E402
 from probe.simulate.world.levels import TYPICAL  # noqa: E402
 from probe.simulate.world.sensor import LevelSensor  # noqa: E402
-from probe.surface.face import FaceSurface  # noqa: E402
-from probe.surface.lattice import LatticeSurface, list_lookup  # noqa: E402
+from probe.surface.face import (  # noqa: E402
+    FaceSurface,
+    LatticeSurface,
+    list_lookup,
+    template,
+)
 from probe.surface.polygon import polygon  # noqa: E402
 from probe.surface.symbols import Relief, emboss  # noqa: E402
-from probe.surface.template import template  # noqa: E402
 from recognizer.touch.lab import EmbossedArray, EncodedFace, Lab, cell_keys  # noqa: E402
 from recognizer.touch.reader import Reader  # noqa: E402
 from recognizer.touch.recognise import recognise  # noqa: E402
