@@ -40,7 +40,7 @@ from probe.simulate.scene import bare_scene
 from probe.simulate.world.levels import LEVELS
 from probe.simulate.world.sensor import BIAS, LevelSensor
 from probe.simulate.world.surfaces import worn_scene
-from recognizer.scan.grow import begin_scan, extend_scan
+from recognizer.scan.belief import begin_scan, extend_scan
 from recognizer.scan.mosaic.planar import (
     PlacedTouch,
     inverse,

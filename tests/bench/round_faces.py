@@ -48,7 +48,7 @@ from probe.simulate.touch import TouchRanges, random_touches  # noqa: E402
 from probe.simulate.world.levels import LEVELS  # noqa: E402
 from probe.simulate.world.sensor import LevelSensor  # noqa: E402
 from probe.simulate.written import RoundPart, round_part  # noqa: E402
-from recognizer.scan.grow import begin_scan, extend_scan  # noqa: E402
+from recognizer.scan.belief import begin_scan, extend_scan  # noqa: E402
 from recognizer.scan.mosaic.planar import PlacedTouch, planar_belief  # noqa: E402
 from recognizer.touch.lab import open_lab  # noqa: E402
 from recognizer.touch.reader import Reader  # noqa: E402

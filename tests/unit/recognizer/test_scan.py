@@ -16,10 +16,10 @@ from probe.simulate.scene import Scene
 from probe.simulate.world.levels import MISMATCH, TYPICAL
 from probe.simulate.world.sensor import LevelSensor
 from probe.surface.polygon import polygon
-from recognizer.scan.grow import begin_scan, extend_scan, read_scan
+from recognizer.scan.belief import begin_scan, extend_scan, read_scan
 from recognizer.scan.mosaic.planar import PlacedTouch, planar_belief
 from recognizer.scan.session import Scan, TouchPlaces
-from recognizer.scan.settings import ScanSettings
+from recognizer.scan.views import ScanSettings
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import NO_CONTACT, TOO_FEW
@@ -108,7 +108,7 @@ def test_a_touch_in_the_air_says_so_and_changes_nothing(lab, reader):
     lifted = extend_scan(scan, air)
     assert lifted.recognition.reason == NO_CONTACT
     assert len(lifted.touches) == 3
-    assert lifted.leading is scan.leading
+    assert lifted.best is scan.best
 
 
 def test_touches_of_another_thing_do_not_make_an_answer(lab, reader):
@@ -124,7 +124,7 @@ def test_touches_of_another_thing_do_not_make_an_answer(lab, reader):
         scan = extend_scan(scan, touch)
         assert scan.recognition.object in (None, "Cube")
     assert scan.recognition.face == "F3"
-    chosen = scan.leading.composite.agreement.chosen
+    chosen = scan.best.evidence.agreement.chosen
     assert chosen[3] < 0
     assert chosen[6] < 0
 

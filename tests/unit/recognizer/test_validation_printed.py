@@ -18,8 +18,7 @@ from generator.errors import PrintError
 from generator.pipeline import encode
 from generator.printed import prints, slicer
 from generator.printed.prints import surface_keys, surface_path
-from generator.printed.surface import Coverage, PrintedSurface
-from generator.printed.surface_file import write_surface
+from generator.printed.surface import Coverage, PrintedSurface, write_surface
 from generator.spec import read_specs
 from probe.errors import SurfaceError
 from probe.simulate import printed
