@@ -11,7 +11,7 @@ from manifold3d import Manifold
 
 from generator.errors import SolidError
 from generator.solid.convex import ConvexSettings, convex_pieces
-from generator.solid.inertia import inertia_of
+from generator.solid.measure import inertia_of
 
 
 def mesh_of(body: Manifold):
