@@ -32,7 +32,7 @@ from probe.contact.contract import WristStiffness
 from probe.contact.engines import engine_named
 from probe.contact.mujoco import STIFFER
 from probe.contact.tips import Tips
-from probe.simulate.part import part_surface
+from probe.simulate.target import part_surface
 from probe.surface.body import body_of
 from probe.surface.mesh import mesh
 

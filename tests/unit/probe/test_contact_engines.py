@@ -17,8 +17,9 @@ from probe.contact.engines import ENGINES, Engine, EngineEntry, engine_named
 from probe.contact.mujoco import AROUND_MM, DEEP_MM, STIFFER, mesh_under
 from probe.contact.tips import Tips
 from probe.errors import ContactError, ProbeError
+from probe.simulate.scene import bare_scene
 from probe.simulate.world.levels import LEVELS
-from probe.simulate.world.reading import read_sensor
+from probe.simulate.world.sensor import LevelSensor
 from probe.surface.mesh import mesh
 
 RIGID = WristStiffness(math.inf, math.inf)
@@ -193,9 +194,9 @@ def test_a_third_engine_is_one_module_and_one_line(monkeypatch):
     monkeypatch.setitem(sys.modules, "third_engine", module)
     monkeypatch.setitem(ENGINES, "third", EngineEntry("third_engine", "everything"))
     rng = np.random.default_rng(3)
-    counts, contact = read_sensor(
-        Void(), SENSOR, Touch(0, 0, 0, 128.0), LEVELS["sound"], rng, "third"
-    )
+    sensor = LevelSensor(SENSOR, LEVELS["sound"], "third")
+    reading = sensor.read(bare_scene(Void()), Touch(0, 0, 0, 128.0), rng)
+    counts, contact = reading.counts, reading.contact
     assert (contact.level, contact.z_mm) == ("third", 0.25)
     assert np.ptp(counts.astype(int)) <= 2  # every tactel bears half a newton; the board rounds
     assert counts.min() > 60

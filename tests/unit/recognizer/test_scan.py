@@ -12,8 +12,10 @@ from probe.arm.carried import SensorPose
 from probe.contact.contract import Touch
 from probe.scan.places import surface_to_sensor
 from probe.simulate.registered import registered_surface
+from probe.simulate.scene import Scene
 from probe.simulate.world.levels import MISMATCH, TYPICAL
-from probe.simulate.world.reading import read_sensor
+from probe.simulate.world.sensor import LevelSensor
+from probe.surface.polygon import polygon
 from recognizer.scan.belief import begin_scan, extend_scan, read_scan
 from recognizer.scan.mosaic.planar import PlacedTouch, planar_belief
 from recognizer.scan.session import Scan, TouchPlaces
@@ -48,18 +50,20 @@ def reader(lab):
     return Reader(lab, SENSOR)
 
 
-MIDDLE = (40.0, 40.0)  #: of a face of the cube: where a print's scale moves nothing
+#: a face of the cube: its middle is where a print's scale moves nothing
+REGION = polygon([np.array([(0, 0), (80, 0), (80, 80), (0, 80)])])
 
 
 def scanned(surface, places, theta, level, seed):
     """Touches with believed places in another frame, and the true poses."""
+    scene = Scene(surface, REGION, "")
     rng = np.random.default_rng(seed)
     c, s = math.cos(0.6), math.sin(0.6)
     touches, true = [], []
     for k, (x, y) in enumerate(places):
         touch = Touch(x, y, theta, float(rng.uniform(40, 110)), *rng.normal(0, 0.008, 2))
         one_sensor = np.random.default_rng(seed)
-        counts, _ = read_sensor(surface, SENSOR, touch, level, one_sensor, datum_mm=MIDDLE)
+        counts = LevelSensor(SENSOR, level).read(scene, touch, one_sensor).counts
         error = rng.normal(0, 1, 3) * SPREAD
         pose = np.array([c * x - s * y + 200, s * x + c * y - 70, theta + 0.6]) + error
         signal = signal_of(counts.astype(float))
@@ -252,7 +256,7 @@ def one_touch(tmp_path_factory):
     def felt(name, face, x, y, T_base_object=None):
         scene = registered_surface(url, name, face)
         touch = Touch(x, y, 0.4, 80.0)
-        counts, _ = read_sensor(scene.surface, SENSOR, touch, TYPICAL, np.random.default_rng(1))
+        counts = LevelSensor(SENSOR, TYPICAL).read(scene, touch, np.random.default_rng(1)).counts
         if T_base_object is None:
             return counts, None
         return counts, T_base_object @ scene.T_object_surface @ surface_to_sensor(x, y, 0.4)
