@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from generator.array.touches import touches_needed
+from generator.array.contract import touches_needed
 from generator.layout.placement import Layout
 from generator.pipeline.faces import FaceReport
 from generator.pipeline.plan import ObjectPlan

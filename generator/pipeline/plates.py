@@ -35,7 +35,7 @@ from generator.printers import Printer
 from generator.solid import Part, box, volume
 
 if TYPE_CHECKING:
-    from generator.printed.sliced_plate import PlateCost
+    from generator.printed.slicer import PlateCost
 
 SetObject = tuple[MakeJob, Layout]  #: one object of a set, as it was made
 
@@ -106,7 +106,7 @@ def write_set(
                 twin = staging.write(file, content.prusaslicer)
                 if slice_plates:
                     progress(f"slicing plate {number}", 0.9)
-                    from generator.printed.sliced_plate import slice_plate
+                    from generator.printed.slicer import slice_plate
 
                     costs[number - 1] = slice_plate(twin.staged)
         page = _set_sheet(name, objects, folder, plates, costs)

@@ -23,8 +23,7 @@ from typing import Any, Final
 from encoded_objects.base.errors import EncodedObjectsError, require
 from encoded_objects.base.output import json_value, message
 from probe.frame import Frame
-from probe.recording.cdr import cdr_bytes
-from probe.recording.ros import IMAGE, POSE_WITH_COVARIANCE, image_message
+from probe.recording.ros import IMAGE, POSE_WITH_COVARIANCE, cdr_bytes, image_message
 from recognizer.command.answers import Answer, AnswerSink
 from recognizer.command.ros import object_message
 

@@ -5,7 +5,7 @@
     /touch/object   geometry_msgs/PoseWithCovarianceStamped  the object, in the robot's base where
                     that is known (frame_id "base"), else in the sensor's frame ("sensor")
     /touch/answer   encoded_objects_msgs/Recognition         every answer, refusals too
-    /touch/image, /touch/frame, /touch/pose                  see `probe.recording.mcap_writer`
+    /touch/image, /touch/frame, /touch/pose                  see `probe.recording.mcap`
 
 Positions in metres; covariances (x, y, z, rx, ry, rz) in the axes of the frame_id, in m and rad.
 """
@@ -24,7 +24,7 @@ from encoded_objects.base.output import json_value
 from probe.arm.carried import SensorPose
 from probe.frame import Frame
 from probe.recording.layout import RecordingOrigin
-from probe.recording.mcap_writer import McapWriter
+from probe.recording.mcap import McapWriter
 from probe.recording.ros import (
     BASE_FRAME,
     POSE_WITH_COVARIANCE,
