@@ -46,14 +46,6 @@ class FeltSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class FeltLoadSettings:
-    """What is said of a load while it lies on the sensor."""
-
-    counts: float = 5.0  #: above rest: a tactel feels it
-    steady: float = 0.05  #: share by which it may change while it is read
-
-
-@dataclass(frozen=True, slots=True)
 class DriftSettings:
     """When a calibration is told to be old."""
 
@@ -66,5 +58,4 @@ AVERAGE = AverageSettings()
 LAW_FIT = LawFitSettings()
 POOL = PoolSettings()
 FELT = FeltSettings()
-FELT_LOAD = FeltLoadSettings()
 DRIFT = DriftSettings()
