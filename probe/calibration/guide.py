@@ -13,14 +13,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from probe.calibration.settings import AVERAGE
+from probe.calibration.load import LEAST_FRAMES, describe_load
 from probe.errors import CalibrationError
 from probe.frame import Frame
 
 LONGEST: Final = 8.0  #: times the asked seconds, that frames which repeat themselves are read
 MOST_FRAMES: Final = 20_000  #: of a load
-_FELT_COUNTS: Final = 5.0  #: above rest: a tactel feels the load
-_STEADY: Final = 0.05  #: share of the median by which a steady load may change while it is read
 
 
 @dataclass(slots=True)
@@ -86,7 +84,7 @@ class CalibrationGuide:
             self._different += last is None or not np.array_equal(frame.counts, last)
             self.frames.append(frame)
             passed_s = (frame.t_ns - self.frames[0].t_ns) * 1e-9
-            enough = self._different >= AVERAGE.frames or passed_s >= LONGEST * self.seconds
+            enough = self._different >= LEAST_FRAMES or passed_s >= LONGEST * self.seconds
             if (enough and passed_s >= self.seconds) or len(self.frames) >= MOST_FRAMES:
                 self.end_step()
 
@@ -94,26 +92,5 @@ class CalibrationGuide:
         """End the step with the frames so far."""
         counts, self.reading = np.stack([frame.counts for frame in self.frames]), False
         self.taken.append(counts)
-        self.felt.append(_describe(counts, self.taken[0] if self.step else None))
+        self.felt.append(describe_load(counts, self.taken[0] if self.step else None))
         self.step += 1
-
-
-def _describe(counts: NDArray[np.uint16], rest: NDArray[np.uint16] | None) -> str:
-    """Return how many tactels felt a load, how much, and whether it was steady.
-
-    counts (N, rows, columns) are frames of the load, rest (M, rows, columns) those of the unloaded
-    sensor; None where the load is the rest.
-    """
-    mean = counts.mean(axis=0)
-    if rest is None:
-        return f"{len(counts)} frames at rest, median {np.median(mean):.1f} counts"
-    rise = mean - rest.mean(axis=0)
-    felt, half = int((rise > _FELT_COUNTS).sum()), len(counts) // 2
-    change = float(np.median(counts[half:].mean(axis=0) - counts[: max(half, 1)].mean(axis=0)))
-    words = (
-        f"{len(counts)} frames, felt by {felt} of {rise.size} tactels, "
-        f"median {np.median(rise):.1f} counts above rest"
-    )
-    if abs(change) > max(1.0, _STEADY * float(np.median(rise))):
-        words += f"; not steady, it changed by {change:+.1f} counts"
-    return words

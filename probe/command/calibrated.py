@@ -22,8 +22,8 @@ from probe.calibration import (
     read_calibration,
     write_calibration,
 )
-from probe.calibration.average import average_frames
-from probe.calibration.condition import ConditionThresholds, common_bias, raised_tactels
+from probe.calibration.condition import common_bias, raised_tactels
+from probe.calibration.load import average_frames
 from probe.circuit import Electronics
 from probe.client.stream import Stream, name_of
 from probe.command.laws import condition_map, describe_laws, places
@@ -68,7 +68,7 @@ def report_bias(
     """
     counts, name, kind = _frames_of(source, sensor, seconds, sensor_type)
     rest = average_frames(counts, source)
-    high = raised_tactels(rest, kind.full, ConditionThresholds())
+    high = raised_tactels(rest, kind.full)
     values: dict[str, Any] = {
         "source": source,
         "sensor": name,

@@ -16,7 +16,7 @@ from encoded_objects.base.files import refuse_taken, staged_file
 from encoded_objects.base.output import message, progress_bar, write, write_json
 from probe.command.app import SimulateOptions
 from probe.command.recorded import check_output
-from probe.simulate.simulated_probe import SimulatedProbe, SimulatedTouch, TouchOptions
+from probe.simulate.simulation import SimulatedProbe, SimulatedTouch, TouchOptions
 
 if TYPE_CHECKING:
     from probe.simulate.scan import ScanKind

@@ -6,14 +6,14 @@ known in any frame p00 ... p33, T_base_sensor by rows (mm), empty in the frames 
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TextIO
 
 import numpy as np
 
+from encoded_objects.base.files import staged_file
 from probe.frame import WRIST
-from probe.recording.files import draft_of, explain_errors
+from probe.recording.files import explain_errors
 from probe.recording.layout import FrameBlock
 from probe.recording.read import Recording
 
@@ -36,14 +36,12 @@ def export_csv(path: Path | str, out: Path | str, *, live: bool = False) -> int:
         The recording cannot be read, or the table not be written.
     """
     recording, out = Recording(path, live=live), Path(out)
-    draft = draft_of(out)
-    try:
-        with explain_errors(out, "write"):
-            with open(draft, "x", encoding="ascii", newline="") as stream:
-                _write_csv(recording, stream)
-            os.replace(draft, out)
-    finally:
-        draft.unlink(missing_ok=True)
+    with (
+        explain_errors(out, "write"),
+        staged_file(out) as draft,
+        open(draft, "x", encoding="ascii", newline="") as stream,
+    ):
+        _write_csv(recording, stream)
     return len(recording)
 
 
