@@ -122,7 +122,7 @@ def stage(
             file, twin = staged["3mf"][2 * number : 2 * number + 2]
             cost = None
             if slice_plates:
-                from generator.printed.sliced_plate import slice_plate
+                from generator.printed.slicer import slice_plate
 
                 progress(f"slicing plate {number + 1}", 0.8)
                 cost = slice_plate(twin.staged)

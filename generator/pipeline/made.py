@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from generator.array.touches import touches_needed
+from generator.array.contract import touches_needed
 from generator.layout.placement import Layout
 from generator.pipeline.faces import FaceReport
 from generator.pipeline.overhang import overhang_of

@@ -1,10 +1,10 @@
-"""Contact engines: the same touch by programs that share no model.
+"""Contact engines: programs that share no model press the same touch.
 
-An engine takes a surface, a sensor, a touch and what is known of the tips, and gives the force
-on every tactel and the plate at rest. `own` is the ladder of `probe.contact`; `mujoco` asks
-MuJoCo's tactile sensor how deep each point of each tip stands in a mesh of what is touched.
+An engine takes a surface, a sensor, a touch and the tips' defects, and gives the force on every
+tactel and the plate at rest. `own` is the ladder of `press`; `mujoco` asks MuJoCo's tactile sensor
+how deep each point of each tip stands in a mesh of the surface.
 
-A third one is a file beside these with a value `ENGINE`, and a line in `ENGINES`.
+A third one is a module with a value `ENGINE`, and a line in `ENGINES`.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ class EngineEntry:
 
 ENGINES = {
     "own": EngineEntry(
-        "probe.contact.engines.own",
+        "probe.contact.press",
         "every tab of the overlay is a column that is pressed straight down: it does not bulge, "
         "does not slide, and does not touch the tabs beside it",
     ),
     "mujoco": EngineEntry(
-        "probe.contact.engines.mujoco",
+        "probe.contact.mujoco",
         "friction; a tip that sinks deeper into a stroke than half the stroke's width is felt as "
         "if it had slid off to the side; and what is finer than 0.1 mm on a print",
     ),

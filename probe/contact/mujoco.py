@@ -1,12 +1,13 @@
-"""MuJoCo's tactile sensor on what is touched: an engine that shares no model with ours.
+"""MuJoCo's tactile sensor on a surface: an engine that shares no model with ours.
 
 Surface + sensor + touch + tips -> Contact. MuJoCo holds the part as a signed distance field on an
-octree of fixed depth, made of what lies under the sensor alone (`under_sensor`); its `tactile`
-sensor says how deep every point of every tip stands in the part, along the shortest way out.
-Each point is a column of the overlay's elastomer (neo-Hookean, its share of the tip's area);
-the plate advances and tilts until forces and moments balance those of the touch and the wrist.
-What is left out: the wall between points of a tip, friction, and depths beyond the half width
-of a stroke, where the shortest way out leads through its side.
+octree of fixed depth, made of the part under the sensor alone: a written part is cut, heights
+alone (a print, a registered face) become a mesh. Its `tactile` sensor gives the depth of every
+point of every tip in the part, along the shortest way out. Each point is a column of the overlay's
+elastomer (neo-Hookean, its share of the tip's area); the plate advances and tilts until forces and
+moments balance those of the touch and the wrist. Left out: the wall between points of a tip,
+friction, and depths beyond the half width of a stroke, where the shortest way out leads through its
+side.
 
 The simulation is never stepped: one touch is a handful of forward evaluations. SI units are
 MuJoCo's; mm and N here.
@@ -20,36 +21,44 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import grey_closing
 
 from encoded_objects.base.errors import require
 from encoded_objects.base.sensor_type import SensorType
-from probe.contact.contract import Contact, Touch
+from probe.contact.contract import STEEPEST_RAD, Contact, Touch, heights_at, nothing_under
 from probe.contact.engines import Engine
-from probe.contact.engines.under_sensor import UNDER, Mesh, mesh_under
 from probe.contact.neo_hooke import NeoHooke
 from probe.contact.plate import checked_load, load_of
 from probe.contact.tips import Tips, tip_points
 from probe.errors import ContactError
-from probe.surface.body import body_of
+from probe.surface.body import (
+    body_of,
+    close_below,
+    indexed_triangles,
+    manifold_from,
+    manifold_of,
+    mesh_heights,
+)
 from probe.surface.contract import HeightMap
 
 require("mujoco", extra="engines", purpose="engine mujoco")
 
 Array = NDArray[np.float64]
+Mesh = tuple[Array, NDArray[np.int64]]  #: corners (n, 3) mm and triangles (m, 3)
 
-
-@dataclass(frozen=True, slots=True)
-class MujocoSettings:
-    """How finely the part is asked, and when the plate is at rest."""
-
-    tolerance: float = 1e-4  #: of the force; MuJoCo's distances are no better
-    stiffer: float = 8.0  #: elastomer against the overlay's: 120 N press 0.5 mm deep, not 1 mm,
-    #: since a distance field knows no depth beyond the half width of a stroke, 0.7 mm
-    step_mm: float = 0.3  #: at most, of the advance and of the rim by a tilt
-    halvings: int = 8  #: of a step that does not help
-    steps: int = 60  #: of Newton's method; 5-12 are usual
-    steepest_rad: float = 0.35  #: tilts beyond are not small
-    damped: float = 1e-9  #: of the stiffness: one row of points that bears all is not singular
+TOLERANCE = 1e-4  # of the force; MuJoCo's distances are no better
+#: Elastomer against the overlay's: 120 N press 0.5 mm deep, not 1 mm, since a distance field knows
+#: no depth beyond the half width of a stroke, 0.7 mm.
+STIFFER = 8.0
+STEP_MM = 0.3  # at most, of the advance and of the rim by a tilt
+HALVINGS = 8  # of a step that does not help
+MOST_STEPS = 60  # of Newton's method; 5-12 are usual
+DAMPED = 1e-9  # of the stiffness: one row of points that bears all is not singular
+AROUND_MM = 5.0  #: of the part, kept around the sensor's square: domes of 2 degrees tilt
+DEEP_MM = 2.5  #: of the part, kept under its highest point: symbols of 1 mm and some of the wall
+CELLS = 256  # along a side, of heights: .14 mm; narrower grooves are filled
+HEIGHT_TOLERANCE_MM = 0.03
+MOVED_MM = 0.05  # by which the mesh of heights may move, to need fewer triangles
 
 
 def press(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips) -> Contact:
@@ -84,17 +93,16 @@ def press(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips) -> C
             fix="take --engine own for a pad",
         )
     checked_load(load_of(touch))
-    settings = MujocoSettings()
     shape = (sensor.rows, sensor.columns)
     if touch.force_n == 0:
         tilts = (touch.tilt_x_rad, touch.tilt_y_rad)
         return Contact(np.zeros(shape), math.inf, *tilts, "mujoco", 0)
     points, drop = tip_points(sensor, tips)
-    depths, top_mm = _scene(mesh_under(surface, sensor, touch, UNDER), sensor, touch, points, drop)
+    depths, top_mm = _scene(mesh_under(surface, sensor, touch), sensor, touch, points, drop)
     share = math.pi * sensor.overlay.tab_diameter_mm**2 / 4 / points.shape[1]
-    modulus = settings.stiffer * sensor.overlay.young_mpa
+    modulus = STIFFER * sensor.overlay.young_mpa
     law = NeoHooke(modulus * share / sensor.overlay.height_mm, sensor.overlay.height_mm)
-    return _rest(depths, top_mm, law, points.reshape(-1, 2), touch, shape, settings)
+    return _rest(depths, top_mm, law, points.reshape(-1, 2), touch, shape)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,7 +120,7 @@ Depths = Callable[[Array], Array]
 
 def _rest(
     depths: Depths, top_mm: float, law: NeoHooke, at: Array, touch: Touch,
-    shape: tuple[int, int], settings: MujocoSettings,
+    shape: tuple[int, int],
 ) -> Contact:  # fmt: skip
     """Advance and tilt the plate until it balances: damped Newton on force and moments."""
     half = float(np.abs(at).max())
@@ -131,12 +139,12 @@ def _rest(
 
     lift = float(np.abs(unloaded).sum())
     plate = np.array([top_mm + lift, *unloaded])
-    plate[0] = _advance(balance, plate, lift + UNDER.deep_mm)
+    plate[0] = _advance(balance, plate, lift + DEEP_MM)
     now = balance(plate)
-    for step in range(1, settings.steps + 1):
-        if np.abs(now.wrong_n).max() <= settings.tolerance * touch.force_n:
+    for step in range(1, MOST_STEPS + 1):
+        if np.abs(now.wrong_n).max() <= TOLERANCE * touch.force_n:
             tilts = plate[1:] / half
-            if np.abs(tilts).max() > settings.steepest_rad:
+            if np.abs(tilts).max() > STEEPEST_RAD:
                 break
             per_tab = now.forces_n.reshape(shape[0] * shape[1], -1).sum(axis=1)
             return Contact(
@@ -145,10 +153,10 @@ def _rest(
             )  # fmt: skip
         stiff = ((rows * now.slopes) @ rows.T + np.diag([0.0, *stiffness]))[np.ix_(free, free)]
         move = np.zeros(3)
-        damped = stiff + settings.damped * np.trace(stiff) * np.eye(len(stiff))
+        damped = stiff + DAMPED * np.trace(stiff) * np.eye(len(stiff))
         move[free] = np.linalg.solve(damped, now.wrong_n)
-        move *= min(1.0, settings.step_mm / max(float(np.abs(move).max()), settings.step_mm))
-        for _ in range(settings.halvings):
+        move *= min(1.0, STEP_MM / max(float(np.abs(move).max()), STEP_MM))
+        for _ in range(HALVINGS):
             then = balance(plate + move)
             if np.linalg.norm(then.wrong_n) < np.linalg.norm(now.wrong_n):
                 break
@@ -253,7 +261,59 @@ def _quaternion(turn: float, tilt_x: float, tilt_y: float) -> list[float]:
 def triangles_under(surface: HeightMap, sensor: SensorType, touch: Touch) -> tuple[int, int] | None:
     """Return how many triangles of a body a touch needs, and how many the body has."""
     body = body_of(surface)
-    return None if body is None else (len(mesh_under(surface, sensor, touch, UNDER)[1]), len(body))
+    return None if body is None else (len(mesh_under(surface, sensor, touch)[1]), len(body))
+
+
+def mesh_under(surface: HeightMap, sensor: SensorType, touch: Touch) -> Mesh:
+    """Return what lies under the sensor: corners (n, 3) and triangles (m, 3).
+
+    Raises
+    ------
+    ContactError
+        There is nothing of it.
+    SurfaceError
+        The triangles of a part close no body.
+    """
+    body = body_of(surface)
+    if body is None:
+        return mesh_heights_under(surface, sensor, touch)
+    return cut_under(body, sensor, touch)
+
+
+def cut_under(solid_mm: Array, sensor: SensorType, touch: Touch) -> Mesh:
+    """Return what of a body (m, 3, 3) lies under the sensor; raises as `mesh_under`."""
+    from manifold3d import Manifold
+
+    reach = max(sensor.half_mm) + AROUND_MM
+    top = float(solid_mm[:, :, 2].max())
+    box = Manifold.cube((2 * reach, 2 * reach, 2 * DEEP_MM), center=True)
+    box = box.rotate((0, 0, math.degrees(touch.theta_rad))).translate((touch.x_mm, touch.y_mm, top))
+    corners, triangles = indexed_triangles(manifold_of(solid_mm) ^ box)
+    if len(triangles) == 0:
+        raise nothing_under(touch)
+    return corners, triangles
+
+
+def mesh_heights_under(surface: HeightMap, sensor: SensorType, touch: Touch) -> Mesh:
+    """Return the heights under the sensor as a body; raises as `mesh_under`.
+
+    Heights are asked twice as densely as they are kept; grooves between beads, narrower than a
+    cell, are filled, as rubber does not enter them. Where there is no matter, and below
+    `deep_mm`, the body has a floor.
+    """
+    reach = max(sensor.half_mm) + AROUND_MM
+    at = np.linspace(-reach, reach, 2 * CELLS + 1)
+    heights = heights_at(surface, touch, np.stack(np.meshgrid(at, at), axis=-1))
+    top = float(heights.max())
+    if not math.isfinite(top):
+        raise nothing_under(touch)
+    heights = grey_closing(np.maximum(heights, top - DEEP_MM), size=3)[::2, ::2]
+    triangles = mesh_heights(heights, HEIGHT_TOLERANCE_MM)
+    bottom = top - 2 * DEEP_MM
+    body = close_below(heights, triangles, 2 * reach / CELLS, bottom)
+    corners, faces = indexed_triangles(manifold_from(*body).simplify(MOVED_MM))
+    corners[:, :2] = touch.on_surface(corners[:, :2])
+    return corners, faces
 
 
 ENGINE = Engine(press, points=7, overlays=("tab",), triangles=triangles_under)
