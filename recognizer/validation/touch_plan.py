@@ -1,19 +1,129 @@
-"""What a campaign touches: the plan of its touches, and the faces and sensor that it names."""
+"""The plan of a campaign's touches, and the faces and scenes that it names.
+
+A face is touched as the database has it, as it was printed, or as it was written: the STL file
+that the database registers, checked by its sha256, in the frame of the face. The part is touched
+alone: beyond the edges of a panel there is nothing. Thesis 6.3.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import Engine
 
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type, force_share
-from probe.simulate.registered import registered_object, registered_objects, scene_of_face
+from generator.database.open import normal_url, open_database, part_path
+from generator.database.read import read_object
+from generator.database.registered import RegisteredObject, RegisteredPart
+from generator.database.transaction import read_transaction
+from probe.simulate.registered import (
+    registered_object,
+    registered_objects,
+    scene_of_face,
+    scene_of_part,
+)
 from probe.simulate.scene import Scene
 from probe.simulate.touch import TouchRanges
 from probe.simulate.world.levels import LEVELS, Level
 from recognizer.touch.lab import EmbossedArray
-from recognizer.validation.made_kinds import SIDE, is_extra
-from recognizer.validation.settings import DRAWING
-from recognizer.validation.written import object_of_run, written_surface
+from recognizer.validation.encoded_set import SIDE, is_extra
+from recognizer.validation.errors import SetError
+
+FORCE_N = (20.0, 120.0)  #: as a hand or an arm presses
+TILT_RAD = math.radians(2.0)  #: at most, of the wrist
+WORN = 0.2  #: probability that a symbol of a worn face is gone
+
+Array = NDArray[np.float64]
+
+
+def written_surface(database: str, object_name: str, face: str) -> Scene:
+    """Return a face as it was written.
+
+    Parameters
+    ----------
+    database
+        `lab.db`, `sqlite:///lab.db` or `postgresql://host/name`.
+    object_name, face
+        As registered.
+
+    Raises
+    ------
+    SetError
+        The object has no STL part that bears the face, the file is not there, or its bytes
+        are not those that were registered.
+    DatabaseError
+        The database cannot be read, or does not hold the object.
+    """
+    held = object_of_run(database, object_name)
+    part = stl_part(held, face)
+    path = part_path(normal_url(database), part.file)
+    check_file(path, part)
+    return scene_of_part(path, held, part, face)
+
+
+@lru_cache(maxsize=64)
+def object_of_run(database: str, object_name: str) -> RegisteredObject:
+    """Return an object of a set, which stays as it is while it is touched (`set_digest`).
+
+    Raises
+    ------
+    DatabaseError
+        The database cannot be read, or does not hold it.
+    """
+    with read_transaction(_database_of_run(database)) as connection:
+        return read_object(connection, object_name)
+
+
+@lru_cache(maxsize=4)
+def _database_of_run(database: str) -> Engine:
+    """Return a database that stays open, so that each query is put into words once."""
+    return open_database(database, writable=False)
+
+
+def stl_part(held: RegisteredObject, face: str) -> RegisteredPart:
+    """Return the STL part that bears a face: its panel, or the whole body.
+
+    Raises
+    ------
+    SetError
+        When there is none.
+    """
+    known = [part for part in held.parts if part.format == "stl"]
+    for part in known:
+        if part.name.endswith(f"-{face}"):
+            return part
+    if len(known) == 1:
+        return known[0]
+    raise SetError(
+        f"'{held.entry.name}' has no STL part that bears {face}",
+        fix="make it again with --format stl, or touch what the database says: --surfaces database",
+        place=held.entry.name,
+    )
+
+
+def check_file(path: Path, part: RegisteredPart) -> None:
+    """See to it that a file holds the bytes that were registered.
+
+    Raises
+    ------
+    SetError
+        When it is not there, or holds others.
+    """
+    fix = "make it again with encode-object"
+    try:
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        cause = f"cannot read the part: {error.strerror}"
+        raise SetError(cause, fix=fix, place=str(path)) from error
+    if digest != part.sha256:
+        cause = "the file is not the one that the database registers"
+        raise SetError(cause, fix=fix, place=str(path))
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,9 +142,9 @@ class TouchPlan:
     seed: int = 1
     level: str = "typical"
     kind: str = "face"
-    force_n: tuple[float, float] = DRAWING.force_n
-    tilt_rad: float = DRAWING.tilt_rad
-    worn: float = DRAWING.worn
+    force_n: tuple[float, float] = FORCE_N
+    tilt_rad: float = TILT_RAD
+    worn: float = WORN
     files: bool = False  #: touch the written STL files, not what the database says of them
     prints: str = ""  #: listing of the printed surfaces that are touched instead; empty: none
     engine: str = "own"  #: of contact, `probe.contact.engines`

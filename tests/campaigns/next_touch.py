@@ -22,8 +22,7 @@ from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import NextTouch, Recognition
 from recognizer.validation.campaign import Campaign, kinds_of, levels_of, plan_of, series_of
-from recognizer.validation.policy import Proposal, as_told, touch_until_answered
-from recognizer.validation.trial import judge
+from recognizer.validation.trial import Proposal, as_told, judge, touch_until_answered
 
 
 def walk(_answer: Recognition, rng: np.random.Generator) -> NextTouch:
