@@ -1,4 +1,4 @@
-"""What is touched, where, and what the sensor reads. Nothing but its number decides a touch.
+"""What is touched, where, and what the sensor reads: deterministic in (seed, number).
 
 TouchPlan + number -> DrawnTouch. It is drawn from `default_rng([seed, number])`, so any touch
 can be repeated by its number, in any order and on any machine.
@@ -62,39 +62,19 @@ UNREST = (
 )
 
 
-def flat_face(_encoding: EmbossedArray, _rng: np.random.Generator) -> HeightMap:
-    """Return a flat face."""
-    return FlatPlate()
-
-
-def ridges(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
-    """Return straight ridges."""
-    return draw_ridges(encoding.style.pitch_mm, encoding.style.stroke_mm, rng)
-
-
-def dots(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
-    """Return dots on a square grid."""
-    return draw_dots(encoding.style.pitch_mm, rng)
-
-
-def rough_face(_encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
-    """Return a random surface."""
-    return draw_rough(rng)
-
-
-def random_symbols(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
-    """Return symbols of the same alphabet at the same pitch, drawn at random."""
+def _random_symbols(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
+    """Return symbols of the lab's alphabet and pitch, drawn at random."""
     return _embossed_surface(encoding, rng.integers(encoding.array.order, size=(64, 64)))
 
 
-def other_lab(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
-    """Return another array in the same alphabet, at the same pitch."""
+def _other_lab(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
+    """Return another array in the lab's alphabet and pitch."""
     sizes = (encoding.array.rows, encoding.array.columns)
     names = ("one-touch", "large") if encoding.array.order == 4 else ("thesis",)
     others = [_array_of(name) for name in names]
     array = next((a for a in others if (a.rows, a.columns) != sizes), others[0])
     if (array.rows, array.columns) == sizes or array.order != encoding.array.order:
-        return random_symbols(encoding, rng)
+        return _random_symbols(encoding, rng)
     row, column = (int(rng.integers(size)) for size in (array.rows, array.columns))
     rows, columns = np.indices((64, 64))
     return _embossed_surface(
@@ -102,22 +82,22 @@ def other_lab(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
     )
 
 
-def text(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
+def _letters(encoding: EmbossedArray, rng: np.random.Generator) -> HeightMap:
     """Return letters as high and as thick as the symbols."""
     letters = alphabet_named("letters-4")
     strokes = tuple(glyph.strokes for glyph in letters.glyphs)
     return draw_text(strokes, letters.reach, encoding.style.pitch_mm, _relief(encoding), rng)
 
 
-#: Surfaces of no database.
+#: Surfaces that no database knows, `--kinds foreign`, in the style of the lab's symbols.
 FOREIGN: dict[str, Callable[[EmbossedArray, np.random.Generator], HeightMap]] = {
-    "blank": flat_face,
-    "ridges": ridges,
-    "dots": dots,
-    "rough": rough_face,
-    "random symbols": random_symbols,
-    "other lab": other_lab,
-    "text": text,
+    "blank": lambda _lab, _rng: FlatPlate(),
+    "ridges": lambda lab, rng: draw_ridges(lab.style.pitch_mm, lab.style.stroke_mm, rng),
+    "dots": lambda lab, rng: draw_dots(lab.style.pitch_mm, rng),
+    "rough": lambda _, rng: draw_rough(rng),
+    "random symbols": _random_symbols,
+    "other lab": _other_lab,
+    "text": _letters,
 }
 
 
@@ -146,19 +126,18 @@ def draw_on_face(
     scene: Scene, kind: str, most: float, rng: np.random.Generator, ranges: TouchRanges
 ) -> Touch:
     """Draw a touch of a face; where a face is too small for its kind, anywhere on it."""
-    inside = INSIDE_MM
     if kind == "corner":
         touch = next(random_touches(scene.region, rng, ranges))
         corner = scene.region.starts[int(rng.integers(len(scene.region.starts)))]
         towards = np.array([touch.x_mm, touch.y_mm]) - corner
-        by = inside * rng.random() / max(float(np.hypot(*towards)), inside)
+        by = INSIDE_MM * rng.random() / max(float(np.hypot(*towards)), INSIDE_MM)
         at = corner + towards * by
         return replace(touch, x_mm=float(at[0]), y_mm=float(at[1]))
     if kind == "edge":
         for touch in random_touches(scene.region, rng, ranges):
-            if scene.region.distance_mm(np.array([[touch.x_mm, touch.y_mm]]))[0] < inside:
+            if scene.region.distance_mm(np.array([[touch.x_mm, touch.y_mm]]))[0] < INSIDE_MM:
                 return touch
-    margin = 0.0 if kind == "anywhere" else min(inside, 0.8 * most)
+    margin = 0.0 if kind == "anywhere" else min(INSIDE_MM, 0.8 * most)
     return next(random_touches(scene.region, rng, replace(ranges, margin_mm=margin)))
 
 

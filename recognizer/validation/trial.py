@@ -19,11 +19,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
 from probe.errors import ContactError
+from probe.scan.places import surface_to_sensor
 from recognizer.scan.session import Scan
 from recognizer.touch.lab import EncodedFace, Lab
 from recognizer.touch.reader import Reader
@@ -48,80 +48,13 @@ FORCE_OFF = 0.1  #: of the logarithm of the force
 TRIES = 4  #: tilts of the wrist that are drawn until the plate finds a rest
 STREAM = 7  #: of random numbers, apart from those that draw the first touch
 
-Array = NDArray[np.float64]
-
+RIGHT, WRONG, REJECTED = "right", "wrong", "rejected"
 ONE, NEXT = POLICY_NAMES = ("one", "next")
+
+Row = dict[str, Any]
 
 #: Says where to touch after an answer that is none; `rng` is the trial's.
 Proposal = Callable[[Recognition, np.random.Generator], NextTouch | None]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PolicyTouch:
-    """A touch of a trial and what all touches so far say."""
-
-    found: DrawnTouch
-    answer: Recognition
-    seconds: float  #: CPU, of reading
-
-
-def as_told(answer: Recognition, _rng: np.random.Generator) -> NextTouch | None:
-    """Return what the answer proposes."""
-    return answer.next
-
-
-def touch_until_answered(
-    plan: TouchPlan,
-    number: int,
-    reader: Reader,
-    most: int,
-    proposal: Proposal = as_told,
-) -> Iterator[PolicyTouch]:
-    """Yield the touches of a trial, the last one answered unless `most` were made."""
-    rng = np.random.default_rng([plan.seed, number, STREAM])
-    found = draw_touch(plan, number, reader)
-    scan, pose, told = Scan(reader), np.eye(4), 0
-    while True:
-        start = time.process_time()
-        answer = scan.add(found.counts.astype(np.float64), pose, seq=number)
-        told += 1
-        yield PolicyTouch(found, answer, time.process_time() - start)
-        step = None if answer else proposal(answer, rng)
-        if step is None or told == most:
-            return
-        pose = pose @ _step_pose(step)
-        found = _touch_at(plan, found, step, reader, rng)
-
-
-def _step_pose(step: NextTouch) -> Array:
-    """Return (4, 4) of a step in the frame before it."""
-    turn = math.radians(step.turn_deg)
-    T = np.eye(4)
-    T[:2, :2] = [[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]]
-    T[:2, 3] = step.dx_mm, step.dy_mm
-    return T
-
-
-def _touch_at(
-    plan: TouchPlan, before: DrawnTouch, step: NextTouch, reader: Reader, rng: np.random.Generator
-) -> DrawnTouch:
-    """Return the touch after a step as the arm makes it."""
-    at, off = before.touch, rng.standard_normal(4)
-    dx, dy = step.dx_mm + STEP_OFF_MM * off[0], step.dy_mm + STEP_OFF_MM * off[1]
-    x, y = at.on_surface(np.array([dx, dy])).tolist()
-    turn = math.radians(step.turn_deg) + TURN_OFF_RAD * off[2]
-    force = step.force_n * math.exp(FORCE_OFF * off[3])
-    moved = replace(at, x_mm=x, y_mm=y, theta_rad=at.theta_rad + turn, force_n=force)
-    for _ in range(TRIES):
-        touch: Touch = draw_tilt(plan, moved, rng)
-        try:
-            return draw_again(plan, before, touch, reader, rng)
-        except ContactError:
-            continue
-    return replace(before, touch=moved, counts=np.zeros_like(before.counts))
-
-
-RIGHT, WRONG, REJECTED = "right", "wrong", "rejected"
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,10 +96,7 @@ def trial(plan: TouchPlan, number: int, reader: Reader) -> Trial:
 
 
 def _trial_of_several(plan: TouchPlan, number: int, reader: Reader) -> Trial:
-    """Return what became of touches until one was answered: the first one's place, the last's fate.
-
-    A touch that is not answered is of the place of the first.
-    """
+    """Return the outcome of touches until one was answered: first place, last answer."""
     made = list(touch_until_answered(plan, number, reader, MOST))
     spent = sum(one.seconds for one in made)
     first, last = (judge(plan, number, one.found, one.answer, spent) for one in (made[0], made[-1]))
@@ -177,6 +107,57 @@ def _trial_of_several(plan: TouchPlan, number: int, reader: Reader) -> Trial:
     )  # fmt: skip
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class PolicyTouch:
+    """A touch of a trial and what all touches so far say."""
+
+    found: DrawnTouch
+    answer: Recognition
+    seconds: float  #: CPU, of reading
+
+
+def touch_until_answered(
+    plan: TouchPlan,
+    number: int,
+    reader: Reader,
+    most: int,
+    proposal: Proposal = lambda answer, _: answer.next,
+) -> Iterator[PolicyTouch]:
+    """Yield the touches of a trial, the last one answered unless `most` were made."""
+    rng = np.random.default_rng([plan.seed, number, STREAM])
+    found = draw_touch(plan, number, reader)
+    scan, pose, made = Scan(reader), np.eye(4), 0
+    while True:
+        start = time.process_time()
+        answer = scan.add(found.counts.astype(np.float64), pose, seq=number)
+        made += 1
+        yield PolicyTouch(found, answer, time.process_time() - start)
+        step = None if answer else proposal(answer, rng)
+        if step is None or made == most:
+            return
+        pose = pose @ surface_to_sensor(step.dx_mm, step.dy_mm, math.radians(step.turn_deg))
+        found = _touch_at(plan, found, step, reader, rng)
+
+
+def _touch_at(
+    plan: TouchPlan, before: DrawnTouch, step: NextTouch, reader: Reader, rng: np.random.Generator
+) -> DrawnTouch:
+    """Return the touch after a step as the arm makes it."""
+    at, off = before.touch, rng.standard_normal(4)
+    dx, dy = step.dx_mm + STEP_OFF_MM * off[0], step.dy_mm + STEP_OFF_MM * off[1]
+    x, y = at.on_surface(np.array([dx, dy])).tolist()
+    turn = math.radians(step.turn_deg) + TURN_OFF_RAD * off[2]
+    force = step.force_n * math.exp(FORCE_OFF * off[3])
+    moved = replace(at, x_mm=x, y_mm=y, theta_rad=at.theta_rad + turn, force_n=force)
+    for _ in range(TRIES):
+        touch: Touch = draw_tilt(plan, moved, rng)
+        try:
+            return draw_again(plan, before, touch, reader, rng)
+        except ContactError:
+            continue
+    return replace(before, touch=moved, counts=np.zeros_like(before.counts))
+
+
 def judge(
     plan: TouchPlan, number: int, found: DrawnTouch, answer: Recognition, seconds: float
 ) -> Trial:
@@ -185,11 +166,12 @@ def judge(
     error, degrees, chi2, verdict = math.nan, math.nan, math.nan, REJECTED
     if answer:
         verdict = WRONG
-        same = scene is not None and (answer.object, answer.face) == (
-            scene.object_name,
-            scene.face,
-        )
-        if same and answer.T_face_probe is not None and answer.covariance is not None:
+        touched = scene and (scene.object_name, scene.face)
+        if (
+            (answer.object, answer.face) == touched
+            and answer.T_face_probe is not None
+            and answer.covariance is not None
+        ):
             T = answer.T_face_probe
             turn = math.atan2(T[1, 0], T[0, 0]) - touch.theta_rad
             away = np.array(
@@ -226,8 +208,6 @@ def judge(
         drawn_anew=" | ".join(found.resampled),
     )
 
-
-Row = dict[str, Any]
 
 #: Names and kinds: text, whole, truth, or decimals after the point.
 COLUMNS: dict[str, str | int] = {
