@@ -20,8 +20,8 @@ from probe.calibration import (
     read_calibration,
     write_calibration,
 )
-from probe.calibration.average import average_frames
-from probe.calibration.condition import ConditionThresholds, common_bias, raised_tactels
+from probe.calibration.condition import common_bias, raised_tactels
+from probe.calibration.load import average_frames
 from probe.circuit import Electronics
 from probe.command.laws import condition_map, describe_laws, places
 from probe.command.listen import Counts, frames_of
@@ -42,7 +42,7 @@ def report_bias(
     """Say what an unloaded sensor reads; returns the exit code."""
     counts, name, kind = frames_of(source, sensor, seconds, sensor_type)
     rest = average_frames(counts, source)
-    high = raised_tactels(rest, kind.full, ConditionThresholds())
+    high = raised_tactels(rest, kind.full)
     values: dict[str, Any] = {
         "source": source,
         "sensor": name,

@@ -18,7 +18,7 @@ import numpy as np
 from encoded_objects.base.files import refuse_taken
 from encoded_objects.base.output import message
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
-from probe.calibration.load_words import describe_load
+from probe.calibration.load import describe_load
 from probe.circuit import Electronics
 from probe.client.stream import Stream, name_of
 from probe.command.calibrated import calibrate_loads

@@ -17,7 +17,7 @@ from encoded_objects.base.errors import MissingExtraError, require
 from encoded_objects.base.files import staged_file
 from encoded_objects.base.sensor_type import SensorType, choose_sensor_type
 from probe.calibration import Calibration, calibrate_image, calibration_hash, drift_of
-from probe.calibration.settings import AVERAGE
+from probe.calibration.load import BIAS_FRAMES
 from probe.command.settings import COMMAND
 from probe.frame import Frame, median_filter
 from probe.recording.files import next_free
@@ -73,7 +73,7 @@ class LiveState:
                 self.recorder.append(frame)
             if self._resting is not None:
                 self._resting.append(frame.counts)
-                if len(self._resting) == AVERAGE.bias_frames:
+                if len(self._resting) == BIAS_FRAMES:
                     self._settle_bias()
         if frames and not self.paused:
             self.frame = frames[-1]
@@ -167,7 +167,7 @@ class LiveState:
     def _settle_bias(self) -> None:
         frames, self._resting = np.stack(self._resting or []), None
         self.bias = frames.mean(axis=0)
-        self.notice = f"bias of {AVERAGE.bias_frames} frames is off the image"
+        self.notice = f"bias of {BIAS_FRAMES} frames is off the image"
         if self.calibration is not None:
             self.bias = None  # a calibration has its own
             drift = drift_of(self.calibration, frames)

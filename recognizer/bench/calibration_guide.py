@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from probe.calibration import Calibration, Condition, calibration_from, even_load
-from probe.calibration.load_words import describe_load
-from probe.calibration.settings import AVERAGE
+from probe.calibration.load import LEAST_FRAMES, describe_load
 from probe.circuit import Electronics
 from probe.frame import Frame
 from recognizer.bench.errors import BenchError, BusyError
@@ -83,7 +82,7 @@ class CalibrationGuide:
         self._news += not self._frames or not np.array_equal(frame.counts, self._frames[-1])
         self._frames.append(frame.counts)
         passed_s = (frame.t_ns - self._began_ns) * 1e-9
-        told = self._news >= AVERAGE.frames or passed_s >= GUIDE.longest * self.seconds
+        told = self._news >= LEAST_FRAMES or passed_s >= GUIDE.longest * self.seconds
         if (told and passed_s >= self.seconds) or len(self._frames) >= GUIDE.most_frames:
             counts, self._frames = np.stack(self._frames), None
             self.taken.append(counts)

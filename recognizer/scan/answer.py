@@ -1,9 +1,9 @@
 """Accumulated evidence -> places of the database -> Recognition. Thesis 6.3.
 
-Evidence is located like the fit of one touch (`recognizer.touch.locate`): its strongest cells list
+Evidence is located like the fit of one touch (`find_hypotheses`): its strongest cells list
 places, all cells compare them. The pose of the last touch is fitted once more with the symbols of
-the database. Acceptance follows `recognizer.touch.belief` on all cells together; the number of
-contradictions that are allowed grows with them.
+the database. `recognizer.touch.verdict` judges all cells together; the number of contradictions
+that are allowed grows with them.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.scan.lattice import Evidence
+from recognizer.scan.lattice import LatticeEvidence
 from recognizer.scan.path import RegisteredPath
+from recognizer.touch import verdict
 from recognizer.touch.belief import null_log_likelihood, unworn_labels_at, weigh_cells
 from recognizer.touch.chance import expected_matches
 from recognizer.touch.hypothesis import Hypothesis, coincide, log_likelihood, under_centre
@@ -25,9 +26,6 @@ from recognizer.touch.locate import find_hypotheses, find_rivals
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import answer_at
 from recognizer.touch.recognition import (
-    AMBIGUOUS,
-    BY_CHANCE,
-    NOT_ENCODED,
     TOO_FEW,
     Recognition,
     RunnerUp,
@@ -53,7 +51,7 @@ WRONG = 0.05  #: share of the cells that may clearly contradict the place
 #: expected matches by chance; a lab of a profile for scans has fewer symbols than one touch of
 #: another profile can distinguish
 DOUBT = 2e-2
-SURPRISE_BY_HAND = 8.0  #: nats over symbols of no registered place, without measured steps
+RATIO_BY_HAND = 8.0  #: nats over symbols of no registered place, without measured steps
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,7 +59,7 @@ class ScanHypothesis:
     """A place of accumulated evidence."""
 
     embossed: EmbossedArray
-    evidence: Evidence
+    evidence: LatticeEvidence
     hypothesis: Hypothesis
     fit: Fit  #: of the evidence, with the pose of the last touch
     score: float  #: log-likelihood of all touches, nats
@@ -88,7 +86,7 @@ class ScanHypothesis:
 
 def locate_evidence(
     embossed: EmbossedArray,
-    found: Sequence[Evidence],
+    found: Sequence[LatticeEvidence],
     path: RegisteredPath | None,
     settings: HypothesisSettings,
 ) -> list[ScanHypothesis]:
@@ -164,9 +162,14 @@ def answer_scan(reader: Reader, found: Sequence[ScanHypothesis], seq: int) -> Re
         runner_up = RunnerUp(*found[1].face, found[1].index)
     if path is not None:
         margin = min(margin, path.margin)
+    by_hand = path is not None and best.evidence.agreement.touches > 1
+    reason = verdict.reject_reason(
+        _verdict_evidence(reader, best), margin, reader.settings.belief,
+        least_ratio=RATIO_BY_HAND if by_hand else verdict.RATIO, wrong_share=WRONG,
+    )  # fmt: skip
     answer = answer_at(
         best.embossed, best.fit, best.hypothesis, reader.settings, seq,
-        reason=_reject_reason(reader, best, margin), margin=margin, runner_up=runner_up,
+        reason=reason, margin=margin, runner_up=runner_up,
     )  # fmt: skip
     if not answer:
         return answer
@@ -174,28 +177,21 @@ def answer_scan(reader: Reader, found: Sequence[ScanHypothesis], seq: int) -> Re
     doubt = expected_matches(arrays, best.embossed, best.fit, best.hypothesis, settings)
     if path is not None:
         doubt *= math.exp(path.ambiguity)
-    if doubt > DOUBT:
-        return refusal(seq, BY_CHANCE, margin=margin, runner_up=runner_up, doubt=doubt)
+    if reason := verdict.reject_chance(doubt, DOUBT):
+        return refusal(seq, reason, margin=margin, runner_up=runner_up, doubt=doubt)
     return replace(answer, doubt=doubt)
 
 
-def _reject_reason(reader: Reader, best: ScanHypothesis, margin: float) -> str:
-    """Return why the best place is not accepted, or ""."""
-    embossed, fit, hypothesis = best.embossed, best.fit, best.hypothesis
-    belief, by_hand = reader.settings.belief, best.path is not None
-    cells = weigh_cells(embossed, fit, hypothesis, belief)
-    inliers = int(cells.agree.sum())
-    chance = null_log_likelihood(embossed, fit)
-    agreeing = best.evidence.agreement.touches
-    surprise = SURPRISE_BY_HAND if by_hand and agreeing > 1 else belief.surprise
-    if fit.value - chance < surprise:
-        return TOO_FEW  # even full agreement would be no surprise
-    if best.score - chance < belief.surprise:
-        return NOT_ENCODED
-    if (cells.against > belief.clearly).sum() > max(belief.contradicted, WRONG * inliers):
-        return NOT_ENCODED
-    if by_hand and 2 * agreeing <= len(best.evidence.agreement.chosen):
-        return TOO_FEW  # any touches may agree in a minority, by chance
-    if best.score - chance < surprise or inliers < belief.least_inliers:
-        return TOO_FEW
-    return AMBIGUOUS if margin < belief.margin else ""
+def _verdict_evidence(reader: Reader, best: ScanHypothesis) -> verdict.Evidence:
+    """Return the evidence of all touches for a place."""
+    fit, agreement = best.fit, best.evidence.agreement
+    cells = weigh_cells(best.embossed, fit, best.hypothesis, reader.settings.belief)
+    chance = null_log_likelihood(best.embossed, fit)
+    return verdict.Evidence(
+        log_likelihood_ratio=best.score - chance,
+        inliers=int(cells.agree.sum()),
+        contradictions=int((cells.against > verdict.CONTRADICTION).sum()),
+        best_ratio=fit.value - chance,
+        touches=1 if best.path is None else len(agreement.chosen),
+        agreeing=agreement.touches,
+    )

@@ -23,7 +23,7 @@ from recognizer.scan.answer import (
 )
 from recognizer.scan.lattice import (
     LEAST_VARIANCE,
-    Evidence,
+    LatticeEvidence,
     PlaneLattice,
     accumulate,
     predict_pose,
@@ -62,6 +62,7 @@ from recognizer.touch.recognition import (
     refusal,
 )
 from recognizer.touch.symbols.gain import Image, image_of_signal
+from recognizer.touch.verdict import least_explained
 
 Array = NDArray[np.float64]
 Views = tuple[tuple[LatticeView, ...], ...]  #: of each touch
@@ -322,9 +323,7 @@ def _pose_last_touch(
     """Return a place with the pose of the last touch, and whether that touch agrees with it."""
     if best.evidence.agreement.chosen[-1] >= 0:
         finer = refine_last_pose(reader, image, reader.prepared[k][1], best)
-        belief = reader.settings.belief
-        many = len(best.fit.cells) >= belief.many_inliers
-        least = belief.explained_by_many if many else belief.explained
+        least = least_explained(len(best.fit.cells))
         if finer.explained >= least and is_definite(finer.fit.covariance):
             return finer, True
     return replace(best, fit=predicted_fit(best.evidence, touch_poses)), False
@@ -339,7 +338,7 @@ def _predicted_poses(lattices: Sequence[PlaneLattice], touch_poses: TouchPoses |
 
 def _evidence_along(
     views: LatticeViews, touch_poses: TouchPoses, pitch_mm: float
-) -> list[Evidence]:
+) -> list[LatticeEvidence]:
     """Return the evidence that agrees with the array along a path; empty if none does."""
     along = PlaneLattice(np.zeros(3), LEAST_VARIANCE * np.eye(3))
     agreement = refine_agreement(views, touch_poses, along, pitch_mm)
@@ -352,7 +351,7 @@ def _evidence_of(
     touch_poses: TouchPoses,
     before: Sequence[PlaneLattice],
     pitch_mm: float,
-) -> list[Evidence]:
+) -> list[LatticeEvidence]:
     """Return the evidence of the followed lattices and of those of the last touch, best first."""
     last = len(touch_poses.poses) - 1
     every = [refine_agreement(views, touch_poses, each, pitch_mm) for each in before]
@@ -364,7 +363,7 @@ def _evidence_of(
     every.sort(key=lambda agreement: -agreement.score)
     at = touch_poses.poses[last]
     distinct: list[PlaneLattice] = []
-    found: list[Evidence] = []
+    found: list[LatticeEvidence] = []
     for agreement in every:
         if any(same_lattice(agreement.lattice, other, at, pitch_mm) for other in distinct):
             continue

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from generator.export.robot.text import numbers, quaternion, roll_pitch_yaw
+from generator.export.robot.model import numbers, quaternion, roll_pitch_yaw
 from manifold3d import Manifold
 
 from generator.errors import SolidError
