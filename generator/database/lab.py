@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from sqlalchemy import Connection, func, select
 
 from generator.array import PROFILES, FoldedArray, ProductArray, Profile, array_from
+from generator.array.contract import symbols_seen, touches_needed
 from generator.array.lab_key import read_lab_key
-from generator.array.touches import symbols_seen, touches_needed
 from generator.database.read import read_array
 from generator.database.registered import RegisteredArray
 from generator.database.tables import arrays, cells, meta, objects

@@ -23,7 +23,7 @@ from recognizer.as_built.parts import estimate_parts
 from recognizer.as_built.settings import ESTIMATE, settings_for_prints
 from recognizer.as_built.touches import feel_prints
 from recognizer.as_built.words import as_built_entry, as_built_sizes
-from recognizer.bench.calibration import CalibrationGuide, forces_given
+from recognizer.bench.calibration import PageGuide, page_guide
 from recognizer.bench.errors import BenchError, BusyError
 from recognizer.bench.feed import ProbeFeed
 from recognizer.bench.files import find_file, list_files
@@ -74,12 +74,12 @@ class CalibrationController:
         with session.lock:
             if not isinstance(session.feed, ProbeFeed):
                 raise BusyError("no probe is connected", fix="choose a port first")
-            forces, name = forces_given(forces_n), session.sensor_name()
-            session.frames.guide = CalibrationGuide(name, forces, seconds, board, now)
+            name = session.sensor_name()
+            session.frames.guide = page_guide(name, forces_n, seconds, board, now)
             session.report()
 
     @contextmanager
-    def guide(self) -> Iterator[CalibrationGuide]:
+    def guide(self) -> Iterator[PageGuide]:
         """Work on the calibration that is being made.
 
         Raises

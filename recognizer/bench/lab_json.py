@@ -21,7 +21,7 @@ from sqlalchemy import Connection, select
 from generator.database import tables
 from generator.database.read import list_objects, read_object
 from generator.database.registered import RegisteredFace, RegisteredObject
-from probe.surface.solids import symbol_triangles, triangulate
+from probe.surface.body import symbol_triangles, triangulate
 from probe.surface.symbols import Relief, emboss
 from recognizer.touch.lab import EmbossedArray, Lab
 

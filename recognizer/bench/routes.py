@@ -255,7 +255,7 @@ def _add_sensor_routes(routes: APIRouter, session: Session) -> None:
             session.calibrations.use(body.name)
         else:
             with session.calibrations.guide() as guide:
-                guide.read() if body.do == "read" else guide.again()
+                guide.read() if body.do == "read" else guide.guide.again()
         return session.as_json()
 
     @routes.post("/scan")

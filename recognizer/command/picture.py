@@ -27,7 +27,7 @@ from generator.database.registered import Polyhedron
 from generator.database.transaction import read_transaction
 from probe.plot.canvas import HEAT, in_mm, page
 from probe.plot.touch import MARK
-from probe.surface.solids import triangulate
+from probe.surface.body import triangulate
 from recognizer.touch.hypothesis import Hypothesis, labels_at
 from recognizer.touch.lab import EmbossedArray
 from recognizer.touch.reader import Reader

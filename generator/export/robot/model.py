@@ -28,8 +28,8 @@ from generator.polyhedron import Polyhedron, face_frame
 from generator.solid import Mesh, Part, body_mesh, emboss_whole, symbol_meshes
 from generator.solid.convex import ConvexPieces, ConvexSettings, convex_pieces
 from generator.solid.emboss import to_part, turn
-from generator.solid.inertia import inertia_of
-from generator.solid.template import closed_template
+from generator.solid.measure import inertia_of
+from generator.solid.triangulate import closed_template
 
 Floats = NDArray[np.float64]
 M = 1e-3  #: metres in a millimetre
