@@ -11,7 +11,7 @@ from encoded_objects.base import console
 from encoded_objects.base.console import Action
 
 if TYPE_CHECKING:
-    from generator.spec import LocatedSpec
+    from generator.spec import ObjectSpec
 
 HELP = """Emboss objects with a pseudo-random array, so that a touch tells object, face and place.
 
@@ -158,7 +158,7 @@ def _make(
     wanted = format_option(formats) if formats else None
     url = database_option(database) if database else None
     sensor = sensor_type_option(sensor_type) if sensor_type else ""
-    located: tuple[LocatedSpec, ...] = read_specs(specs, database=url, sensor_type=sensor)
+    located: tuple[ObjectSpec, ...] = read_specs(specs, database=url, sensor_type=sensor)
 
     from generator.pipeline import encode as make
 
