@@ -26,10 +26,9 @@ from numpy.typing import NDArray
 
 from generator.alphabet.outline import Tiers
 from generator.layout.placement import FaceLayout
-from generator.polyhedron.developable import Developable
+from generator.polyhedron.check import directed_edges
 from generator.polyhedron.development import Development, development
-from generator.polyhedron.surface import directed_edges
-from generator.polyhedron.winged import Polyhedron
+from generator.polyhedron.winged import Developable, Polyhedron
 from generator.solid.emboss import turn
 from generator.solid.part import AnalyticFace, BentSymbol, Part, Points, Rim
 from generator.solid.settings import EMBOSS
