@@ -5,6 +5,7 @@ condition  dead, stuck, hidden, preloaded; whether the loads suffice
 fit        rest and loads -> the force law of every tactel
 file       the calibration, and its file: JSON with a hash
 apply      counts -> newtons, and back; drift
+guide      which load to put on next, and when it was read enough
 """
 
 from probe.calibration.apply import (
