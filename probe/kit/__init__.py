@@ -6,6 +6,7 @@ Sensor type -> printable parts (mould, housing, cap, coupon), parts list, wiring
 
     sizes       lengths of the parts
     model       sizes -> solids of the CAD kernel, STEP text and triangles, checked
+    coupon      a small encoded plate for the first touch
     board       electric parts, and the wiring picture
     sheet       casting and assembly, parts list, tolerances: one page
     make        all of it into a folder, with an encoded coupon for the first touch
