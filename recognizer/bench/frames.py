@@ -21,11 +21,15 @@ from probe.frame import Frame
 from probe.recording.files import next_free
 from probe.recording.record import Recorder
 from recognizer.bench.broker import Broker
-from recognizer.bench.calibration_guide import CalibrationGuide, condition_json
-from recognizer.bench.calibration_state import CalibrationState, values_or_counts
+from recognizer.bench.calibration import (
+    CalibrationState,
+    PageGuide,
+    condition_json,
+    values_or_counts,
+)
 from recognizer.bench.errors import BusyError
 from recognizer.bench.message import FrameMessage
-from recognizer.bench.recognition_thread import PendingFrame, RecognitionThread
+from recognizer.bench.reading import PendingFrame, RecognitionThread
 from recognizer.sensor.wiring import Wiring
 
 Array = NDArray[np.float64]
@@ -51,14 +55,14 @@ class FrameHandler:
         recognition: RecognitionThread,
         note: Callable[[str], None],
     ) -> None:
-        self.guide: CalibrationGuide | None = None
+        self.guide: PageGuide | None = None
         self.state = CalibrationState()
         self.replayed = ("", 0)  #: recording that the frames are of, and its first time (ns)
         self.wiring = Wiring()  #: of images as they come; recordings keep these
         self._sensor, self._broker, self._recognition = sensor, broker, recognition
         self._note = note
         self._newest: Frame | None = None
-        self._told_shape: tuple[int, int] | None = None  # of frames that are not shown
+        self._refused_shape: tuple[int, int] | None = None  # of frames that are not shown
         self._recorder: Recorder | None = None
 
     @property
@@ -71,8 +75,8 @@ class FrameHandler:
         known = [frame for frame in frames if frame.counts.shape == self._sensor.shape]
         if len(known) < len(frames):
             rows, columns = frames[-1].counts.shape
-            if self._told_shape != (rows, columns):
-                self._told_shape = rows, columns
+            if self._refused_shape != (rows, columns):
+                self._refused_shape = rows, columns
                 self._note(
                     f"frames of {rows} x {columns} readings are not shown: this bench is for "
                     f"{self._sensor.name}; start it with their --sensor-type"
@@ -84,7 +88,7 @@ class FrameHandler:
         frames = [self.wiring.frame(frame, self._sensor.full) for frame in frames]
         for frame in frames:
             if self.guide is not None:
-                self.guide.take(frame)
+                self.guide.guide.take([frame])
             for notice in self.state.take(frame):
                 self._note(notice)
         if not frames:
@@ -141,7 +145,7 @@ class FrameHandler:
             files = ", ".join(file.name for file in recorder.files)
             self._note(f"{files}: {recorder.frames:,} frames")
 
-    def finish_calibration(self, guide: CalibrationGuide, folder: Path) -> dict[str, Any]:
+    def finish_calibration(self, guide: PageGuide, folder: Path) -> dict[str, Any]:
         """Fit the laws, write and use them; returns what they say of the sensor."""
         found = guide.calibration()
         folder.mkdir(parents=True, exist_ok=True)
