@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 from encoded_objects.base import console
 from encoded_objects.base.errors import UsageError
-from encoded_objects.base.options import Argument, Json, Option, Options, command
+from encoded_objects.base.options import Argument, Json, Option, command
 from generator.command import NAME
 
 HELP = """Emboss objects with a pseudo-random array, so that a touch tells object, face and place.
@@ -38,133 +37,101 @@ More commands, each with --help:
 app = console.application()
 
 
-@dataclass(frozen=True, slots=True)
-class EncodeOptions(Options):
-    """What is made, where it goes, and what is done besides."""
-
+@command(app, help=HELP, epilog=EPILOG, version_of=NAME)
+def encode(
     specs: Annotated[
         list[Path] | None, Argument("What to make: objects or sets.", "SPEC.yaml...")
-    ] = None
+    ] = None,
     folder: Annotated[
         Path | None,
-        Option(
-            "Folder for the files, in place of output: folder:.", "DIR", names=("-o", "--output")
-        ),
-    ] = None
+        Option("Folder for the files, in place of output: folder:.", "DIR",
+               names=("-o", "--output")),
+    ] = None,
     formats: Annotated[
         str,
-        Option(
-            "step, stl, 3mf, glb, stpz (STEP, gzipped), mjcf, urdf, sdf, usd: files to write, "
-            "with commas between.",
-            "LIST",
-            names=("--format",),
-        ),
-    ] = ""
+        Option("step, stl, 3mf, glb, stpz (STEP, gzipped), mjcf, urdf, sdf, usd: files to write, "
+               "with commas between.", "LIST", names=("--format",)),
+    ] = "",
     database: Annotated[
-        str, Option("Registers the cells: lab.db, sqlite:///lab.db, postgresql://host/name.", "URL")
-    ] = ""
+        str,
+        Option("Registers the cells: lab.db, sqlite:///lab.db, postgresql://host/name.", "URL"),
+    ] = "",
     lab_key: Annotated[
         str,
-        Option(
-            "Of a new database: the same key, the same arrays and bytes; drawn if left out. "
-            "encode-object lab prints it.",
-            "KEY",
-        ),
-    ] = ""
+        Option("Of a new database: the same key, the same arrays and bytes; drawn if left out. "
+               "encode-object lab prints it.", "KEY"),
+    ] = "",
     sensor_type: Annotated[
         str,
-        Option(
-            "What will touch them, in place of sensor_type: in the specs; fsr-16. Decides the "
-            "pitch that auto takes, and what faces promise.",
-            "NAME|FILE",
-        ),
-    ] = ""
-    dry_run: Annotated[bool, Option("Say what would be made; write nothing.")] = False
+        Option("What will touch them, in place of sensor_type: in the specs; fsr-16. Decides the "
+               "pitch that auto takes, and what faces promise.", "NAME|FILE"),
+    ] = "",
+    dry_run: Annotated[bool, Option("Say what would be made; write nothing.")] = False,
     verify: Annotated[
         bool, Option("Read every file back and prove it (needs the cad and mesh extras).")
-    ] = False
+    ] = False,
     slice_plates: Annotated[
         bool,
-        Option(
-            "Slice the plates with PrusaSlicer: time and filament on the build sheet.",
-            names=("--slice",),
-        ),
-    ] = False
-    replace: Annotated[bool, Option("Allow a changed spec under a registered name.")] = False
+        Option("Slice the plates with PrusaSlicer: time and filament on the build sheet.",
+               names=("--slice",)),
+    ] = False,
+    replace: Annotated[bool, Option("Allow a changed spec under a registered name.")] = False,
     printed_check: Annotated[
         bool,
-        Option(
-            "Slice and print in simulation: which symbols survive; makes a picture, registers "
-            "nothing."
-        ),
-    ] = False
+        Option("Slice and print in simulation: which symbols survive; makes a picture, registers "
+               "nothing."),
+    ] = False,
     print_profile: Annotated[
-        str,
-        Option("For --printed-check: fdm-0.4-0.2, ... or an exported .ini file.", "NAME"),
-    ] = ""
+        str, Option("For --printed-check: fdm-0.4-0.2, ... or an exported .ini file.", "NAME")
+    ] = "",
     print_faults: Annotated[
         str,
         Option("For --printed-check: what the machine does wrong.", "none|usual|bad|k=v,..."),
-    ] = ""
+    ] = "",
     jobs: Annotated[
         int | None,
         Option("Processes for a set of many objects.", "N", names=("-j", "--jobs"), least=1),
-    ] = None
-    as_json: Json = False
-
-    def check(self) -> None:
-        """Refuse options that exclude each other."""
-        if not self.specs:
-            raise UsageError("no spec is named")
-        if (self.print_profile or self.print_faults) and not self.printed_check:
-            raise UsageError("print profile and faults need --printed-check")
-
-
-@command(app, help=HELP, epilog=EPILOG, version_of=NAME)
-def encode(options: EncodeOptions) -> int:
-    """Make objects; `HELP` is what people see."""
+    ] = None,
+    as_json: Json = False,
+) -> int:  # fmt: skip
+    """Make objects, or check how they print; `HELP` is what people see."""
+    if not specs:
+        raise UsageError("no spec is named")
+    if not printed_check and (print_profile or print_faults):
+        raise UsageError("print profile and faults need --printed-check")
     from encoded_objects.base.output import progress_bar
+    from generator.spec import read_specs
     from generator.spec.option import database_option, format_option, sensor_type_option
-    from generator.spec.read import read_specs
 
-    formats = format_option(options.formats) if options.formats else None
-    url = database_option(options.database) if options.database else None
-    sensor = sensor_type_option(options.sensor_type) if options.sensor_type else ""
-    specs = options.specs or []
-    if options.printed_check:
-        from generator.command.printed_report import print_printed
-        from generator.pipeline.printed_check import check_printed
-        from generator.printed.faults import print_faults
-
-        with progress_bar("reading", 1) as bar:
-            objects = check_printed(
-                read_specs(specs, database=url, sensor_type=sensor),
-                folder=options.folder,
-                database=url,
-                profile=options.print_profile,
-                faults=print_faults(options.print_faults),
-                progress=lambda what, share: bar.show(share, label=what),
-            )
-        print_printed(objects, as_json=options.as_json)
-        return 0
-    located = read_specs(specs, database=url, sensor_type=sensor)
-
-    from generator.command.made_report import print_made
-    from generator.pipeline import encode as make
-
+    wanted = format_option(formats) if formats and not printed_check else None
+    url = database_option(database) if database else None
+    sensor = sensor_type_option(sensor_type) if sensor_type else ""
+    found = read_specs(specs, database=url, sensor_type=sensor)
     with progress_bar("reading", 1) as bar:
-        encoded = make(
-            located,
-            folder=options.folder,
-            formats=formats,
-            database=url,
-            lab_key=options.lab_key,
-            dry_run=options.dry_run,
-            verify=options.verify,
-            slice_plates=options.slice_plates,
-            replace=options.replace,
-            progress=lambda what, share: bar.show(share, label=what),
-            jobs=options.jobs,
-        )
-    print_made(encoded, dry_run=options.dry_run, as_json=options.as_json)
+
+        def progress(what: str, share: float) -> None:
+            bar.show(share, label=what)
+
+        if printed_check:
+            from generator.command.printed_report import print_printed
+            from generator.pipeline.printed_check import check_printed
+            from generator.printed.faults import print_faults as faults_named
+
+            checked = check_printed(
+                found, folder=folder, database=url, profile=print_profile,
+                faults=faults_named(print_faults), progress=progress,
+            )  # fmt: skip
+        else:
+            from generator.command.made_report import print_made
+            from generator.pipeline import encode as make
+
+            made = make(
+                found, folder=folder, formats=wanted, database=url, lab_key=lab_key,
+                dry_run=dry_run, verify=verify, slice_plates=slice_plates, replace=replace,
+                progress=progress, jobs=jobs,
+            )  # fmt: skip
+    if printed_check:
+        print_printed(checked, as_json=as_json)
+    else:
+        print_made(made, dry_run=dry_run, as_json=as_json)
     return 0

@@ -19,9 +19,6 @@ Only = Annotated[
     list[str] | None,
     Option("Only this one; may be given several times.", "NAME", names=("--object",)),
 ]
-SensorTypeName = Annotated[
-    str, Option("What touches it, for what faces promise; fsr-16.", "NAME|FILE")
-]
 LAB = "sqlite:///lab.db"
 
 
@@ -49,7 +46,7 @@ def lab(database: Database = LAB, as_json: Json = False) -> int:
     Every new database draws a key, from which its arrays are made: two labs agree on a touch by
     chance only. A new database that is given the same key, --lab-key KEY, has the same arrays.
     """
-    from generator.command.lab_report import print_lab
+    from generator.command.object_report import print_lab
     from generator.database.lab import read_fullness
     from generator.database.open import open_database
     from generator.database.transaction import read_transaction
@@ -66,7 +63,9 @@ def lab(database: Database = LAB, as_json: Json = False) -> int:
 def show(
     name: Annotated[str, Argument("As `list` names it.", "OBJECT")],
     database: Database = LAB,
-    sensor_type: SensorTypeName = "",
+    sensor_type: Annotated[
+        str, Option("What touches it, for what faces promise; fsr-16.", "NAME|FILE")
+    ] = "",
     as_json: Json = False,
 ) -> int:
     """Print all about one object: faces, cells, origin, files and whether they are unchanged."""
@@ -196,10 +195,10 @@ def _confirm(engine: Engine, names: list[str], *, as_json: bool) -> None:
     if as_json or not sys.stdin.isatty():
         raise UsageError("--free removes objects for good; confirm it with --yes")
     sys.stderr.write(object_report.warning_before(entries))
-    from typer import Exit, confirm
+    import typer
 
-    if not confirm("Remove them and free their cells?", err=True):
-        raise Exit(1)
+    if not typer.confirm("Remove them and free their cells?", err=True):
+        raise typer.Exit(1)
 
 
 def _new_name(given: str) -> tuple[str, str]:

@@ -19,9 +19,9 @@ app = console.application()
 @command(app)
 def init(
     shape: Annotated[
-        str, Argument("cube, box, triangular_prism, tetrahedron, octahedron, "
-                                 "dodecahedron, prism, pyramid, cylinder, cone, "
-                                 "polyhedron or file."),
+        str,
+        Argument("cube, box, triangular_prism, tetrahedron, octahedron, dodecahedron, prism, "
+                 "pyramid, cylinder, cone, polyhedron or file."),
     ] = "cube",
     file: Annotated[
         Path | None,
