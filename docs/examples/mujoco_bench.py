@@ -45,7 +45,7 @@ from probe.wrist import (
     stiffness,
 )
 from recognizer.touch.robot import carried_pose, object_pose
-from recognizer.validation.written import written_surface
+from recognizer.validation.touch_plan import written_surface
 
 Array = np.ndarray
 Shown = Callable[[Any, Array, Any], None] | None

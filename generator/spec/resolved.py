@@ -44,7 +44,7 @@ class ShapeSpec:
     ============================================  ===============================================
 
     All but `file` and `solid` are what the functions of `generator.polyhedron.shapes.SHAPES`
-    and `generator.polyhedron.round.ROUND_SHAPES` take.
+    and `generator.polyhedron.shapes.ROUND_SHAPES` take.
     """
 
     kind: str

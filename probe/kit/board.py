@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from html import escape
 
 from encoded_objects.base.sensor_type import SensorType
+from probe.kit import sizes
 from probe.kit.sizes import KitSizes
 
 LINES_MAX = 16  #: rows or columns of the board
@@ -64,10 +65,10 @@ def mechanical_items(k: KitSizes) -> list[Item]:
         Item("two-part silicone", f"Shore A {shore:.0f} (E = {overlay.young_mpa:g} MPa)",
              f"{litres:.1f} ml", "the overlay, a third more than it holds"),
         Item("release spray for silicone", "", "a little", "mould"),
-        Item("dowel pin", f"{k.settings.pin_mm:g} x 20 mm", "2", "mould"),
+        Item("dowel pin", f"{sizes.PIN_MM:g} x 20 mm", "2", "mould"),
         Item("screw and nut", "M3 x 25", "4", "mould"),
         Item("screw", "M3 x 30, socket head, with nut", "4", "frame, body, adapter"),
-        Item("foam sheet", f"EVA, {k.settings.foam_mm:g} mm",
+        Item("foam sheet", f"EVA, {sizes.FOAM_MM:g} mm",
              f"{2 * k.sensor.half_mm[0]:.0f} x {2 * k.sensor.half_mm[1]:.0f} mm",
              "under the foot of the cap"),
         Item("screw", "M6 x 16, socket head", "4", "robot flange ISO 9409-1-50-4-M6"),

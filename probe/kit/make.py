@@ -31,9 +31,7 @@ from probe.kit.board import (
     wiring_svg,
 )
 from probe.kit.coupon import DATABASE, Coupon, make_coupon
-from probe.kit.mesh import KitPartReport, check_part, mesh_of, step_text
-from probe.kit.model import PARTS
-from probe.kit.settings import KIT
+from probe.kit.model import PARTS, KitPartReport, check_part, mesh_of, step_text
 from probe.kit.sheet import FILAMENT, RESIN, PrintedPart, sheet_html
 from probe.kit.sizes import KitSizes, kit_sizes
 
@@ -91,7 +89,7 @@ def make_kit(
             if not _is_needed(name, k):
                 continue
             solid = model(k)
-            mesh = mesh_of(solid, KIT)
+            mesh = mesh_of(solid)
             step = staging.write(f"{name}.step", step_text(solid, name))
             stl = staging.write(f"{name}.stl", stl_chunks(mesh))
             if verify:

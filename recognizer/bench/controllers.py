@@ -18,11 +18,9 @@ from generator.database.as_built import AsBuilt
 from probe.calibration import read_calibration
 from probe.circuit import Electronics
 from probe.recording.files import next_free
-from recognizer.as_built.keep import keep_prints
-from recognizer.as_built.parts import estimate_parts
-from recognizer.as_built.settings import ESTIMATE, settings_for_prints
-from recognizer.as_built.touches import feel_prints
-from recognizer.as_built.words import as_built_entry, as_built_sizes
+from recognizer.as_built.estimate import ENOUGH_TOUCHES, estimate_parts, keep_prints
+from recognizer.as_built.touches import measure_prints, settings_for_prints
+from recognizer.as_built.verdict import as_built_entry, as_built_sizes
 from recognizer.bench.calibration import PageGuide, page_guide
 from recognizer.bench.errors import BenchError, BusyError
 from recognizer.bench.feed import ProbeFeed
@@ -277,7 +275,7 @@ class PrintController:
         ]  # fmt: skip
         with self._lock:
             self._found = ()
-            prints = feel_prints(reader, touches, calibration=session.frames.state.calibration)
+            prints = measure_prints(reader, touches, calibration=session.frames.state.calibration)
             estimates, few = estimate_parts(prints, session.database, material)
             self._found = tuple(found for found, _ in estimates)
         parts = [
@@ -299,7 +297,7 @@ class PrintController:
         """
         with self._lock:
             if not self._found:
-                raise BusyError("nothing was estimated", fix=f"touch {ESTIMATE.enough} places "
+                raise BusyError("nothing was estimated", fix=f"touch {ENOUGH_TOUCHES} places "
                                 "all over the part, then estimate")  # fmt: skip
             printer = keep_prints(self._session.database, self._found)
             self._found = ()

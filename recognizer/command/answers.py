@@ -12,7 +12,7 @@ from recognizer.touch.recognition import NO_CONTACT
 
 if TYPE_CHECKING:
     from probe.frame import Frame
-    from recognizer.thesis.edges.line import Edge
+    from recognizer.thesis.line import Edge
     from recognizer.touch.contacts import TouchImage
     from recognizer.touch.recognition import Recognition
     from recognizer.touch.robot import ObjectPose

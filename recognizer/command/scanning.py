@@ -18,7 +18,7 @@ from recognizer.errors import RecognizerError
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from recognizer.thesis.edges.line import Edge
+    from recognizer.thesis.line import Edge
     from recognizer.touch.contacts import TouchImage
     from recognizer.touch.lab import EmbossedArray
     from recognizer.touch.reader import Reader
@@ -62,7 +62,7 @@ def belief_for(reader: Reader, method: str) -> Belief:
 
 def edges_of(reader: Reader, signal: Signal) -> tuple[Edge, ...]:
     """Return the edges that a touch feels, in the sensor frame."""
-    from recognizer.thesis.edges.find import touch_edges
+    from recognizer.thesis.edge_fit import touch_edges
 
     return touch_edges(reader.sensor, signal)
 

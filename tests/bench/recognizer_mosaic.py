@@ -55,7 +55,7 @@ from recognizer.scan.mosaic.planar import (
     wrap_angle,
 )
 from recognizer.scan.mosaic.register import register_patches
-from recognizer.thesis.product import product_shift
+from recognizer.thesis.merge import product_shift
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise

@@ -1,8 +1,8 @@
 """Straight edges and the corners between them. Thesis 4.3, appendix 3.
 
-An edge is the line n x = offset with the unit normal n = (cos angle, sin angle) that points to
-where the face is, so that n x - offset is how far a point lies inside. It is kept by its angle
-and offset, which stay finite for every direction, unlike slope and intercept. Image frame, mm.
+An edge is the line n x = offset with the unit normal n = (cos angle, sin angle) that points into
+the face: n x - offset is how far a point lies inside. Angle and offset stay finite for every
+direction, unlike slope and intercept. Image frame, mm.
 """
 
 from __future__ import annotations
@@ -13,20 +13,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from recognizer.thesis.settings import EDGE_LINE
-
 Array = NDArray[np.float64]
+
+PARALLEL = 0.1  #: sine of the angle below which two edges have no corner
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Edge:
-    """A straight edge of what is felt."""
+    """A straight edge of the pressed area."""
 
     angle_rad: float  #: of the normal that points into the face
     offset_mm: float  #: of the line from the image frame's origin, along that normal
-    start_mm: Array  #: (2,) ends of the part that is seen, the face to the left of the way
+    start_mm: Array  #: (2,) ends of the visible part, the face to the left of the way
     end_mm: Array  #: (2,)
-    points: int  #: edge points that it was found by
+    points: int  #: number of its edge points
     covariance: Array  #: (2, 2) of angle (rad) and offset (mm)
 
     @property
@@ -36,12 +36,12 @@ class Edge:
 
     @property
     def length_mm(self) -> float:
-        """Length of the part that is seen."""
+        """Length of the visible part."""
         return float(np.linalg.norm(self.end_mm - self.start_mm))
 
     @property
     def middle_mm(self) -> Array:
-        """Middle (2,) of the part that is seen."""
+        """Middle (2,) of the visible part."""
         return (self.start_mm + self.end_mm) / 2
 
     @property
@@ -83,9 +83,9 @@ def fit_line(points_mm: Array, normals: Array, least_mm: float) -> Edge:
     Parameters
     ----------
     points_mm
-        (n, 2), two or more that are not all in one place.
+        (n, 2), two or more, not all in one place.
     normals
-        (n, 2) into the face, roughly: which side it lies on.
+        (n, 2) into the face, roughly: they define its side.
     least_mm
         Standard deviation of a point across the edge, at least.
     """
@@ -101,7 +101,7 @@ def fit_line(points_mm: Array, normals: Array, least_mm: float) -> Edge:
     across, places = away @ n, away @ t
     variance = max(least_mm, float(np.sqrt((across**2).sum() / max(1, len(away) - 2)))) ** 2
     spread = float((places**2).sum())
-    # offset = n(angle) middle: what turns the line moves it at the origin, too
+    # offset = n(angle) middle: a turn of the line moves it at the origin, too
     lever = float(middle @ t)
     turning = variance / spread if spread > 0 else math.pi**2
     by_turn = np.array([1.0, -lever])
@@ -127,7 +127,7 @@ def corner_between(first: Edge, second: Edge, joint: Array | None = None) -> Cor
         (4, 4) covariance of the first one's angle and offset and the second one's; by default
         they are independent.
     """
-    if abs(_cross(first.normal, second.normal)) < EDGE_LINE.parallel:
+    if abs(_cross(first.normal, second.normal)) < PARALLEL:
         return None
     offsets = np.array([first.offset_mm, second.offset_mm])
     at = np.asarray(np.linalg.solve(np.stack([first.normal, second.normal]), offsets), np.float64)
