@@ -15,8 +15,7 @@ from generator.database.open import part_path
 from generator.database.registered import RegisteredPart
 from generator.errors import ShapeError
 from generator.polyhedron.read import file_content
-from generator.polyhedron.read.settings import MODEL
-from generator.polyhedron.read.stl import stl_triangles
+from generator.polyhedron.read.stl import MOST_PART_TRIANGLES, stl_triangles
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +41,7 @@ def part_state(url: URL, part: RegisteredPart) -> PartState:
     return PartState(part, path, state)
 
 
-LARGEST_BYTES = 84 + 50 * MODEL.most_part_triangles
+LARGEST_BYTES = 84 + 50 * MOST_PART_TRIANGLES
 
 
 def part_triangles(file: str | os.PathLike[str]) -> NDArray[np.float64]:
@@ -65,7 +64,7 @@ def part_triangles(file: str | os.PathLike[str]) -> NDArray[np.float64]:
     """
     place = str(file)
     content = file_content(Path(file), place, LARGEST_BYTES)
-    corners = stl_triangles(content, place, most=MODEL.most_part_triangles, padded=False)
+    corners = stl_triangles(content, place, most=MOST_PART_TRIANGLES, padded=False)
     if not len(corners):
         raise ShapeError("the file holds no triangle", fix="export the part again", place=place)
     return corners

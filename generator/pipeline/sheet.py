@@ -20,7 +20,7 @@ from generator.layout.placement import FaceLayout, Layout, object_code
 from generator.pipeline.made import overhang_of
 from generator.pipeline.plan import ObjectPlan
 from generator.polyhedron import face_polygon
-from generator.polyhedron.assembly import AssemblyStep, assembly_order, telling_faces
+from generator.polyhedron.assembly import AssemblyStep, assembly_order, distinct_faces
 from generator.polyhedron.frame import face_frame
 from generator.printers import Printer
 from generator.solid import Part, box, volume
@@ -190,7 +190,7 @@ def _checks(plan: ObjectPlan, layout: Layout) -> tuple[Check, ...]:
         (edge.start, edge.end): number + 1 for number, edge in enumerate(plan.polyhedron.edges)
     }
     found = []
-    for face in telling_faces(plan.polyhedron, sorted(by_face)):
+    for face in distinct_faces(plan.polyhedron, sorted(by_face)):
         name = plan.polyhedron.faces[face].name
         loop = plan.polyhedron.faces[face].loops[0]
         first = numbers.get((loop[0], loop[1])) or numbers[loop[1], loop[0]]

@@ -1,51 +1,60 @@
-"""Touches of a recording -> how the print under each of them is stretched."""
+"""Touches of a recording -> strain and stroke width of the print under each."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from probe.calibration import Calibration
-from recognizer.as_built.estimate import FeltPrint
+from recognizer.as_built.estimate import MeasuredPrint
 from recognizer.errors import AsBuiltError
 from recognizer.touch.belief import VerifiedHypothesis, unworn_labels_at, weigh_cells
 from recognizer.touch.contacts import TouchImage
 from recognizer.touch.lab import EncodedFace
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise_with_hypothesis
+from recognizer.touch.settings import DEFAULTS, ReaderSettings
 from recognizer.touch.symbols.stretch import fit_stretch
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def feel_prints(
+def settings_for_prints() -> ReaderSettings:
+    """Return settings of a reader that accepts prints farther off than usual."""
+    refine = DEFAULTS.refine
+    prior = (*refine.prior[:6], 0.04)
+    return replace(DEFAULTS, refine=replace(refine, prior=prior, limits=(*refine.limits[:3], 0.12)))
+
+
+def measure_prints(
     reader: Reader,
     touches: Iterable[TouchImage],
     *,
     calibration: Calibration | None = None,
     place: str = "",
-) -> tuple[FeltPrint, ...]:
-    """Return how every touch that is recognised felt the print.
+) -> tuple[MeasuredPrint, ...]:
+    """Return the print under every touch that is recognised.
 
     Parameters
     ----------
     reader
-        With settings of `settings_for_prints`, so that a print far off is read too.
+        With settings of `settings_for_prints`, which read prints far off, too.
     place
         Of the touches, for messages.
 
     Raises
     ------
     AsBuiltError
-        Nothing is recognised, or several objects are; or only round faces, whose stretch a touch
-        does not tell from their bend.
+        Nothing is recognised, or several objects are; or only round faces, whose strain cannot be
+        separated from their curvature.
     """
-    found: list[FeltPrint] = []
+    found: list[MeasuredPrint] = []
     reasons: Counter[str] = Counter()
     for touch in touches:
         signal = reader.signal(touch.counts, calibration=calibration)
@@ -82,7 +91,7 @@ def feel_prints(
 
 def _fit_print(
     verified: VerifiedHypothesis, face: EncodedFace, T_part_face: Array, seq: int
-) -> FeltPrint:
+) -> MeasuredPrint:
     fit, embossed, place = verified.fit, verified.embossed, verified.hypothesis
     worn = fit.cells[weigh_cells(embossed, fit, place, verified.image.settings.belief).worn]
 
@@ -98,7 +107,7 @@ def _fit_print(
         [s * s, c * c, -2 * c * s],
         [-c * s, c * s, c * c - s * s],
     ]
-    return FeltPrint(
+    return MeasuredPrint(
         seq=seq,
         object=face.object,
         face=face.face,

@@ -1,11 +1,11 @@
-"""A probe that comes down on a registered part where it is told.
+"""A probe that comes down on a registered part where the bench says.
 
-    touch:                        in software
-    touch:?firmware=avr           through the probe's own firmware on an emulated processor
+    sim:touch                     in software
+    sim:touch?firmware=avr        through the probe's own firmware on an emulated processor
 
 Options: rate (frames a second, 100), noise (typical, quiet), hold (s, 2), seed. Either way it
 is a device on a serial line, which can be unplugged, and its frames say nothing of where it
-stands.
+stands. `touch:` is the old spelling.
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ from probe.simulate.scene import Scene
 from recognizer.bench.errors import BenchError
 from recognizer.bench.press_sequence import PressSequence, SimulationSettings
 from recognizer.bench.serial_line import SoftwareLine
-from recognizer.bench.settings import PRESS
 
-SCHEME = "touch:"
+TOUCH, FORMERLY = "sim:touch", "touch:"
+SCENES = 32  #: surfaces that are kept
+UNPLUGGED_S = 60.0  #: at most
 _OPTIONS = ("firmware", "rate", "noise", "hold", "seed")
 
 
@@ -133,10 +134,8 @@ class TouchProbe:
 
     def unplug(self, seconds: float) -> None:
         """Pull the plug, and put it in again after so many seconds."""
-        if not 0 < seconds <= PRESS.unplugged_s:
-            raise BenchError(
-                f"unplugged for {seconds:g} s", fix=f"give up to {PRESS.unplugged_s:g} s"
-            )
+        if not 0 < seconds <= UNPLUGGED_S:
+            raise BenchError(f"unplugged for {seconds:g} s", fix=f"give up to {UNPLUGGED_S:g} s")
         if self.firmware:
             self._emulator.fault(f"unplug {seconds:g}")
         else:
@@ -156,7 +155,7 @@ class TouchProbe:
         if key not in self._scenes:
             self._scenes[key] = registered_surface(self.database, object_name, face)
         self._scenes.move_to_end(key)
-        while len(self._scenes) > PRESS.scenes:
+        while len(self._scenes) > SCENES:
             self._scenes.popitem(last=False)
         return self._scenes[key]
 
@@ -171,9 +170,14 @@ class TouchProbe:
                 return
 
 
+def is_simulation(url: str) -> bool:
+    """Whether a URL names the probe of this module."""
+    return url.partition("?")[0] in (TOUCH, FORMERLY)
+
+
 def parse_simulation(url: str) -> tuple[bool, SimulationSettings]:
     """Read the options of a URL: whether by firmware, and how the probe moves."""
-    _, _, query = url.removeprefix(SCHEME).partition("?")
+    _, _, query = url.partition("?")
     given = dict(parse_qsl(query, keep_blank_values=True))
     unknown = sorted(set(given) - set(_OPTIONS))
     firmware, noise = given.get("firmware", ""), given.get("noise", "typical")

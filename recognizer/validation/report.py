@@ -11,19 +11,45 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from encoded_objects.base.errors import require
 from recognizer.validation import pictures
-from recognizer.validation.bounds import FAILS, HOLDS, UNTOLD
-from recognizer.validation.precision_pictures import work_precision
+from recognizer.validation.campaign import FILES, PRINTED, series_of
+from recognizer.validation.extremes import extremes
+from recognizer.validation.files import (
+    TIMES,
+    columns_of,
+    read_series,
+    write_json,
+    write_table,
+    write_text,
+)
+from recognizer.validation.flat_faces import flat_objects
+from recognizer.validation.pictures import work_precision
+from recognizer.validation.provenance import judging_limits, provenance
+from recognizer.validation.results import results_of, world_times
+from recognizer.validation.run import RunRecord
+from recognizer.validation.statistics import FAILS, HOLDS, UNTOLD
+from recognizer.validation.studies import (
+    contact_study,
+    decoder_study,
+    engine_lines,
+    reader_study,
+    work_avoided,
+)
+from recognizer.validation.touch_plan import TouchPlan
+from recognizer.validation.workers import prepare_reader
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-PAGE, PAIR = "report.html.j2", "compare.html.j2"
+PAGE, REPORT = "report.html.j2", "report.html"
+TRIALS, RESULTS, TIMES_FILE = "trials.parquet", "results.json", "times.json"
 
 
 def require_report(command: str) -> None:
-    """See to it that what writes tables, pictures and pages is installed."""
+    """Raise `MissingExtraError` unless the libraries of tables and pages are installed."""
     require("pyarrow", "matplotlib", "jinja2", extra="report", purpose=command)
 
 
@@ -32,14 +58,8 @@ def page_of(
 ) -> str:
     """Return the page of a run.
 
-    Parameters
-    ----------
-    results, times
-        As they are written to `results.json` and `times.json`.
-    rows
-        Columns of `trials.parquet`.
-    flat
-        The faces of every object drawn flat, as `flat_faces.flat_objects` returns them.
+    Results and times are those of `results.json` and `times.json`; `rows` are columns of
+    `trials.parquet`; `flat` is what `flat_faces.flat_objects` returns.
     """
     study, level = results["study"], results["provenance"]["contact_level"]
     drawn = {
@@ -66,18 +86,10 @@ def environment() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    made.filters.update(
-        size=_size, percent=_percent, share=_share, count=_count, interval=_interval, tint=_tint
-    )
+    tints = {HOLDS: "good", FAILS: "bad", UNTOLD: "untold"}  # classes of cells
+    made.filters.update(size=_size, percent=_percent, share=_share, count=_count,
+                        interval=_interval, tint=lambda state: tints.get(state, ""))  # fmt: skip
     return made
-
-
-_TINTS = {HOLDS: "good", FAILS: "bad", UNTOLD: "untold"}
-
-
-def _tint(state: str) -> str:
-    """Return the class of a cell: red is what fails, grey what nobody can tell yet."""
-    return _TINTS.get(state, "")
 
 
 def _interval(ends: tuple[float, float | None], digits: int = 3) -> str:
@@ -104,3 +116,53 @@ def _share(share: dict[str, Any], digits: int = 2) -> str:
 
 def _count(value: int | None) -> str:
     return "–" if value is None else f"{value:,}"
+
+
+def write_results(record: RunRecord, folder: Path) -> dict[str, Any]:
+    """Write everything that follows from the touches; returns the results."""
+    campaign, work = record.campaign, record.work_now(folder)
+    series = series_of(campaign)
+    table = read_series(folder, series[0])
+    rows = columns_of(table)
+    spent = columns_of(read_series(folder, series[0], TIMES))
+    reader = prepare_reader(work)
+    asked = provenance(record, work.database)
+    results = results_of(rows, asked["campaign"])
+    times: dict[str, Any] = {name: _cpu_ms(spent[name]) for name in ("drawing", "reading")}
+    times["worlds"] = world_times(rows, spent, asked["campaign"])
+    results["rule"] = judging_limits()
+    results["study"], results["left_out"], results["engines"] = {}, [], engine_lines()
+    if campaign.study:
+        studies = {
+            "contact": contact_study(),
+            "decoders": decoder_study(reader.lab.arrays[0], campaign.seed),
+            "readers": reader_study(folder, campaign),
+        }
+        plan = TouchPlan(work.database, campaign.seed, kind="face",
+                         files=campaign.surfaces == FILES, prints=work.prints,
+                         engine=campaign.engine)  # fmt: skip
+        avoided = work_avoided(reader, plan, studies["readers"])
+        results["study"] = {name: study.counted for name, study in studies.items()}
+        results["left_out"] = avoided.counted
+        times |= {name: study.spent for name, study in studies.items()}
+        times["left_out"] = avoided.spent
+    if campaign.surfaces == PRINTED:
+        from recognizer.validation.printing import prints_as_results
+
+        results["printed"] = prints_as_results(folder, campaign)
+    results["extremes"] = extremes(reader)
+    results["provenance"] = asked
+    write_table(table, folder / TRIALS)
+    write_json(folder / RESULTS, results)
+    write_json(folder / TIMES_FILE, times)
+    flat = flat_objects(reader.lab, rows, results["objects"]["faces"])
+    write_text(folder / REPORT, page_of(results, times, rows, flat))
+    return results
+
+
+def _cpu_ms(seconds: Any) -> dict[str, float]:
+    """Return quantiles of CPU times, ms."""
+    at = {"median": 0.5, "p95": 0.95, "p99": 0.99}
+    found = {name: float(np.quantile(seconds, q)) for name, q in at.items()}
+    found["mean"] = float(np.mean(seconds))
+    return {name: round(1e3 * value, 3) for name, value in found.items()}

@@ -6,7 +6,7 @@
 Objects of `fixtures/specs` (80 mm cube, prism, tetrahedron, box; of the product profile the
 cube) are scanned face by face, a touch every 4.25 tactels: in lines there and back from one end
 of the face (`face`; `worn`: with 20 % of its symbols gone), or round its first corner, 5 mm
-from the edges (`corner`); or another surface of `recognizer.validation.surfaces` is scanned, and
+from the edges (`corner`); or another surface of `recognizer.validation.draw` is scanned, and
 any answer is wrong. Places are those of an arm whose joints have noise and backlash (`arm`), or
 they err by so many tactels; 20-120 N, up to 2 degrees of tilt. A scan is felt by one sensor,
 drawn from a level of `recognizer.validation`, with the same noise in every touch. Ways:
@@ -29,7 +29,7 @@ from pathlib import Path
 import numpy as np
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.arm.links import Arm
+from probe.arm import Arm
 from probe.contact.contract import Touch
 from probe.errors import ContactError
 from probe.scan.kinesthetic import JointErrors, follow_poses
@@ -50,13 +50,12 @@ from recognizer.scan.mosaic.planar import (
     transform_points,
 )
 from recognizer.thesis.scan import read_scan as read_classically
-from recognizer.thesis.settings import MergingSettings
 from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognise import recognise
 from recognizer.touch.signal import signal_of
+from recognizer.validation.draw import FOREIGN
 from recognizer.validation.statistics import chi2_quantile
-from recognizer.validation.surfaces import FOREIGN
 
 SPECS = Path(__file__).parents[2] / "fixtures" / "specs"
 SHAPES = {"thesis": ("cube", "prism", "tetrahedron", "box"), "product": ("cube",),
@@ -262,13 +261,13 @@ def alone(reader, felt, name, tally):
 
 def classical(lab, felt, name, sigma, tally):
     """Read a scan the thesis's way, after every eighth touch and at the end."""
-    merging = MergingSettings(window_tactels=max(0.75, 2 * (sigma or 0)))
+    window = max(0.75, 2 * (sigma or 0))
     poses = np.array([touch.believed.pose for touch in felt.touches])
     images = [np.maximum(counts - BIAS, 0) for counts in felt.counts]
     first, n = None, len(images)
     for k in [*range(8, n, 8), n]:
         start = time.process_time()
-        found = read_classically(lab, SENSOR, images[:k], poses[:k], merging=merging)
+        found = read_classically(lab, SENSOR, images[:k], poses[:k], window_tactels=window)
         if k == n:
             tally.ms.append(1e3 * (time.process_time() - start) / n)
         if tally.judge(found.recognition, name, felt.true[k - 1]) and first is None:

@@ -20,7 +20,7 @@ from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import AMBIGUOUS, NOT_ENCODED, TOO_FEW, refusal
 from recognizer.touch.signal import signal_of
-from recognizer.validation.surfaces import FOREIGN
+from recognizer.validation.draw import FOREIGN
 
 SENSOR = SensorType()
 X, Y = np.moveaxis(SENSOR.centres_mm(), -1, 0)

@@ -44,7 +44,7 @@ from recognizer.scan.mosaic.search import (
     peaks,
     points_mm,
 )
-from recognizer.thesis.product import product_shift
+from recognizer.thesis.merge import product_shift
 from recognizer.touch.recognition import Recognition, refusal
 from recognizer.touch.signal import Signal, signal_of
 

@@ -8,7 +8,7 @@ import pytest
 from encoded_objects.base.sensor_type import SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
-from probe.arm.carried import SensorPose
+from probe.arm import SensorPose
 from probe.contact.contract import Touch
 from probe.scan.places import surface_to_sensor
 from probe.simulate.registered import registered_surface
@@ -24,7 +24,7 @@ from recognizer.touch.lab import open_lab
 from recognizer.touch.reader import Reader
 from recognizer.touch.recognition import NO_CONTACT, TOO_FEW
 from recognizer.touch.signal import signal_of
-from recognizer.validation.surfaces import FOREIGN
+from recognizer.validation.draw import FOREIGN
 
 SENSOR = SensorType()
 SPREAD = (0.4, 0.4, 0.004)

@@ -1,0 +1,269 @@
+"""Error against run time, and the work that is avoided.
+
+Counts go to the results, CPU times to the times: `counted` holds the lines, `spent` their CPU
+times, ms, in order. Contact models and engines were measured against finer references by
+`tests/bench/contact_precision.py` and `contact_engines.py`; decoders read damaged windows of the
+set's own array; readers that spend more or less read the same touches.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from decoder import Decodings, Likelihood, decode_exact, decode_good_tuple
+from generator.array import FoldedArray
+from generator.database.open import open_database
+from generator.database.read import object_names, read_object
+from generator.database.transaction import read_transaction
+from probe.contact.engines import ENGINES, engine_named, engine_table
+from probe.contact.press import LEVELS, level_for, table
+from probe.contact.tips import Tips, tip_points
+from recognizer.touch.lab import EmbossedArray
+from recognizer.touch.reader import Reader
+from recognizer.validation.campaign import Campaign, series_of, settings_of
+from recognizer.validation.draw import draw_touch
+from recognizer.validation.files import TIMES, columns_of, read_series
+from recognizer.validation.results import line_of
+from recognizer.validation.touch_plan import TouchPlan
+
+WINDOWS = 200  #: damaged ones for each decoder
+WRONG_SYMBOLS = 0.05  #: of these windows
+BEYOND = 2  #: rows and columns of a view beyond the window, so that errors show
+LARGEST_SERIAL = 1 << 13  #: places up to which the serial method ends in time
+OBJECTS = 20  #: read to know what reading all would take
+REPEATS = 5  #: of what is timed; the median counts
+
+Ints = NDArray[np.int64]
+
+
+@dataclass(slots=True)
+class Study:
+    """Lines of a picture, and the CPU time of each."""
+
+    counted: list[dict[str, Any]] = field(default_factory=list)
+    spent: list[Any] = field(default_factory=list)  #: ms CPU
+
+    def add_avoided(
+        self, what: str, needed: int, of: int, unit: str,
+        ms: float | None = None, whole_ms: float | None = None,
+    ) -> None:  # fmt: skip
+        """Add a line: how much one touch looks at, out of how much, and the CPU time of both."""
+        self.counted.append({"what": what, "needed": needed, "of": of, "unit": unit})
+        self.spent += [None if t is None else float(f"{t:.3g}") for t in (ms, whole_ms)]
+
+
+def contact_study() -> Study:
+    """Return error and time of every contact level and engine, as they were measured once."""
+    study = Study()
+    found = [
+        (f"{kind}, own engine", line.level, line.error, line.ms)
+        for kind, lines in table().items()
+        for line in lines
+    ]
+    found += [(f"tab, {each.engine}", each.level, each.error, each.ms) for each in engine_table()]
+    for series, level, error, ms in found:
+        study.counted.append({"series": series, "level": level, "error": error})
+        study.spent.append(ms)
+    return study
+
+
+def reader_study(folder: Path, campaign: Campaign) -> Study:
+    """Return the outcome of the same touches for readers that spend more or less."""
+    study = Study()
+    for series in series_of(campaign)[1:]:
+        rows = columns_of(read_series(folder, series))
+        line = {"reader": series.reader, "settings": settings_of(series.reader)}
+        study.counted.append(line | line_of(rows, np.ones(len(rows["number"]), bool)))
+        spent = columns_of(read_series(folder, series, TIMES))["reading"]
+        study.spent.append(round(1e3 * float(np.mean(spent)), 3))
+    return study
+
+
+def decoder_study(encoding: EmbossedArray, seed: int) -> Study:
+    """Return the outcome of damaged windows at registered places of an array, by decoder."""
+    study, array = Study(), encoding.array
+    shape = (array.window[0] + BEYOND, array.window[1] + BEYOND)
+    rng = np.random.default_rng([seed, 2])
+    keys = encoding.keys[rng.integers(len(encoding.keys), size=WINDOWS)]
+    rows, columns = (part.astype(np.int64) for part in np.divmod(keys, np.uint64(array.columns)))
+    down, along = np.indices(shape)
+    windows = array.symbols(
+        (rows[:, None, None] + down) % array.rows,
+        (columns[:, None, None] + along) % array.columns,
+    )
+    other = (windows + rng.integers(1, array.order, windows.shape)) % array.order
+    windows = np.where(rng.random(windows.shape) < WRONG_SYMBOLS, other, windows)
+    for name, decode in _decoders(encoding):
+        decode(windows[:2])
+        start = time.process_time()
+        found = decode(windows)
+        study.spent.append(round(1e3 * (time.process_time() - start) / WINDOWS, 5))
+        right = (found.rows == rows.astype(np.uint64)) & (
+            found.columns == columns.astype(np.uint64)
+        )
+        study.counted.append(
+            {
+                "decoder": name,
+                "view": list(shape),
+                "wrong_symbols": WRONG_SYMBOLS,
+                "windows": WINDOWS,
+                "right": int((found.answered & right).sum()),
+                "wrong": int((found.answered & ~right).sum()),
+                "rejected": int((~found.answered).sum()),
+            }
+        )
+    return study
+
+
+def _decoders(encoding: EmbossedArray) -> Iterator[tuple[str, Callable[[Ints], Decodings]]]:
+    array = encoding.array
+    places = array.rows * array.columns
+    methods = ["logarithm"]
+    if places <= LARGEST_SERIAL:
+        methods = ["table", "serial", "milestones", *methods]
+    for method in methods:
+        yield method, _exact(array, method)
+    if isinstance(array, FoldedArray):
+        yield "good tuple", lambda windows: decode_good_tuple(array, windows)
+    yield "likelihood", Likelihood(array).decode
+    at = np.divmod(encoding.keys, np.uint64(array.columns))
+    prior = np.stack([part.astype(np.int64) for part in at], axis=1)
+    yield "likelihood, registered cells", Likelihood(array, prior=prior).decode
+
+
+def _exact(array: Any, method: str) -> Callable[[Ints], Decodings]:
+    return lambda windows: decode_exact(array, windows, method)
+
+
+def work_avoided(reader: Reader, plan: TouchPlan, readers: Study) -> Study:
+    """Return the work that is avoided for a touch of a registered face.
+
+    The example is touch 0 of the plan, of kind `face`; in the study of readers the first is the
+    reader as it is, and the last spends most.
+    """
+    study = Study()
+    _objects(study, reader)
+    _heights(study, plan, reader)
+    _levels(study, reader)
+    _triangles(study, plan, reader)
+    _cells(study, reader)
+    if readers.counted:
+        tried, most = (readers.counted[k]["settings"]["candidates"] for k in (0, -1))
+        study.add_avoided(
+            "Ways to read the touch that are tried out: the likeliest ones; more only where these "
+            "give no answer", tried, most, "ways", readers.spent[0], readers.spent[-1],
+        )  # fmt: skip
+    return study
+
+
+def _objects(study: Study, reader: Reader) -> None:
+    """Objects read from the database: the one whose cells were found."""
+    with read_transaction(open_database(reader.lab.url, writable=False)) as connection:
+        names = object_names(connection)
+        spent = [_cpu_ms(partial(read_object, connection, name), 1) for name in names[:OBJECTS]]
+    one = float(np.median(spent))
+    study.add_avoided(
+        "Objects loaded from the database: only the one that is touched",
+        1,
+        len(names),
+        "objects",
+        one,
+        one * len(names),
+    )
+
+
+def _heights(study: Study, plan: TouchPlan, reader: Reader) -> None:
+    """Heights computed: under the tips, not of the whole face."""
+    found = draw_touch(plan, 0, reader)
+    scene = found.contact.scene
+    points = tip_points(reader.sensor, Tips())[0].reshape(-1, 2)
+    under = found.touch.on_surface(points)
+    low, high = scene.region.box_mm
+    sensor_area = 4 * reader.sensor.half_mm[0] * reader.sensor.half_mm[1]
+    step = float(np.sqrt(sensor_area / len(under)))
+    x, y = (np.arange(a, b, step) for a, b in zip(low, high, strict=True))
+    whole = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    surface = scene.surface
+    surface.heights_mm(under)
+    study.add_avoided(
+        "Places where the height of the surface is computed: only under the sensor's tips",
+        len(under),
+        len(whole),
+        "places",
+        _cpu_ms(lambda: surface.heights_mm(under)),
+        _cpu_ms(lambda: surface.heights_mm(whole)),
+    )
+
+
+def _levels(study: Study, reader: Reader) -> None:
+    """Points or cells of the contact model: as many as its error needs."""
+    kind = reader.sensor.overlay.kind
+    chosen = level_for(reader.sensor)
+    lines = {line.level: line for line in table()[kind]}
+    finest = [level for level in LEVELS[kind] if level in lines][-1]
+    study.add_avoided(
+        f"Fineness of the simulated contact: {chosen}, the cheapest that is exact enough; "
+        f"the finest is {finest}",
+        LEVELS[kind].index(chosen) + 1,
+        len(lines),
+        "levels",
+        lines[chosen].ms,
+        lines[finest].ms,
+    )
+
+
+def _triangles(study: Study, plan: TouchPlan, reader: Reader) -> None:
+    """Triangles of the part that the engine of the run gets, if it takes meshes of parts."""
+    triangles = engine_named(plan.engine).triangles
+    if triangles is None:
+        return
+    found = draw_touch(plan, 0, reader)
+    surface = found.contact.scene.under(found.touch).surface
+    counted = triangles(surface, reader.sensor, found.touch)
+    if counted is None:
+        return
+    needed, of = counted
+    study.add_avoided(
+        f"Triangles of the part that engine {plan.engine} gets: only those under the sensor",
+        needed,
+        of,
+        "triangles",
+    )
+
+
+def engine_lines() -> list[dict[str, Any]]:
+    """Return, in plain words, which effects of a real touch each engine leaves out."""
+    measured = {line.engine: line.from_own for line in engine_table()}
+    return [
+        {"engine": name, "left_out": entry.left_out, "from_own": measured.get(name)}
+        for name, entry in ENGINES.items()
+    ]
+
+
+def _cells(study: Study, reader: Reader) -> None:
+    """Cells weighed: those that are registered, not all of the array."""
+    for encoding in reader.lab.arrays:
+        cells = encoding.array.rows * encoding.array.columns
+        what = (
+            f"Places that an answer may name: only those that were made, of all "
+            f"{encoding.array.rows} x {encoding.array.columns} of the array"
+        )
+        study.add_avoided(what, len(encoding.keys), cells, "places")
+
+
+def _cpu_ms(work: Callable[[], object], repeats: int = REPEATS) -> float:
+    """Return the median CPU time of something, ms."""
+    times = []
+    for _ in range(repeats):
+        start = time.process_time()
+        work()
+        times.append(1e3 * (time.process_time() - start))
+    return float(np.median(times))
