@@ -59,6 +59,7 @@ class Recorder:
     Examples
     --------
     >>> import tempfile
+    >>> import numpy as np
     >>> from probe.frame import frame_from
     >>> path = Path(tempfile.mkdtemp()) / "touch.h5"
     >>> with Recorder(path, sensor="bench 1") as recorder:
