@@ -1,7 +1,7 @@
 """The state of a sensor in a file: JSON that a person can read, the same bytes for the same state.
 
-It stands beside the calibration. Dead and hot tactels are letters (`.` sound, `D`, `H`), a row a
-line, as in a calibration; numbers have seven digits. Written beside the file and moved over it.
+It lies next to the calibration. Dead and hot tactels are letters (`.` sound, `D`, `H`), a row a
+line, as in a calibration; numbers have seven digits. A staged file replaces it as a whole.
 """
 
 from __future__ import annotations
@@ -138,19 +138,19 @@ def state_words(state: SensorState) -> str:
         return (
             f"{state.sensor}: {many}, too few to learn from; touch {LEAST_TOUCHES} places or more"
         )
-    said = []
+    parts = []
     for name, what in (("dead", "never answer"), ("hot", "read high with nothing on them")):
         if len(entry[name]):
-            said.append(f"{len(entry[name])} of {state.dead.size} tactels {what}")
+            parts.append(f"{len(entry[name])} of {state.dead.size} tactels {what}")
     if state.floating:
-        said.append("rows float while another is read: the network is inverted")
-    said.append(f"gains differ by {100 * entry['gain_spread']:.0f} %")
+        parts.append("rows float while another is read: the network is inverted")
+    parts.append(f"gains differ by {100 * entry['gain_spread']:.0f} %")
     if entry["tips_known"]:
-        said.append(f"tips stand {entry['tips_aside_mm']:.2f} mm aside (of {entry['tips_known']})")
+        parts.append(f"tips stand {entry['tips_aside_mm']:.2f} mm aside (of {entry['tips_known']})")
     unit = "N" if state.newtons else "counts"
     if abs(state.drift) >= (0.05 if state.newtons else 2.0):
-        said.append(f"the background drifted by {state.drift:+.2g} {unit}")
-    return f"{state.sensor}, {many}: {'; '.join(said)}"
+        parts.append(f"the background drifted by {state.drift:+.2g} {unit}")
+    return f"{state.sensor}, {many}: {'; '.join(parts)}"
 
 
 def _round_digits(value: Any) -> Any:

@@ -41,7 +41,7 @@ CHANGES: dict[str, Change] = {
     "values": lambda image, full: full - np.minimum(image, full),
     "quarter": lambda image, _: np.rot90(image),
 }
-#: What touches can tell; the others are a turn of one of these.
+#: Changes that refused touches can show, with a message; the others are a turn of one of these.
 HINTS = {
     "columns": "columns or rows seem reversed, or the image transposed: `--flip columns` (rows, "
     "transpose); `recognize-object check` tells which",
