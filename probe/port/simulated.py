@@ -27,7 +27,7 @@ from probe.port.software import SoftwareProbe
 from probe.protocol import IdentPacket
 
 if TYPE_CHECKING:
-    from probe.port.emulated import EmulatedProbe
+    from probe.firmware.emulator import EmulatedProbe
 
 FULL_MV = 5000.0
 _RATE_HZ = 100.0  #: frames of a simulated probe
@@ -82,7 +82,7 @@ class EmulatedPort:
     """The serial line of an emulated AVR, and a thread that shows it the images."""
 
     def __init__(self, url: str, frames: Iterator[Frame], rate: float) -> None:
-        from probe.port.emulated import emulated_probe
+        from probe.firmware.emulator import emulated_probe
         from probe.port.serial_line import open_serial
 
         self._url = url

@@ -19,7 +19,7 @@ from urllib.parse import parse_qsl
 from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
 from probe.errors import ProbeError
-from probe.port.emulated import emulated_probe
+from probe.firmware.emulator import emulated_probe
 from probe.port.simulated import FULL_MV
 from probe.simulate.registered import registered_object, registered_surface
 from probe.simulate.scene import Scene
