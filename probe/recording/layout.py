@@ -56,7 +56,7 @@ class RecordingOrigin:
     sensor: str = ""  #: ident of the probe, or what was simulated
     calibration: str = ""  #: hash of the calibration file; empty: none
     units: str = "counts"
-    sensor_type: str = ""  #: as YAML, `sensor_type_text`; empty: not told
+    sensor_type: str = ""  #: as YAML, `sensor_type_text`; empty: not known
     more: MappingProxyType[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
 
