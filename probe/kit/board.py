@@ -1,4 +1,4 @@
-"""What is bought and soldered: parts list, connections, wiring picture.
+"""Board of the probe: parts list, connections, wiring picture.
 
 Rows are driven by shift registers, columns read through a multiplexer and a load resistor: the
 grounded board of `probe/firmware/README.md`. It has 16 x 16 lines at most; larger matrices are read
@@ -38,7 +38,7 @@ def has_board(sensor: SensorType) -> bool:
 
 
 def electric_items(sensor: SensorType) -> list[Item]:
-    """Return what stands on the board."""
+    """Return the parts of the board."""
     if not has_board(sensor):
         return []
     registers = math.ceil(sensor.rows / 8)
@@ -58,7 +58,7 @@ def electric_items(sensor: SensorType) -> list[Item]:
 
 
 def mechanical_items(k: KitSizes) -> list[Item]:
-    """Return what holds the probe together and shapes the overlay."""
+    """Return the mechanical parts and the material of the overlay."""
     overlay, litres = k.sensor.overlay, 1.3 * k.silicone_mm3 / 1000
     shore = shore_a(overlay.young_mpa)
     found = [
@@ -159,7 +159,7 @@ class _Drawing:
         self.lines: list[str] = []
 
     def part(self, name: str, pins: list[tuple[str, str]]) -> None:
-        """Draw a box with its pins, those with a rail beside them by its name."""
+        """Draw a box with its pins, with the names of their rails."""
         x = _COLUMNS_PX[name]
         y = self.next.get(x, 30)
         right = [pin for pin in pins if _stands_right(name, pin[0])]

@@ -83,7 +83,7 @@ def make_kit(
     pitch = sensor.symbol_pitch_mm
     k = kit_sizes(sensor, pitch)
     parts, meshes, reports = [], [], []
-    with Staging(folder) as staging, tempfile.TemporaryDirectory() as beside:
+    with Staging(folder) as staging, tempfile.TemporaryDirectory() as scratch:
         for number, (name, (what, model, resin)) in enumerate(PARTS.items()):
             progress(name, number / (len(PARTS) + 1))
             if not _is_needed(name, k):
@@ -99,7 +99,7 @@ def make_kit(
             parts.append(PrintedPart(name, what, (x, y, z), float(solid.volume), resin))
             meshes.append((name, mesh, resin))
         progress("coupon", len(PARTS) / (len(PARTS) + 1))
-        database = Path(beside) / DATABASE
+        database = Path(scratch) / DATABASE
         coupon = make_coupon(k, pitch, RESIN if pitch < FINE_MM else FILAMENT, database)
         staging.write("coupon.step", step_chunks(coupon.part))
         staging.write("coupon.stl", stl_chunks(triangles(coupon.part)))

@@ -35,7 +35,7 @@ Shape = Any  # a solid of build123d
 
 
 def mould_base(k: KitSizes) -> Shape:
-    """Return what closes the tips' ends: flat, a vent beside every line of tips."""
+    """Return the plate that closes the tips' ends: flat, a vent along every line of tips."""
     plate = _box(*k.mould_mm, s.PLATE_MM)
     cut = [*_mould_holes(k, s.PLATE_MM)]
     if k.tip_mm:
@@ -47,7 +47,7 @@ def mould_base(k: KitSizes) -> Shape:
 
 
 def mould_plate(k: KitSizes) -> Shape:
-    """Return what shapes the tabs: a pocket for the skin, its floor pierced for every tab.
+    """Return the plate that shapes the tabs: a pocket for the skin, pierced for every tab.
 
     A pad's pocket has a floor without holes.
     """
@@ -65,7 +65,7 @@ def mould_plate(k: KitSizes) -> Shape:
 
 
 def mould_lid(k: KitSizes) -> Shape:
-    """Return what presses the skin to its thickness: a boss, open for posts, vents and silicone."""
+    """Return the lid that presses the skin to its thickness: a boss with holes."""
     boss = s.POCKET_MM - s.WEB_MM
     inner = (k.skin_mm[0] - 2 * s.CLEARANCE_MM, k.skin_mm[1] - 2 * s.CLEARANCE_MM)
     lid = _join(_box(*k.mould_mm, s.PLATE_MM), [_box(*inner, boss, at=(0.0, 0.0, s.PLATE_MM))])
@@ -83,9 +83,9 @@ def riser_places(k: KitSizes) -> tuple[tuple[float, float], ...]:
 
 
 def housing_body(k: KitSizes) -> Shape:
-    """Return what bears the film: a platform with a bed for it, posts, a way for the tail.
+    """Return the body that bears the film: a platform with a bed for it, posts, a way for the tail.
 
-    The tail bends down beside the platform and lies on a tongue, where a cable tie holds it.
+    The tail bends down along the platform and lies on a tongue, where a cable tie holds it.
     """
     top = s.SHOULDER_MM + s.PLATFORM_MM
     up = k.thickness_skin_mm + k.lip_mm / 2
@@ -109,7 +109,7 @@ def housing_body(k: KitSizes) -> Shape:
 
 
 def housing_frame(k: KitSizes) -> Shape:
-    """Return what holds skin and film down, lower than the tips; it lies on its outer face."""
+    """Return the frame that holds skin and film down, lower than the tips; it lies face down."""
     inner = s.PLATFORM_MM + k.thickness_skin_mm
     high = inner + k.lip_mm
     frame = _box(*k.side_mm, high)
@@ -137,7 +137,7 @@ def flange_adapter(k: KitSizes) -> Shape:
 
 
 def calibration_cap(k: KitSizes) -> Shape:
-    """Return what loads all tabs evenly: foot, skirt over the frame, a ring to centre weights.
+    """Return the cap that loads all tabs evenly: foot, skirt over the frame, ring for weights.
 
     It lies on its pan, the foot up.
     """

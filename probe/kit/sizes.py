@@ -43,7 +43,7 @@ FREE_MM = 0.8  #: height of the tips above the frame: faces meet tips alone
 OPENING_MM = 0.5  #: of the frame beyond the matrix, each side
 BEND_MM = 2.0  #: radius over which the tail leaves the platform
 ADAPTER_MM = 10.0  #: thickness of the plate on the robot's flange
-TONGUE_MM = 14.0  #: length of the support of tail and cable beside the housing
+TONGUE_MM = 14.0  #: length of the support of tail and cable next to the housing
 TIE_MM = (4.0, 2.0)  #: slots in it for a cable tie, the strain relief
 # Of the cap:
 SKIRT_MM = 2.0  #: thickness of the sleeve that guides it over the frame

@@ -71,7 +71,7 @@ def estimate_print(
 
     Parameters
     ----------
-    felt
+    measured
         Touches of it.
     object_id, printer, material
         Keys of the result in the database.
@@ -167,7 +167,7 @@ def estimate_parts(
 
     Parameters
     ----------
-    felt
+    measured
         Touches of one object.
     database, material
         Where it is registered, and its material.

@@ -48,19 +48,19 @@ def judge_print(found: AsBuilt, stroke_mm: float) -> PrintVerdict:
     """
     x, y = found.scale_x - 1, found.scale_y - 1
     unsure = np.sqrt(np.diag(found.covariance))
-    said, causes = [], []
+    findings, causes = [], []
     if max(abs(x) - unsure[0], abs(y) - unsure[1]) > ALIKE:
         if abs(x - y) <= TOGETHER:
             both = (x + y) / 2
-            said.append(f"{_percent(both)} {'small' if both < 0 else 'large'}")
+            findings.append(f"{_percent(both)} {'small' if both < 0 else 'large'}")
             causes.append("scale in the slicer, shrinkage?")
         else:
             for name, off, least in (("X", x, unsure[0]), ("Y", y, unsure[1])):
                 if abs(off) - least > ALIKE:
-                    said.append(f"{name} is {_percent(off)} {'short' if off < 0 else 'long'}")
+                    findings.append(f"{name} is {_percent(off)} {'short' if off < 0 else 'long'}")
             causes.append("belts?")
     if abs(found.skew_rad) - unsure[2] > SQUARE_RAD:
-        said.append(f"{abs(math.degrees(found.skew_rad)):.1f} degrees askew")
+        findings.append(f"{abs(math.degrees(found.skew_rad)):.1f} degrees askew")
         causes.append("a frame out of square?")
     wider = found.stroke_mm - stroke_mm
     strokes = ""
@@ -68,13 +68,13 @@ def judge_print(found: AsBuilt, stroke_mm: float) -> PrintVerdict:
         which = "wide" if wider > 0 else "narrow"
         strokes = f"strokes {abs(wider):.1f} mm too {which}: flow, first layer?"
     far = max(abs(x), abs(y)) > MOST_SCALE or abs(found.skew_rad) > MOST_SKEW_RAD
-    if not said:
+    if not findings:
         return PrintVerdict(AS_DESIGNED, "; ".join(filter(None, ("as designed", strokes))))
-    what = ", ".join(said)
+    deviations = ", ".join(findings)
     if far:
-        words = f"print again, {what}: {' '.join(causes)}"
+        words = f"print again, {deviations}: {' '.join(causes)}"
         return PrintVerdict(PRINT_AGAIN, "; ".join(filter(None, (words, strokes))))
-    words = f"{what}, within what the reader corrects"
+    words = f"{deviations}, within what the reader corrects"
     return PrintVerdict(CORRECTED, "; ".join(filter(None, (words, strokes))))
 
 

@@ -25,12 +25,16 @@ from recognizer.bench.calibration import PageGuide, page_guide
 from recognizer.bench.errors import BenchError, BusyError
 from recognizer.bench.feed import ProbeFeed
 from recognizer.bench.files import find_file, list_files
-from recognizer.sensor.file import read_state, write_state
-from recognizer.sensor.learn import learn_sensor
-from recognizer.sensor.mounting import WORDS, FoundMounting, find_mounting, simplify_turns
-from recognizer.sensor.settings import LEARNING
-from recognizer.sensor.wiring import Wiring, wiring_named
-from recognizer.sensor.words import state_words
+from recognizer.sensor.file import read_state, state_words, write_state
+from recognizer.sensor.learn import LEAST_TOUCHES, learn_sensor
+from recognizer.sensor.wiring import (
+    WORDS,
+    FoundMounting,
+    Wiring,
+    find_mounting,
+    simplify_turns,
+    wiring_named,
+)
 from recognizer.touch.contacts import TouchImage
 from recognizer.touch.reader import Reader
 
@@ -184,9 +188,9 @@ class SensorController:
         session = self._session
         reader = _reader(session)
         frames = session.recognition.touches.frames()[-MOST:]
-        if len(frames) < LEARNING.least:
+        if len(frames) < LEAST_TOUCHES:
             raise BusyError(
-                f"{len(frames)} touches were read, {LEARNING.least} are the least to learn from",
+                f"{len(frames)} touches were read, {LEAST_TOUCHES} are the least to learn from",
                 fix="touch other places of registered faces first",
             )
         with session.lock:
@@ -222,7 +226,7 @@ class SensorController:
             "learning": self._share,
             "learned": {"name": self._name, "words": self._text} if self._name else None,
             "states": list_files(self._session.folder, STATE),
-            "least": LEARNING.least,
+            "least": LEAST_TOUCHES,
         }
 
     def _learn(self, reader: Reader, images: list[Any]) -> None:

@@ -1,11 +1,11 @@
-"""A probe that comes down on a registered part where it is told.
+"""A probe that comes down on a registered part where the bench says.
 
-    touch:                        in software
-    touch:?firmware=avr           through the probe's own firmware on an emulated processor
+    sim:touch                     in software
+    sim:touch?firmware=avr        through the probe's own firmware on an emulated processor
 
 Options: rate (frames a second, 100), noise (typical, quiet), hold (s, 2), seed. Either way it
 is a device on a serial line, which can be unplugged, and its frames say nothing of where it
-stands.
+stands. `touch:` is the old spelling.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from urllib.parse import parse_qsl
 from encoded_objects.base.sensor_type import SensorType
 from probe.contact.contract import Touch
 from probe.errors import ProbeError
-from probe.port.emulated import emulated_probe
+from probe.firmware.emulator import emulated_probe
 from probe.port.simulated import FULL_MV
 from probe.simulate.registered import registered_object, registered_surface
 from probe.simulate.scene import Scene
@@ -27,7 +27,7 @@ from recognizer.bench.errors import BenchError
 from recognizer.bench.press_sequence import PressSequence, SimulationSettings
 from recognizer.bench.serial_line import SoftwareLine
 
-SCHEME = "touch:"
+TOUCH, FORMERLY = "sim:touch", "touch:"
 SCENES = 32  #: surfaces that are kept
 UNPLUGGED_S = 60.0  #: at most
 _OPTIONS = ("firmware", "rate", "noise", "hold", "seed")
@@ -170,9 +170,14 @@ class TouchProbe:
                 return
 
 
+def is_simulation(url: str) -> bool:
+    """Whether a URL names the probe of this module."""
+    return url.partition("?")[0] in (TOUCH, FORMERLY)
+
+
 def parse_simulation(url: str) -> tuple[bool, SimulationSettings]:
     """Read the options of a URL: whether by firmware, and how the probe moves."""
-    _, _, query = url.removeprefix(SCHEME).partition("?")
+    _, _, query = url.partition("?")
     given = dict(parse_qsl(query, keep_blank_values=True))
     unknown = sorted(set(given) - set(_OPTIONS))
     firmware, noise = given.get("firmware", ""), given.get("noise", "typical")

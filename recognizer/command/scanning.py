@@ -12,7 +12,7 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from probe.arm.carried import SensorPose
+from probe.arm import SensorPose
 from recognizer.errors import RecognizerError
 
 if TYPE_CHECKING:
@@ -115,8 +115,8 @@ def pose_during(
         )
     import numpy as np
 
-    from probe.arm.links import Arm
-    from probe.wrist.geometry import Wrist
+    from probe.arm import Arm
+    from probe.wrist import Wrist
     from recognizer.touch.robot import carried_pose
 
     angles = np.radians(joints_deg[number - 1])

@@ -1,14 +1,13 @@
-"""Edges of the face that one touch feels, fitted to its readings. Thesis 3.3, 4.2, 4.3.
+"""Edges of the face in one touch, fitted to its readings. Thesis 3.3, 4.2, 4.3.
 
 The thesis's edges (`edges`) are moved until they explain the readings of the tactels themselves,
-several times as precise. Faces with symbols are not felt themselves, only their symbols are; there,
-edges are those of symbols.
+several times as precise. On faces with symbols only the symbols press, so edges are theirs.
 
 Response of a tactel at the edge of a flat face, as a function of how far its centre lies inside: 0
-where the face does not reach, 1 well inside it. A tab feels the share of its round tip that lies on
-the face, and a little more because a partly covered tip bulges into the open; between two tabs, an
-edge is not felt. A pad's tactel feels a share of its square, smeared by the pad. Cross-talk and
-rounded edges blur both.
+where the face does not reach, 1 well inside it. A tab responds by the share of its round tip that
+lies on the face, and a little more because a partly covered tip bulges into the open; between two
+tabs, an edge has no effect. A pad's tactel responds by a share of its square, smeared by the pad.
+Cross-talk and rounded edges blur both.
 
 Fit: the face presses as p(x, y) = exp(a quadratic form), which follows a tilted plate and an
 overlay that hardens; a tactel reads p times its response to every edge near it. In turns, p is

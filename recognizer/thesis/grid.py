@@ -111,7 +111,7 @@ def _grow_grid(
 def _join_beyond_gaps(
     found: Sequence[Symbol], members: dict[Cell, int], free: set[int], pitch_mm: float
 ) -> dict[Cell, int]:
-    """Return members with those beyond gaps that stand where the whole lattice expects them."""
+    """Return members with symbols beyond gaps that lie at cells of the whole lattice."""
     while len(members) > 1:
         lattice = _lattice(found, members, pitch_mm)
         predicted: set[Cell] = set()

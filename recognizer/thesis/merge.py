@@ -139,7 +139,7 @@ def relative_poses(poses: ArrayLike) -> Array:
 def average_touches(
     sensor: SensorType, images: Sequence[TactileImage], placed: Array
 ) -> TactileImage:
-    """Return the mean of images laid at poses (n, 3), sampled four times as finely."""
+    """Return the mean of images at poses (n, 3), sampled four times as finely."""
     cell = sensor.pitch_mm / MAGNIFIED
     half = np.array(sensor.half_mm) - sensor.pitch_mm / 2
     corners = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])

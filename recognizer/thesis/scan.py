@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.arm.carried import SensorPose
+from probe.arm import SensorPose
 from recognizer.scan.mosaic.grow import add_touch
 from recognizer.scan.mosaic.mosaic import no_touches
 from recognizer.scan.session import TouchPlaces

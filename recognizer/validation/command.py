@@ -268,9 +268,9 @@ def report(
     as_json: Json = False,
 ) -> int:
     """Write results and report anew from the touches that are there."""
-    from recognizer.validation.pipeline import report_anew
+    from recognizer.validation.pipeline import report_again
 
-    _report(report_anew(folder), as_json=as_json)
+    _report(report_again(folder), as_json=as_json)
     return console.DONE
 
 

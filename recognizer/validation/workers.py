@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 LOSSES = 3  #: pools in a row that break before they have done anything
 CLUSTER_WAIT_S = 20.0  #: for the scheduler, and for its first worker
 
+Result = TypeVar("Result")
 PACKAGES = ("generator", "decoder", "probe", "recognizer")
 
 
@@ -63,12 +64,12 @@ class BatchResult:
     times: tuple[CpuTime, ...]
 
 
-#: Takes work and batches, yields what is done in any order. `workers`, `cluster`.
+#: Takes work and batches, yields finished batches in any order.
 Workers = Callable[[Work, Iterable[Batch]], Iterator[BatchResult]]
 
 
 def touch(work: Work, batch: Batch) -> BatchResult:
-    """Return what became of the touches of a batch.
+    """Return the rows of a batch's touches.
 
     Raises
     ------
@@ -118,9 +119,6 @@ def code_digest() -> str:
             digest.update(path.relative_to(root).as_posix().encode() + b"\0")
             digest.update(path.read_bytes() + b"\0")
     return digest.hexdigest()
-
-
-Result = TypeVar("Result")
 
 
 def workers_of(processes: int, cluster: str = "") -> Workers:

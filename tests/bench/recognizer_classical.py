@@ -24,7 +24,7 @@ from scipy.ndimage import gaussian_filter
 from encoded_objects.base.sensor_type import SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
-from probe.arm.links import Arm
+from probe.arm import Arm
 from probe.contact.contract import Touch
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips

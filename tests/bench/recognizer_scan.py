@@ -29,7 +29,7 @@ from pathlib import Path
 import numpy as np
 
 from encoded_objects.base.sensor_type import SensorType
-from probe.arm.links import Arm
+from probe.arm import Arm
 from probe.contact.contract import Touch
 from probe.errors import ContactError
 from probe.scan.kinesthetic import JointErrors, follow_poses

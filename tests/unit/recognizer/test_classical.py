@@ -9,7 +9,7 @@ import pytest
 from encoded_objects.base.sensor_type import SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
-from probe.arm.links import Arm
+from probe.arm import Arm
 from probe.contact.tabs import tabs
 from probe.contact.tips import Tips
 from probe.scan.kinesthetic import JointErrors, follow_poses

@@ -8,7 +8,7 @@ import pytest
 from encoded_objects.base.sensor_type import SensorType
 from generator.pipeline import encode
 from generator.spec import read_specs
-from probe.arm.carried import SensorPose
+from probe.arm import SensorPose
 from probe.contact.contract import Touch
 from probe.scan.places import surface_to_sensor
 from probe.simulate.registered import registered_surface

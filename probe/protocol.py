@@ -1,4 +1,4 @@
-"""Packets as values, to the wire and back.
+"""Packets on the wire and commands to the probe.
 
 Little endian: type u8, version u8, seq u16, t_us u32, body, CRC u16 over all before it;
 COBS over that, then one zero byte. The CRC is CRC-16-CCITT with initial value 0xFFFF (check
@@ -19,6 +19,9 @@ columns, they are 16x16 (530 and 274 bytes with header and check sum).
 
 A block that is no whole packet is no error but a `Damage`: on a real line it is expected.
 The packet after Cheshire and Baker, "Consistent overhead byte stuffing", 1999.
+
+A command is one byte, so there is nothing to resynchronise. A byte that is none is counted by the
+device as a receive error. Nothing answers a lost command: the client repeats `START` after silence.
 """
 
 from __future__ import annotations
@@ -32,7 +35,7 @@ import numpy as np
 from cobs import cobs
 from numpy.typing import NDArray
 
-from probe.errors import FrameError
+from probe.errors import FrameError, PortError
 from probe.frame import WRIST
 
 VERSION = 2
@@ -239,3 +242,67 @@ def _decode_ident(seq: int, t_us: int, payload: bytes) -> IdentPacket | Damage:
         columns=columns,
         name=name.decode("ascii").rstrip(),
     )
+
+
+SENSORS = 8  #: sensors among which a probe selects, thesis 4.2
+
+
+class Command:
+    """The commands without a number."""
+
+    START = b"s"  #: send frame after frame
+    STOP = b"x"
+    ONE = b"g"  #: send one frame
+    IDENT = b"i"
+    STATISTICS = b"t"
+
+
+def sensor_command(sensor: int) -> bytes:
+    """Return the command that selects a sensor, 0 ... 7.
+
+    Raises
+    ------
+    PortError
+        When there is no such sensor.
+    """
+    if sensor not in range(SENSORS):
+        raise PortError(
+            f"there is no sensor {sensor}, a probe has sensors 0 ... {SENSORS - 1}",
+            fix="select one of them",
+        )
+    return str(sensor).encode()
+
+
+def bits_command(bits: int) -> bytes:
+    """Return the command for readings of 8 or 10 bits.
+
+    Raises
+    ------
+    PortError
+        When the probe has no such readings.
+    """
+    if bits not in (8, 10):
+        raise PortError(f"readings of {bits} bits, a probe reads 8 or 10", fix="take 8 or 10")
+    return b"b" if bits == 8 else b"a"
+
+
+DELIMITER = b"\0"
+
+
+class Splitter:
+    """Collects bytes until their delimiter comes; never holds more than `LONGEST` + 1."""
+
+    __slots__ = ("_rest",)
+
+    def __init__(self) -> None:
+        self._rest = b""
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """Return the blocks that `data` completes, without delimiters and empty blocks.
+
+        Of a block without end only the beginning is kept: it is too long to be a packet, and
+        stays so.
+        """
+        *blocks, rest = (self._rest + data).split(DELIMITER)
+        self._rest = rest[: LONGEST + 1]
+        return [block for block in blocks if block]
