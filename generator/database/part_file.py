@@ -6,16 +6,19 @@ import hashlib
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import URL
 
-from generator.database.open import part_path
-from generator.database.registered import RegisteredPart
 from generator.errors import ShapeError
 from generator.polyhedron.read import file_content
 from generator.polyhedron.read.stl import MOST_PART_TRIANGLES, stl_triangles
+
+if TYPE_CHECKING:
+    from sqlalchemy import URL
+
+    from generator.database.registered import RegisteredPart
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +32,8 @@ class PartState:
 
 def part_state(url: URL, part: RegisteredPart) -> PartState:
     """Compare a part's file with the SHA-256 under which it is registered."""
+    from generator.database.open import part_path  # a part alone needs no database library
+
     path = part_path(url, part.file)
     try:
         with open(path, "rb") as file:

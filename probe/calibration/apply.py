@@ -97,7 +97,7 @@ def calibrate_image(
 
 
 def expected_counts(forces_n: ArrayLike, calibration: Calibration) -> Image:
-    """Return what the calibrated sensor reads under forces: the inverse of `calibrate_image`.
+    """Return the readings of the calibrated sensor under forces: inverse of `calibrate_image`.
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ class Client:
         Of a port, see `probe.port.url`. It is opened at once.
     sensor, bits
         The sensor to select (0 ... 7) and the readings' width (8 or 10); as the device has
-        them if not given. Both are told again after a reboot.
+        them if not given. Both are sent again after a reboot.
     buffer
         Frames that wait for the consumer at most; 1: always the newest.
     reopen_s
@@ -205,9 +205,9 @@ class Client:
             elif self._take(data, now_ns):
                 heard_s = now_s
             # After a torn packet: a reset, whose ident was joined to what was being sent.
-            anew, torn = heard_s > asked_s, self._receiver.torn
-            if now_s - max(heard_s, asked_s) > (_SLICE_S if anew and torn else _SILENCE_S):
-                if anew and not torn:
+            since, torn = heard_s > asked_s, self._receiver.torn
+            if now_s - max(heard_s, asked_s) > (_SLICE_S if since and torn else _SILENCE_S):
+                if since and not torn:
                     self._tell(f"nothing came for {_SILENCE_S:g} s; the stream is started again")
                 self._send(self._greeting())
                 asked_s = now_s

@@ -18,7 +18,7 @@ three million corrupted packets none was handed on (tests/campaigns/probe_corrup
 Readings of 8 bits have no bits to spare: there it is a few of a million.
 
 Number (u16) and time (u32, us) are unwrapped to whole numbers without end. When the device
-starts anew, its number starts anew too, and the time goes on rising by the host's clock.
+restarts, its number restarts too, and the time goes on rising by the host's clock.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class ClientStatistics:
     lost: int = 0  #: numbers that never came as a trusted frame
     failed: int = 0  #: blocks that are no packet: check sum, length, type, version, value
     doubtful: int = 0  #: frames whose check sum is right, but not their neighbour; not handed on
-    reboots: int = 0  #: times the device started anew
+    reboots: int = 0  #: times the device restarted
     reopenings: int = 0  #: times the port went away and came back
     overruns: int = 0  #: trusted frames that the consumer was too slow to take
 
@@ -64,7 +64,7 @@ class FrameOrder:
         self.lost = 0
         self.doubtful = 0
         self.reboots = 0
-        self.boot: int | None = None  #: the device's boot counter, once an ident told it
+        self.boot: int | None = None  #: the device's boot counter, once an ident came
         self._held: FramePacket | None = None
         self._failed = self._failed_bytes = 0  # blocks since the held frame, and their bytes
         self._last: FramePacket | None = None  # handed on
@@ -124,10 +124,10 @@ class FrameOrder:
         return held, failed
 
     def _reboot(self, ident: IdentPacket) -> bool:
-        anew = self.boot is not None and ident.boot != self.boot
+        restarted = self.boot is not None and ident.boot != self.boot
         self.boot = ident.boot
-        self.reboots += anew
-        return anew
+        self.reboots += restarted
+        return restarted
 
     def _trusted(self, packet: FramePacket, now_ns: int) -> Frame:
         step_us = 0
@@ -160,7 +160,7 @@ def _advance(last: FramePacket, packet: FramePacket, step_us: float) -> tuple[in
     """Return how many frames and us `packet` comes after `last`.
 
     0 frames: the device's number went back; 0 us: its clock did. A pause longer than 65,536
-    frames is told by the clock.
+    frames shows in the clock alone.
     """
     later_us = (packet.t_us - last.t_us) % _TIMES
     if later_us >= _TIMES // 2:
@@ -218,7 +218,7 @@ class Receiver:
 
     @property
     def reboots(self) -> int:
-        """Times the device started anew."""
+        """Times the device restarted."""
         return self._order.reboots
 
     def statistics(self, *, reopenings: int = 0, overruns: int = 0) -> ClientStatistics:

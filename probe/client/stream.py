@@ -77,7 +77,7 @@ class Stream:
         except queue.Empty:
             return frames
         if self._failure is not None:
-            if frames:  # the failure is told by the next call
+            if frames:  # the next call raises the failure
                 self._queue.put(None)
                 self.ended = False
                 return frames

@@ -164,7 +164,7 @@ class PadLines:
         return (2 * self.x.size - 1) * (2 * self.y.size - 1)
 
     def bytes_needed(self, tactels: int) -> int:
-        """Return what `condense` holds at its peak, for so many tactels on the quarter."""
+        """Return the peak memory of `condense`, for a number of tactels on the quarter."""
         right = self.top_nodes + tactels
         block = 12 * (2 * self.y.size - 1) * (self.z.size - 1)
         sweep = 5 * block * block + 3 * block * right + 2 * right * right

@@ -107,7 +107,7 @@ def press(surface: HeightMap, sensor: SensorType, touch: Touch, tips: Tips) -> C
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Balance:
-    """What a pose of the plate leaves over, and what every point bears."""
+    """Imbalance at a pose of the plate, and the force on every point."""
 
     wrong_n: Array  #: (1 to 3,) force and moments (over the half width) that do not balance
     forces_n: Array  #: (n,)
@@ -281,7 +281,7 @@ def mesh_under(surface: HeightMap, sensor: SensorType, touch: Touch) -> Mesh:
 
 
 def cut_under(solid_mm: Array, sensor: SensorType, touch: Touch) -> Mesh:
-    """Return what of a body (m, 3, 3) lies under the sensor; raises as `mesh_under`."""
+    """Return the part of a body (m, 3, 3) under the sensor; raises as `mesh_under`."""
     from manifold3d import Manifold
 
     reach = max(sensor.half_mm) + AROUND_MM

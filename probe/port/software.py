@@ -66,7 +66,7 @@ class SoftwareProbe(CommandedProbe):
         return b"".join(self._ready(time.monotonic()))
 
     def begin(self) -> None:
-        """Let the device's clock begin anew."""
+        """Let the device's clock begin at zero."""
         self._origin_s = 0.0
 
     def now(self) -> tuple[int, int]:

@@ -3,7 +3,7 @@
 Commanded poses of the sensor -> joint angles -> believed and true poses, with the covariance
 that belongs to the errors. The encoders sit before the gears: what the arm believes is what
 was commanded. A joint follows its motor only when the play is used up, so its error depends
-on the way it came; on top there is noise, anew for each touch. The thesis's reason for
+on the way it came; on top there is noise, drawn for each touch. The thesis's reason for
 correlating images: touches are placed by these beliefs.
 """
 

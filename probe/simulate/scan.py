@@ -118,7 +118,7 @@ def scan_path(
     PoseError
         When the arm does not reach.
     ContactError
-        When the force cannot be felt.
+        When the force cannot be measured.
     """
     way = raster(scene.region.loops(), sensor, theta_rad=theta_rad).there_and_back(LEAST_COVER)
     if most is not None and most < len(way):

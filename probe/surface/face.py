@@ -137,7 +137,7 @@ class LatticeSurface:
 
     @cached_property
     def _to_cells(self) -> tuple[Array, Array]:
-        """Return what takes face points to columns and rows: matrix (2, 2) and shift (2,)."""
+        """Return matrix (2, 2) and shift (2,) from face points to columns and rows."""
         c, s, p = math.cos(self.rotation_rad), math.sin(self.rotation_rad), self.template.pitch_mm
         turn = np.array([[c, -s], [-s, -c]]) / p
         return turn, np.array([self.x_mm, -self.y_mm]) / p

@@ -29,7 +29,7 @@ from recognizer.validation.trial import ONE, POLICY_NAMES
 SHARD = 1000  #: touches in a file, lost at most with a run
 BATCH = 25  #: touches that a worker takes at once, 1/8 s: calls cost nothing then
 #: Touches of faces that every reader of a study gets: the interval of 99.5 % is then 2 % wide. Six
-#: readers take 1,200, so a run of fewer touches than this has no study unless one is asked for.
+#: readers take 1,200, so a run of fewer touches than this has no study unless it is named.
 STUDY = 200
 
 TOUCHES = "touches"  #: name of the series that is counted
@@ -89,7 +89,7 @@ def touchable(campaign: Campaign, named: bool) -> Campaign:
     Parameters
     ----------
     campaign
-        As it was asked for.
+        As it was given.
     named
         Whether a person named the kinds; otherwise those that cannot be are left out.
 
@@ -195,13 +195,13 @@ def reader_with(reader: Reader, name: str) -> Reader:
     if name == AS_IS:
         return reader
     candidates, steps, finalists, final_steps = READERS[name]
-    asked: dict[str, int] = {
+    effort: dict[str, int] = {
         "candidates": candidates,
         "steps": steps,
         "finalists": finalists,
         "final_steps": final_steps,
     }
-    spent = replace(reader.settings.first, **asked)
+    spent = replace(reader.settings.first, **effort)
     return replace(reader, settings=replace(reader.settings, first=spent, thorough=spent))
 
 

@@ -150,7 +150,7 @@ LABS = "labs"
 
 
 def make_for_kinds(folder: Path, database: str, kinds: Collection[str], seed: int) -> None:
-    """Make what kinds need beside the set.
+    """Make what kinds need besides the set.
 
     Parameters
     ----------

@@ -94,7 +94,7 @@ def validate(
     engine
         Of contact: `own`, or `mujoco` (extra `engines`), which knows tabs alone.
     sensor_per
-        `touch`: every touch is felt by another sensor; `run`: all by one, whose errors stay.
+        `touch`: another sensor for every touch; `run`: one sensor, whose errors stay.
     policy
         `one`: every touch by itself; `next`: where it is not answered, touches follow where the
         answer proposes, up to three, read as one belief.

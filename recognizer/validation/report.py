@@ -1,6 +1,6 @@
 """The page of a run: one HTML file that needs nothing else.
 
-Results + times + rows -> report.html, in the order of the questions that are asked of it:
+Results + times + rows -> report.html, in the order of its questions:
 does it hold, who is taken for whom, how far off, when not, error against run time, extremes,
 what was left out, the worst touches, where it comes from. Every picture is inline SVG.
 """
@@ -126,10 +126,10 @@ def write_results(record: RunRecord, folder: Path) -> dict[str, Any]:
     rows = columns_of(table)
     spent = columns_of(read_series(folder, series[0], TIMES))
     reader = prepare_reader(work)
-    asked = provenance(record, work.database)
-    results = results_of(rows, asked["campaign"])
+    origin = provenance(record, work.database)
+    results = results_of(rows, origin["campaign"])
     times: dict[str, Any] = {name: _cpu_ms(spent[name]) for name in ("drawing", "reading")}
-    times["worlds"] = world_times(rows, spent, asked["campaign"])
+    times["worlds"] = world_times(rows, spent, origin["campaign"])
     results["rule"] = judging_limits()
     results["study"], results["left_out"], results["engines"] = {}, [], engine_lines()
     if campaign.study:
@@ -151,7 +151,7 @@ def write_results(record: RunRecord, folder: Path) -> dict[str, Any]:
 
         results["printed"] = prints_as_results(folder, campaign)
     results["extremes"] = extremes(reader)
-    results["provenance"] = asked
+    results["provenance"] = origin
     write_table(table, folder / TRIALS)
     write_json(folder / RESULTS, results)
     write_json(folder / TIMES_FILE, times)

@@ -66,7 +66,7 @@ def line_of(rows: Columns, where: Mask) -> dict[str, Any]:
     intervals; `inside_95` is how many of these errors lie inside the answer's own 95 % ellipsoid;
     `drawn_anew` counts draws that were no touch. `state` fails by one wrong answer, and where fewer
     than `ANSWERED` of the touches with enough symbols are answered; `inside_state` by `INSIDE`;
-    both are empty where nothing is asked of these touches.
+    both are empty where no bound applies.
     """
     verdicts = rows["verdict"][where]
     right = where & (rows["verdict"] == RIGHT)
@@ -181,19 +181,19 @@ def results_of(rows: Columns, campaign: Mapping[str, Any] | None = None) -> dict
 
     The campaign is as `results.json` has it; None: the usual one.
     """
-    asked = asdict(Campaign()) if campaign is None else campaign
+    given = asdict(Campaign()) if campaign is None else campaign
     verdicts, kinds, levels = rows["verdict"], rows["kind"], rows["level"]
     registered = rows["object"] != ""
     whole = registered & (kinds != "worn")
     fair = np.asarray(rows["enough"], bool)
     inside = kinds == "face"
     everything = np.ones(len(kinds), bool)
-    policy = {"policy": _until_answered(rows, asked)} if asked.get("policy") == NEXT else {}
+    policy = {"policy": _until_answered(rows, given)} if given.get("policy") == NEXT else {}
     return policy | {
         "format": FORMAT,
         "totals": line_of(rows, everything),
         "enough": line_of(rows, fair),
-        "worlds": worlds_of(rows, asked),
+        "worlds": worlds_of(rows, given),
         "verdict": _verdict(rows, fair),
         "kinds": [
             {
@@ -201,16 +201,16 @@ def results_of(rows: Columns, campaign: Mapping[str, Any] | None = None) -> dict
                 "surface": surface,
                 **line_of(rows, (kinds == kind) & _surface_mask(rows, surface)),
             }
-            for kind, surface in _kinds(rows, asked["kinds"])
+            for kind, surface in _kinds(rows, given["kinds"])
         ],
         "levels": [
             {"level": level, **line_of(rows, (levels == level) & fair)}
-            for level in names_in(levels[fair], asked["levels"])
+            for level in names_in(levels[fair], given["levels"])
         ],
         "objects": _confusion(rows, registered),
         "reasons": dict(sorted(Counter(rows["reason"][verdicts == REJECTED].tolist()).items())),
         "drawn_anew": _drawn_anew(rows),
-        "pose": _pose(rows, asked["levels"]),
+        "pose": _pose(rows, given["levels"]),
         "against": {
             name: {
                 "unit": unit,
@@ -223,13 +223,13 @@ def results_of(rows: Columns, campaign: Mapping[str, Any] | None = None) -> dict
     }
 
 
-def _until_answered(rows: Columns, asked: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _until_answered(rows: Columns, given: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return how many touches it took until one was answered right, by kind; all faces first."""
     right = rows["verdict"] == RIGHT
     registered = rows["object"] != ""
     found = []
     masks = [("all faces", registered)]
-    masks += [(kind, rows["kind"] == kind) for kind in names_in(rows["kind"], asked["kinds"])]
+    masks += [(kind, rows["kind"] == kind) for kind in names_in(rows["kind"], given["kinds"])]
     for kind, where in masks:
         within = [
             share_of(int((where & right & (rows["touches"] <= n)).sum()), int(where.sum()))
@@ -338,7 +338,7 @@ def _drawn_anew(rows: Columns) -> dict[str, int]:
 
 
 def _face(rows: Columns, numbers: list[int]) -> dict[str, Any]:
-    """Return what became of the touches of a face, and whether it must be looked at."""
+    """Return the line of a face, and whether it needs a look."""
     here = {name: values[numbers] for name, values in rows.items()}
     whole = line_of(here, here["kind"] != "worn")
     return line_of(here, np.ones(len(numbers), bool)) | {"bad": face_is_bad(whole)}

@@ -74,7 +74,7 @@ def touch(work: Work, batch: Batch) -> BatchResult:
     Raises
     ------
     WorkersError
-        The code or the set is not the one that was asked for.
+        The code or the set is not that of the run.
     """
     reader = prepare_reader(work)
     series = next(s for s in series_of(work.campaign) if s.name == batch.series)
@@ -169,7 +169,7 @@ def run_pool(
     BrokenProcessPool
         A process was lost; also what a call raises.
     """
-    # Begun anew rather than forked: no open database and no thread is taken over.
+    # Started fresh rather than forked: no open database and no thread is taken over.
     pool = ProcessPoolExecutor(processes, get_context("spawn"), initializer=_prepare_worker)
     try:
         waiting = [pool.submit(function, *call) for call in calls]
@@ -266,7 +266,7 @@ def connect(address: str) -> Client:
 
 
 def _failure(error: Any) -> Exception:
-    """Return what a worker raised; what became of a batch that outlived its workers."""
+    """Return the error of a worker, or of a batch that outlived its workers."""
     if type(error).__name__ == "KilledWorker":
         return WorkersError(
             "several workers were lost at the same touches",

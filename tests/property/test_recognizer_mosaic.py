@@ -81,7 +81,7 @@ def test_the_order_of_touches_does_not_matter_to_the_canvas(seed, places):
 
 @given(seeds, st.integers(2, 12))
 @settings(max_examples=20, deadline=None)
-def test_whatever_the_ties_say_there_is_a_pose_with_a_covariance(seed, n):
+def test_any_constraints_give_a_pose_with_a_covariance(seed, n):
     rng = np.random.default_rng(seed)
     constraints = []
     for k in range(n):

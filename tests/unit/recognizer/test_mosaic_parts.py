@@ -211,7 +211,7 @@ def test_bad_tactels_are_filled_from_around():
     assert patch(broken, np.zeros((16, 16))).scale == 0
 
 
-def test_a_raster_resample_another():
+def test_a_raster_is_resampled_on_another():
     found = magnify_patch(patch(sampled()))
     assert found.values.shape == (64, 64)
     pose = np.array([2.0, -1.0, 0.3])
@@ -224,7 +224,7 @@ def test_a_raster_resample_another():
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.5, 1.2])
-def test_a_ridge_moved_along_itself_is_not_seen(angle):
+def test_a_ridge_moved_along_itself_is_invisible(angle):
     points = SENSOR.centres_mm().reshape(-1, 2)
     across = points @ [math.cos(angle), math.sin(angle)]
     ridge = patch(np.exp(-((across - 1.0) ** 2) / 4).reshape(16, 16))
@@ -238,7 +238,7 @@ def test_a_ridge_moved_along_itself_is_not_seen(angle):
     assert np.linalg.eigvalsh(information).min() > -1e-6
 
 
-def test_a_dome_turned_about_its_middle_is_not_seen():
+def test_a_dome_turned_about_its_middle_is_invisible():
     points = SENSOR.centres_mm().reshape(-1, 2)
     dome = patch(np.exp(-((points - [2, 1]) ** 2).sum(axis=1) / 18).reshape(16, 16))
     everywhere = np.ones(256, bool)
@@ -251,7 +251,7 @@ def test_a_dome_turned_about_its_middle_is_not_seen():
 # --- canvas and image ----------------------------------------------------------------------
 
 
-def test_what_is_taken_off_again_leaves_nothing():
+def test_a_removed_touch_leaves_nothing():
     canvas = empty_canvas(P)
     sure = np.diag([1e-4, 1e-4, 1e-7])
     first = CanvasEntry(np.array([5.0, 40.0, 0.2]), sure, 1.0)
