@@ -10,8 +10,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 
+from generator.export.sheet import Section
+from generator.export.sheet import sheet_html as page
 from generator.printers import Printer, printer_named
 from probe.kit import sizes
 from probe.kit.board import Item, has_board
@@ -22,13 +23,11 @@ FILAMENT, RESIN = "fdm-0.4", "resin"
 G = 9.80665  #: m / s^2
 PLA_G_MM3 = 1.24e-3
 
-_STYLE = """
-body{font:15px/1.45 Helvetica,Arial,sans-serif;color:#0F172A;max-width:900px;margin:24px auto;
-padding:0 16px}h1{font-size:26px;margin:0 0 8px}h2{font-size:19px;margin:28px 0 8px}
-table{border-collapse:collapse}td,th{text-align:left;padding:3px 14px 3px 0;vertical-align:top;
-border-bottom:1px solid #E2E8F0}li{margin:5px 0}svg{max-width:100%;height:auto}
-@media print{body{margin:0}}
-"""
+_RESIN, _FILAMENT = "resin, .05 mm layers", "filament, .2 mm layers, no supports"
+_MEASURED = (
+    "Measured in simulation (tests/bench/kit_tolerances.py). No part of this kit was cast, wired "
+    "or calibrated by its authors: sizes and connections were checked by programs."
+)
 
 
 #: Dimension | tolerance | the reading measured there.
@@ -89,49 +88,36 @@ def sheet_html(
     wiring: str,
 ) -> str:
     """Return the page; `wiring` is the picture of the board, empty without one."""
-    name = k.sensor.name
-    body = [
-        f"<h1>{escape(name)}: probe kit</h1>",
-        f"<p>{escape(_about(k))}</p>",
-        "<h2>Print</h2>",
-        _table(
-            ("file", "what it does", "size, mm", "print"),
-            [
-                (f"{p.name}.stl", p.what, " x ".join(f"{s:.1f}" for s in p.size_mm),
-                 "; ".join(filter(None, (
-                     "resin, .05 mm layers" if p.resin else "filament, .2 mm layers, no supports",
-                     p.bed_hint))))
-                for p in parts
-            ],
-        ),
-        f"<p>{escape(_coupon(coupon))}</p>",
-        "<h2>Parts list</h2>",
-        _table(
-            ("part", "value", "quantity", "for"),
-            [(i.what, i.value, i.quantity, i.use) for i in items],
-        ),
-        *([] if not wiring else ["<h2>Wiring</h2>", wiring]),
-        f"<p>{escape(_board(k))}</p>",
-        "<h2>Cast the overlay</h2>",
-        _steps(casting_steps(k)),
-        "<h2>Assemble</h2>",
-        _steps(assembly_steps(k)),
-        "<h2>Calibrate</h2>",
-        _steps(calibration_steps(k, parts)),
-        "<h2>What must fit how well</h2>",
-        _table(
-            ("dimension", "keep within", "what it costs"),
-            [[field.strip() for field in line.split("|")] for line in _paragraphs(TOLERANCES)],
-        ),
-        ("<p>Measured in simulation (tests/bench/kit_tolerances.py). No part of this kit was cast, "
-        "wired or calibrated by its authors: sizes and connections were checked by programs.</p>"),
-    ]  # fmt: skip
-    return (
-        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-        f"<title>{escape(name)}: probe kit</title><style>{_STYLE}</style></head><body>\n"
-        + "\n".join(body)
-        + "\n</body></html>\n"
-    )
+    files = [
+        (
+            f"{part.name}.stl",
+            part.what,
+            " x ".join(f"{side:.1f}" for side in part.size_mm),
+            "; ".join(filter(None, (_RESIN if part.resin else _FILAMENT, part.bed_hint))),
+        )
+        for part in parts
+    ]
+    bought = [(i.what, i.value, i.quantity, i.use) for i in items]
+    fits = [[field.strip() for field in line.split("|")] for line in _paragraphs(TOLERANCES)]
+    return page(
+        f"{k.sensor.name}: probe kit",
+        [
+            Section(text=_about(k)),
+            Section(
+                "Print", head=("file", "what it does", "size, mm", "print"), rows=files,
+                notes=[_coupon(coupon)],
+            ),
+            Section("Parts list", head=("part", "value", "quantity", "for"), rows=bought),
+            Section("Wiring" if wiring else "", drawing=wiring, notes=[_board(k)]),
+            Section("Cast the overlay", steps=casting_steps(k)),
+            Section("Assemble", steps=assembly_steps(k)),
+            Section("Calibrate", steps=calibration_steps(k, parts)),
+            Section(
+                "What must fit how well", head=("dimension", "keep within", "what it costs"),
+                rows=fits, notes=[_MEASURED],
+            ),
+        ],
+    )  # fmt: skip
 
 
 def casting_steps(k: KitSizes) -> list[str]:
@@ -255,13 +241,3 @@ def _board(k: KitSizes) -> str:
         f"Our board has 16 x 16 lines at most; {k.sensor.rows} x {k.sensor.columns} need that of "
         "the film's maker (flexitac:///dev/ttyUSB0 reads FlexiTac's), or a port of yours."
     )
-
-
-def _table(head: tuple[str, ...], rows: Sequence[Sequence[str]]) -> str:
-    titles = "".join(f"<th>{escape(one)}</th>" for one in head)
-    lines = ("".join(f"<td>{escape(one)}</td>" for one in row) for row in rows)
-    return f"<table><tr>{titles}</tr>{''.join(f'<tr>{line}</tr>' for line in lines)}</table>"
-
-
-def _steps(texts: Sequence[str]) -> str:
-    return f"<ol>{''.join(f'<li>{escape(text)}</li>' for text in texts)}</ol>"
